@@ -1,0 +1,40 @@
+"""The world of a shot: what can be hit, what blocks, and where it is."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planes.arrays import InputError as InputError
+    from planes.constants import ALL as ALL
+    from planes.items import Role as Role
+    from planes.scene import Planes as Planes
+    from planes.scene import Scene as Scene
+    from planes.scene import load_scene as load_scene
+    from planes.spans import Spans as Spans
+    from planes.sprite import Sprite as Sprite
+
+_HOME = {
+    "ALL": "constants",
+    "InputError": "arrays",
+    "Planes": "scene",
+    "Role": "items",
+    "Scene": "scene",
+    "Spans": "spans",
+    "Sprite": "sprite",
+    "load_scene": "scene",
+}
+
+__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a module when something of it is first used: importing the package costs little."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

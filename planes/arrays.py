@@ -1,0 +1,139 @@
+"""The entry gate: what comes from outside is checked once, here, and named when it is wrong."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Ints", "InputError", "bools", "choice", "flag", "integer", "integers", "real", "reals", "within"]
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Image = npt.NDArray[np.uint8]
+Shape = tuple[int | None, ...]
+
+
+class InputError(ValueError):
+    """Bad input: the message names the field, the row, what was expected and what came."""
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Put the place of a field in front of the errors raised inside: file, list, row."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+
+
+def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> Floats:
+    """Check an array of finite numbers.
+
+    Parameters
+    ----------
+    field : name for the error
+    values : anything that `numpy.asarray` takes
+    shape : expected shape; None stands for any length
+    limit : largest absolute value
+
+    Returns
+    -------
+    float64 array of that shape
+
+    Raises
+    ------
+    InputError
+        If it is not numeric, not finite, of another shape, or beyond the limit.
+    """
+    array = _numeric(field, values, shape, "iuf").astype(np.float64)
+    _first_bad(field, array, np.isfinite(array), "a finite number")
+    _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:g}")
+    return array
+
+
+def integers(field: str, values: object, shape: Shape, low: int, high: int) -> Ints:
+    """Check an array of whole numbers in [low, high]; floats pass when they are whole."""
+    array = _numeric(field, values, shape, "iuf")
+    whole = f"a whole number from {low} to {high}"
+    if array.dtype.kind == "f":
+        _first_bad(field, array, np.isfinite(array) & (np.rint(array) == array), whole)
+    _first_bad(field, array, (array >= low) & (array <= high), whole)
+    return array.astype(np.int64)
+
+
+def bools(field: str, values: object, shape: Shape) -> Bools:
+    """Check an array of booleans; numbers pass when they are all 0 or 1."""
+    array = _numeric(field, values, shape, "biu")
+    if array.dtype.kind != "b":
+        _first_bad(field, array, (array == 0) | (array == 1), "0 or 1")
+    return array.astype(np.bool_)
+
+
+def real(field: str, value: object, low: float, high: float) -> float:
+    """Check one finite number in [low, high]."""
+    number = float(reals(field, value, ()))
+    if not low <= number <= high:
+        raise InputError(f"{field}: expected a number from {low:g} to {high:g}, got {_shown(value)}")
+    return number
+
+
+def integer(field: str, value: object, low: int, high: int) -> int:
+    """Check one whole number in [low, high], of any size."""
+    whole = isinstance(value, int | np.integer) or (isinstance(value, float) and value.is_integer())
+    if isinstance(value, bool) or not whole or not low <= int(value) <= high:  # type: ignore[call-overload]
+        raise InputError(f"{field}: expected a whole number from {low} to {high}, got {_shown(value)}")
+    return int(value)  # type: ignore[call-overload,no-any-return]
+
+
+def flag(field: str, value: object) -> bool:
+    """Check one boolean."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{field}: expected true or false, got {_shown(value)}")
+    return bool(value)
+
+
+def choice(field: str, value: object, options: Iterable[str]) -> str:
+    """Check one word out of a few; the error suggests the nearest."""
+    names = list(options)
+    if isinstance(value, str) and value in names:
+        return value
+    near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    raise InputError(f"{field}: expected one of {', '.join(map(repr, names)) or 'none'}, got {_shown(value)}{hint}")
+
+
+def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArray[Any]:
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise InputError(f"{field}: expected an array of shape {_spelled(shape)}, got {_shown(values)}") from error
+    if array.size and array.dtype.kind not in kinds:
+        kind = "booleans" if kinds.startswith("b") else "numbers"
+        raise InputError(f"{field}: expected {kind}, got {array.dtype} ({_shown(values)})")
+    if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
+        raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
+    return array
+
+
+def _first_bad(field: str, array: npt.NDArray[Any], good: Bools | np.bool_, expected: str) -> None:
+    if np.all(good):
+        return
+    row = tuple(int(i) for i in np.argwhere(~np.asarray(good))[0])
+    place = "".join(f"[{i}]" for i in row)
+    raise InputError(f"{field}{place}: expected {expected}, got {array[row]}")
+
+
+def _spelled(shape: Shape) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,74 @@
+"""Limits and units: each with its value, its unit and its reason."""
+
+SUB = 256
+"""Positions are integers in 1/256 px: fine enough for sub-pixel aim, coarse enough for exact int64 products."""
+
+HALF = SUB // 2
+"""Half a pixel in 1/256 px: the closed square of pixel k is [256 k - 128, 256 k + 128]."""
+
+TRIG_BITS = 30
+"""Directions are (cos, sin) times 2**30: times a reach of 2**28 units that is 2**58, inside int64."""
+
+SCALE_BITS = 16
+"""Scales are integers in 1/65536: half a pixel over the longest mask side (2**15)."""
+
+POSITION_MAX = 2**40
+"""Largest position, px: 256 times it (2**48) is exact in float64 and leaves room for sums in int64."""
+
+REACH_MAX = 2**20
+"""Farthest a pattern reaches from its origin, px: differences are below 2**29 units, cross products below 2**58."""
+
+SCALE_MIN = 1 / 256
+SCALE_MAX = 256
+"""Scale of a sprite: with 2**15 px of side the numerators of the inverse mapping stay below 2**62."""
+
+MASK_SIDE_MAX = 2**15
+"""Longest side of a mask, px."""
+
+MASK_AREA_MAX = 2**26
+"""Largest area of a mask or an image, px (64 Mpx: a 256 MB picture)."""
+
+PLANE_SIDE_MAX = 65_535
+"""Longest side of a plane, px."""
+
+PLANE_AREA_MAX = 2**28
+"""Largest area of one whole plane, px (1 GiB of uint32 codes). Larger worlds are answered without planes."""
+
+ITEMS_UINT16 = 32_767
+"""Item numbers that fit a uint16 code plane, whose lowest bit says "more behind"."""
+
+CATEGORY_BITS = 32
+"""Categories are bits of one unsigned 32-bit number."""
+
+ALL = 2**CATEGORY_BITS - 1
+"""Every category."""
+
+ALPHA_THRESHOLD = 127
+"""A pixel of an image belongs to its mask when alpha is greater: more opaque than not."""
+
+WEIGHT_FULL = 65_535
+"""The weight of a sample at full strength; falloff lowers it to 0 at the end of the reach."""
+
+PELLETS_MAX = 65_536
+"""Pellets of one spread, and rounds of one burst: beyond it a loop was forgotten."""
+
+NEAR_PX = 32
+"""How far from the pattern `why_not` looks for objects, px."""
+
+MARGIN_PX = 8
+"""How far `margins` shifts a pattern to look for a flip, px."""
+
+VARIANT_CACHE_BYTES = 64 * 2**20
+"""Turned and scaled masks kept for the next who asks, bytes."""
+
+ATLAS_SLACK_BYTES = 2**20
+"""Masks no longer in use that an atlas tolerates beside half of its size, bytes."""
+
+CHUNK_SAMPLES = 2**18
+"""Samples worked on at a time: about the level-2 cache with their indices."""
+
+CHUNK_PAIRS = 2**21
+"""(placement, item) box tests made at a time: 2 MB of booleans."""
+
+JOURNAL_ROWS = 2**16
+"""Changes that a scene remembers; a plane that lags behind by more is drawn anew."""

@@ -1,0 +1,284 @@
+"""Everything that is placed in a scene, as columns; what decides hits, front to back; and what changed since when."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Ints
+from planes.constants import ATLAS_SLACK_BYTES, JOURNAL_ROWS
+from planes.grid256 import pixel
+from planes.sprite import Form, Sprite, Variant, variant_of
+
+__all__ = ["Items", "MaskAtlas", "Role", "Stack", "overlapping"]
+
+
+class Role(Enum):
+    """What an object is for; only HITTABLE and OCCLUDER decide hits, the rest is for the picture."""
+
+    BACKGROUND = "background"
+    HITTABLE = "hittable"
+    MOVER = "mover"
+    OCCLUDER = "occluder"
+    HUD = "hud"
+
+
+ROLES = tuple(Role)
+HITTABLE, OCCLUDER = ROLES.index(Role.HITTABLE), ROLES.index(Role.OCCLUDER)
+NOWHERE = (0, 0, -1, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The items that decide hits, front to back, as columns; a view of one version of a scene.
+
+    Parameters
+    ----------
+    ids, categories, owner : (M,) int64
+    occluder : (M,) bool
+    box_xyxy : (M, 4) int64, inclusive, px
+    offset : (M,) where the item's mask begins in `masks`, row by row
+    masks : flat booleans of all masks in use
+    """
+
+    ids: Ints
+    occluder: Bools
+    categories: Ints
+    owner: Ints
+    box_xyxy: Ints
+    offset: Ints
+    masks: Bools
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def width(self) -> Ints:
+        """Pixels in a row of each mask."""
+        return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    def mask(self, place: int) -> Bools:
+        """Mask (h, w) of the item at a place in the stack."""
+        x, y, x_max, y_max = self.box_xyxy[place].tolist()
+        size = (x_max - x + 1) * (y_max - y + 1)
+        return self.masks[self.offset[place] : self.offset[place] + size].reshape(y_max - y + 1, x_max - x + 1)
+
+
+def overlapping(box_xyxy: Ints, boxes_xyxy: Ints) -> Bools:
+    """Which inclusive boxes (..., 4) share a pixel with a box (..., 4)."""
+    a, b = box_xyxy, boxes_xyxy
+    return np.asarray(
+        (a[..., 0] <= b[..., 2]) & (b[..., 0] <= a[..., 2]) & (a[..., 1] <= b[..., 3]) & (b[..., 1] <= a[..., 3])
+    )
+
+
+@dataclass
+class MaskAtlas:
+    """All masks in use in one flat array; an equal mask is stored once."""
+
+    flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
+    used: int = 0
+    live: int = 0
+    offsets: dict[tuple[int, Form], int] = field(default_factory=dict)
+    users: dict[tuple[int, Form], int] = field(default_factory=dict)
+
+    def take(self, variant: Variant) -> int:
+        """Offset of a mask that an item begins to use."""
+        self.users[variant.key] = self.users.get(variant.key, 0) + 1
+        if self.users[variant.key] == 1:
+            self.live += variant.mask.size
+        if variant.key not in self.offsets:
+            self._append(variant)
+        return self.offsets[variant.key]
+
+    def drop(self, variant: Variant) -> None:
+        """Tell that an item no longer uses a mask."""
+        self.users[variant.key] -= 1
+        if not self.users[variant.key]:
+            del self.users[variant.key]
+            self.live -= variant.mask.size
+
+    @property
+    def wasteful(self) -> bool:
+        """More than half of it, beyond some slack, is no longer in use."""
+        return self.used > 2 * self.live + ATLAS_SLACK_BYTES
+
+    def _append(self, variant: Variant) -> None:
+        end = self.used + variant.mask.size
+        if end > len(self.flat):
+            grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
+            grown[: self.used] = self.flat[: self.used]
+            self.flat = grown  # a stack that was handed out keeps the old array
+        self.flat[self.used : end] = variant.mask.reshape(-1)
+        self.offsets[variant.key] = self.used
+        self.used = end
+
+
+COLUMNS: dict[str, tuple[int, ...]] = {
+    "alive": (), "role": (), "layer": (), "categories": (), "owner": (),
+    "position_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (),
+}  # fmt: skip
+
+
+class Items:
+    """Columns by id; ids count up from 0 and are never used again."""
+
+    alive: Ints
+    role: Ints
+    layer: Ints
+    categories: Ints
+    owner: Ints
+    position_256: Ints
+    pivot_256: Ints
+    size_wh: Ints
+    offset: Ints
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.version = 0
+        self.atlas = MaskAtlas()
+        self.sprites: list[Sprite] = []
+        self.forms: list[Form] = []
+        self.angles: list[float] = []
+        self.variants: list[Variant] = []
+        self.names: list[str] = []
+        self._journal: deque[tuple[int, Ints, Ints, Ints]] = deque()
+        self._journal_rows = 0
+        self._forgotten = 0
+        self._stack: tuple[int, Stack] | None = None
+        for name, shape in COLUMNS.items():
+            setattr(self, name, np.zeros((16, *shape), np.int64))
+
+    def add(self, sprite: Sprite, form: Form, angle: float, name: str, values: dict[str, object]) -> int:
+        """Append an item; `values` are its columns."""
+        item = self.count
+        self._reserve(item + 1)
+        self.count += 1
+        variant = variant_of(sprite, form)
+        self.sprites.append(sprite)
+        self.forms.append(form)
+        self.angles.append(angle)
+        self.variants.append(variant)
+        self.names.append(name)
+        for column, value in values.items():
+            getattr(self, column)[item] = value
+        self.alive[item] = 1
+        self._use(item, variant)
+        ids = np.array([item])
+        self.record(ids, np.array([NOWHERE]))
+        return item
+
+    def skip_to(self, item: int) -> None:
+        """Leave ids unused, as if their items had been removed; a scene file keeps the ids of what it saved."""
+        self._reserve(item)
+        empty = Sprite(frames=())
+        missing = item - self.count
+        blank = Variant((empty.uid, Form()), np.zeros((0, 0), np.bool_), 0, 0, 0)
+        self.sprites += [empty] * missing
+        self.forms += [Form()] * missing
+        self.angles += [0.0] * missing
+        self.variants += [blank] * missing
+        self.names += [""] * missing
+        self.count = max(self.count, item)
+
+    def remove(self, ids: Ints) -> None:
+        """Take items away; their ids stay unused."""
+        before = self.deciding_boxes(ids)
+        self.alive[ids] = 0
+        for item in ids.tolist():
+            self.atlas.drop(self.variants[item])
+        self.record(ids, before)
+
+    def reform(self, ids: Sequence[int], forms: Sequence[Form]) -> None:
+        """Give items another form; all masks are made, or found, before any item changes."""
+        variants = [variant_of(self.sprites[item], form) for item, form in zip(ids, forms, strict=True)]
+        for item, form, variant in zip(ids, forms, variants, strict=True):
+            self.atlas.drop(self.variants[item])
+            self.forms[item], self.variants[item] = form, variant
+            self._use(item, variant)
+
+    def record(self, ids: Ints, before: Ints) -> None:
+        """Note that items changed; `before` are their deciding boxes before it."""
+        self.version += 1
+        self._journal.append((self.version, ids, before, self.deciding_boxes(ids)))
+        self._journal_rows += len(ids)
+        while self._journal_rows > JOURNAL_ROWS:
+            version, old, _, _ = self._journal.popleft()
+            self._journal_rows -= len(old)
+            self._forgotten = version
+
+    def changed_boxes(self, version: int) -> Ints | None:
+        """Boxes (n, 4) where deciding items were or are, changed after a version; None if that is forgotten."""
+        if version < self._forgotten:
+            return None
+        boxes = [np.zeros((0, 4), np.int64)]
+        for at, _, before, after in reversed(self._journal):
+            if at <= version:
+                break
+            boxes += [before, after]
+        every = np.concatenate(boxes)
+        return every[every[:, 0] <= every[:, 2]]
+
+    def boxes(self, ids: Ints) -> Ints:
+        """Inclusive boxes (n, 4) of the masks of items; x_max < x_min where nothing is there to be met."""
+        corner = pixel(self.position_256[ids] - self.pivot_256[ids])
+        boxes = np.concatenate([corner, corner + self.size_wh[ids] - 1], axis=1)
+        boxes[(self.alive[ids] == 0) | (self.size_wh[ids, 0] == 0)] = NOWHERE
+        return boxes
+
+    def corner(self, item: int) -> tuple[int, int]:
+        """Pixel (x, y) of the top left of an item's mask."""
+        x, y = pixel(self.position_256[item] - self.pivot_256[item]).tolist()
+        return x, y
+
+    def deciding_boxes(self, ids: Ints) -> Ints:
+        """Like `boxes`, and nowhere for items that decide no hit: what they do, planes need not follow."""
+        boxes = self.boxes(ids)
+        boxes[~np.isin(self.role[ids], (HITTABLE, OCCLUDER))] = NOWHERE
+        return boxes
+
+    def stack(self) -> Stack:
+        """Items that decide, front to back: greater layer; occluders before objects; then the later added."""
+        if self._stack is None or self._stack[0] != self.version:
+            if self.atlas.wasteful:
+                self._compact()
+            self._stack = (self.version, self.stack_of(Role.HITTABLE, Role.OCCLUDER))
+        return self._stack[1]
+
+    def stack_of(self, *roles: Role) -> Stack:
+        """Items of some roles, front to back."""
+        n = self.count
+        wanted = np.isin(self.role[:n], [ROLES.index(role) for role in roles])
+        ids = np.flatnonzero((self.alive[:n] == 1) & wanted & (self.size_wh[:n, 0] > 0))
+        occluder = self.role[ids] == OCCLUDER
+        order = np.lexsort((-ids, ~occluder, -self.layer[ids]))
+        ids, occluder = ids[order], occluder[order]
+        return Stack(
+            ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat
+        )
+
+    def _use(self, item: int, variant: Variant) -> None:
+        self.offset[item] = self.atlas.take(variant)
+        self.pivot_256[item] = variant.pivot_x, variant.pivot_y
+        self.size_wh[item] = variant.mask.shape[::-1]
+
+    def _compact(self) -> None:
+        """Lay the masks in use out anew, without the others."""
+        self.atlas = MaskAtlas()
+        for item in np.flatnonzero(self.alive[: self.count]).tolist():
+            self.offset[item] = self.atlas.take(self.variants[item])
+
+    def _reserve(self, count: int) -> None:
+        size = len(self.alive)
+        if count <= size:
+            return
+        for name in COLUMNS:
+            old: npt.NDArray[np.int64] = getattr(self, name)
+            grown = np.zeros((max(count, 2 * size), *old.shape[1:]), np.int64)
+            grown[:size] = old
+            setattr(self, name, grown)

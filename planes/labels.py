@@ -1,0 +1,55 @@
+"""Whole planes in: labels, masks and images of one size, to sprites and where they lie."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, InputError, bools, integers
+from planes.sprite import Sprite
+
+__all__ = ["plane_objects", "plane_size"]
+
+
+def plane_size(role: str, array: npt.NDArray[Any]) -> tuple[int, int]:
+    """Width and height of a plane."""
+    image = _is_image(array)
+    if array.ndim not in (2, 3) or 0 in array.shape:
+        expected = "a plane (h, w), masks (n, h, w) or an image (h, w, 3 or 4)"
+        raise InputError(f"{role}: expected {expected}, got {array.shape}")
+    height, width = array.shape[:2] if image else array.shape[-2:]
+    return width, height
+
+
+def plane_objects(role: str, array: npt.NDArray[Any]) -> list[tuple[str, Sprite, int, int]]:
+    """Objects of a plane: name, sprite held at its top left, and where that is."""
+    if _is_image(array):
+        return [(role, Sprite.from_image(array, pivot_xy=(0, 0)), 0, 0)]
+    if array.ndim == 3:
+        masks = bools(role, array, (None, None, None))
+        return [_cropped(f"{role} {i}", mask, 0, 0) for i, mask in enumerate(masks)]
+    if array.dtype.kind == "b":
+        return [_cropped(role, array, 0, 0)]
+    labels = integers(role, array, (None, None), 0, 2**31 - 1)
+    y, x = np.nonzero(labels)
+    order = np.argsort(labels[y, x], kind="stable")
+    y, x = y[order], x[order]
+    names, first = np.unique(labels[y, x], return_index=True)
+    if not len(names):
+        return []
+    low = [np.minimum.reduceat(v, first).tolist() for v in (x, y)]
+    high = [np.maximum.reduceat(v, first).tolist() for v in (x, y)]
+    return [
+        _cropped(str(name), labels[y0 : y1 + 1, x0 : x1 + 1] == name, x0, y0)
+        for name, x0, y0, x1, y1 in zip(names.tolist(), *low, *high, strict=True)
+    ]
+
+
+def _cropped(name: str, mask: Bools, x: int, y: int) -> tuple[str, Sprite, int, int]:
+    return name, Sprite.from_mask(mask, pivot_xy=(0, 0)), x, y
+
+
+def _is_image(array: npt.NDArray[Any]) -> bool:
+    return array.ndim == 3 and array.dtype == np.uint8 and array.shape[2] in (3, 4)

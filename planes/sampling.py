@@ -1,0 +1,221 @@
+"""Kernels: runs of samples through the stack, front to back, or through the code plane in one read.
+
+Everything is in row runs. A run is one piece of one row of one placed pattern; `owner` numbers the placement. A sample
+is a pixel of a run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Ints
+from planes.compose import Codes
+from planes.items import Stack
+from planes.spans import Box, each_pixel, ragged
+
+__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "split", "tally", "walk"]
+
+HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
+"""What happened to a sample: an object was hit, an occluder ended its walk, an item was skipped; it still walks."""
+
+
+class Verdict(IntEnum):
+    """What became of a sample."""
+
+    EMPTY = 0
+    HIT = 1
+    OCCLUDED = 2
+    FILTERED = 3
+    OUTSIDE = 4
+
+
+VERDICT_OF = np.array(
+    [
+        Verdict.HIT if state & HIT else Verdict.OCCLUDED if state & BLOCK else Verdict.FILTERED if state & SKIP else 0
+        for state in range(16)
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Runs of samples, sorted by (owner, y, x_first), disjoint within an owner.
+
+    Parameters
+    ----------
+    owner, y, x_first, x_last : (n,) int64
+    ordinal : (n,) number of the run's pixel x = 0 in its pattern's prefix sums
+    """
+
+    owner: Ints
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+    ordinal: Ints
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+    @classmethod
+    def joined(cls, parts: list[Runs]) -> Runs:
+        """Runs of several lists, in order."""
+        none = np.zeros(0, np.int64)
+        every = [cls(none, none, none, none, none), *parts]
+        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
+
+    def take(self, chosen: Ints | Bools | slice) -> Runs:
+        """Pick some of the runs, in order."""
+        return Runs(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+    @property
+    def lengths(self) -> Ints:
+        """Samples of each run."""
+        return self.x_last - self.x_first + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of a placement and an item that may touch, sorted by (owner, place).
+
+    Parameters
+    ----------
+    owner : (k,) placement
+    place : (k,) place of the item in the stack, 0 in front
+    refused : (k,) whether the shot's filter refuses the item
+    """
+
+    owner: Ints
+    place: Ints
+    refused: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """What happened on the way, in runs: kind, item, where, and number of the run of samples that it is a part of."""
+
+    kind: Ints
+    place: Ints
+    run: Ints
+    x_first: Ints
+    x_last: Ints
+
+    @classmethod
+    def joined(cls, parts: list[Events]) -> Events:
+        """All events of several lists."""
+        none = np.zeros(0, np.int64)
+        every = [cls(none, none, none, none, none), *parts]
+        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
+
+    def take(self, chosen: Ints | Bools) -> Events:
+        """Pick some of the events."""
+        return Events(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+
+def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tuple[Events, npt.NDArray[np.uint8]]:
+    """Let each sample meet the items in front of each other, from the front.
+
+    An item that is refused is skipped; an accepted occluder ends the walk; an accepted object is hit, and ends the
+    walk unless the weapon pierces. All placements meet their first item in one step, their second in the next.
+
+    Parameters
+    ----------
+    emit : which kinds of events to give out, as bits HIT, BLOCK, SKIP
+
+    Returns
+    -------
+    events, and the state of each sample of the runs in order
+    """
+    start = np.cumsum(runs.lengths) - runs.lengths
+    state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
+    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.place], BLOCK, HIT))
+    ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
+    keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
+    pair, run, x_first, x_last = _meetings(runs, pairs, stack)
+    depth = np.arange(len(pairs.owner)) - np.searchsorted(pairs.owner, pairs.owner)
+    order = np.argsort(depth[pair], kind="stable")
+    steps = np.flatnonzero(np.diff(depth[pair][order], prepend=-1, append=-1))
+    box, item = stack.box_xyxy, pairs.place[pair]
+    sample = start[run] - runs.x_first[run]
+    texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
+    events = []
+    for first, last in pairwise(steps):
+        now = order[first:last]
+        meeting, x = each_pixel(x_first[now], x_last[now])
+        index = sample[now][meeting] + x
+        on = stack.masks[texel[now][meeting] + x] & (state[index] >= LIVE)
+        meeting, x, index = meeting[on], x[on], index[on]
+        met = pair[now][meeting]
+        state[index] = (state[index] | kind[met].astype(np.uint8)) & keep[met]
+        events.append(_told(meeting, x, now, pair, run, kind, pairs, emit))
+    return Events.joined(events), state
+
+
+def read_codes(runs: Runs, codes: Codes, plane_xyxy: Box) -> tuple[Ints, Ints, Ints, Ints]:
+    """Read the code plane under runs that lie in it, as runs of one code: (run, x_first, x_last, code)."""
+    x, y = plane_xyxy[:2]
+    run, column = each_pixel(runs.x_first, runs.x_last)
+    found = codes.reshape(-1)[((runs.y - y) * codes.shape[1] - x)[run] + column]
+    first, last = _stretches(run, column, found)
+    return run[first], column[first], column[last], found[first].astype(np.int64)
+
+
+def tally(owner: Ints, verdict: Ints, samples: Ints, owners: int) -> Ints:
+    """Add up samples (owners, 5) by owner and verdict."""
+    counts = np.zeros((owners, len(Verdict)), np.int64)
+    np.add.at(counts, (owner, verdict), samples)
+    return counts
+
+
+def split(lengths: Ints, samples: int) -> list[slice]:
+    """Cut a list of runs into stretches of about so many samples."""
+    total = np.cumsum(lengths)
+    if not len(total):
+        return []
+    cuts = np.searchsorted(total, np.arange(samples, int(total[-1]), samples)) + 1
+    edges = np.unique(np.concatenate([[0], cuts, [len(total)]])).tolist()
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:
+    """Pieces of runs inside the boxes of the items they are paired with: (pair, run, x_first, x_last)."""
+    if not len(runs):
+        none = np.zeros(0, np.int64)
+        return none, none, none, none
+    low, high = int(runs.y.min()), int(runs.y.max())
+    rows = high - low + 1
+    row = runs.owner * rows + (runs.y - low)
+    box = stack.box_xyxy[pairs.place]
+    top, bottom = np.maximum(box[:, 1], low), np.minimum(box[:, 3], high)
+    first = np.searchsorted(row, pairs.owner * rows + (top - low))
+    last = np.searchsorted(row, pairs.owner * rows + (bottom - low), side="right")
+    pair, place = ragged(np.where(top <= bottom, last - first, 0))
+    run = first[pair] + place
+    x_first = np.maximum(runs.x_first[run], box[pair, 0])
+    x_last = np.minimum(runs.x_last[run], box[pair, 2])
+    some = x_first <= x_last
+    return pair[some], run[some], x_first[some], x_last[some]
+
+
+def _told(meeting: Ints, x: Ints, now: Ints, pair: Ints, run: Ints, kind: Ints, pairs: Pairs, emit: int) -> Events:
+    """Events of one step, as runs."""
+    first, last = _stretches(meeting, x, np.zeros(len(x), np.int8))
+    which = now[meeting[first]]
+    kinds = kind[pair[which]]
+    told = (kinds & emit) != 0
+    which, first, last = which[told], first[told], last[told]
+    return Events(kinds[told], pairs.place[pair[which]], run[which], x[first], x[last])
+
+
+def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic]) -> tuple[Ints, Ints]:
+    """First and last index of each stretch of neighbours in one group with one value."""
+    if not len(x):
+        none = np.zeros(0, np.int64)
+        return none, none
+    apart = (group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1) | (value[1:] != value[:-1])
+    cut = np.flatnonzero(apart)
+    return np.concatenate([[0], cut + 1]), np.concatenate([cut, [len(x) - 1]])

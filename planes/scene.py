@@ -1,0 +1,463 @@
+"""The scene: objects by role, their poses, and every change of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Floats, InputError, Ints, choice, integer, integers, reals, within
+from planes.compose import CodePlane, label_plane, plane_fits
+from planes.constants import ALL, CATEGORY_BITS, POSITION_MAX, SCALE_BITS, SUB
+from planes.grid256 import snap
+from planes.items import ROLES, Items, Role
+from planes.labels import plane_objects, plane_size
+from planes.scenefile import FileObject, SceneFile, read_scene, write_scene
+from planes.spans import Box
+from planes.sprite import Form, as_sprite, form_of
+
+__all__ = ["Planes", "Scene", "load_scene"]
+
+ROLE_NAMES = tuple(role.value for role in ROLES)
+LAYER_MAX = 2**31
+DEFAULT_CATEGORY = "default"
+"""Name of the first category bit: the one that objects have unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Whole planes of a scene, one for each role: front-most id + 1 at each pixel (h, w), 0 where there is none."""
+
+    origin_xy: tuple[int, int]
+    background: npt.NDArray[np.int32]
+    hittable: npt.NDArray[np.int32]
+    movers: npt.NDArray[np.int32]
+    occluders: npt.NDArray[np.int32]
+    hud: npt.NDArray[np.int32]
+
+
+class Scene:
+    """A stack of objects, some of which can be hit and some of which block.
+
+    Parameters
+    ----------
+    size_wh : width and height of the bounds, px; None for a world without bounds, where nothing is outside
+    origin_xy : first pixel of the bounds
+    categories : names of the category bits from 1 on; bit 0 is "default"
+    name : for reports
+    """
+
+    def __init__(
+        self,
+        size_wh: Sequence[int] | None = None,
+        origin_xy: Sequence[int] = (0, 0),
+        *,
+        categories: Iterable[str] = (),
+        name: str = "scene",
+    ) -> None:
+        self.name = name
+        self.categories = (DEFAULT_CATEGORY, *categories)
+        if len(self.categories) > CATEGORY_BITS:
+            raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
+        if len(set(self.categories)) < len(self.categories):
+            raise InputError(f"categories: expected distinct names, got {list(self.categories)}")
+        self.bounds: Box | None = None
+        if size_wh is not None:
+            x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
+            w, h = integers("size_wh", size_wh, (2,), 1, POSITION_MAX).tolist()
+            self.bounds = (x, y, x + w - 1, y + h - 1)
+        self.items = Items()
+        self.weapons: dict[str, Any] = {}
+        self.shots: list[Any] = []
+        self._code_plane: CodePlane | None = None
+
+    @classmethod
+    def from_planes(
+        cls,
+        *,
+        background: object = None,
+        hittable: object = None,
+        movers: object = None,
+        occluders: object = None,
+        hud: object = None,
+        origin_xy: Sequence[int] = (0, 0),
+    ) -> Scene:
+        """Make a scene of whole planes of one size.
+
+        Parameters
+        ----------
+        background, hittable, movers, occluders, hud : array
+            (h, w) booleans: one object; (h, w) whole numbers: labels, one object for each but 0, in rising order,
+            named by its label; (n, h, w) booleans: one object each; (h, w, 3 or 4) bytes: an image.
+        origin_xy : pixel of the world at [0, 0]
+        """
+        given = {"background": background, "hittable": hittable, "mover": movers, "occluder": occluders, "hud": hud}
+        arrays = {role: np.asarray(plane) for role, plane in given.items() if plane is not None}
+        sizes = {plane_size(role, array) for role, array in arrays.items()}
+        if len(sizes) != 1:
+            raise InputError(f"planes: expected one or more, all of one size, got {sorted(sizes)}")
+        scene = cls(next(iter(sizes)), origin_xy)
+        x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
+        for role, array in arrays.items():
+            in_picture = role == "hud"
+            for name, sprite, left, top in plane_objects(role, array):
+                scene.add(sprite, (left, top) if in_picture else (x + left, y + top), role=role, name=name)
+        return scene
+
+    @property
+    def version(self) -> int:
+        """Counts the changes: an answer from another version is stale."""
+        return self.items.version
+
+    def __len__(self) -> int:
+        return int(self.items.alive[: self.items.count].sum())
+
+    def add(
+        self,
+        sprite: object,
+        position_xy: Sequence[float] = (0.0, 0.0),
+        *,
+        role: Role | str = Role.HITTABLE,
+        angle: float = 0.0,
+        scale: float | Sequence[float] = 1.0,
+        flip: str = "none",
+        frame: int = 0,
+        layer: int = 0,
+        categories: int | Sequence[str] | None = None,
+        owner: int | None = None,
+        name: str | None = None,
+    ) -> int:
+        """Place an object and return its id.
+
+        Parameters
+        ----------
+        sprite : Sprite, or a mask (h, w) of booleans, or an image (h, w, 3 or 4) of bytes
+        position_xy : where the sprite's pivot goes, px (HUD: in picture coordinates)
+        role : "background", "hittable", "mover", "occluder" or "hud"
+        angle : degrees, clockwise on the screen
+        scale : one number, or (sx, sy)
+        flip : "none", "x" (left to right), "y" or "xy"
+        frame : number of the sprite's frame
+        layer : greater is nearer the viewer
+        categories : names, or bits; by default bit 0 for objects, all bits for occluders
+        owner : id of the object that this one is a part of; by default itself
+        name : by default "role id"
+
+        Raises
+        ------
+        InputError
+            Naming the field.
+        """
+        made = as_sprite(sprite)
+        kind = _role(role)
+        number = self.items.count
+        turn = float(reals("angle", angle, ()))
+        form = form_of(made, frame, flip, _scale_pair(scale), turn)
+        values: dict[str, object] = {
+            "role": ROLES.index(kind),
+            "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
+            "categories": self._bits(categories, _default_bits(kind)),
+            "owner": number if owner is None else integer("owner", owner, 0, number),
+            "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
+        }
+        return self.items.add(made, form, turn, name or f"{kind.value} {number}", values)
+
+    def remove(self, ids: int | Sequence[int] | Ints) -> None:
+        """Take objects out of the scene; their ids are not used again."""
+        self.items.remove(self._existing(ids))
+
+    def move(self, ids: int | Sequence[int] | Ints, xy: object) -> None:
+        """Place objects at new positions: ids (n,) and xy (n, 2), or one position for all of them, px."""
+        self.set(ids, position_xy=xy)
+
+    def set(
+        self,
+        ids: int | Sequence[int] | Ints,
+        *,
+        position_xy: object = None,
+        angle: object = None,
+        scale: object = None,
+        flip: str | Sequence[str] | None = None,
+        frame: object = None,
+        layer: object = None,
+        categories: object = None,
+        owner: object = None,
+        role: Role | str | None = None,
+    ) -> None:
+        """Change objects, all at once or not at all; each value is one for all, or one per object.
+
+        `scale` is a number, one per object (n,), or pairs (n, 2) or (1, 2). The other parameters are those of `add`.
+        """
+        rows = self._existing(ids)
+        n = len(rows)
+        columns: dict[str, Any] = {}
+        if position_xy is not None:
+            columns["position_256"] = snap(_per_row("position_xy", position_xy, n, 2))
+        if layer is not None:
+            columns["layer"] = integers("layer", _broad(layer, n), (n,), -LAYER_MAX, LAYER_MAX)
+        if categories is not None:
+            columns["categories"] = self._bits_per_row(categories, n)
+        if owner is not None:
+            columns["owner"] = integers("owner", _broad(owner, n), (n,), 0, self.items.count - 1)
+        if role is not None:
+            columns["role"] = ROLES.index(_role(role))
+        angles, forms = self._new_forms(rows, angle, scale, flip, frame)
+        before = self.items.deciding_boxes(rows)
+        if forms is not None:
+            self.items.reform(rows.tolist(), forms)
+            for item, value in zip(rows.tolist(), angles, strict=True):
+                self.items.angles[item] = value
+        for name, values in columns.items():
+            getattr(self.items, name)[rows] = values
+        self.items.record(rows, before)
+
+    def ids(self, role: Role | str | None = None) -> Ints:
+        """Ids of the objects in the scene, of one role or of all, rising."""
+        n = self.items.count
+        alive = self.items.alive[:n] == 1
+        return np.flatnonzero(alive if role is None else alive & (self.items.role[:n] == ROLES.index(_role(role))))
+
+    def name_of(self, item: int) -> str:
+        """Name of an object, also of one that was removed."""
+        return self.items.names[integer("id", item, 0, self.items.count - 1)]
+
+    def find(self, name: str) -> int:
+        """Id of the only object of a name."""
+        named = [i for i in self.ids().tolist() if self.items.names[i] == name]
+        if not named:
+            choice("name", name, [self.items.names[i] for i in self.ids().tolist()])
+        if len(named) > 1:
+            raise InputError(f"name: expected one object named {name!r}, got {len(named)}")
+        return int(named[0])
+
+    def category_bits(self, *names: str) -> int:
+        """Bits of named categories, for `accept`."""
+        return sum(1 << self.categories.index(choice("category", name, self.categories)) for name in names)
+
+    def mask(self, item: int) -> tuple[Bools, tuple[int, int]]:
+        """Mask (h, w) of an object as it is tested, read-only, and the pixel (x, y) of the world at [0, 0]."""
+        row = int(self._existing(item)[0])
+        return self.items.variants[row].mask, self.items.corner(row)
+
+    def extent(self) -> Box:
+        """Box (x_min, y_min, x_max, y_max) of the bounds, or of all that is placed where there are none."""
+        if self.bounds is not None:
+            return self.bounds
+        boxes = self.items.boxes(np.setdiff1d(self.ids(), self.ids(Role.HUD)))
+        boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
+        if not len(boxes):
+            return (0, 0, 0, 0)
+        x, y = boxes[:, :2].min(axis=0).tolist()
+        x_max, y_max = boxes[:, 2:].max(axis=0).tolist()
+        return (x, y, x_max, y_max)
+
+    def planes(self) -> Planes:
+        """Whole planes of the scene by role, read-only; HUD objects are placed from the corner of the picture."""
+        box = self.extent()
+        x, y, x_max, y_max = box
+        out: dict[str, npt.NDArray[np.int32]] = {}
+        fields = ("background", "hittable", "movers", "occluders", "hud")
+        for field, role in zip(fields, ROLES, strict=True):
+            at = (0, 0, x_max - x, y_max - y) if role is Role.HUD else box
+            out[field] = label_plane(self.items.stack_of(role), at)
+            out[field].flags.writeable = False
+        return Planes((x, y), **out)
+
+    def code_plane(self) -> CodePlane | None:
+        """The plane that the composed strategy reads; None where there are no bounds or they are too large."""
+        if self._code_plane is None and self.bounds is not None and plane_fits(self.bounds):
+            self._code_plane = CodePlane(self.bounds)
+        return self._code_plane
+
+    def content_hash(self) -> str:
+        """Hash of all that decides hits: equal scenes answer every shot alike."""
+        stack = self.items.stack()
+        digest = hashlib.sha256(repr(self.bounds).encode())
+        for column in (stack.ids, stack.occluder, stack.categories, stack.owner, stack.box_xyxy):
+            digest.update(np.ascontiguousarray(column).tobytes())
+        for place in range(len(stack)):
+            digest.update(np.packbits(stack.mask(place)).tobytes())
+        return digest.hexdigest()[:16]
+
+    def save(self, folder: str | Path) -> None:
+        """Write the scene as a folder of scene.json and PNGs; `load_scene` gives the same verdicts."""
+        objects = [self._file_object(item) for item in self.ids().tolist()]
+        x, y, x_max, y_max = self.bounds or (0, 0, 0, 0)
+        size = None if self.bounds is None else (x_max - x + 1, y_max - y + 1)
+        names = self._bit_names()
+        used = [names.index(name) + 1 for entry in objects for name in entry.categories or ()]
+        names = names[1 : max([len(self.categories), *used])]
+        write_scene(Path(folder), SceneFile(self.name, (x, y), size, names, objects, self.weapons, self.shots))
+
+    def _bit_names(self) -> list[str]:
+        """A name for every bit."""
+        return [*self.categories, *(f"bit {bit}" for bit in range(len(self.categories), CATEGORY_BITS))]
+
+    def _file_object(self, item: int) -> FileObject:
+        items, form = self.items, self.items.forms[item]
+        one = 1 << SCALE_BITS
+        pose: dict[str, Any] = {}
+        if items.angles[item]:
+            pose["angle"] = items.angles[item]
+        if (form.scale_x, form.scale_y) != (one, one):
+            pose["scale"] = [form.scale_x / one, form.scale_y / one]
+        if form.flip != "none":
+            pose["flip"] = form.flip
+        if form.frame:
+            pose["frame"] = form.frame
+        if items.layer[item]:
+            pose["layer"] = int(items.layer[item])
+        role = ROLES[int(items.role[item])]
+        bits, owner = int(items.categories[item]), int(items.owner[item])
+        x, y = (items.position_256[item] / SUB).tolist()
+        categories = None
+        if bits != _default_bits(role):
+            categories = [name for bit, name in enumerate(self._bit_names()) if bits >> bit & 1]
+        part_of = None if owner == item else owner
+        return FileObject(role, items.sprites[item], (x, y), pose, items.names[item], categories, part_of, item)
+
+    def _existing(self, ids: object) -> Ints:
+        """Ids that are in the scene, each once."""
+        given = np.atleast_1d(np.asarray(ids))
+        rows = integers("ids", given if given.size else np.zeros(0, np.int64), (None,), 0, self.items.count - 1)
+        gone = rows[self.items.alive[rows] == 0]
+        if len(gone):
+            row = int(np.flatnonzero(rows == gone[0])[0])
+            raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
+        if len(np.unique(rows)) < len(rows):
+            raise InputError(f"ids: expected each object once, got {rows.tolist()!r:.60}")
+        return rows
+
+    def _new_forms(
+        self, rows: Ints, angle: object, scale: object, flip: object, frame: object
+    ) -> tuple[list[float], list[Form] | None]:
+        """Angles and forms of objects after a change; no forms if nothing of them changes."""
+        n = len(rows)
+        old = [self.items.forms[item] for item in rows.tolist()]
+        angles = [self.items.angles[item] for item in rows.tolist()]
+        if angle is None and scale is None and flip is None and frame is None:
+            return angles, None
+        if angle is not None:
+            angles = reals("angle", _broad(angle, n), (n,)).tolist()
+        one = 1 << SCALE_BITS
+        scales = [(form.scale_x / one, form.scale_y / one) for form in old]
+        if scale is not None:
+            scales = [(sx, sy) for sx, sy in _scale_rows(scale, n).tolist()]
+        frames = [form.frame for form in old]
+        if frame is not None:
+            frames = integers("frame", _broad(frame, n), (n,), 0, 2**31).tolist()
+        flips = [form.flip for form in old]
+        if flip is not None:
+            flips = list(_broad(flip, n).tolist())
+        sprites = [self.items.sprites[item] for item in rows.tolist()]
+        forms = []
+        for row, values in enumerate(zip(sprites, frames, flips, scales, angles, strict=True)):
+            with within(f"row {row}"):
+                forms.append(form_of(*values))
+        return angles, forms
+
+    def _bits(self, categories: object, default: int) -> int:
+        if categories is None:
+            return default
+        if isinstance(categories, int | np.integer):
+            return integer("categories", categories, 0, ALL)
+        if isinstance(categories, str) or not isinstance(categories, Iterable):
+            raise InputError(f"categories: expected bits or a list of names, got {categories!r}")
+        return self.category_bits(*categories)
+
+    def _bits_per_row(self, categories: object, n: int) -> Ints:
+        values = np.asarray(categories)
+        if values.dtype.kind in "iu" and values.ndim:
+            return integers("categories", values, (n,), 0, ALL)
+        return np.full(n, self._bits(categories, 0))
+
+
+def load_scene(folder: str | Path) -> Scene:
+    """Read a scene folder: scene.json and the PNGs that it names.
+
+    Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the section, the row and the field.
+    """
+    file = read_scene(Path(folder))
+    with within(str(Path(folder) / "scene.json")):
+        x, y = file.origin_xy
+        scene = Scene(file.size_wh, (x, y), categories=file.categories, name=file.name)
+        scene.weapons, scene.shots = file.weapons, file.shots
+        numbered = [entry.id is not None for entry in file.objects]
+        if any(numbered) and not all(numbered):
+            raise InputError("objects: expected an id for each object or for none, got some")
+        entries = sorted(file.objects, key=lambda entry: entry.id) if any(numbered) else file.objects  # type: ignore[arg-type,return-value]
+        for entry in entries:
+            _add_entry(scene, entry)
+        _set_owners(scene, entries)
+        return scene
+
+
+def _add_entry(scene: Scene, entry: FileObject) -> None:
+    with within(f"object {entry.name or entry.id or scene.items.count!r}"):
+        if entry.id is not None:
+            if entry.id < scene.items.count:
+                raise InputError(f"id: expected each id once, got {entry.id} again")
+            scene.items.skip_to(entry.id)
+        scene.add(
+            entry.sprite,
+            entry.position_xy,
+            role=entry.role,
+            name=entry.name,
+            categories=entry.categories,
+            **entry.pose,
+        )
+
+
+def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
+    for item, entry in zip(scene.ids().tolist(), entries, strict=True):
+        if entry.owner is not None:
+            with within(f"object {scene.name_of(item)}: owner"):
+                owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
+                scene.set(item, owner=owner)
+
+
+def _role(role: object) -> Role:
+    if isinstance(role, Role):
+        return role
+    return Role(choice("role", role, ROLE_NAMES))
+
+
+def _default_bits(role: Role) -> int:
+    return ALL if role is Role.OCCLUDER else 1
+
+
+def _scale_pair(scale: object) -> tuple[float, float]:
+    values = np.asarray(scale)
+    pair = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
+    return pair[0], pair[1]
+
+
+def _broad(value: object, n: int) -> npt.NDArray[Any]:
+    """One value for all rows; a list is left as it is, for the gate to check its shape."""
+    array = np.asarray(value)
+    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
+
+
+def _scale_rows(scale: object, n: int) -> Floats:
+    values = np.asarray(scale)
+    if values.ndim < 2:
+        values = _broad(values, n)[:, None]
+    shape = (n, 2) if values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2) else values.shape
+    return reals("scale", np.broadcast_to(values, shape), (n, 2))
+
+
+def _per_row(name: str, values: object, n: int, width: int) -> Floats:
+    array = np.asarray(values)
+    if array.shape == (width,):
+        array = np.broadcast_to(array, (n, width))
+    return reals(name, array, (n, width), POSITION_MAX)

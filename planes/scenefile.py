@@ -1,0 +1,333 @@
+"""A scene folder (scene.json and its PNGs) to plain rows, and back; weapons and shots pass through as plain JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from planes.arrays import Bools, Image, InputError, bools, choice, integer, integers, reals, within
+from planes.constants import CATEGORY_BITS, POSITION_MAX
+from planes.image import read_png, write_png, write_text
+from planes.items import Role
+from planes.sprite import Sprite, rows_of
+
+__all__ = ["FileObject", "SceneFile", "mask_of_rows", "read_scene", "write_scene"]
+
+FORMAT = "hitplanes-scene/1"
+FILE_NAME = "scene.json"
+SECTIONS = {
+    "background": Role.BACKGROUND,
+    "hittable": Role.HITTABLE,
+    "movers": Role.MOVER,
+    "occluders": Role.OCCLUDER,
+    "hud": Role.HUD,
+}
+SOURCES = {
+    "image": ("alpha_threshold", "color_key", "frames", "pivot_xy"),
+    "polygon": ("holes", "color"),
+    "circle": ("color",),
+    "box_wh": ("color",),
+    "mask": ("pivot_xy", "color"),
+}
+POSE = ("angle", "scale", "flip", "frame", "layer")
+OBJECT_KEYS = ("id", "name", "position_xy", *POSE, "categories", "owner")
+SCENE_KEYS = ("format", "name", "bounds", "categories", "objects", "weapons", "shots")
+MASK_ROWS_AREA = 4096
+"""A larger mask, px, is saved as an image: rows of text would fill pages."""
+
+
+@dataclass
+class FileObject:
+    """One object as a scene file has it; what is left out is not in `pose`."""
+
+    role: Role
+    sprite: Sprite
+    position_xy: tuple[float, float]
+    pose: dict[str, Any] = field(default_factory=dict)
+    name: str | None = None
+    categories: list[str] | None = None
+    owner: str | int | None = None
+    id: int | None = None
+
+
+@dataclass
+class SceneFile:
+    """A whole scene as plain rows, in the order of the file."""
+
+    name: str = "scene"
+    origin_xy: tuple[int, int] = (0, 0)
+    size_wh: tuple[int, int] | None = None
+    categories: list[str] = field(default_factory=list)
+    objects: list[FileObject] = field(default_factory=list)
+    weapons: dict[str, Any] = field(default_factory=dict)
+    shots: list[Any] = field(default_factory=list)
+
+
+def read_scene(folder: Path) -> SceneFile:
+    """Read a scene folder.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the section, the row and the field.
+    """
+    path = folder / FILE_NAME
+    with within(str(path)):
+        data = _parsed(path)
+        keys_of("scene", data, SCENE_KEYS)
+        if data.get("format") != FORMAT:
+            raise InputError(f"format: expected {FORMAT!r}, got {data.get('format')!r}")
+        scene = SceneFile(
+            name=text_of("name", data.get("name", folder.resolve().name)),
+            categories=names_of("categories", data.get("categories", [])),
+            weapons=_typed("weapons", data.get("weapons", {}), dict),
+            shots=_typed("shots", data.get("shots", []), list),
+        )
+        if data.get("bounds") is not None:
+            scene.origin_xy, scene.size_wh = _bounds(data["bounds"])
+        sprites: dict[str, Sprite] = {}
+        sections = _typed("objects", data.get("objects", {}), dict)
+        keys_of("objects", sections, SECTIONS)
+        for section, role in SECTIONS.items():
+            for row, entry in enumerate(_typed(f"objects.{section}", sections.get(section, []), list)):
+                with within(f"objects.{section}[{row}]"):
+                    scene.objects.append(_object(entry, role, folder, sprites))
+        return scene
+
+
+def write_scene(folder: Path, scene: SceneFile) -> None:
+    """Write a scene folder; images first, scene.json last, so that an interrupt leaves the old scene whole."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
+    saved: dict[int, dict[str, Any]] = {}
+    sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
+    for entry in scene.objects:
+        if entry.sprite.uid not in saved:
+            saved[entry.sprite.uid] = _saved_source(entry.sprite, folder)
+        section = next(name for name, role in SECTIONS.items() if role is entry.role)
+        sections[section].append(_object_json(entry, saved[entry.sprite.uid]))
+    bounds = None
+    if scene.size_wh is not None:
+        bounds = {"origin_xy": list(scene.origin_xy), "size_wh": list(scene.size_wh)}
+    data = {
+        "format": FORMAT,
+        "name": scene.name,
+        "bounds": bounds,
+        "categories": scene.categories,
+        "objects": sections,
+        "weapons": scene.weapons,
+        "shots": scene.shots,
+    }
+    write_text(folder / FILE_NAME, json.dumps(data, indent=1) + "\n")
+
+
+def keys_of(what: str, data: object, known: object) -> dict[str, Any]:
+    """Check that a JSON object has no key but the known ones."""
+    checked = _typed(what, data, dict)
+    for key in checked:
+        choice("key", key, list(known))  # type: ignore[call-overload]
+    return dict(checked)
+
+
+def text_of(name: str, value: object) -> str:
+    """Check a text of 1 to 200 characters."""
+    if not isinstance(value, str) or not 0 < len(value) <= 200:
+        raise InputError(f"{name}: expected a text of 1 to 200 characters, got {value!r:.60}")
+    return value
+
+
+def names_of(name: str, value: object) -> list[str]:
+    """Check a list of distinct texts."""
+    names = [text_of(f"{name}[{i}]", v) for i, v in enumerate(_typed(name, value, list))]
+    if len(set(names)) < len(names):
+        raise InputError(f"{name}: expected distinct names, got {names}")
+    return names
+
+
+def mask_of_rows(name: str, rows: object) -> Bools:
+    """Mask (h, w) of rows of '#' (set) and '.' (not), or an array of booleans."""
+    if not (isinstance(rows, list) and rows and isinstance(rows[0], str)):
+        return bools(name, rows, (None, None))
+    for i, row in enumerate(rows):
+        if not isinstance(row, str) or len(row) != len(rows[0]) or set(row) - set("#."):
+            raise InputError(f"{name}[{i}]: expected {len(rows[0])} of '#' and '.', got {row!r:.60}")
+    return np.array([[v == "#" for v in row] for row in rows], np.bool_)
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [key for key, _ in pairs]
+            raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
+        return found
+
+    def number(text: str) -> float:
+        raise InputError(f"number: expected a finite number, got {text}")
+
+    try:
+        text = path.read_text(encoding="utf-8")
+        data = json.loads(text, object_pairs_hook=distinct, parse_constant=number)
+    except OSError as error:
+        raise InputError(f"cannot read it: {error.strerror}") from error
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"expected JSON in UTF-8: {error}") from error
+    return _typed("scene", data, dict)  # type: ignore[no-any-return]
+
+
+def _typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
+    if not isinstance(value, kind):
+        raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {value!r:.60}")
+    return value
+
+
+def _bounds(value: object) -> tuple[tuple[int, int], tuple[int, int]]:
+    with within("bounds"):
+        data = keys_of("bounds", value, ("origin_xy", "size_wh"))
+        x, y = integers("origin_xy", data.get("origin_xy", [0, 0]), (2,), -POSITION_MAX, POSITION_MAX).tolist()
+        w, h = integers("size_wh", data.get("size_wh"), (2,), 1, POSITION_MAX).tolist()
+        return (x, y), (w, h)
+
+
+def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
+    data = _typed("object", entry, dict)
+    kinds = [key for key in SOURCES if key in data]
+    if len(kinds) != 1:
+        raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {' and '.join(kinds) or 'none'}")
+    kind = kinds[0]
+    keys_of("object", data, (*OBJECT_KEYS, kind, *SOURCES[kind]))
+    if "position_xy" not in data:
+        raise InputError("position_xy: expected two numbers, got nothing")
+    x, y = reals("position_xy", data["position_xy"], (2,), POSITION_MAX).tolist()
+    source = {key: data[key] for key in (kind, *SOURCES[kind]) if key in data}
+    shared = json.dumps(source, sort_keys=True)
+    if shared not in sprites:
+        sprites[shared] = READERS[kind](source, folder)
+    owner = data.get("owner")
+    return FileObject(
+        role=role,
+        sprite=sprites[shared],
+        position_xy=(x, y),
+        pose={key: data[key] for key in POSE if key in data},
+        name=text_of("name", data["name"]) if "name" in data else None,
+        categories=names_of("categories", data["categories"]) if "categories" in data else None,
+        owner=owner if owner is None or isinstance(owner, str) else integer("owner", owner, 0, 2**31),
+        id=integer("id", data["id"], 0, 2**31) if "id" in data else None,
+    )
+
+
+def _image_sprite(source: dict[str, Any], folder: Path) -> Sprite:
+    frames = keys_of("frames", source.get("frames", {}), ("grid_wh", "rects_xywh"))
+    options = {key: source[key] for key in ("alpha_threshold", "color_key", "pivot_xy") if key in source}
+    image = read_png(_inside(folder, source["image"]))
+    return Sprite.from_image(image, **options, **frames, source=source)
+
+
+def _polygon_sprite(source: dict[str, Any], folder: Path) -> Sprite:
+    holes = _typed("holes", source.get("holes", []), list)
+    return Sprite.polygon(source["polygon"], holes, color=source.get("color"))
+
+
+def _circle_sprite(source: dict[str, Any], folder: Path) -> Sprite:
+    return Sprite.circle(source["circle"], color=source.get("color"))
+
+
+def _box_sprite(source: dict[str, Any], folder: Path) -> Sprite:
+    width, height = reals("box_wh", source["box_wh"], (2,)).tolist()
+    return Sprite.box(width, height, color=source.get("color"))
+
+
+def _mask_sprite(source: dict[str, Any], folder: Path) -> Sprite:
+    mask = mask_of_rows("mask", source["mask"])
+    return Sprite.from_mask(mask, pivot_xy=source.get("pivot_xy"), color=source.get("color"), source=source)
+
+
+READERS: dict[str, Callable[[dict[str, Any], Path], Sprite]] = {
+    "image": _image_sprite,
+    "polygon": _polygon_sprite,
+    "circle": _circle_sprite,
+    "box_wh": _box_sprite,
+    "mask": _mask_sprite,
+}
+
+
+def _inside(folder: Path, name: object) -> Path:
+    """Path of a file of the scene's folder; one that leads out of it is refused."""
+    text = text_of("image", name)
+    parts = PurePosixPath(text).parts
+    path = folder.joinpath(*parts)
+    if "\\" in text or ":" in text or text.startswith("/") or ".." in parts:
+        raise InputError(f"image: expected a path inside the scene's folder, got {text!r}")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f"image: expected a path inside the scene's folder, got {text!r}, which leads out of it")
+    return path
+
+
+def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
+    data: dict[str, Any] = {"id": entry.id, "name": entry.name, **source}
+    data |= {"position_xy": list(entry.position_xy), **entry.pose}
+    if entry.categories is not None:
+        data["categories"] = entry.categories
+    if entry.owner is not None:
+        data["owner"] = entry.owner
+    return data
+
+
+def _saved_source(sprite: Sprite, folder: Path) -> dict[str, Any]:
+    """Source of a sprite as JSON; its image is written to the folder, and no other file is ever overwritten."""
+    if sprite.outline is not None:
+        color = {} if sprite.color is None else {"color": list(sprite.color)}
+        return {**(sprite.source or {}), **color}
+    masks = [frame.mask for frame in sprite.frames]
+    options: dict[str, Any] = {}
+    if sprite.pivot_256 is not None:
+        options["pivot_xy"] = [v / 256 for v in sprite.pivot_256]
+    if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
+        color = {} if sprite.color is None else {"color": list(sprite.color)}
+        return {"mask": rows_of(masks[0]), **options, **color}
+    known = sprite.source or {}
+    if "alpha_threshold" in known:
+        options["alpha_threshold"] = known["alpha_threshold"]
+    sheet, rects = _sheet(sprite)
+    if len(rects) > 1:
+        options["frames"] = {"rects_xywh": rects}
+    return {"image": _write_apart(folder, str(known.get("image", "sprite.png")), sheet), **options}
+
+
+def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
+    """All frames side by side, and their rectangles."""
+    rects, x = [], 0
+    for frame in sprite.frames:
+        h, w = frame.mask.shape
+        rects.append([x, 0, w, h])
+        x += w
+    sheet = np.zeros((max(r[3] for r in rects), x, 4), np.uint8)
+    for frame, (left, _, w, h) in zip(sprite.frames, rects, strict=True):
+        if frame.image is not None:
+            sheet[:h, left : left + w] = frame.image
+        else:
+            sheet[:h, left : left + w][frame.mask] = (*(sprite.color or (255, 255, 255)), 255)
+    return sheet, rects
+
+
+def _write_apart(folder: Path, name: str, sheet: Image) -> str:
+    """Write an image under its own name, or under a numbered one where another image has that name already."""
+    stem = PurePosixPath(name).stem
+    for number in range(1, 10**6):
+        path = folder / (f"{stem}.png" if number == 1 else f"{stem}-{number}.png")
+        if not path.exists():
+            write_png(path, sheet)
+            return path.name
+        if np.array_equal(read_png(path), sheet):
+            return path.name
+    raise InputError(f"image: expected a free name like {name!r} in {folder}")
+
+
+CATEGORIES_MAX = CATEGORY_BITS - 1

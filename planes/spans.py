@@ -1,0 +1,135 @@
+"""A set of pixels as row runs: masks and patterns alike.
+
+y = 0   . # # . #      (0, 1, 2) (0, 4, 4)
+y = 1   # # # # #      (1, 0, 4)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planes.arrays import Bools, Ints
+
+__all__ = ["Spans", "each_pixel", "merged_runs", "ragged"]
+
+Box = tuple[int, int, int, int]
+
+
+def ragged(lengths: Ints) -> tuple[Ints, Ints]:
+    """Number the elements of groups: [2, 3] gives groups [0, 0, 1, 1, 1] and places [0, 1, 0, 1, 2]."""
+    group = np.repeat(np.arange(len(lengths)), lengths)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+
+
+def each_pixel(x_first: Ints, x_last: Ints) -> tuple[Ints, Ints]:
+    """Write runs out pixel by pixel, as (run number, x)."""
+    run, place = ragged(x_last - x_first + 1)
+    return run, x_first[run] + place
+
+
+def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:
+    """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); an empty run is dropped."""
+    some = x_first <= x_last
+    order = np.lexsort((x_first[some], row[some]))
+    row, x_first, x_last = row[some][order], x_first[some][order], x_last[some][order]
+    if not len(row):
+        return row, x_first, x_last
+    # Lay all rows on one line, two pixels apart, so that one running maximum serves them all.
+    left = x_first.min()
+    _, rank = np.unique(row, return_inverse=True)
+    shift = rank * (x_last.max() - left + 3) - left
+    reach = np.maximum.accumulate(x_last + shift)
+    begins = np.concatenate(([True], (x_first + shift)[1:] > reach[:-1] + 1))
+    ends = np.concatenate((begins[1:], [True]))
+    return row[begins], x_first[begins], (reach - shift)[ends]
+
+
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """Pixels (x, y) with x_first <= x <= x_last in row y; runs are maximal, disjoint, sorted by (y, x_first).
+
+    Parameters
+    ----------
+    y, x_first, x_last : (n,) int64, px
+    """
+
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+
+    @classmethod
+    def from_runs(cls, y: Ints, x_first: Ints, x_last: Ints) -> Spans:
+        """Union of any runs: unsorted, overlapping, or empty (x_first > x_last)."""
+        runs = (np.asarray(v, np.int64) for v in (y, x_first, x_last))
+        return cls(*merged_runs(*runs))
+
+    @classmethod
+    def empty(cls) -> Spans:
+        """No pixel at all."""
+        none = np.zeros(0, np.int64)
+        return cls(none, none, none)
+
+    @classmethod
+    def from_mask(cls, mask: Bools, origin_xy: tuple[int, int] = (0, 0)) -> Spans:
+        """Pixels that are set in a mask (h, w) whose pixel [0, 0] lies at `origin_xy`."""
+        edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        y, x_first = np.nonzero(edges == 1)
+        x_last = np.nonzero(edges == -1)[1] - 1
+        return cls(y + origin_xy[1], x_first + origin_xy[0], x_last + origin_xy[0])
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Spans):
+            return NotImplemented
+        pairs = ((self.y, other.y), (self.x_first, other.x_first), (self.x_last, other.x_last))
+        return all(np.array_equal(a, b) for a, b in pairs)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def lengths(self) -> Ints:
+        """Pixels of each run."""
+        return self.x_last - self.x_first + 1
+
+    @property
+    def count(self) -> int:
+        """Pixels of the set."""
+        return int(self.lengths.sum())
+
+    @property
+    def box_xyxy(self) -> Box | None:
+        """(x_min, y_min, x_max, y_max), inclusive; None for the empty set."""
+        if not len(self):
+            return None
+        return int(self.x_first.min()), int(self.y[0]), int(self.x_last.max()), int(self.y[-1])
+
+    def to_mask(self) -> tuple[Bools, tuple[int, int]]:
+        """Mask (h, w) of the set's box, and where its pixel [0, 0] lies."""
+        box = self.box_xyxy
+        if box is None:
+            return np.zeros((0, 0), np.bool_), (0, 0)
+        x, y, x_max, y_max = box
+        edges = np.zeros((y_max - y + 1, x_max - x + 2), np.int8)
+        edges[self.y - y, self.x_first - x] = 1
+        edges[self.y - y, self.x_last - x + 1] = -1  # runs are maximal: the pixel behind a run begins no other
+        return np.cumsum(edges, axis=1, dtype=np.int8)[:, :-1].astype(np.bool_), (x, y)
+
+    def pixels(self) -> Ints:
+        """Pixels as rows (x, y), ordered by (y, x)."""
+        run, x = each_pixel(self.x_first, self.x_last)
+        return np.stack([x, self.y[run]], axis=1)
+
+    def translated(self, dx: int, dy: int) -> Spans:
+        """Shift the set by whole pixels."""
+        return Spans(self.y + dy, self.x_first + dx, self.x_last + dx)
+
+    def union(self, other: Spans) -> Spans:
+        """Pixels of either set."""
+        y = np.concatenate([self.y, other.y])
+        return Spans.from_runs(
+            y, np.concatenate([self.x_first, other.x_first]), np.concatenate([self.x_last, other.x_last])
+        )

@@ -1,0 +1,415 @@
+"""Images and shapes to masks: frames, and the one rule by which they are flipped, scaled, turned and placed.
+
+A turn is 90 k + r degrees: k by exact turns of the array, r by inverse mapping in integers. A pixel of the result is
+set when its centre, mapped back, lies in a closed pixel square that is set; so a mirrored sprite turns into the mirror
+image. Picture and mask go through the same map: what is drawn is what is tested.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Image, InputError, Ints, bools, choice, integer, integers, real, reals
+from planes.constants import (
+    ALPHA_THRESHOLD,
+    HALF,
+    MASK_AREA_MAX,
+    MASK_SIDE_MAX,
+    SCALE_BITS,
+    SCALE_MAX,
+    SCALE_MIN,
+    SUB,
+    TRIG_BITS,
+    VARIANT_CACHE_BYTES,
+)
+from planes.grid256 import quarter_turns, rounded_div, snap, turned
+from planes.rasterise import ellipse, polygon
+from planes.spans import Spans
+
+__all__ = ["Form", "Sprite", "Variant", "as_sprite", "form_of", "picture_of", "rows_of", "variant_of"]
+
+FLIPS = ("none", "x", "y", "xy")
+ONE = 1 << SCALE_BITS
+
+
+@dataclass(frozen=True)
+class Form:
+    """All of a pose that changes a mask, as integers: frame, flip, scale in 1/65536, quarter turns and the rest."""
+
+    frame: int = 0
+    flip: str = "none"
+    scale_x: int = ONE
+    scale_y: int = ONE
+    quarter: int = 0
+    c: int = 1 << TRIG_BITS
+    s: int = 0
+
+    @property
+    def plain(self) -> bool:
+        """No inverse mapping is needed: nothing but flips and quarter turns."""
+        return self.scale_x == self.scale_y == ONE and self.s == 0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture of a sprite: mask (h, w) and, where there is one, the image (h, w, 4) that it came from."""
+
+    mask: Bools
+    image: Image | None = None
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A shape in 1/256 px about its position: rings of points, or the two semi-axes of a circle."""
+
+    rings: tuple[Ints, ...] = ()
+    radius: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A mask as it is tested: cropped, read-only, with its pivot in 1/256 px from the centre of pixel [0, 0]."""
+
+    key: tuple[int, Form]
+    mask: Bools
+    pivot_x: int
+    pivot_y: int
+    area: int
+
+
+@dataclass(frozen=True, eq=False)
+class Sprite:
+    """What an object looks like and where it can be hit: frames of image and mask, or one shape.
+
+    Made by the class methods; `source` is what a scene file says of it, as JSON, or None.
+    """
+
+    frames: tuple[Frame, ...]
+    pivot_256: tuple[int, int] | None = None
+    outline: Outline | None = None
+    color: tuple[int, int, int] | None = None
+    source: dict[str, Any] | None = None
+    uid: int = field(default_factory=itertools.count().__next__)
+
+    @classmethod
+    def from_image(
+        cls,
+        image: object,
+        *,
+        alpha_threshold: int = ALPHA_THRESHOLD,
+        color_key: Sequence[int] | None = None,
+        grid_wh: Sequence[int] | None = None,
+        rects_xywh: Sequence[Sequence[int]] | None = None,
+        pivot_xy: Sequence[float] | None = None,
+        source: dict[str, Any] | None = None,
+    ) -> Sprite:
+        """Cut an image into frames and their masks.
+
+        Parameters
+        ----------
+        image : (h, w, 3) RGB or (h, w, 4) RGBA, bytes
+        alpha_threshold : a pixel is in the mask when its alpha is greater
+        color_key : RGB of the pixels that are transparent
+        grid_wh : size of a frame; frames run left to right, then top to bottom
+        rects_xywh : (n, 4) frames as rectangles
+        pivot_xy : where a frame is held, px; by default its centre ((w-1)/2, (h-1)/2)
+
+        Raises
+        ------
+        InputError
+            Naming the field: not bytes, not an image, frames that leave it, a sheet that the grid does not divide.
+        """
+        rgba = _as_rgba(image)
+        mask = rgba[:, :, 3] > integer("alpha_threshold", alpha_threshold, 0, 255)
+        if color_key is not None:
+            key = integers("color_key", color_key, (3,), 0, 255)
+            mask &= (rgba[:, :, :3] != key).any(axis=2)
+            rgba[:, :, 3] = np.where(mask, rgba[:, :, 3], 0)
+        rects = _frame_rects(rgba.shape[1], rgba.shape[0], grid_wh, rects_xywh)
+        frames = tuple(
+            Frame(_frozen(mask[y : y + h, x : x + w]), _frozen(rgba[y : y + h, x : x + w])) for x, y, w, h in rects
+        )
+        return cls(frames, _pivot(pivot_xy), source=source)
+
+    @classmethod
+    def from_mask(
+        cls,
+        mask: object,
+        *,
+        pivot_xy: Sequence[float] | None = None,
+        color: Sequence[int] | None = None,
+        source: dict[str, Any] | None = None,
+    ) -> Sprite:
+        """Take a boolean array (h, w) as the mask of one frame."""
+        checked = bools("mask", mask, (None, None))
+        _check_size("mask", checked.shape[1], checked.shape[0])
+        return cls((Frame(_frozen(checked)),), _pivot(pivot_xy), color=_color(color), source=source)
+
+    @classmethod
+    def polygon(cls, points_xy: object, holes: Sequence[object] = (), *, color: Sequence[int] | None = None) -> Sprite:
+        """Shape of points (n, 2) in px about the position; holes by the even-odd rule; edges belong to it."""
+        given = [("polygon", points_xy), *((f"holes[{i}]", hole) for i, hole in enumerate(holes))]
+        rings = []
+        for name, points in given:
+            checked = reals(name, points, (None, 2), MASK_SIDE_MAX)
+            if len(checked) < 3:
+                raise InputError(f"{name}: expected 3 points or more, got {len(checked)}")
+            rings.append(snap(checked))
+        source: dict[str, Any] = {"polygon": (rings[0] / SUB).tolist()}
+        if holes:
+            source["holes"] = [(r / SUB).tolist() for r in rings[1:]]
+        return cls((), (0, 0), Outline(tuple(rings)), _color(color), source)
+
+    @classmethod
+    def circle(cls, radius: float, *, color: Sequence[int] | None = None) -> Sprite:
+        """Shape of the centres at most `radius` px from the position; scaled by (sx, sy) it is an ellipse."""
+        r = int(snap(real("circle", radius, 0, MASK_SIDE_MAX)))
+        return cls((), (0, 0), Outline(radius=r), _color(color), {"circle": r / SUB})
+
+    @classmethod
+    def box(cls, width: float, height: float, *, color: Sequence[int] | None = None) -> Sprite:
+        """Closed rectangle of `width` x `height` px centred on the position."""
+        w, h = (real(f"box_wh[{i}]", v, 0, MASK_SIDE_MAX) / 2 for i, v in enumerate((width, height)))
+        shape = cls.polygon([(-w, -h), (w, -h), (w, h), (-w, h)], color=color)
+        return cls((), (0, 0), shape.outline, shape.color, {"box_wh": [float(width), float(height)]})
+
+    @property
+    def frame_count(self) -> int:
+        """Frames of the sprite; a shape has one."""
+        return max(len(self.frames), 1)
+
+
+def as_sprite(value: object) -> Sprite:
+    """Take a Sprite, a boolean array (h, w) or an image (h, w, 3 or 4): whatever `numpy.asarray` takes."""
+    if isinstance(value, Sprite):
+        return value
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise InputError("sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4)") from error
+    if array.ndim == 2:
+        return Sprite.from_mask(array)
+    if array.ndim == 3:
+        return Sprite.from_image(array)
+    raise InputError(f"sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4), got {array.shape}")
+
+
+def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Form:
+    """Check a pose and reduce it to what changes the mask."""
+    number = integer("frame", frame, 0, sprite.frame_count - 1)
+    scales = [real(f"scale[{i}]", v, SCALE_MIN, SCALE_MAX) for i, v in enumerate(scale_xy)]
+    sx, sy = (round(v * ONE) for v in scales)
+    return Form(number, choice("flip", flip, FLIPS), sx, sy, *quarter_turns(angle))
+
+
+def variant_of(sprite: Sprite, form: Form) -> Variant:
+    """Mask of a sprite in a form; the last ones asked for are kept, up to a number of bytes."""
+    return _kept.get(sprite, form)
+
+
+def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple[Image, int, int]:
+    """Image (h, w, 4) of a sprite in a form, and its pivot (x, y) in 1/256 px; a bare mask is filled with `color`."""
+    frame = sprite.frames[form.frame] if sprite.frames else None
+    if frame is None or frame.image is None:
+        variant = variant_of(sprite, form)
+        image = np.zeros((*variant.mask.shape, 4), np.uint8)
+        image[variant.mask] = (*(sprite.color or color), 255)
+        return image, variant.pivot_x, variant.pivot_y
+    source, pivot_x, pivot_y = _source_pixels(frame.mask, _frame_pivot(sprite, frame), form)
+    image = frame.image.reshape(-1, 4)[np.maximum(source, 0)]
+    image[source < 0] = 0
+    return image, pivot_x, pivot_y
+
+
+def rows_of(mask: Bools) -> list[str]:
+    """A mask as rows of '#' and '.', as scene files have it."""
+    return ["".join("#" if v else "." for v in row) for row in mask.tolist()]
+
+
+class _Kept:
+    """Variants by last use, within VARIANT_CACHE_BYTES."""
+
+    def __init__(self) -> None:
+        self.variants: OrderedDict[tuple[int, Form], Variant] = OrderedDict()
+        self.bytes = 0
+
+    def get(self, sprite: Sprite, form: Form) -> Variant:
+        key = (sprite.uid, form)
+        found = self.variants.pop(key, None)
+        if found is None:
+            found = _make_variant(sprite, form)
+            self.bytes += found.mask.nbytes
+        self.variants[key] = found
+        while self.bytes > VARIANT_CACHE_BYTES and len(self.variants) > 1:
+            self.bytes -= self.variants.popitem(last=False)[1].mask.nbytes
+        return found
+
+
+_kept = _Kept()
+
+
+def _make_variant(sprite: Sprite, form: Form) -> Variant:
+    if sprite.outline is not None:
+        mask, (x, y) = _shape_spans(sprite.outline, form).to_mask()
+        pivot_x, pivot_y = -SUB * x, -SUB * y
+    else:
+        frame = sprite.frames[form.frame]
+        source, pivot_x, pivot_y = _source_pixels(frame.mask, _frame_pivot(sprite, frame), form)
+        mask = frame.mask.reshape(-1)[np.maximum(source, 0)] & (source >= 0) if frame.mask.size else frame.mask
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return Variant((sprite.uid, form), np.zeros((0, 0), np.bool_), 0, 0, 0)
+    y, x = int(rows[0]), int(columns[0])
+    cropped = _frozen(mask[y : rows[-1] + 1, x : columns[-1] + 1])
+    return Variant((sprite.uid, form), cropped, pivot_x - SUB * x, pivot_y - SUB * y, int(cropped.sum()))
+
+
+def _shape_spans(outline: Outline, form: Form) -> Spans:
+    """A shape's points flipped, scaled and turned, then filled."""
+    c, s = form.c, form.s
+    for _ in range(form.quarter):
+        c, s = -s, c
+    if outline.radius is not None:
+        radii = [int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y)]
+        _check_size("scale", *(2 * v // SUB + 1 for v in radii))
+        return ellipse(radii[0], radii[1], c, s)
+    sign = np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
+    scale = np.array([form.scale_x, form.scale_y])
+    rings = [rounded_div(r * sign * scale, ONE) for r in outline.rings]
+    every = np.concatenate(rings)
+    _check_size("scale", *(int(v) // SUB + 1 for v in every.max(axis=0) - every.min(axis=0)))
+    return polygon([turned(r, c, s) for r in rings])
+
+
+def _source_pixels(mask: Bools, pivot_256: tuple[int, int], form: Form) -> tuple[Ints, int, int]:
+    """For each pixel of the result the flat index of the frame's pixel it comes from (-1: none), and the pivot."""
+    h, w = mask.shape
+    source = np.arange(h * w).reshape(h, w)
+    x, y = pivot_256
+    if "x" in form.flip:
+        source, x = source[:, ::-1], SUB * (w - 1) - x
+    if form.flip in ("y", "xy"):
+        source, y = source[::-1], SUB * (h - 1) - y
+    if not form.plain and mask.size:
+        source, x, y = _inverse_mapped(source, mask.reshape(-1), x, y, form)
+    for _ in range(form.quarter):
+        source, x, y = np.rot90(source, -1), SUB * (source.shape[0] - 1) - y, x
+    return source, x, y
+
+
+def _inverse_mapped(source: Ints, inside: Bools, x: int, y: int, form: Form) -> tuple[Ints, int, int]:
+    """Scale and turn by r: map each centre of the result back to the squares of the frame that hold it."""
+    h, w = source.shape
+    pivot, (width, height) = _result_grid((w, h), (x, y), form)
+    dx = SUB * np.arange(width) - pivot[0]
+    dy = (SUB * np.arange(height) - pivot[1])[:, None]
+    columns = _squares(dx * form.c + dy * form.s, x, form.scale_x)
+    rows = _squares(dy * form.c - dx * form.s, y, form.scale_y)
+    found = np.full((height, width), -1, np.int64)
+    held = np.zeros(found.shape, np.bool_)
+    for row, column in itertools.product(rows, columns):
+        valid = (row >= 0) & (row < h) & (column >= 0) & (column < w) & ~held
+        found[valid] = source[row[valid], column[valid]]
+        held[valid] = inside[found[valid]]
+    return found, pivot[0], pivot[1]
+
+
+def _result_grid(
+    size_wh: tuple[int, int], pivot: tuple[int, int], form: Form
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Pivot and size of a grid that holds the scaled and turned frame.
+
+    The pivot keeps its place between the pixels. A scaled one goes where the edges of the frame put it, to half a
+    pixel: whole scales repeat pixels exactly, and a mirrored frame lies on the mirrored grid.
+    """
+    edges, places = [], []
+    for size, v, scale in zip(size_wh, pivot, (form.scale_x, form.scale_y), strict=True):
+        edges.append([(e - v) * scale // ONE + up for e, up in ((-HALF, 0), (SUB * size - HALF, 1))])
+        halves = rounded_div(np.array((v + HALF) * scale - HALF * ONE), HALF * ONE)
+        places.append(v % SUB if scale == ONE else int(halves) * HALF % SUB)
+    corners = turned(np.array(list(itertools.product(*edges))), form.c, form.s)
+    low, high = (corners.min(axis=0) - 1).tolist(), (corners.max(axis=0) + 1).tolist()
+    x, y = (place - SUB * ((edge + place) // SUB) for place, edge in zip(places, low, strict=True))
+    width, height = (high[0] + x) // SUB + 1, (high[1] + y) // SUB + 1
+    _check_size("scale", width, height)
+    return (x, y), (width, height)
+
+
+def _squares(mapped: Ints, pivot: int, scale: int) -> list[Ints]:
+    """Columns (or rows) of the closed squares that hold positions; two of them where a position is on a border.
+
+    `mapped` is in 2**-38 px of the result; column = floor(mapped / scale + pivot + 1/2).
+    """
+    column, rest = np.divmod(mapped + (pivot + HALF) * scale * (1 << 14), scale * (1 << 22))
+    border = rest == 0
+    return [column, column - border] if border.any() else [column]
+
+
+def _frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:
+    h, w = frame.mask.shape
+    return sprite.pivot_256 or ((w - 1) * HALF, (h - 1) * HALF)
+
+
+def _pivot(pivot_xy: Sequence[float] | None) -> tuple[int, int] | None:
+    if pivot_xy is None:
+        return None
+    x, y = snap(reals("pivot_xy", pivot_xy, (2,), MASK_SIDE_MAX)).tolist()
+    return x, y
+
+
+def _color(color: Sequence[int] | None) -> tuple[int, int, int] | None:
+    if color is None:
+        return None
+    red, green, blue = integers("color", color, (3,), 0, 255).tolist()
+    return red, green, blue
+
+
+def _as_rgba(image: object) -> Image:
+    array = np.asarray(image)
+    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] not in (3, 4):
+        raise InputError(f"image: expected bytes of shape (h, w, 3 or 4), got {array.dtype} {array.shape}")
+    _check_size("image", array.shape[1], array.shape[0])
+    if array.shape[2] == 4:
+        return array.copy()
+    return np.dstack([array, np.full(array.shape[:2], 255, np.uint8)])
+
+
+def _frame_rects(
+    width: int, height: int, grid_wh: Sequence[int] | None, rects_xywh: Sequence[Sequence[int]] | None
+) -> list[list[int]]:
+    if grid_wh is not None and rects_xywh is not None:
+        raise InputError("frames: expected grid_wh or rects_xywh, got both")
+    if rects_xywh is not None:
+        rects = integers("rects_xywh", rects_xywh, (None, 4), 0, MASK_SIDE_MAX)
+        if not len(rects):
+            raise InputError("rects_xywh: expected at least one rectangle, got none")
+        for i, (x, y, w, h) in enumerate(rects.tolist()):
+            if w < 1 or h < 1 or x + w > width or y + h > height:
+                got = [x, y, w, h]
+                raise InputError(f"rects_xywh[{i}]: expected to lie in the image of {width} x {height}, got {got}")
+        return [list(r) for r in rects.tolist()]
+    if grid_wh is None:
+        return [[0, 0, width, height]]
+    w, h = integers("grid_wh", grid_wh, (2,), 1, MASK_SIDE_MAX).tolist()
+    if width % w or height % h:
+        raise InputError(f"grid_wh: expected to divide the image of {width} x {height}, got {[w, h]}")
+    return [[x, y, w, h] for y in range(0, height, h) for x in range(0, width, w)]
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    if max(width, height) > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
+        limit = f"a mask of sides up to {MASK_SIDE_MAX} px and {MASK_AREA_MAX} px in all"
+        raise InputError(f"{name}: expected {limit}, got {width} x {height}")
+
+
+def _frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    out = np.array(array, order="C")
+    out.flags.writeable = False
+    return out

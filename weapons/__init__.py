@@ -1,0 +1,52 @@
+"""The shot: what is fired, and what it did."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planes.sampling import Verdict as Verdict
+    from weapons.arsenal import Beam as Beam
+    from weapons.arsenal import Box as Box
+    from weapons.arsenal import Cone as Cone
+    from weapons.arsenal import Disc as Disc
+    from weapons.arsenal import Point as Point
+    from weapons.arsenal import Polygon as Polygon
+    from weapons.arsenal import Ring as Ring
+    from weapons.arsenal import Rounds as Rounds
+    from weapons.arsenal import Spread as Spread
+    from weapons.arsenal import Stencil as Stencil
+    from weapons.arsenal import Weapon as Weapon
+    from weapons.arsenal import arsenal_of as arsenal_of
+    from weapons.arsenal import weapon_from_json as weapon_from_json
+    from weapons.firing import fire as fire
+    from weapons.hits import Hits as Hits
+
+_HOME = {
+    **dict.fromkeys(
+        ("Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon"),
+        "weapons.arsenal",
+    ),
+    "arsenal_of": "weapons.arsenal",
+    "weapon_from_json": "weapons.arsenal",
+    "fire": "weapons.firing",
+    "Hits": "weapons.hits",
+    "Verdict": "planes.sampling",
+}
+
+__all__ = [
+    "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
+    "arsenal_of", "weapon_from_json", "fire", "Hits", "Verdict",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Import a module when something of it is first used: importing the package costs little."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,407 @@
+"""The weapons, from Python and from JSON: what pattern each fires, and how many of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cached_property, lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planes.arrays import InputError, Ints, bools, choice, flag, integer, real, reals, within
+from planes.constants import HALF, MASK_SIDE_MAX, PELLETS_MAX, REACH_MAX, SUB
+from planes.grid256 import pixel, snap, turned, unit
+from planes.rasterise import beam, cone, disc, polygon, ring
+from planes.scenefile import keys_of, mask_of_rows
+from planes.spans import Spans
+from planes.sprite import Form, Sprite, rows_of, variant_of
+from weapons.pattern import FALLOFFS, Pattern, make_pattern
+
+__all__ = [
+    "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
+    "arsenal_of", "pattern_of", "weapon_from_json",
+]  # fmt: skip
+
+ORIGIN = np.zeros(2, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Weapon:
+    """What is fired; two are equal when their JSON is."""
+
+    kind: ClassVar[str]
+
+    @cached_property
+    def _text(self) -> str:
+        return json.dumps(self.to_json(), sort_keys=True)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Weapon) and self._text == other._text
+
+    def __hash__(self) -> int:
+        return hash(self._text)
+
+    def to_json(self) -> dict[str, Any]:
+        """The weapon as a scene file has it; fields at their defaults are left out."""
+        shown: dict[str, Any] = {"kind": self.kind}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.default is MISSING or value != f.default:
+                shown[f.name] = _plain_json(value)
+        return shown
+
+
+@dataclass(frozen=True, eq=False)
+class Plain(Weapon):
+    """A weapon of one pattern.
+
+    Parameters
+    ----------
+    pierce : samples go on through the objects that they hit, up to an occluder
+    falloff : None (full weight everywhere), "linear" or "smooth", from the shot's pixel to the end of the reach
+    """
+
+    lengths: ClassVar[tuple[str, ...]] = ()
+    directed: ClassVar[bool] = False
+    pierce: bool = field(default=False, kw_only=True)
+    falloff: str | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check the fields that all kinds share, and the lengths."""
+        flag("pierce", self.pierce)
+        if self.falloff is not None:
+            choice("falloff", self.falloff, FALLOFFS)
+        for name in self.lengths:
+            real(name, getattr(self, name), 0, REACH_MAX)
+
+    @property
+    def reach_256(self) -> int:
+        """Where falloff ends, in 1/256 px from the shot's pixel."""
+        return 0
+
+    def spans(self, c: int, s: int) -> Spans:
+        """Pixels about the shot's pixel, aimed along the direction (c, s) of length 2**30."""
+        raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+
+
+@dataclass(frozen=True, eq=False)
+class Point(Plain):
+    """One pixel."""
+
+    kind: ClassVar[str] = "point"
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The shot's pixel."""
+        return disc(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Disc(Plain):
+    """Centres at most `radius` px away: a blast."""
+
+    kind: ClassVar[str] = "disc"
+    lengths: ClassVar[tuple[str, ...]] = ("radius",)
+    radius: float
+
+    @property
+    def reach_256(self) -> int:
+        """The radius."""
+        return _snapped(self.radius)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed disc."""
+        return disc(_snapped(self.radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Ring(Plain):
+    """Centres from `inner_radius` to `outer_radius` px away: a shock wave."""
+
+    kind: ClassVar[str] = "ring"
+    lengths: ClassVar[tuple[str, ...]] = ("inner_radius", "outer_radius")
+    inner_radius: float
+    outer_radius: float
+
+    def __post_init__(self) -> None:
+        """Check that the inner radius is not the larger one."""
+        super().__post_init__()
+        if self.inner_radius > self.outer_radius:
+            raise InputError(f"inner_radius: expected at most {self.outer_radius}, got {self.inner_radius}")
+
+    @property
+    def reach_256(self) -> int:
+        """The outer radius."""
+        return _snapped(self.outer_radius)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed ring."""
+        return ring(_snapped(self.inner_radius), _snapped(self.outer_radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Plain):
+    """`width` x `height` px exactly, turned with the aim; an even side is centred right of or below the pixel."""
+
+    kind: ClassVar[str] = "box"
+    directed: ClassVar[bool] = True
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        """Check that the sides are whole."""
+        super().__post_init__()
+        for name in ("width", "height"):
+            integer(name, getattr(self, name), 1, REACH_MAX)
+
+    @property
+    def reach_256(self) -> int:
+        """Distance of the farthest corner."""
+        return _farthest(self._corners())
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed rectangle whose edges lie between the pixels."""
+        return polygon([turned(self._corners(), c, s)])
+
+    def _corners(self) -> Ints:
+        sides = [(HALF * (1 - n % 2), HALF * n) for n in (int(self.width), int(self.height))]
+        (left, right), (top, low) = ((center - half, center + half) for center, half in sides)
+        return np.array([(left, top), (right, top), (right, low), (left, low)], np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon(Plain):
+    """Points in px about the shot, turned with the aim; convex or not, with holes, by the even-odd rule.
+
+    Parameters
+    ----------
+    points : (n, 2) px; closed by itself
+    holes : more rings (n, 2)
+    """
+
+    kind: ClassVar[str] = "polygon"
+    directed: ClassVar[bool] = True
+    points: Sequence[Sequence[float]]
+    holes: Sequence[Sequence[Sequence[float]]] = ()
+
+    def __post_init__(self) -> None:
+        """Check the rings and keep them as tuples."""
+        super().__post_init__()
+        object.__setattr__(self, "points", _ring_of("points", self.points))
+        if isinstance(self.holes, str) or not isinstance(self.holes, Sequence):
+            raise InputError(f"holes: expected a list of rings, got {self.holes!r:.60}")
+        object.__setattr__(self, "holes", tuple(_ring_of(f"holes[{i}]", r) for i, r in enumerate(self.holes)))
+
+    @property
+    def reach_256(self) -> int:
+        """Distance of the farthest point."""
+        return _farthest(np.concatenate(self._rings()))
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The filled rings."""
+        return polygon([turned(ring, c, s) for ring in self._rings()])
+
+    def _rings(self) -> list[Ints]:
+        return [snap(ring) for ring in (self.points, *self.holes)]
+
+
+@dataclass(frozen=True, eq=False)
+class Cone(Plain):
+    """Centres at most `reach` px away and at most half the `angle`, degrees, off the aim: a flame, a swing.
+
+    The supercover of the axis belongs to it, so it has no gap near the muzzle.
+    """
+
+    kind: ClassVar[str] = "cone"
+    lengths: ClassVar[tuple[str, ...]] = ("reach",)
+    directed: ClassVar[bool] = True
+    reach: float
+    angle: float
+
+    def __post_init__(self) -> None:
+        """Check the angle."""
+        super().__post_init__()
+        real("angle", self.angle, 0, 360)
+
+    @property
+    def reach_256(self) -> int:
+        """The reach."""
+        return _snapped(self.reach)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed sector."""
+        c_half, s_half = unit(self.angle / 2)
+        return cone(_snapped(self.reach), c, s, int(c_half), int(s_half))
+
+
+@dataclass(frozen=True, eq=False)
+class Beam(Plain):
+    """Centres at most `width` / 2 px from a segment of `length` px along the aim, and the segment's supercover."""
+
+    kind: ClassVar[str] = "beam"
+    lengths: ClassVar[tuple[str, ...]] = ("length", "width")
+    directed: ClassVar[bool] = True
+    length: float
+    width: float
+
+    @property
+    def reach_256(self) -> int:
+        """The length and half the width."""
+        return _snapped(self.length) + _snapped(self.width / 2)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A segment with round ends."""
+        return beam(ORIGIN, turned(np.array([_snapped(self.length), 0]), c, s), _snapped(self.width / 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Stencil(Plain):
+    """Any mask, turned with the aim by the rule of sprites.
+
+    Parameters
+    ----------
+    mask : (h, w) booleans, or rows of '#' and '.'
+    pivot_xy : pixel of the mask that lies on the shot; by default its centre
+    """
+
+    kind: ClassVar[str] = "stencil"
+    directed: ClassVar[bool] = True
+    mask: Any
+    pivot_xy: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the mask and keep a copy that cannot be written."""
+        super().__post_init__()
+        rows = self.mask.tolist() if isinstance(self.mask, np.ndarray) else list(self.mask)
+        object.__setattr__(self, "mask", tuple(rows_of(bools("mask", mask_of_rows("mask", rows), (None, None)))))
+        if self.pivot_xy is not None:
+            pivot = reals("pivot_xy", self.pivot_xy, (2,), MASK_SIDE_MAX)
+            object.__setattr__(self, "pivot_xy", tuple(pivot.tolist()))
+
+    @cached_property
+    def _sprite(self) -> Sprite:
+        return Sprite.from_mask(mask_of_rows("mask", list(self.mask)), pivot_xy=self.pivot_xy)
+
+    @property
+    def reach_256(self) -> int:
+        """Distance of the farthest pixel, unturned."""
+        return _farthest(SUB * self.spans(1 << 30, 0).pixels())
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The turned mask."""
+        quarter = 0
+        while not -c <= s < c:
+            quarter, c, s = quarter + 1, s, -c
+        variant = variant_of(self._sprite, Form(quarter=quarter, c=c, s=s))
+        x, y = pixel(np.array([-variant.pivot_x, -variant.pivot_y])).tolist()
+        return Spans.from_mask(variant.mask, (x, y))
+
+
+@dataclass(frozen=True, eq=False)
+class Spread(Weapon):
+    """A shotgun: `count` pellets of another pattern, their offsets uniform over a disc of `radius` px."""
+
+    kind: ClassVar[str] = "spread"
+    pellet: Plain
+    count: int
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Check the parts."""
+        if not isinstance(self.pellet, Plain):
+            raise InputError(f"pellet: expected a weapon of one pattern, got {self.pellet!r:.60}")
+        integer("count", self.count, 1, PELLETS_MAX)
+        real("radius", self.radius, 0, REACH_MAX)
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds(Weapon):
+    """A burst: `count` rounds of a weapon, each shifted and turned by the recoil of those before it.
+
+    Parameters
+    ----------
+    recoil_xy : shift of each round against the last, px
+    recoil_deg : turn of the aim of each round against the last, degrees
+    """
+
+    kind: ClassVar[str] = "rounds"
+    weapon: Plain | Spread
+    count: int
+    recoil_xy: Sequence[float] = (0.0, 0.0)
+    recoil_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the parts."""
+        if not isinstance(self.weapon, Plain | Spread):
+            raise InputError(f"weapon: expected a weapon other than rounds, got {self.weapon!r:.60}")
+        integer("count", self.count, 1, PELLETS_MAX)
+        recoil = reals("recoil_xy", self.recoil_xy, (2,), REACH_MAX)
+        object.__setattr__(self, "recoil_xy", tuple(recoil.tolist()))
+        real("recoil_deg", self.recoil_deg, -360, 360)
+
+
+KINDS: dict[str, type[Weapon]] = {
+    kind.kind: kind for kind in (Point, Disc, Ring, Box, Polygon, Cone, Beam, Stencil, Spread, Rounds)
+}
+
+
+@lru_cache(maxsize=1024)
+def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
+    """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept."""
+    return make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256)
+
+
+def weapon_from_json(data: object, name: str = "weapon") -> Weapon:
+    """Make a weapon of its JSON.
+
+    Raises
+    ------
+    InputError
+        Naming the weapon and the field: an unknown kind or key, a missing field, a value out of range.
+    """
+    with within(name):
+        if not isinstance(data, Mapping):
+            raise InputError(f"expected an object with a kind, got {data!r:.60}")
+        kind = KINDS[choice("kind", data.get("kind"), KINDS)]
+        known = {f.name: f for f in fields(kind)}
+        keys_of(name, dict(data), ("kind", *known))
+        missing = [key for key, f in known.items() if f.default is MISSING and key not in data]
+        if missing:
+            raise InputError(f"{missing[0]}: expected a value, got nothing")
+        values = {key: value for key, value in data.items() if key != "kind"}
+        for key in ("pellet", "weapon"):
+            if key in known:
+                values[key] = weapon_from_json(values[key], key)
+        return kind(**values)
+
+
+def arsenal_of(scene: Any) -> dict[str, Weapon]:
+    """Weapons of a scene's file, by name."""
+    return {name: weapon_from_json(data, f"weapons.{name}") for name, data in scene.weapons.items()}
+
+
+def _snapped(length: float) -> int:
+    return int(snap(length))
+
+
+def _farthest(points_256: Ints) -> int:
+    if not len(points_256):
+        return 0
+    return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())
+
+
+def _ring_of(name: str, points: object) -> tuple[tuple[float, float], ...]:
+    ring = reals(name, points, (None, 2), REACH_MAX / 2)
+    if len(ring) < 3:
+        raise InputError(f"{name}: expected 3 points or more, got {len(ring)}")
+    return tuple((x, y) for x, y in ring.tolist())
+
+
+def _plain_json(value: object) -> Any:
+    if isinstance(value, Weapon):
+        return value.to_json()
+    if isinstance(value, tuple | list):
+        return [_plain_json(v) for v in value]
+    return value

@@ -1,0 +1,238 @@
+"""What is derived from a shot when it is asked for: each sample, shares, blockers, why not, margins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planes.arrays import InputError, Ints
+from planes.constants import MARGIN_PX, MASK_AREA_MAX, NEAR_PX
+from planes.items import Stack
+from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Runs, Verdict, walk
+from planes.scene import Scene
+from planes.spans import Spans, each_pixel
+from weapons.arsenal import Plain, Rounds, Weapon
+from weapons.candidates import pairs_of, refused
+from weapons.resolve import Sight, direct
+from weapons.volley import Shots, Volley, volley_of
+
+__all__ = [
+    "Blocked", "Samples", "Share", "WhyNot", "blockers_of", "margins_of", "pierces", "samples_of", "shares_of",
+    "why_not_of",
+]  # fmt: skip
+
+
+class Samples(NamedTuple):
+    """Every sample of a shot, ordered by (round, pellet, y, x).
+
+    `item` is the object that was hit first, the occluder that ended the walk, or the first item that was skipped;
+    -1 where there is none.
+    """
+
+    xy: Ints
+    round: Ints
+    pellet: Ints
+    verdict: Ints
+    item: Ints
+
+
+class Share(NamedTuple):
+    """What part of the pattern hit, and what part of the object was hit, as seen by this weapon and as a whole."""
+
+    of_pattern: float
+    of_visible: float
+    of_mask: float
+
+
+class Blocked(NamedTuple):
+    """An occluder and the samples whose walk it ended."""
+
+    occluder: int
+    samples: int
+
+
+class WhyNot(NamedTuple):
+    """Why an object near the shot was not hit.
+
+    `reason` is "missed" (no sample on it), "category", "excluded", "behind" (every sample on it ended in front of
+    it), or "outside" (of the bounds); `samples` counts those on it; `by` tells what ended them, as {id: samples};
+    `distance` is that from the pattern, px, 0 where a sample is on it.
+    """
+
+    object: int
+    reason: str
+    samples: int
+    by: dict[int, int]
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Detail:
+    """One shot sample by sample; the last column is a place in the stack, -1 for none."""
+
+    runs: Runs
+    run: Ints
+    x: Ints
+    verdict: Ints
+    place: Ints
+
+
+def pierces(weapon: Weapon) -> bool:
+    """Whether the samples of a weapon go on through objects."""
+    inner = weapon.weapon if isinstance(weapon, Rounds) else weapon
+    plain = inner if isinstance(inner, Plain) else getattr(inner, "pellet", inner)
+    return bool(getattr(plain, "pierce", False))
+
+
+def samples_of(scene: Scene, weapon: Weapon, shot: Shots) -> Samples:
+    """All samples of one shot."""
+    volley = volley_of(weapon, shot)
+    detail = _detail(scene, weapon, volley, shot)
+    owner = detail.runs.owner[detail.run]
+    ids = np.append(scene.items.stack().ids, -1)
+    xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
+    return Samples(xy, volley.round[owner], volley.pellet[owner], detail.verdict, ids[detail.place])
+
+
+def blockers_of(scene: Scene, weapon: Weapon, shot: Shots) -> list[Blocked]:
+    """Occluders that ended samples, most first, then by id."""
+    samples = samples_of(scene, weapon, shot)
+    ids, counts = np.unique(samples.item[samples.verdict == Verdict.OCCLUDED], return_counts=True)
+    found = [Blocked(*pair) for pair in zip(ids.tolist(), counts.tolist(), strict=True)]
+    return sorted(found, key=lambda b: (-b.samples, b.occluder))
+
+
+def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
+    """Share of each row; what an object shows is worked out once for each filter."""
+    stack = scene.items.stack()
+    place_of = {item: place for place, item in enumerate(stack.ids.tolist())}
+    visible: dict[tuple[object, ...], int] = {}
+    shares = []
+    in_round: dict[int, Ints] = {}
+    for row in rows:
+        place = place_of[row.object]
+        key = (place, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
+        if key not in visible:
+            visible[key] = _visible(scene, place, pierces(weapon), shots.take(row.shot, row.shot + 1))
+        if row.shot not in in_round:
+            volley = volley_of(weapon, shots.take(row.shot, row.shot + 1))
+            in_round[row.shot] = np.bincount(volley.round, volley.count).astype(np.int64)
+        fired = int(in_round[row.shot][row.round])
+        shares.append(Share(row.samples / fired, row.pixels / visible[key], row.pixels / int(stack.mask(place).sum())))
+    return shares
+
+
+def why_not_of(scene: Scene, weapon: Weapon, shot: Shots, hit: Set[int]) -> list[WhyNot]:
+    """Objects within NEAR_PX of the pattern that were not hit, nearest first, then by id."""
+    volley = volley_of(weapon, shot)
+    stack = scene.items.stack()
+    detail = _detail(scene, weapon, volley, shot)
+    boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
+    near = np.unique(pairs_of(boxes, volley.shot, shot, stack, "box").place)
+    found = []
+    for place in near.tolist():
+        if stack.occluder[place] or int(stack.ids[place]) in hit:
+            continue
+        distance = math.sqrt(_distance2(detail.runs, stack, place))
+        if distance <= NEAR_PX:
+            found.append(_why(stack, place, shot, detail, distance))
+    return sorted(found, key=lambda w: (w.distance, w.object))
+
+
+def margins_of(scene: Scene, weapon: Weapon, shot: Shots) -> dict[int, float]:
+    """Length of the shortest whole-pixel shift of the pattern that flips each object, looked for up to MARGIN_PX."""
+    side = np.arange(-MARGIN_PX, MARGIN_PX + 1)
+    shift = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    shift = shift[(shift**2).sum(axis=1) <= MARGIN_PX**2]
+    volley = volley_of(weapon, shot)
+    stack = scene.items.stack()
+    n, placements = len(shift), len(volley.shot)
+    moved = np.repeat(shift, placements, axis=0)
+    every = replace(
+        volley,
+        pattern=np.tile(volley.pattern, n), xy=np.tile(volley.xy, (n, 1)) + moved,
+        origin_xy=np.tile(volley.origin_xy, (n, 1)), round=np.tile(volley.round, n), pellet=np.tile(volley.pellet, n),
+        shot=np.zeros(n * placements, np.int64),
+    )  # fmt: skip
+    met = direct(every, shot, Sight(stack, scene.bounds, pierces(weapon), "box"))
+    hit = np.zeros((n, len(stack)), np.bool_)
+    hit[met.owner // placements, met.place] = True
+    length2 = (shift**2).sum(axis=1)
+    flips = hit != hit[length2 == 0]
+    shortest = np.where(flips, length2[:, None], MARGIN_PX**2 + 1).min(axis=0, initial=MARGIN_PX**2 + 1)
+    found = [(int(stack.ids[p]), math.sqrt(int(shortest[p]))) for p in np.flatnonzero(shortest <= MARGIN_PX**2)]
+    return dict(sorted(found))
+
+
+def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detail:
+    """Walk every sample of one shot and keep what decided it."""
+    stack, bounds = scene.items.stack(), scene.bounds
+    if int(volley.count.sum()) > MASK_AREA_MAX:
+        raise InputError(f"samples: expected a shot of at most {MASK_AREA_MAX} samples, got {int(volley.count.sum())}")
+    runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
+    run, x = each_pixel(runs.x_first, runs.x_last)
+    pairs = pairs_of(volley.boxes, volley.shot, shot, stack, "box")
+    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
+    place = np.full(len(x), -1, np.int64)
+    start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    for kind in (SKIP, BLOCK, HIT):  # of one kind the first counts; a hit outranks a block, a block a skip
+        told = events.take(np.flatnonzero(events.kind == kind)[::-1])
+        event, column = each_pixel(told.x_first, told.x_last)
+        place[start[told.run][event] + column] = told.place[event]
+    verdict = VERDICT_OF[state]
+    if bounds is not None:
+        y = runs.y[run]
+        outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
+        verdict = np.where(outside, Verdict.OUTSIDE, verdict)
+        place[outside] = -1
+    return _Detail(runs, run, x, verdict, place)
+
+
+def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float) -> WhyNot:
+    """Reason of one object that was not hit."""
+    item = int(stack.ids[place])
+    x0, y0, x1, y1 = stack.box_xyxy[place].tolist()
+    y = detail.runs.y[detail.run]
+    inside = np.flatnonzero((detail.x >= x0) & (detail.x <= x1) & (y >= y0) & (y <= y1))
+    on = inside[stack.mask(place)[y[inside] - y0, detail.x[inside] - x0]]
+    deciders = detail.place[on]
+    by_place = np.unique(deciders[(deciders >= 0) & (deciders != place)], return_counts=True)
+    by = {int(stack.ids[p]): int(n) for p, n in zip(*by_place, strict=True)}
+    here = np.array([place])
+    if refused(stack, here, shot, np.zeros(1, np.int64))[0]:
+        foreign = not int(stack.categories[place]) & int(shot.accept[0])
+        return WhyNot(item, "category" if foreign else "excluded", len(on), by, distance)
+    if not len(on):
+        return WhyNot(item, "missed", 0, {}, distance)
+    outside = (detail.verdict[on] == Verdict.OUTSIDE).all()
+    return WhyNot(item, "outside" if outside else "behind", len(on), by, distance)
+
+
+def _distance2(runs: Runs, stack: Stack, place: int) -> int:
+    """Least squared distance between the pixels of a pattern and those of an item, px^2."""
+    x, y = stack.box_xyxy[place, :2].tolist()
+    spans = Spans.from_mask(stack.mask(place), (x, y))
+    gap = np.maximum(np.maximum(runs.x_first[:, None] - spans.x_last, spans.x_first - runs.x_last[:, None]), 0)
+    return int((gap**2 + (runs.y[:, None] - spans.y) ** 2).min(initial=(2 * NEAR_PX) ** 2))
+
+
+def _visible(scene: Scene, place: int, pierce: bool, shot: Shots) -> int:
+    """Pixels of an object that a pattern covering everything would hit."""
+    stack, bounds = scene.items.stack(), scene.bounds
+    x, y = stack.box_xyxy[place, :2].tolist()
+    spans = Spans.from_mask(stack.mask(place), (x, y))
+    zero = np.zeros(len(spans), np.int64)
+    runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
+    if bounds is not None:
+        first, last = np.maximum(spans.x_first, bounds[0]), np.minimum(spans.x_last, bounds[2])
+        some = (first <= last) & (spans.y >= bounds[1]) & (spans.y <= bounds[3])
+        runs = Runs(zero, spans.y, first, last, zero).take(some)
+    box = stack.box_xyxy[place][None]
+    pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack, "box")
+    events, _ = walk(runs, pairs, stack, pierce, HIT)
+    own = events.place == place
+    return int((events.x_last - events.x_first + 1)[own].sum())

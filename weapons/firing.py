@@ -1,0 +1,93 @@
+"""Fire a weapon at a scene: the whole flow on one screen.
+
+scene -> stack -> weapon -> patterns -> placed -> pre-filter -> samples -> rows
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.arrays import InputError, choice
+from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
+from planes.sampling import Verdict
+from planes.scene import Scene
+from weapons.arsenal import Weapon
+from weapons.candidates import PREFILTERS
+from weapons.explain import pierces
+from weapons.hits import Hits, Rows, rows_of_met
+from weapons.plan import chosen_strategy, plan_of
+from weapons.resolve import Sight, composed, direct
+from weapons.volley import Volley, checked_shots, volley_of
+
+__all__ = ["fire"]
+
+
+def fire(
+    scene: Scene,
+    weapon: Weapon,
+    at: object,
+    *,
+    aim: object = None,
+    toward: object = None,
+    accept: object = ALL,
+    exclude: object = None,
+    seed: int = 0,
+    shot: object = None,
+    prefilter: str = "auto",
+    strategy: str = "auto",
+) -> Hits:
+    """Decide what shots hit.
+
+    Parameters
+    ----------
+    scene : what is fired at
+    weapon : one weapon for all shots
+    at : (2,) position of one shot, or (N, 2) of a batch, px
+    aim : degrees, 0 along +x, clockwise on the screen; or
+    toward : (2,) or (N, 2) point that the weapon is aimed at, px
+    accept : category bits of what may be hit and of what may block; all by default
+    exclude : owners that are passed over, the shooter's for one: a number, or (N,), or (N, K) padded with -1
+    seed : of the pellets, 0 .. 2**64 - 1
+    shot : numbers of the shots, 0 .. N-1 by default: a shot of a batch fired again alone under its number is the same
+    prefilter : "auto", "none", "box": what goes before the pixels; it changes no row
+    strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row
+
+    Each of aim, toward, accept, exclude and shot is one for all shots or one for each.
+
+    Raises
+    ------
+    InputError
+        Naming the argument and the row.
+    """
+    if not isinstance(weapon, Weapon):
+        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    choice("prefilter", prefilter, PREFILTERS)
+    shots = checked_shots(weapon, at, aim, toward, accept, exclude, seed, shot)
+    stack = scene.items.stack()
+    sight = Sight(stack, scene.bounds, pierces(weapon), prefilter)
+    probe = volley_of(weapon, shots.take(0, 1))
+    name, why = chosen_strategy(strategy, scene, stack, probe.table, len(probe.shot) * len(shots))
+    plane = scene.code_plane() if name == "composed" else None
+    codes = plane.read(scene.items) if plane else None
+    rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
+    step = _shots_per_part(probe, len(stack))
+    for first in range(0, len(shots), step):
+        part = shots.take(first, min(first + step, len(shots)))
+        volley = volley_of(weapon, part)
+        if plane and codes is not None:
+            met = composed(volley, part, sight, codes, plane.box_xyxy)
+        else:
+            met = direct(volley, part, sight)
+        rows.append(rows_of_met(met, volley, stack.ids, first))
+        counts = np.zeros((len(part), len(Verdict)), np.int64)
+        np.add.at(counts, volley.shot, met.counts)
+        verdicts.append(counts)
+    plan = plan_of(scene, stack, probe, name, why, prefilter, plane)
+    return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
+
+
+def _shots_per_part(probe: Volley, items: int) -> int:
+    """Shots worked on at a time, so that samples and pairs of a part stay within their chunks."""
+    placements = max(len(probe.shot), 1)
+    samples = max(int(probe.count.sum()), placements)
+    return max(1, min(CHUNK_SAMPLES // samples, CHUNK_PAIRS // (placements * max(items, 1))))

@@ -1,0 +1,238 @@
+"""Hits: a row for each object that a round of a shot hit, the verdicts of its samples, and what may be asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planes.arrays import InputError, Ints, integer
+from planes.sampling import Verdict
+from planes.scene import Scene
+from planes.spans import merged_runs
+from weapons.arsenal import Weapon
+from weapons.explain import Blocked, Samples, Share, WhyNot, blockers_of, margins_of, samples_of, shares_of, why_not_of
+from weapons.plan import Plan
+from weapons.resolve import Met
+from weapons.volley import Shots, Volley
+
+__all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
+
+
+class HitRow(NamedTuple):
+    """One object hit by one round of one shot.
+
+    `samples` counts pixels of all pellets, `pixels` each pixel once, `weight` adds whole weights (65,535 a sample at
+    full strength), `pellets` counts those that hit; `first_xy` is the hit pixel nearest to the round's pixel and
+    `distance2` its squared distance, px^2.
+    """
+
+    shot: int
+    round: int
+    object: int
+    samples: int
+    pixels: int
+    weight: int
+    pellets: int
+    first_xy: tuple[int, int]
+    distance2: int
+
+
+class OwnerRow(NamedTuple):
+    """One body hit by one shot: the rows of all its parts and all rounds added up."""
+
+    shot: int
+    owner: int
+    samples: int
+    pixels: int
+    weight: int
+    objects: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack)."""
+
+    shot: Ints
+    round: Ints
+    object: Ints
+    samples: Ints
+    pixels: Ints
+    weight: Ints
+    pellets: Ints
+    first_xy: Ints
+    distance2: Ints
+
+    @classmethod
+    def joined(cls, parts: list[Rows]) -> Rows:
+        """Rows of several parts of a batch, in order."""
+        if len(parts) == 1:
+            return parts[0]
+        none = np.zeros(0, np.int64)
+        every = [cls(none, none, none, none, none, none, none, np.zeros((0, 2), np.int64), none), *parts]
+        return cls(*(np.concatenate([getattr(p, name) for p in every]) for name in HitRow._fields))
+
+
+class Hits:
+    """What a call of `fire` hit.
+
+    Its columns (`shot`, `round`, `object`, `samples`, `pixels`, `weight`, `pellets`, `first_xy`, `distance2`) are
+    arrays with one entry a row, in a total order. It has a length (rows), is true if anything was hit, and yields named
+    rows. Two are equal when rows and verdict counts are; plan and version do not count.
+
+    Parameters
+    ----------
+    starts : (N + 1,) the rows of shot i are starts[i] .. starts[i + 1] - 1
+    verdicts : (N, 5) samples of each shot by verdict, in the order of `Verdict`
+    fired : (N,) samples of each shot
+    plan : what ran and what was left out
+    version : of the scene, when it was fired on
+    """
+
+    def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
+        self.shot, self.round, self.object = rows.shot, rows.round, rows.object
+        self.samples, self.pixels, self.weight = rows.samples, rows.pixels, rows.weight
+        self.pellets, self.first_xy, self.distance2 = rows.pellets, rows.first_xy, rows.distance2
+        self.verdicts = verdicts
+        self.fired = verdicts.sum(axis=1)
+        self.starts = np.searchsorted(rows.shot, np.arange(len(shots) + 1))
+        self.weapon, self.shots, self.plan = weapon, shots, plan
+        self.version = scene.version
+        self._scene = scene
+
+    def __len__(self) -> int:
+        return len(self.shot)
+
+    def __bool__(self) -> bool:
+        return len(self.shot) > 0
+
+    def __iter__(self) -> Iterator[HitRow]:
+        columns = [getattr(self, name).tolist() for name in HitRow._fields]
+        for row in zip(*columns, strict=True):
+            yield _named(row)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Hits):
+            return NotImplemented
+        names = (*HitRow._fields, "verdicts")
+        return all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<Hits: {len(self)} rows of {len(self.shots)} shots, {self.verdict_counts()}>"
+
+    def of(self, shot: int) -> list[HitRow]:
+        """Rows of one shot."""
+        first, last = self.starts[self._checked(shot)], self.starts[shot + 1]
+        columns = [getattr(self, name)[first:last].tolist() for name in HitRow._fields]
+        return [_named(row) for row in zip(*columns, strict=True)]
+
+    def verdict_counts(self, shot: int | None = None) -> dict[str, int]:
+        """Samples by verdict, of one shot or of all; they add up to the samples fired."""
+        counts = self.verdicts.sum(axis=0) if shot is None else self.verdicts[self._checked(shot)]
+        return {verdict.name.lower(): int(counts[verdict]) for verdict in Verdict}
+
+    def by_owner(self) -> list[OwnerRow]:
+        """Rows added up by body: one event for one shot and owner, ordered by (shot, first row of the owner)."""
+        bodies: dict[tuple[int, int], list[HitRow]] = {}
+        for row in self:
+            bodies.setdefault((row.shot, int(self._scene.items.owner[row.object])), []).append(row)
+        self._fresh()
+        return [
+            OwnerRow(
+                shot, owner, sum(r.samples for r in rows), sum(r.pixels for r in rows), sum(r.weight for r in rows),
+                tuple(dict.fromkeys(r.object for r in rows)),
+            )
+            for (shot, owner), rows in bodies.items()
+        ]  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows and verdict counts as JSON."""
+        rows = [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]
+        return {
+            "rows": rows,
+            "verdicts": [self.verdict_counts(shot) for shot in range(len(self.shots))],
+            "plan": self.plan.to_dict(),
+        }
+
+    def samples_at(self, shot: int = 0) -> Samples:
+        """Every sample of one shot: pixel, pellet, verdict, and the item that decided it."""
+        return samples_of(self._fresh(), self.weapon, self._one(shot))
+
+    def shares(self) -> list[Share]:
+        """For each row its share of the pattern, of the visible object, and of the whole mask."""
+        return shares_of(self._fresh(), self.weapon, self.shots, list(self))
+
+    def why_not(self, shot: int = 0) -> list[WhyNot]:
+        """Objects within 32 px of one shot that it did not hit, and why."""
+        hit = {row.object for row in self.of(shot)}
+        return why_not_of(self._fresh(), self.weapon, self._one(shot), hit)
+
+    def blockers(self, shot: int = 0) -> list[Blocked]:
+        """Occluders that ended samples of one shot, most samples first."""
+        return blockers_of(self._fresh(), self.weapon, self._one(shot))
+
+    def margins(self, shot: int = 0) -> dict[int, float]:
+        """How far the verdicts of one shot are from flipping.
+
+        For each object that a shift of up to 8 px turns from hit to not hit or back: the length of the shortest such
+        whole-pixel shift, px. One of 1 px is fragile.
+        """
+        return margins_of(self._fresh(), self.weapon, self._one(shot))
+
+    def _one(self, shot: int) -> Shots:
+        return self.shots.take(self._checked(shot), shot + 1)
+
+    def _checked(self, shot: int) -> int:
+        return integer("shot", shot, 0, len(self.shots) - 1)
+
+    def _fresh(self) -> Scene:
+        """The scene, if it is still as it was fired on."""
+        if self._scene.version != self.version:
+            now = self._scene.version
+            raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
+        return self._scene
+
+
+def _named(row: tuple[Any, ...]) -> HitRow:
+    return HitRow(*row[:7], tuple(row[7]), row[8])
+
+
+def rows_of_met(met: Met, volley: Volley, ids: Ints, first_shot: int) -> Rows:
+    """Gather runs of hit pixels into rows; pixels hit by several pellets count once in `pixels`."""
+    rounds = int(volley.round.max(initial=0)) + 1
+    group = (volley.shot[met.owner] * rounds + volley.round[met.owner]) * max(len(ids), 1) + met.place
+    origin = volley.origin_xy[met.owner]
+    x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
+    distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
+    order = np.lexsort((x, met.y, distance2, group))
+    group, distance2 = group[order], distance2[order]
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    best = order[first]
+    lengths = (met.x_last - met.x_first + 1)[order]
+    samples = np.add.reduceat(lengths, first) if len(first) else lengths
+    weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
+    pellets, pixels = np.ones_like(samples), samples
+    if int(volley.pellet.max(initial=0)):
+        pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
+    owner, place = met.owner[best], met.place[best]
+    columns = (volley.shot[owner], volley.round[owner], distance2[first], met.y[best], x[best], place)
+    sort = np.lexsort(columns[::-1])
+    first_xy = np.stack([x[best], met.y[best]], axis=1)
+    return Rows(
+        volley.shot[owner][sort] + first_shot, volley.round[owner][sort], ids[place][sort], samples[sort], pixels[sort],
+        weight[sort], pellets[sort], first_xy[sort], distance2[first][sort],
+    )  # fmt: skip
+
+
+def _distinct(met: Met, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
+    """Pellets that hit, and pixels counted once, of each group."""
+    pairs = np.unique(np.stack([group, met.owner[order]]), axis=1)
+    y = met.y[order] - met.y.min(initial=0)
+    rows = int(y.max(initial=0)) + 1
+    row, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
+    pixels = np.bincount(row // rows, x_last - x_first + 1, groups).astype(np.int64)
+    return np.bincount(pairs[0], minlength=groups), pixels

@@ -1,0 +1,111 @@
+"""Patterns: the pixels of a shot about its whole pixel, with their weights; and many of them as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planes.arrays import InputError, Ints
+from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
+from planes.sampling import Runs
+from planes.spans import Spans, ragged
+
+__all__ = ["FALLOFFS", "Pattern", "PatternTable", "falloff_weights", "make_pattern"]
+
+FALLOFFS = ("linear", "smooth")
+_DOUBT = 2.0**-30  # the float below is right to 2**-34; nearer to a whole number than this, integers decide
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A set of pixels about the origin, and prefix sums of their weights in span order (None: all at full weight)."""
+
+    spans: Spans
+    prefix: Ints | None
+
+
+def make_pattern(spans: Spans, falloff: str | None, reach_256: int) -> Pattern:
+    """Weigh the pixels of a set by their distance from the origin."""
+    if falloff is None:
+        return Pattern(spans, None)
+    if spans.count > MASK_AREA_MAX:
+        raise InputError(f"falloff: expected a pattern of at most {MASK_AREA_MAX} px, got {spans.count}")
+    weights = falloff_weights((spans.pixels() ** 2).sum(axis=1), falloff, reach_256)
+    return Pattern(spans, np.concatenate([[0], np.cumsum(weights)]))
+
+
+def falloff_weights(distance2: Ints, falloff: str, reach_256: int) -> Ints:
+    """Whole weights from 65,535 at the origin to 0 at the reach.
+
+    Parameters
+    ----------
+    distance2 : squared distances from the origin, px^2, whole numbers
+    falloff : "linear", or "smooth": 3 t^2 - 2 t^3 of the linear weight t (Perlin's smoothstep)
+    reach_256 : distance at which the weight is 0, in 1/256 px
+    """
+    distance2 = np.asarray(distance2, np.int64)
+    if reach_256 == 0:
+        return np.where(distance2 == 0, WEIGHT_FULL, 0)
+    lost = np.sqrt(distance2.astype(np.float64)) * (WEIGHT_FULL * SUB) / reach_256
+    whole = np.floor(lost).astype(np.int64)
+    for i in np.flatnonzero(np.abs(lost - np.rint(lost)) < _DOUBT):
+        near = round(float(lost[i]))
+        reached = (near * reach_256) ** 2 <= int(distance2[i]) * (WEIGHT_FULL * SUB) ** 2
+        whole[i] = near if reached else near - 1
+    left = np.maximum(WEIGHT_FULL - whole, 0)
+    if falloff == "smooth":
+        left = left * left * (3 * WEIGHT_FULL - 2 * left) // WEIGHT_FULL**2
+    return left
+
+
+class PatternTable:
+    """The distinct patterns of a call, one after another.
+
+    Parameters
+    ----------
+    begin : (n + 1,) first span of each pattern
+    count : (n,) pixels of each
+    box_xyxy : (n, 4) inclusive; x_max < x_min for an empty pattern
+    """
+
+    def __init__(self, patterns: Sequence[Pattern]) -> None:
+        spans = [p.spans for p in patterns]
+        self.y = np.concatenate([s.y for s in spans])
+        self.x_first = np.concatenate([s.x_first for s in spans])
+        self.x_last = np.concatenate([s.x_last for s in spans])
+        self.begin = np.cumsum([0, *(len(s) for s in spans)])
+        self.count = np.array([s.count for s in spans], np.int64)
+        self.box_xyxy = np.array([s.box_xyxy or (0, 0, -1, -1) for s in spans], np.int64)
+        self.prefix: Ints | None = None
+        lengths = self.x_last - self.x_first + 1
+        ordinal = np.cumsum(lengths) - lengths
+        if patterns[0].prefix is not None:
+            self.prefix = np.concatenate([p.prefix for p in patterns if p.prefix is not None])
+            ordinal = ordinal + np.repeat(np.arange(len(patterns)), np.diff(self.begin))  # each prefix begins with a 0
+        self.ordinal = ordinal - self.x_first
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the spans and prefix sums."""
+        return 4 * self.y.nbytes + (0 if self.prefix is None else self.prefix.nbytes)
+
+    def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
+        """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""
+        lengths = np.diff(self.begin)[pattern]
+        owner, place = ragged(lengths)
+        span = self.begin[pattern][owner] + place
+        box = boxes_xyxy[owner]
+        row = self.y[span] + y[owner]
+        x_first = np.maximum(self.x_first[span] + x[owner], box[:, 0])
+        x_last = np.minimum(self.x_last[span] + x[owner], box[:, 2])
+        some = (x_first <= x_last) & (row >= box[:, 1]) & (row <= box[:, 3])
+        ordinal = self.ordinal[span] - x[owner]
+        return Runs(owner[some], row[some], x_first[some], x_last[some], ordinal[some])
+
+    def weight(self, ordinal: Ints, x_first: Ints, x_last: Ints) -> Ints:
+        """Sum of the weights of runs."""
+        if self.prefix is None:
+            return (x_last - x_first + 1) * WEIGHT_FULL
+        return np.asarray(self.prefix[ordinal + x_last + 1] - self.prefix[ordinal + x_first])

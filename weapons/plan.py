@@ -1,0 +1,111 @@
+"""What a call does and what it leaves out: the cost model that chooses a strategy, and the record of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from planes.arrays import InputError, choice
+from planes.compose import CodePlane
+from planes.items import Role, Stack
+from planes.scene import Scene
+from weapons.pattern import PatternTable
+from weapons.volley import Volley
+
+__all__ = ["STRATEGIES", "Plan", "Stage", "chosen_strategy", "plan_of"]
+
+STRATEGIES = ("auto", "direct", "composed")
+
+DIRECT_PLACEMENT_NS, DIRECT_PAIR_NS, DIRECT_PIXEL_NS = 1500.0, 4.0, 16.0
+COMPOSED_PLACEMENT_NS, COMPOSED_PIXEL_NS, REDRAW_PIXEL_NS = 1000.0, 14.0, 0.5
+"""Measured on one machine of 2 cores with `tests/bench/strategies.py`; only their ratios matter."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage that ran, or one that was left out: why, and how many bytes it made."""
+
+    name: str
+    why: str
+    bytes_made: int = 0
+
+
+@dataclass
+class Plan:
+    """Stages of a call in the order in which they ran, and those left out."""
+
+    ran: list[Stage] = field(default_factory=list)
+    left_out: list[Stage] = field(default_factory=list)
+
+    def run(self, name: str, why: str, bytes_made: int = 0) -> None:
+        """Record a stage that ran."""
+        self.ran.append(Stage(name, why, bytes_made))
+
+    def leave_out(self, name: str, why: str) -> None:
+        """Record that a stage was not needed."""
+        self.left_out.append(Stage(name, why))
+
+    def to_dict(self) -> dict[str, list[dict[str, object]]]:
+        """The plan as JSON."""
+        return {
+            "ran": [{"stage": s.name, "why": s.why, "bytes": s.bytes_made} for s in self.ran],
+            "left_out": [{"stage": s.name, "why": s.why} for s in self.left_out],
+        }
+
+
+def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTable, placements: int) -> tuple[str, str]:
+    """Strategy of a call and why: the one asked for, or the cheaper by the cost model.
+
+    Raises
+    ------
+    InputError
+        If the composed strategy is asked for where no whole plane can be made.
+    """
+    choice("strategy", strategy, STRATEGIES)
+    plane = scene.code_plane()
+    if strategy == "composed" and plane is None:
+        raise InputError("strategy: expected bounds that fit one plane for 'composed', got a scene without them")
+    if strategy != "auto":
+        return strategy, "asked for"
+    if plane is None:
+        return "direct", "no bounds that fit one plane"
+    samples = placements * (int(table.count.sum()) / max(len(table.count), 1))
+    redraw = plane.cost(scene.items)
+    composed = placements * COMPOSED_PLACEMENT_NS + samples * COMPOSED_PIXEL_NS + redraw * REDRAW_PIXEL_NS
+    x, y, x_max, y_max = plane.box_xyxy
+    box = stack.box_xyxy
+    covered = int(((box[:, 2] - box[:, 0] + 1) * (box[:, 3] - box[:, 1] + 1)).sum())
+    density = covered / ((x_max - x + 1) * (y_max - y + 1))
+    direct = placements * (DIRECT_PLACEMENT_NS + len(stack) * DIRECT_PAIR_NS) + samples * density * DIRECT_PIXEL_NS
+    name = "composed" if composed < direct else "direct"
+    return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
+
+
+def plan_of(
+    scene: Scene, stack: Stack, volley: Volley, strategy: str, why: str, prefilter: str, plane: CodePlane | None
+) -> Plan:
+    """Record of a call, from what it used."""
+    plan = Plan()
+    table = volley.table
+    plan.run("patterns", f"{len(table.count)} made for the first shot", table.nbytes)
+    if table.prefix is None:
+        plan.leave_out("weights", "the weapon has no falloff")
+    if scene.bounds is None:
+        plan.leave_out("outside", "the scene has no bounds")
+    if not stack.occluder.any():
+        plan.leave_out("occluders", "the scene has none")
+    if plane is not None and plane.codes is not None:
+        redrawn = plane.redrawn * plane.codes.itemsize
+        plan.run("code plane", f"{plane.redrawn} px drawn anew", redrawn)
+        plan.run("read", f"composed: {why}")
+        plan.leave_out("pre-filter", "only for samples that look behind the front item")
+    else:
+        plan.leave_out("code plane", f"direct: {why}")
+        if not len(stack):
+            plan.leave_out("walk", "nothing in the scene can be hit or blocks")
+        else:
+            plan.run("pre-filter", f"{'box' if prefilter == 'auto' else prefilter}: each against {len(stack)} items")
+            plan.run("walk", f"direct: {why}")
+    for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
+        if len(scene.ids(role)):
+            plan.leave_out(role.value, "drawn only for a picture")
+    return plan

@@ -1,0 +1,190 @@
+"""Shots to placed patterns: every round and every pellet of every shot, each on its whole pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planes.arrays import InputError, Ints, integer, integers, reals
+from planes.constants import ALL, POSITION_MAX
+from planes.grid256 import ONE, pixel, rounded_div, snap, unit, unit_toward
+from weapons.arsenal import Plain, Rounds, Spread, Weapon, pattern_of
+from weapons.draws import disc_offsets
+from weapons.pattern import PatternTable
+
+__all__ = ["Shots", "Volley", "checked_shots", "volley_of"]
+
+SEED_MAX = 2**64 - 1
+OWNER_MAX = 2**31
+
+
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """A checked batch.
+
+    Parameters
+    ----------
+    at_256 : (N, 2) positions in 1/256 px
+    direction : (N, 2) cos and sin of the aim times 2**30
+    accept : (N,) category bits
+    exclude : (N, K) owners, -1 for none
+    number : (N,) shot numbers, for the draws
+    seed : of the draws
+    single : the caller gave one position, not a batch
+    """
+
+    at_256: Ints
+    direction: Ints
+    accept: Ints
+    exclude: Ints
+    number: Ints
+    seed: int
+    single: bool
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    def take(self, first: int, last: int) -> Shots:
+        """Shots first .. last - 1."""
+        part = slice(first, last)
+        return replace(
+            self,
+            at_256=self.at_256[part],
+            direction=self.direction[part],
+            accept=self.accept[part],
+            exclude=self.exclude[part],
+            number=self.number[part],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Volley:
+    """Placed patterns, sorted by (shot, round, pellet), as columns.
+
+    Parameters
+    ----------
+    table : the distinct patterns
+    pattern : (P,) which of them
+    xy : (P, 2) whole pixel it is placed on
+    origin_xy : (P, 2) whole pixel of its round, from which distances are counted
+    shot, round, pellet : (P,) whose it is; `shot` counts from 0 within the batch
+    """
+
+    table: PatternTable
+    pattern: Ints
+    xy: Ints
+    origin_xy: Ints
+    shot: Ints
+    round: Ints
+    pellet: Ints
+
+    @property
+    def boxes(self) -> Ints:
+        """Inclusive boxes (P, 4); far from everything for an empty pattern."""
+        return np.asarray(self.table.box_xyxy[self.pattern] + np.concatenate([self.xy, self.xy], axis=1))
+
+    @property
+    def count(self) -> Ints:
+        """Samples (P,) of each."""
+        return self.table.count[self.pattern]
+
+
+def checked_shots(
+    weapon: Weapon,
+    at: object,
+    aim: object,
+    toward: object,
+    accept: object,
+    exclude: object,
+    seed: object,
+    shot: object,
+) -> Shots:
+    """Check the arguments of `fire`; each of them is one for all shots or one for each."""
+    given = np.asarray(at)
+    single = given.shape == (2,)
+    at_256 = snap(reals("at", given.reshape(1, 2) if single else given, (None, 2), POSITION_MAX))
+    n = len(at_256)
+    numbers = np.arange(n) if shot is None else shot
+    return Shots(
+        at_256,
+        _directions(weapon, at_256, aim, toward),
+        integers("accept", _each(accept, n, "accept"), (n,), 0, ALL),
+        _owners(exclude, n, single),
+        integers("shot", _each(numbers, n, "shot"), (n,), 0, 2**63 - 1),
+        integer("seed", seed, 0, SEED_MAX),
+        single,
+    )
+
+
+def volley_of(weapon: Weapon, shots: Shots) -> Volley:
+    """Place every pellet of every round of every shot."""
+    burst = weapon if isinstance(weapon, Rounds) else None
+    inner = burst.weapon if burst else weapon
+    spread = inner if isinstance(inner, Spread) else None
+    plain = spread.pellet if spread else inner
+    if not isinstance(plain, Plain):
+        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
+    shot = np.repeat(np.arange(len(shots)), rounds * pellets)
+    round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
+    pellet = np.tile(np.arange(pellets), len(shots) * rounds)
+    origin = shots.at_256[shot]
+    direction = shots.direction[shot]
+    if burst:
+        origin = origin + round_[:, None] * snap(burst.recoil_xy)
+        direction = _recoiled(direction, round_, burst.recoil_deg)
+    origin_xy = pixel(origin)
+    xy = origin_xy
+    if spread:
+        xy = origin_xy + disc_offsets(int(snap(spread.radius)), shots.seed, shots.number[shot], round_, pellet)
+    if not plain.directed:
+        table = PatternTable([pattern_of(plain, ONE, 0)])
+        return Volley(table, np.zeros(len(shot), np.int64), xy, origin_xy, shot, round_, pellet)
+    distinct, which = np.unique(direction, axis=0, return_inverse=True)
+    table = PatternTable([pattern_of(plain, c, s) for c, s in distinct.tolist() or [(ONE, 0)]])
+    return Volley(table, which.reshape(-1), xy, origin_xy, shot, round_, pellet)
+
+
+def _directions(weapon: Weapon, at_256: Ints, aim: object, toward: object) -> Ints:
+    n = len(at_256)
+    if toward is None:
+        return np.stack(unit(reals("aim", _each(0.0 if aim is None else aim, n, "aim"), (n,))), axis=1)
+    if aim is not None:
+        raise InputError("aim: expected aim or toward, got both")
+    points = np.asarray(toward)
+    points = np.broadcast_to(points, (n, 2)) if points.shape == (2,) else points
+    offset = snap(reals("toward", points, (n, 2), POSITION_MAX)) - at_256
+    same = np.flatnonzero((offset == 0).all(axis=1))
+    if len(same):
+        got = points[same[0]].tolist()
+        raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
+    return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
+
+
+def _recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
+    if not degrees:
+        return direction
+    c, s = unit(degrees * np.arange(int(round_.max(initial=0)) + 1))
+    c, s = c[round_], s[round_]
+    x, y = direction[:, 0], direction[:, 1]
+    return np.stack([rounded_div(x * c - y * s, ONE), rounded_div(x * s + y * c, ONE)], axis=1)
+
+
+def _each(value: object, n: int, name: str) -> object:
+    array = np.asarray(value)
+    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
+
+
+def _owners(exclude: object, n: int, single: bool) -> Ints:
+    """Owners (n, K): a number, one for each shot (n,), or several for all (1, K) or for each (n, K); -1 for none."""
+    if exclude is None:
+        return np.zeros((n, 0), np.int64)
+    array = np.asarray(exclude)
+    if array.ndim == 0:
+        array = np.broadcast_to(array, (n, 1))
+    elif array.ndim == 1:
+        array = array[None] if single else array[:, None]
+    if array.ndim == 2 and len(array) == 1:
+        array = np.broadcast_to(array, (n, array.shape[1]))
+    return integers("exclude", array, (n, None), -1, OWNER_MAX)
