@@ -198,7 +198,7 @@ class Hits:
 
 
 def _named(row: tuple[Any, ...]) -> HitRow:
-    return HitRow(*row[:7], tuple(row[7]), row[8])
+    return HitRow._make((*row[:7], tuple(row[7]), row[8]))
 
 
 def rows_of_met(met: Met, volley: Volley, ids: Ints, first_shot: int) -> Rows:

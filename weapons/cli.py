@@ -1,0 +1,101 @@
+"""The command `hitplanes`: one function for each of its words, and no decision of its own."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from planes.arrays import InputError
+from planes.image import write_png, write_text
+from planes.scene import load_scene
+from weapons.arsenal import arsenal_of
+from weapons.facts import report_of
+from weapons.orders import order_from_json, orders_of
+from weapons.picture import picture_of_report
+
+__all__ = ["main"]
+
+DESCRIPTION = "What does a shot hit in a 2-D scene? Decided by pixels, exactly, and shown why."
+
+REPORT_HELP = """\
+Fire shots at a scene folder and write a picture, and the facts as JSON, that say what was hit and why.
+Without --weapon the shots of scene.json are fired.
+"""
+
+EXAMPLES = """\
+examples:
+  hitplanes report fixtures/gallery
+  hitplanes report fixtures/gallery -o report.png --json report.json
+  hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
+  hitplanes report fixtures/gallery --weapon laser --at 100,167 --aim -4.5
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; exit codes: 0 done, 2 bad input."""
+    arguments = parser().parse_args(argv)
+    try:
+        arguments.run(arguments)
+    except InputError as error:
+        print(f"hitplanes: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """Words, options and help of the command."""
+    top = argparse.ArgumentParser(prog="hitplanes", description=DESCRIPTION)
+    words = top.add_subparsers(required=True, metavar="COMMAND")
+    raw = argparse.RawDescriptionHelpFormatter
+    one = words.add_parser(
+        "report",
+        help="fire at a scene and draw what was hit",
+        description=REPORT_HELP,
+        epilog=EXAMPLES,
+        formatter_class=raw,
+    )
+    one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
+    one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
+    one.add_argument("--at", metavar="X,Y", help="where it is fired, px")
+    one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
+    one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
+    one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
+    one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
+    one.set_defaults(run=report)
+    return top
+
+
+def report(arguments: argparse.Namespace) -> None:
+    """Write the picture, and the facts, of the scene's shots or of one shot."""
+    scene = load_scene(arguments.scene)
+    arsenal = arsenal_of(scene)
+    if arguments.weapon is None:
+        for name in ("at", "aim", "seed"):
+            if getattr(arguments, name) is not None:
+                raise InputError(f"--{name}: expected together with --weapon")
+        orders = orders_of(scene, arsenal)
+    else:
+        orders = [order_from_json(_shot(arguments), scene, arsenal)]
+    facts = report_of(scene, orders)
+    write_png(arguments.output, picture_of_report(facts, scene))
+    if arguments.json is not None:
+        write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
+    for shot in facts["shots"]:
+        hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"]) or "nothing"
+        print(f"{shot['weapon']} at {shot['at'][0]:g}, {shot['at'][1]:g}: {hit}")
+
+
+def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
+    """One shot of the command line as a scene file would have it."""
+    if arguments.at is None:
+        raise InputError("--at: expected X,Y with --weapon, got nothing")
+    try:
+        at = [float(part) for part in arguments.at.split(",")]
+    except ValueError as error:
+        raise InputError(f"--at: expected two numbers X,Y, got {arguments.at!r}") from error
+    shot: dict[str, Any] = {"weapon": arguments.weapon, "at": at}
+    return shot | {name: getattr(arguments, name) for name in ("aim", "seed") if getattr(arguments, name) is not None}
