@@ -31,6 +31,9 @@ WHY_NOT_LINES = 3
 """Objects that a card names as not hit; the JSON has them all."""
 
 
+HEADER = ["object", "pixels", "of seen", "first at"]
+
+
 class Text(NamedTuple):
     """A line of text: (x, y) is the left end of its base line, or the right end, px."""
 
@@ -69,7 +72,8 @@ def draw_texts(page: Image, texts: Sequence[Text]) -> None:
     for text in texts:
         shown = text.text.encode("ascii", "replace").decode()
         x = text.x - text_width(shown) if text.right else text.x
-        cv2.putText(page, shown, (x, text.y), cv2.FONT_HERSHEY_SIMPLEX, SIZE, text.color, 1 + text.bold, cv2.LINE_AA)
+        font = cv2.FONT_HERSHEY_DUPLEX if text.bold else cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(page, shown, (x, text.y), font, SIZE, text.color, 1, cv2.LINE_AA)
 
 
 def text_width(text: str) -> int:
@@ -125,7 +129,7 @@ def _card(
     _bar(page, shot["verdicts"], x + 10, y + 36, wide - 20)
     for row, cells in enumerate(lines):
         base = y + 66 + row * LINE
-        color = FAINT if len(cells) == 1 or (row == 0 and cells[0] == "object") else INK
+        color = FAINT if len(cells) == 1 or cells == HEADER else INK
         texts.append(Text(x + 10, base, _clipped(cells[0], wide - 20 if len(cells) == 1 else wide - 250), color))
         for cell, offset in zip(cells[1:], (160, 90, 10), strict=False):
             texts.append(Text(x + wide - offset, base, cell, color, right=True))
@@ -137,7 +141,7 @@ def _card_lines(shot: Mapping[str, Any]) -> list[list[str]]:
     counts = [f"{n} {verdict}" for verdict, n in shot["verdicts"].items() if n]
     lines = [[", ".join(counts) or "no samples"]]
     if shot["rows"]:
-        lines.append(["object", "pixels", "of seen", "first at"])
+        lines.append(HEADER)
     rounds = len({row["round"] for row in shot["rows"]}) > 1
     for row in shot["rows"]:
         name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]

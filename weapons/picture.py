@@ -20,7 +20,7 @@ from planes.spans import Box
 from weapons.marks import MARKS, glyph
 from weapons.panel import EDGE, HATCH, OUTLINE, OUTLINE_HIT, TOP, Text, draw_texts, page_of
 
-__all__ = ["picture_of_report"]
+__all__ = ["mark_samples", "picture_of_report", "view_of"]
 
 WIDTH, HEIGHT, LARGEST = 1440, 900, 24
 """The scene is enlarged by the greatest whole factor, up to LARGEST, that stays within these pixels."""
@@ -99,7 +99,7 @@ def _world(report: Mapping[str, Any], scene: Scene, view: Box, factor: int) -> t
         if item not in hit:
             _outline(world, scene, item, view, factor, hit=False)
     for verdict in MARKS:
-        _mark(world, report, verdict, view, factor)
+        mark_samples(world, report, verdict, view, factor)
     for item in sorted(hit):
         _outline(world, scene, item, view, factor, hit=True)
     return world, _badges(world, report, view, factor)
@@ -143,7 +143,7 @@ def _core(inside: Bools) -> Bools:
     return np.asarray(inside & up & down & np.roll(inside, 1, axis=1) & np.roll(inside, -1, axis=1))
 
 
-def _mark(world: Image, report: Mapping[str, Any], verdict: str, view: Box, factor: int) -> None:
+def mark_samples(world: Image, report: Mapping[str, Any], verdict: str, view: Box, factor: int) -> None:
     """Mark the samples of one verdict, each with the verdict's shape."""
     at = np.zeros((view[3] - view[1] + 1, view[2] - view[0] + 1), np.bool_)
     for shot in report["shots"]:

@@ -1,0 +1,68 @@
+"""The command, as its user runs it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from weapons.cli import main
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+
+
+def test_report_writes_picture_and_facts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    png, facts = tmp_path / "r.png", tmp_path / "r.json"
+    assert main(["report", str(GALLERY), "-o", str(png), "--json", str(facts)]) == 0
+    picture = cv2.imread(str(png))
+    assert picture.shape[1] > 1000 and picture.std() > 20
+    report = json.loads(facts.read_text())
+    assert [shot["weapon"] for shot in report["shots"]][:2] == ["pistol", "shotgun"]
+    assert "bullseye 1 px" in capsys.readouterr().out
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.json", "r.png"]
+
+
+def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    png, facts = tmp_path / "r.png", tmp_path / "r.json"
+    words = ["report", str(GALLERY), "--weapon", "laser", "--at", "126,167", "--aim", "1", "--seed", "4"]
+    assert main([*words, "-o", str(png), "--json", str(facts)]) == 0
+    (shot,) = json.loads(facts.read_text())["shots"]
+    assert shot["aim"] == 1 and shot["seed"] == 4
+    assert [row["name"] for row in shot["rows"]] == ["duck 1", "duck 2", "duck 3"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["report", "nowhere"], "nowhere/scene.json: cannot read it"),
+        (["report", str(GALLERY), "--weapon", "lazer", "--at", "1,2"], "did you mean 'laser'?"),
+        (["report", str(GALLERY), "--weapon", "laser"], "--at: expected X,Y"),
+        (["report", str(GALLERY), "--weapon", "laser", "--at", "1;2"], "--at: expected two numbers X,Y, got '1;2'"),
+        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,nan"], "at[1]: expected a finite number"),
+        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),
+        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
+        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
+        (["report", str(GALLERY), "--at", "1,2"], "--at: expected together with --weapon"),
+        (["report", str(GALLERY), "-o", "/no/such/folder/r.png"], "cannot write /no/such/folder/r.png"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_shows_examples_and_bad_words_exit_2() -> None:
+    run = [sys.executable, "-W", "error", "-m", "weapons"]
+    shown = subprocess.run([*run, "report", "--help"], capture_output=True, text=True, check=True).stdout
+    assert "hitplanes report fixtures/gallery --weapon shotgun --at 138,91" in shown
+    assert subprocess.run([*run, "rapport"], capture_output=True, check=False).returncode == 2
+    assert subprocess.run(run, capture_output=True, check=False).returncode == 2

@@ -1,0 +1,149 @@
+"""Reports: facts that agree with the hits, and pictures that show them, on any OpenCV."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planes import InputError, Scene, Sprite, load_scene
+from planes.render import blend, draw_view
+from weapons import Disc, Weapon, arsenal_of, fire
+from weapons.facts import report_of
+from weapons.marks import MARKS, glyph
+from weapons.orders import Order, fire_order, orders_of
+from weapons.panel import EDGE, TOP
+from weapons.picture import mark_samples, picture_of_report
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+
+
+def order(weapon: Weapon, at: tuple[float, float], **more: Any) -> Order:
+    return Order("test", weapon, at, **more)
+
+
+def small_scene() -> tuple[Scene, int]:
+    scene = Scene((32, 24))
+    target = scene.add(np.ones((6, 6), np.bool_), (10, 10), name="target")
+    scene.add(np.ones((3, 12), np.bool_), (10, 12), role="occluder", layer=1, name="wall")
+    return scene, target
+
+
+def test_facts_agree_with_the_hits() -> None:
+    scene = load_scene(GALLERY)
+    orders = orders_of(scene, arsenal_of(scene))
+    report = report_of(scene, orders)
+    assert json.loads(json.dumps(report)) == report
+    for told, given in zip(report["shots"], orders, strict=True):
+        hits = fire_order(scene, given)
+        assert [row["object"] for row in told["rows"]] == hits.object.tolist()
+        assert told["verdicts"] == hits.verdict_counts(0)
+        samples = hits.samples_at(0)
+        pixels = {tuple(p) for p in samples.xy.tolist()}
+        assert sum(last - first + 1 for runs in told["samples"].values() for _, first, last in runs) == len(pixels)
+
+
+def test_every_sample_is_marked_with_its_shape() -> None:
+    scene, _ = small_scene()
+    report = report_of(scene, [order(Disc(6), (10, 10))])
+    samples = report["shots"][0]["samples"]
+    assert set(samples) == {"hit", "occluded", "empty"}
+    factor, view = 8, (2, 3, 20, 19)
+    for verdict, runs in samples.items():
+        world = np.zeros((17 * factor, 19 * factor, 3), np.uint8)
+        mark_samples(world, report, verdict, view, factor)
+        wanted = np.zeros(world.shape[:2], np.bool_)
+        for y, first, last in runs:
+            for x in range(max(first, 2), last + 1):
+                if y >= 3:
+                    wanted[(y - 3) * factor :, (x - 2) * factor :][:factor, :factor] = glyph(verdict, factor)
+        assert np.array_equal(world.any(axis=2), wanted), verdict
+        assert wanted.any()
+
+
+def test_shapes_differ_from_each_other_without_colour() -> None:
+    for size in (3, 4, 6, 12, 24):
+        drawn = {verdict: glyph(verdict, size).tobytes() for verdict in MARKS}
+        assert len(set(drawn.values())) == len(MARKS), size
+
+
+@pytest.mark.parametrize(
+    ("scene", "shots"),
+    [
+        (Scene((32, 24)), []),
+        (Scene((32, 24)), [order(Disc(3), (500, 500))]),
+        (Scene((1920, 1080)), [order(Disc(40), (900, 500))]),
+        (Scene(), [order(Disc(2), (10**9, -(10**9)))]),
+        (Scene((1, 1)), [order(Disc(0), (0, 0))]),
+        (Scene((2**40, 2**40)), [order(Disc(30), (2**39, 2**39))]),
+    ],
+    ids=["no shot", "outside", "large", "no bounds, far", "one pixel", "huge world"],
+)
+def test_any_scene_has_a_picture(scene: Scene, shots: list[Order]) -> None:
+    report = report_of(scene, shots)
+    picture = picture_of_report(report, scene)
+    assert picture.dtype == np.uint8 and picture.shape[2] == 3
+    assert max(picture.shape) <= 4000
+
+
+def test_long_and_foreign_names_and_many_objects_are_drawn() -> None:
+    scene = Scene((200, 100), name="a very long name " * 12)
+    for i in range(300):
+        scene.add(Sprite.circle(4), (5 + i % 20 * 10, 5 + i // 20 * 6), name=f"objet numéro {i} " + "x" * 80)
+    picture = picture_of_report(report_of(scene, [order(Disc(60), (100, 50))]), scene)
+    assert picture.shape[0] < 10_000
+
+
+def test_text_is_a_layer_of_its_own() -> None:
+    scene, _ = small_scene()
+    report = report_of(scene, [order(Disc(6), (10, 10))])
+    with_text, without = picture_of_report(report, scene), picture_of_report(report, scene, text=False)
+    assert with_text.shape == without.shape
+    assert not np.array_equal(with_text, without)
+
+
+def test_picture_without_text_is_the_same_on_every_opencv() -> None:
+    scene = load_scene(GALLERY)
+    report = report_of(scene, orders_of(scene, arsenal_of(scene)))
+    world = picture_of_report(report, scene, text=False)[TOP : TOP + 810, EDGE : EDGE + 1440]
+    assert hashlib.sha256(world.tobytes()).hexdigest()[:16] == WORLD_HASH
+
+
+WORLD_HASH = "6203330855319e9d"
+"""Of the gallery's world without text; look at the picture before changing it."""
+
+
+def test_a_changed_scene_is_refused() -> None:
+    scene, target = small_scene()
+    report = report_of(scene, [order(Disc(6), (10, 10))])
+    scene.move(target, (11, 10))
+    with pytest.raises(InputError, match="it has changed"):
+        picture_of_report(report, scene)
+
+
+def test_drawing_changes_nothing_that_decides() -> None:
+    scene, _ = small_scene()
+    before = scene.content_hash(), scene.version
+    hits = fire(scene, Disc(6), (10, 10))
+    picture_of_report(report_of(scene, [order(Disc(6), (10, 10))]), scene)
+    assert (scene.content_hash(), scene.version) == before
+    assert hits == fire(scene, Disc(6), (10, 10))
+
+
+def test_view_draws_by_layer_and_hud_last() -> None:
+    scene = Scene((4, 1))
+    scene.add(Sprite.from_mask(np.ones((1, 4), np.bool_), color=(10, 0, 0)), (1.5, 0), role="background", layer=9)
+    scene.add(Sprite.from_mask(np.ones((1, 3), np.bool_), color=(20, 0, 0)), (2, 0), layer=2)
+    scene.add(Sprite.from_mask(np.ones((1, 2), np.bool_), color=(30, 0, 0)), (2.5, 0), role="mover", layer=3)
+    scene.add(Sprite.from_mask(np.ones((1, 1), np.bool_), color=(40, 0, 0)), (3, 0), role="hud", layer=-5)
+    assert draw_view(scene.items, (0, 0, 3, 0))[0, :, 0].tolist() == [10, 20, 30, 40]
+
+
+def test_blend_rounds_to_the_nearest_and_clips() -> None:
+    picture = np.full((2, 2, 3), 100, np.uint8)
+    blend(picture, (200, 200, 200), np.full((3, 3), 128, np.uint8), -1, -1)
+    assert picture.tolist() == [[[150] * 3] * 2] * 2

@@ -1,0 +1,70 @@
+"""What the README shows is run as written."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from planes import load_scene
+from weapons import arsenal_of
+from weapons.arsenal import KINDS
+from weapons.orders import fire_order, orders_of
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def section(heading: str) -> str:
+    return README.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+@pytest.mark.parametrize("heading", ["Run it", "Test it"])
+def test_each_command_is_one_block_of_one_line(heading: str) -> None:
+    (block,) = re.findall(r"```sh\n(.*?)```", section(heading), flags=re.DOTALL)
+    assert len(block.strip().splitlines()) == 1
+
+
+def test_ten_lines_print_what_is_shown() -> None:
+    code, shown = blocks("python")[0], blocks("text")[0]
+    assert len([line for line in code.splitlines() if line]) <= 10
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert done.stdout == shown
+
+
+def test_batch_example_runs() -> None:
+    subprocess.run([sys.executable, "-W", "error", "-c", blocks("python")[1]], cwd=ROOT, check=True)
+
+
+def test_scene_example_loads_and_hits(tmp_path: Path) -> None:
+    (tmp_path / "scene.json").write_text(blocks("json")[0])
+    scene = load_scene(tmp_path)
+    (order,) = orders_of(scene, arsenal_of(scene))
+    assert [scene.name_of(row.object) for row in fire_order(scene, order)] == ["duck"]
+
+
+def test_every_weapon_and_scene_key_is_told() -> None:
+    told = section("The scene folder")
+    for kind, weapon in KINDS.items():
+        assert f"`{kind}`" in told
+        for field in fields(weapon):
+            assert f"`{field.name}`" in told, f"{kind}: {field.name}"
+
+
+def test_picture_is_there() -> None:
+    (name,) = re.findall(r"!\[.*?\]\((.*?)\)", README)
+    assert (ROOT / name).stat().st_size < 400_000
+
+
+def test_glossary_names_every_verdict() -> None:
+    counts = json.loads(blocks("text")[0].splitlines()[-1].replace("'", '"'))
+    assert all(verdict in section("Glossary") for verdict in counts)
