@@ -17,7 +17,7 @@ from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
 from planes.items import Items, Stack, overlapping
 from planes.spans import Box
 
-__all__ = ["CodePlane", "label_plane", "plane_fits"]
+__all__ = ["CodePlane", "area", "label_plane", "plane_fits"]
 
 Codes = npt.NDArray[np.unsignedinteger[Any]]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from planes.arrays import Bools
 
-__all__ = ["MARKS", "glyph"]
+__all__ = ["MARKS", "TINT", "glyph", "tiled_glyph"]
 
 MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
     "empty": ((255, 255, 255), 190),
@@ -16,6 +16,20 @@ MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
     "hit": ((235, 96, 10), 225),
 }
 """Colour (after Okabe and Ito) and opacity of each verdict, in the order of drawing."""
+
+
+TINT = 40
+"""Opacity of a mark's ground: where samples are too small for a shape each, it shows all of them."""
+
+SHAPE_MIN = 6
+"""Least size of a shape on the page, px; smaller samples share one."""
+
+
+def tiled_glyph(verdict: str, factor: int, shape: tuple[int, ...]) -> Bools:
+    """Marks side by side over a page (height, width), one for each sample, or for a few where they are small."""
+    size = factor if factor >= SHAPE_MIN // 2 else -(-SHAPE_MIN // factor) * factor
+    one = glyph(verdict, size)
+    return np.tile(one, (-(-shape[0] // size), -(-shape[1] // size)))[: shape[0], : shape[1]]
 
 
 def glyph(verdict: str, size: int) -> Bools:

@@ -18,11 +18,14 @@ Color = tuple[int, int, int]
 EDGE, TOP = 16, 44
 """Left edge of the picture on the page, and its top, px."""
 
-LINE, COLUMN, NARROWEST, GAP = 19, 430, 900, 12
+LINE, COLUMN, NARROWEST, GAP = 19, 420, 900, 12
 """Height of a line, least width of a card, least width of a page, space between cards, px."""
 
 GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
 OUTLINE_HIT, OUTLINE, HATCH = (255, 200, 40), (240, 240, 240), (200, 212, 230)
+
+ENTRY = 124
+"""Width of an entry of the legend, px; not taken from the text, whose width depends on the version of OpenCV."""
 
 SIZE = 0.42
 """Scale of OpenCV's font, about 8 px a letter."""
@@ -45,8 +48,8 @@ class Text(NamedTuple):
     right: bool = False
 
 
-def page_of(report: Mapping[str, Any], world: Image) -> tuple[Image, list[Text]]:
-    """Lay a page around the enlarged world; its texts are drawn later."""
+def page_of(report: Mapping[str, Any], world: Image, badges: Sequence[Text]) -> tuple[Image, list[Text]]:
+    """Lay a page around the enlarged world; texts, with those of the world, are drawn later."""
     width = max(world.shape[1] + 2 * EDGE, NARROWEST)
     columns = max(1, (width - 2 * EDGE + GAP) // (COLUMN + GAP))
     wide = (width - 2 * EDGE - GAP * (columns - 1)) // columns
@@ -59,8 +62,10 @@ def page_of(report: Mapping[str, Any], world: Image) -> tuple[Image, list[Text]]
         bottoms[column] += len(lines) * LINE + 62 + GAP
     page = np.empty((max(bottoms) + 34, width, 3), np.uint8)
     page[:] = GROUND
-    page[TOP : TOP + world.shape[0], EDGE : EDGE + world.shape[1]] = world
-    texts = [Text(EDGE, 28, report["scene"]["name"], INK, bold=True), _summary(report, width)]
+    left = (width - world.shape[1]) // 2
+    page[TOP : TOP + world.shape[0], left : left + world.shape[1]] = world
+    texts = [badge._replace(x=badge.x + left, y=badge.y + TOP) for badge in badges]
+    texts += [Text(EDGE, 28, _clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
     texts += _legend(page, report, TOP + world.shape[0] + 14)
     for number, (shot, lines, (x, y)) in enumerate(zip(report["shots"], cards, places, strict=True), 1):
         texts += _card(page, shot, number, lines, (x, y, wide))
@@ -98,13 +103,13 @@ def _legend(page: Image, report: Mapping[str, Any], y: int) -> list[Text]:
             page[y : y + 14, x : x + 14] = (70, 74, 82)
             page[y : y + 14, x : x + 14][glyph(verdict, 14)] = color
             texts.append(Text(x + 20, y + 12, verdict, FAINT))
-            x += 44 + text_width(verdict)
+            x += ENTRY
     hit = any(shot["rows"] for shot in report["shots"])
     for color, name, there in ((OUTLINE_HIT, "object hit", hit), (OUTLINE, "other target", True)):
         if there:
             cv2.rectangle(page, (x, y), (x + 13, y + 13), color, 1)
             texts.append(Text(x + 20, y + 12, name, FAINT))
-            x += 44 + text_width(name)
+            x += ENTRY
     if report["scene"]["occluders"]:
         rows, columns = np.mgrid[:14, :14]
         page[y : y + 14, x : x + 14] = (70, 74, 82)
@@ -146,7 +151,7 @@ def _card_lines(shot: Mapping[str, Any]) -> list[list[str]]:
     for row in shot["rows"]:
         name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]
         distance = f"{row['distance2'] ** 0.5:.1f} px"
-        lines.append([name, str(row["pixels"]), f"{100 * row['shares']['of_visible']:.1f} %", distance])
+        lines.append([name, str(row["pixels"]), _percent(row["shares"]["of_visible"]), distance])
     for entry in shot["why_not"][:WHY_NOT_LINES]:
         lines.append([f"not {entry['name']}: {_reason(entry)}"])
     if len(shot["why_not"]) > WHY_NOT_LINES:
@@ -199,6 +204,10 @@ def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
         Text(EDGE, height - 12, left, FAINT),
         Text(width - EDGE, height - 12, "ran: " + ", ".join(ran) if ran else "", FAINT, right=True),
     ]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
 
 
 def _clipped(text: str, width: int) -> str:

@@ -17,12 +17,12 @@ from planes.items import Role
 from planes.render import blend, draw_view
 from planes.scene import Scene
 from planes.spans import Box
-from weapons.marks import MARKS, glyph
-from weapons.panel import EDGE, HATCH, OUTLINE, OUTLINE_HIT, TOP, Text, draw_texts, page_of
+from weapons.marks import MARKS, TINT, tiled_glyph
+from weapons.panel import HATCH, OUTLINE, OUTLINE_HIT, Text, draw_texts, page_of
 
 __all__ = ["mark_samples", "picture_of_report", "view_of"]
 
-WIDTH, HEIGHT, LARGEST = 1440, 900, 24
+WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 """The scene is enlarged by the greatest whole factor, up to LARGEST, that stays within these pixels."""
 
 VIEW_MAX = 2048
@@ -59,9 +59,9 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     factor = min(WIDTH // (view[2] - view[0] + 1), HEIGHT // (view[3] - view[1] + 1), LARGEST)
     factor = max(factor, 1)
     world, texts = _world(report, scene, view, factor)
-    page, more = page_of(report, world)
+    page, texts = page_of(report, world, texts)
     if text:
-        draw_texts(page, [Text(t.x + EDGE, t.y + TOP, t.text, t.color, t.bold) for t in texts] + more)
+        draw_texts(page, texts)
     return page
 
 
@@ -92,6 +92,8 @@ def _world(report: Mapping[str, Any], scene: Scene, view: Box, factor: int) -> t
     if scene.bounds is not None:
         _shade_outside(dimmed, view, scene.bounds)
     world = _enlarged(dimmed, factor)
+    if scene.bounds is not None and view != scene.bounds:
+        _frame(world, view, scene.bounds, factor)
     front = label_plane(scene.items.stack(), view)
     _hatch(world, np.isin(front, scene.ids(Role.OCCLUDER) + 1), factor)
     hit = {row["object"] for shot in report["shots"] for row in shot["rows"]}
@@ -110,6 +112,13 @@ def _shade_outside(picture: Image, view: Box, bounds: Box) -> None:
     y, x = np.ogrid[view[1] : view[3] + 1, view[0] : view[2] + 1]
     outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
     picture[outside] = (18, 19, 22)
+
+
+def _frame(world: Image, view: Box, bounds: Box, factor: int) -> None:
+    """Draw a line around the bounds."""
+    corners = [(v - low) * factor for v, low in zip(bounds, (view[0], view[1]) * 2, strict=True)]
+    x, y, x_max, y_max = np.clip(corners, -factor, max(world.shape) + factor).tolist()
+    cv2.rectangle(world, (x - 1, y - 1), (x_max + factor, y_max + factor), (120, 126, 136), 1)
 
 
 def _hatch(world: Image, occluding: Bools, factor: int) -> None:
@@ -154,10 +163,12 @@ def mark_samples(world: Image, report: Mapping[str, Any], verdict: str, view: Bo
     if not len(rows):
         return
     y0, x0 = int(rows.min()), int(columns.min())
-    part = at[y0 : rows.max() + 1, x0 : columns.max() + 1]
-    marks = np.kron(part, glyph(verdict, factor)).astype(np.bool_)
+    part = _enlarged(at[y0 : rows.max() + 1, x0 : columns.max() + 1], factor)
+    shape = tiled_glyph(verdict, factor, part.shape)
     color, alpha = MARKS[verdict]
-    _lay(world[y0 * factor :, x0 * factor :], marks, color, alpha)
+    window = world[y0 * factor :, x0 * factor :]
+    _lay(window, part, color, TINT)
+    _lay(window, part & shape, color, alpha)
 
 
 def _badges(world: Image, report: Mapping[str, Any], view: Box, factor: int) -> list[Text]:

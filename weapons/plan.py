@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from planes.arrays import InputError, choice
-from planes.compose import CodePlane
+from planes.compose import CodePlane, area
 from planes.items import Role, Stack
 from planes.scene import Scene
 from weapons.pattern import PatternTable
@@ -15,9 +15,10 @@ __all__ = ["STRATEGIES", "Plan", "Stage", "chosen_strategy", "plan_of"]
 
 STRATEGIES = ("auto", "direct", "composed")
 
-DIRECT_PLACEMENT_NS, DIRECT_PAIR_NS, DIRECT_PIXEL_NS = 1500.0, 4.0, 16.0
-COMPOSED_PLACEMENT_NS, COMPOSED_PIXEL_NS, REDRAW_PIXEL_NS = 1000.0, 14.0, 0.5
-"""Measured on one machine of 2 cores with `tests/bench/strategies.py`; only their ratios matter."""
+DIRECT_PLACEMENT_NS, DIRECT_PAIR_NS, DIRECT_PIXEL_NS = 300.0, 5.3, 20.0
+COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
+REDRAW_PIXEL_NS = 0.5
+"""Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +69,13 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
         return strategy, "asked for"
     if plane is None:
         return "direct", "no bounds that fit one plane"
-    samples = placements * (int(table.count.sum()) / max(len(table.count), 1))
-    redraw = plane.cost(scene.items)
-    composed = placements * COMPOSED_PLACEMENT_NS + samples * COMPOSED_PIXEL_NS + redraw * REDRAW_PIXEL_NS
+    patterns = max(len(table.count), 1)
+    samples = placements * int(table.count.sum()) / patterns
+    spans = placements * len(table.y) / patterns
+    composed = COMPOSED_CALL_NS + placements * COMPOSED_PLACEMENT_NS + spans * COMPOSED_SPAN_NS
+    composed += samples * COMPOSED_PIXEL_NS + plane.cost(scene.items) * REDRAW_PIXEL_NS
     x, y, x_max, y_max = plane.box_xyxy
-    box = stack.box_xyxy
-    covered = int(((box[:, 2] - box[:, 0] + 1) * (box[:, 3] - box[:, 1] + 1)).sum())
-    density = covered / ((x_max - x + 1) * (y_max - y + 1))
+    density = area(stack.box_xyxy) / ((x_max - x + 1) * (y_max - y + 1))
     direct = placements * (DIRECT_PLACEMENT_NS + len(stack) * DIRECT_PAIR_NS) + samples * density * DIRECT_PIXEL_NS
     name = "composed" if composed < direct else "direct"
     return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
