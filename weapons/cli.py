@@ -86,7 +86,7 @@ def report(arguments: argparse.Namespace) -> None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
     for shot in facts["shots"]:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"]) or "nothing"
-        print(f"{shot['weapon']} at {shot['at'][0]:g}, {shot['at'][1]:g}: {hit}")
+        print(f"{shot['weapon']} at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}: {hit}")
 
 
 def _shot(arguments: argparse.Namespace) -> dict[str, Any]:

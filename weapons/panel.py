@@ -170,11 +170,11 @@ def _reason(entry: Mapping[str, Any]) -> str:
 
 
 def _fired(shot: Mapping[str, Any]) -> str:
-    parts = [f"at {shot['at'][0]:g}, {shot['at'][1]:g}"]
+    parts = [f"at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}"]
     if shot["aim"] is not None:
         parts.append(f"aim {shot['aim']:g} deg")
     if shot["toward"] is not None:
-        parts.append(f"toward {shot['toward'][0]:g}, {shot['toward'][1]:g}")
+        parts.append(f"toward {shot['toward'][0]:.12g}, {shot['toward'][1]:.12g}")
     if shot["seed"]:
         parts.append(f"seed {shot['seed']}")
     if shot["accept"] is not None:
