@@ -11,12 +11,22 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Bools, Image, InputError, bools, choice, integer, integers, reals, within
-from planes.constants import CATEGORY_BITS, POSITION_MAX
+from planes.constants import POSITION_MAX, SUB
 from planes.image import read_png, write_png, write_text
 from planes.items import Role
 from planes.sprite import Sprite, rows_of
 
-__all__ = ["FileObject", "SceneFile", "mask_of_rows", "read_scene", "write_scene"]
+__all__ = [
+    "FileObject",
+    "SceneFile",
+    "keys_of",
+    "laid_out",
+    "mask_of_rows",
+    "names_of",
+    "read_scene",
+    "text_of",
+    "write_scene",
+]
 
 FORMAT = "hitplanes-scene/1"
 FILE_NAME = "scene.json"
@@ -125,7 +135,20 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
         "weapons": scene.weapons,
         "shots": scene.shots,
     }
-    write_text(folder / FILE_NAME, json.dumps(data, indent=1) + "\n")
+    write_text(folder / FILE_NAME, laid_out(data) + "\n")
+
+
+def laid_out(value: Any, depth: int = 0) -> str:
+    """JSON with one object of the scene, one weapon or one shot to a line."""
+    flat, pad, end = json.dumps(value), "\n" + "  " * (depth + 1), "\n" + "  " * depth
+    entry = depth > 1 and isinstance(value, dict)
+    if (depth > 0 and len(flat) <= 100) or entry or not isinstance(value, dict | list):
+        return flat
+    if isinstance(value, dict):
+        return (
+            "{" + ",".join(f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1)}" for key, v in value.items()) + end + "}"
+        )
+    return "[" + ",".join(pad + laid_out(v, depth + 1) for v in value) + end + "]"
 
 
 def keys_of(what: str, data: object, known: object) -> dict[str, Any]:
@@ -153,7 +176,7 @@ def names_of(name: str, value: object) -> list[str]:
 
 def mask_of_rows(name: str, rows: object) -> Bools:
     """Mask (h, w) of rows of '#' (set) and '.' (not), or an array of booleans."""
-    if not (isinstance(rows, list) and rows and isinstance(rows[0], str)):
+    if not (isinstance(rows, list | tuple) and rows and isinstance(rows[0], str)):
         return bools(name, rows, (None, None))
     for i, row in enumerate(rows):
         if not isinstance(row, str) or len(row) != len(rows[0]) or set(row) - set("#."):
@@ -288,7 +311,7 @@ def _saved_source(sprite: Sprite, folder: Path) -> dict[str, Any]:
     masks = [frame.mask for frame in sprite.frames]
     options: dict[str, Any] = {}
     if sprite.pivot_256 is not None:
-        options["pivot_xy"] = [v / 256 for v in sprite.pivot_256]
+        options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
     if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
         color = {} if sprite.color is None else {"color": list(sprite.color)}
         return {"mask": rows_of(masks[0]), **options, **color}
@@ -328,6 +351,3 @@ def _write_apart(folder: Path, name: str, sheet: Image) -> str:
         if np.array_equal(read_png(path), sheet):
             return path.name
     raise InputError(f"image: expected a free name like {name!r} in {folder}")
-
-
-CATEGORIES_MAX = CATEGORY_BITS - 1

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planes.arrays import InputError, Ints, bools, choice, flag, integer, real, reals, within
+from planes.arrays import InputError, Ints, choice, flag, integer, real, reals, within
 from planes.constants import HALF, MASK_SIDE_MAX, PELLETS_MAX, REACH_MAX, SUB
 from planes.grid256 import pixel, snap, turned, unit
 from planes.rasterise import beam, cone, disc, polygon, ring
@@ -274,15 +274,14 @@ class Stencil(Plain):
     def __post_init__(self) -> None:
         """Check the mask and keep a copy that cannot be written."""
         super().__post_init__()
-        rows = self.mask.tolist() if isinstance(self.mask, np.ndarray) else list(self.mask)
-        object.__setattr__(self, "mask", tuple(rows_of(bools("mask", mask_of_rows("mask", rows), (None, None)))))
+        object.__setattr__(self, "mask", tuple(rows_of(mask_of_rows("mask", self.mask))))
         if self.pivot_xy is not None:
             pivot = reals("pivot_xy", self.pivot_xy, (2,), MASK_SIDE_MAX)
             object.__setattr__(self, "pivot_xy", tuple(pivot.tolist()))
 
     @cached_property
     def _sprite(self) -> Sprite:
-        return Sprite.from_mask(mask_of_rows("mask", list(self.mask)), pivot_xy=self.pivot_xy)
+        return Sprite.from_mask(mask_of_rows("mask", self.mask), pivot_xy=self.pivot_xy)
 
     @property
     def reach_256(self) -> int:
