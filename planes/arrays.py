@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Ints", "InputError", "bools", "choice", "flag", "integer", "integers", "real", "reals", "within"]
+__all__ = [
+    "Bools", "Floats", "Image", "InputError", "Ints", "array_of", "bools", "choice", "each", "flag", "integer",
+    "integers", "real", "reals", "within",
+]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -31,6 +34,21 @@ def within(place: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{place}: {error}") from error
+
+
+def array_of(field: str, values: object, shape: Shape | None = None) -> npt.NDArray[Any]:
+    """Take whatever `numpy.asarray` takes; rows of different length and the like are refused by name."""
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError, OverflowError) as error:
+        of_shape = "" if shape is None else f" of shape {_spelled(shape)}"
+        raise InputError(f"{field}: expected an array{of_shape}, got {_shown(values)}") from error
+
+
+def each(field: str, value: object, n: int) -> npt.NDArray[Any]:
+    """Spread one value over n rows; an array is left as it is, for the next check."""
+    array = array_of(field, value)
+    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
 
 
 def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> Floats:
@@ -110,10 +128,7 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
 
 
 def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArray[Any]:
-    try:
-        array = np.asarray(values)
-    except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"{field}: expected an array of shape {_spelled(shape)}, got {_shown(values)}") from error
+    array = array_of(field, values, shape)
     if array.size and array.dtype.kind not in kinds:
         kind = "booleans" if kinds.startswith("b") else "numbers"
         raise InputError(f"{field}: expected {kind}, got {array.dtype} ({_shown(values)})")

@@ -34,6 +34,9 @@ PLANE_SIDE_MAX = 65_535
 PLANE_AREA_MAX = 2**28
 """Largest area of one whole plane, px (1 GiB of uint32 codes). Larger worlds are answered without planes."""
 
+ITEMS_MAX = 2**22
+"""Objects that a scene may ever have had: ids are not used again, and each takes about 100 bytes."""
+
 ITEMS_UINT16 = 32_767
 """Item numbers that fit a uint16 code plane, whose lowest bit says "more behind"."""
 
@@ -48,6 +51,9 @@ ALPHA_THRESHOLD = 127
 
 WEIGHT_FULL = 65_535
 """The weight of a sample at full strength; falloff lowers it to 0 at the end of the reach."""
+
+SEED_MAX = 2**64 - 1
+"""Largest seed."""
 
 PELLETS_MAX = 65_536
 """Pellets of one spread, and rounds of one burst: beyond it a loop was forgotten."""

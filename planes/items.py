@@ -10,8 +10,8 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
-from planes.constants import ATLAS_SLACK_BYTES, JOURNAL_ROWS
+from planes.arrays import Bools, InputError, Ints
+from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
 from planes.sprite import Form, Sprite, Variant, variant_of
 
@@ -157,9 +157,11 @@ class Items:
     def add(self, sprite: Sprite, form: Form, angle: float, name: str, values: dict[str, object]) -> int:
         """Append an item; `values` are its columns."""
         item = self.count
+        if item >= ITEMS_MAX:
+            raise InputError(f"objects: expected at most {ITEMS_MAX} in the life of a scene, got one more")
+        variant = variant_of(sprite, form)
         self._reserve(item + 1)
         self.count += 1
-        variant = variant_of(sprite, form)
         self.sprites.append(sprite)
         self.forms.append(form)
         self.angles.append(angle)

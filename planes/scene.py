@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError, Ints, choice, integer, integers, reals, within
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, choice, each, integer, integers, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
-from planes.scenefile import FileObject, SceneFile, read_scene, write_scene
+from planes.scenefile import FileObject, SceneFile, read_scene, text_of, write_scene
 from planes.spans import Box
 from planes.sprite import Form, as_sprite, form_of
 
@@ -60,8 +60,8 @@ class Scene:
         categories: Iterable[str] = (),
         name: str = "scene",
     ) -> None:
-        self.name = name
-        self.categories = (DEFAULT_CATEGORY, *categories)
+        self.name = text_of("name", name)
+        self.categories = (DEFAULT_CATEGORY, *(text_of("categories", category) for category in categories))
         if len(self.categories) > CATEGORY_BITS:
             raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
         if len(set(self.categories)) < len(self.categories):
@@ -97,7 +97,7 @@ class Scene:
         origin_xy : pixel of the world at [0, 0]
         """
         given = {"background": background, "hittable": hittable, "mover": movers, "occluder": occluders, "hud": hud}
-        arrays = {role: np.asarray(plane) for role, plane in given.items() if plane is not None}
+        arrays = {role: array_of(role, plane) for role, plane in given.items() if plane is not None}
         sizes = {plane_size(role, array) for role, array in arrays.items()}
         if len(sizes) != 1:
             raise InputError(f"planes: expected one or more, all of one size, got {sorted(sizes)}")
@@ -165,7 +165,8 @@ class Scene:
             "owner": number if owner is None else integer("owner", owner, 0, number),
             "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
         }
-        return self.items.add(made, form, turn, name or f"{kind.value} {number}", values)
+        called = f"{kind.value} {number}" if name in (None, "") else text_of("name", name)
+        return self.items.add(made, form, turn, called, values)
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
         """Take objects out of the scene; their ids are not used again."""
@@ -199,11 +200,11 @@ class Scene:
         if position_xy is not None:
             columns["position_256"] = snap(_per_row("position_xy", position_xy, n, 2))
         if layer is not None:
-            columns["layer"] = integers("layer", _broad(layer, n), (n,), -LAYER_MAX, LAYER_MAX)
+            columns["layer"] = integers("layer", each("layer", layer, n), (n,), -LAYER_MAX, LAYER_MAX)
         if categories is not None:
             columns["categories"] = self._bits_per_row(categories, n)
         if owner is not None:
-            columns["owner"] = integers("owner", _broad(owner, n), (n,), 0, self.items.count - 1)
+            columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
         if role is not None:
             columns["role"] = ROLES.index(_role(role))
         angles, forms = self._new_forms(rows, angle, scale, flip, frame)
@@ -237,7 +238,10 @@ class Scene:
 
     def category_bits(self, *names: str) -> int:
         """Bits of named categories, for `accept`."""
-        return sum(1 << self.categories.index(choice("category", name, self.categories)) for name in names)
+        bits = 0
+        for name in names:
+            bits |= 1 << self.categories.index(choice("category", name, self.categories))
+        return bits
 
     def mask(self, item: int) -> tuple[Bools, tuple[int, int]]:
         """Mask (h, w) of an object as it is tested, read-only, and the pixel (x, y) of the world at [0, 0]."""
@@ -295,8 +299,14 @@ class Scene:
         write_scene(Path(folder), SceneFile(self.name, (x, y), size, names, objects, self.weapons, self.shots))
 
     def _bit_names(self) -> list[str]:
-        """A name for every bit."""
-        return [*self.categories, *(f"bit {bit}" for bit in range(len(self.categories), CATEGORY_BITS))]
+        """A name for every bit, each its own."""
+        names = list(self.categories)
+        for bit in range(len(names), CATEGORY_BITS):
+            name = f"bit {bit}"
+            while name in self.categories:
+                name += "'"
+            names.append(name)
+        return names
 
     def _file_object(self, item: int) -> FileObject:
         items, form = self.items, self.items.forms[item]
@@ -323,7 +333,7 @@ class Scene:
 
     def _existing(self, ids: object) -> Ints:
         """Ids that are in the scene, each once."""
-        given = np.atleast_1d(np.asarray(ids))
+        given = np.atleast_1d(array_of("ids", ids))
         rows = integers("ids", given if given.size else np.zeros(0, np.int64), (None,), 0, self.items.count - 1)
         gone = rows[self.items.alive[rows] == 0]
         if len(gone):
@@ -343,17 +353,19 @@ class Scene:
         if angle is None and scale is None and flip is None and frame is None:
             return angles, None
         if angle is not None:
-            angles = reals("angle", _broad(angle, n), (n,)).tolist()
+            angles = reals("angle", each("angle", angle, n), (n,)).tolist()
         one = 1 << SCALE_BITS
         scales = [(form.scale_x / one, form.scale_y / one) for form in old]
         if scale is not None:
             scales = [(sx, sy) for sx, sy in _scale_rows(scale, n).tolist()]
         frames = [form.frame for form in old]
         if frame is not None:
-            frames = integers("frame", _broad(frame, n), (n,), 0, 2**31).tolist()
+            frames = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
         flips = [form.flip for form in old]
         if flip is not None:
-            flips = list(_broad(flip, n).tolist())
+            flips = each("flip", flip, n).tolist()
+            if len(flips) != n:
+                raise InputError(f"flip: expected one for all or {n}, got {len(flips)}")
         sprites = [self.items.sprites[item] for item in rows.tolist()]
         forms = []
         for row, values in enumerate(zip(sprites, frames, flips, scales, angles, strict=True)):
@@ -371,7 +383,7 @@ class Scene:
         return self.category_bits(*categories)
 
     def _bits_per_row(self, categories: object, n: int) -> Ints:
-        values = np.asarray(categories)
+        values = array_of("categories", categories)
         if values.dtype.kind in "iu" and values.ndim:
             return integers("categories", values, (n,), 0, ALL)
         return np.full(n, self._bits(categories, 0))
@@ -403,7 +415,7 @@ def load_scene(folder: str | Path) -> Scene:
 
 
 def _add_entry(scene: Scene, entry: FileObject) -> None:
-    with within(f"object {entry.name or entry.id or scene.items.count!r}"):
+    with within(entry.place):
         if entry.id is not None:
             if entry.id < scene.items.count:
                 raise InputError(f"id: expected each id once, got {entry.id} again")
@@ -421,8 +433,10 @@ def _add_entry(scene: Scene, entry: FileObject) -> None:
 def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
     for item, entry in zip(scene.ids().tolist(), entries, strict=True):
         if entry.owner is not None:
-            with within(f"object {scene.name_of(item)}: owner"):
+            with within(f"{entry.place}: owner"):
                 owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
+                if entry.id is not None and owner >= scene.items.count:
+                    scene.items.skip_to(owner + 1)  # the owner was removed before the scene was saved
                 scene.set(item, owner=owner)
 
 
@@ -437,27 +451,21 @@ def _default_bits(role: Role) -> int:
 
 
 def _scale_pair(scale: object) -> tuple[float, float]:
-    values = np.asarray(scale)
+    values = array_of("scale", scale)
     pair = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
     return pair[0], pair[1]
 
 
-def _broad(value: object, n: int) -> npt.NDArray[Any]:
-    """One value for all rows; a list is left as it is, for the gate to check its shape."""
-    array = np.asarray(value)
-    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
-
-
 def _scale_rows(scale: object, n: int) -> Floats:
-    values = np.asarray(scale)
+    values = array_of("scale", scale)
     if values.ndim < 2:
-        values = _broad(values, n)[:, None]
+        values = each("scale", values, n)[:, None]
     shape = (n, 2) if values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2) else values.shape
     return reals("scale", np.broadcast_to(values, shape), (n, 2))
 
 
 def _per_row(name: str, values: object, n: int, width: int) -> Floats:
-    array = np.asarray(values)
+    array = array_of(name, values)
     if array.shape == (width,):
         array = np.broadcast_to(array, (n, width))
     return reals(name, array, (n, width), POSITION_MAX)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Bools, Image, InputError, bools, choice, integer, integers, reals, within
-from planes.constants import POSITION_MAX, SUB
+from planes.constants import ITEMS_MAX, POSITION_MAX, SUB
 from planes.image import read_png, write_png, write_text
 from planes.items import Role
 from planes.sprite import Sprite, rows_of
@@ -47,13 +47,16 @@ SOURCES = {
 POSE = ("angle", "scale", "flip", "frame", "layer")
 OBJECT_KEYS = ("id", "name", "position_xy", *POSE, "categories", "owner")
 SCENE_KEYS = ("format", "name", "bounds", "categories", "objects", "weapons", "shots")
+SHEET_WIDTH = 4096
+"""Frames of a saved sprite are laid in rows of about this width, px."""
+
 MASK_ROWS_AREA = 4096
 """A larger mask, px, is saved as an image: rows of text would fill pages."""
 
 
 @dataclass
 class FileObject:
-    """One object as a scene file has it; what is left out is not in `pose`."""
+    """One object as a scene file has it; what is left out is not in `pose`; `place` is for errors."""
 
     role: Role
     sprite: Sprite
@@ -63,6 +66,7 @@ class FileObject:
     categories: list[str] | None = None
     owner: str | int | None = None
     id: int | None = None
+    place: str = ""
 
 
 @dataclass
@@ -105,8 +109,10 @@ def read_scene(folder: Path) -> SceneFile:
         keys_of("objects", sections, SECTIONS)
         for section, role in SECTIONS.items():
             for row, entry in enumerate(_typed(f"objects.{section}", sections.get(section, []), list)):
-                with within(f"objects.{section}[{row}]"):
+                place = f"objects.{section}[{row}]"
+                with within(place):
                     scene.objects.append(_object(entry, role, folder, sprites))
+                    scene.objects[-1].place = place
         return scene
 
 
@@ -135,12 +141,16 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
         "weapons": scene.weapons,
         "shots": scene.shots,
     }
-    write_text(folder / FILE_NAME, laid_out(data) + "\n")
+    try:
+        text = laid_out(data)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"weapons, shots: expected plain JSON, got a value that is not: {error}") from error
+    write_text(folder / FILE_NAME, text + "\n")
 
 
 def laid_out(value: Any, depth: int = 0) -> str:
     """JSON with one object of the scene, one weapon or one shot to a line."""
-    flat, pad, end = json.dumps(value), "\n" + "  " * (depth + 1), "\n" + "  " * depth
+    flat, pad, end = json.dumps(value, allow_nan=False), "\n" + "  " * (depth + 1), "\n" + "  " * depth
     entry = depth > 1 and isinstance(value, dict)
     if (depth > 0 and len(flat) <= 100) or entry or not isinstance(value, dict | list):
         return flat
@@ -161,7 +171,7 @@ def keys_of(what: str, data: object, known: object) -> dict[str, Any]:
 
 def text_of(name: str, value: object) -> str:
     """Check a text of 1 to 200 characters."""
-    if not isinstance(value, str) or not 0 < len(value) <= 200:
+    if not isinstance(value, str) or not 0 < len(value) <= 200 or any(0xD800 <= ord(c) < 0xE000 for c in value):
         raise InputError(f"{name}: expected a text of 1 to 200 characters, got {value!r:.60}")
     return value
 
@@ -200,7 +210,9 @@ def _parsed(path: Path) -> dict[str, Any]:
         data = json.loads(text, object_pairs_hook=distinct, parse_constant=number)
     except OSError as error:
         raise InputError(f"cannot read it: {error.strerror}") from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON in UTF-8: {error}") from error
     return _typed("scene", data, dict)  # type: ignore[no-any-return]
 
@@ -241,8 +253,8 @@ def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite])
         pose={key: data[key] for key in POSE if key in data},
         name=text_of("name", data["name"]) if "name" in data else None,
         categories=names_of("categories", data["categories"]) if "categories" in data else None,
-        owner=owner if owner is None or isinstance(owner, str) else integer("owner", owner, 0, 2**31),
-        id=integer("id", data["id"], 0, 2**31) if "id" in data else None,
+        owner=owner if owner is None or isinstance(owner, str) else integer("owner", owner, 0, ITEMS_MAX - 1),
+        id=integer("id", data["id"], 0, ITEMS_MAX - 1) if "id" in data else None,
     )
 
 
@@ -288,7 +300,11 @@ def _inside(folder: Path, name: object) -> Path:
     path = folder.joinpath(*parts)
     if "\\" in text or ":" in text or text.startswith("/") or ".." in parts:
         raise InputError(f"image: expected a path inside the scene's folder, got {text!r}")
-    if not path.resolve().is_relative_to(folder.resolve()):
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a link to itself, a zero byte, a name that is too long
+        inside = False
+    if not inside:
         raise InputError(f"image: expected a path inside the scene's folder, got {text!r}, which leads out of it")
     return path
 
@@ -325,18 +341,22 @@ def _saved_source(sprite: Sprite, folder: Path) -> dict[str, Any]:
 
 
 def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
-    """All frames side by side, and their rectangles."""
-    rects, x = [], 0
+    """All frames in rows on one sheet, and their rectangles."""
+    widest = max(SHEET_WIDTH, *(frame.mask.shape[1] for frame in sprite.frames), 0)
+    rects, x, y, tall = [], 0, 0, 0
     for frame in sprite.frames:
         h, w = frame.mask.shape
-        rects.append([x, 0, w, h])
-        x += w
-    sheet = np.zeros((max(r[3] for r in rects), x, 4), np.uint8)
-    for frame, (left, _, w, h) in zip(sprite.frames, rects, strict=True):
+        if x + w > widest:
+            x, y, tall = 0, y + tall, 0
+        rects.append([x, y, w, h])
+        x, tall = x + w, max(tall, h)
+    sheet = np.zeros((y + tall, max(r[0] + r[2] for r in rects), 4), np.uint8)
+    for frame, (left, top, w, h) in zip(sprite.frames, rects, strict=True):
+        part = sheet[top : top + h, left : left + w]
         if frame.image is not None:
-            sheet[:h, left : left + w] = frame.image
+            part[:] = frame.image
         else:
-            sheet[:h, left : left + w][frame.mask] = (*(sprite.color or (255, 255, 255)), 255)
+            part[frame.mask] = (*(sprite.color or (255, 255, 255)), 255)
     return sheet, rects
 
 

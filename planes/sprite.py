@@ -8,6 +8,7 @@ image. Picture and mask go through the same map: what is drawn is what is tested
 from __future__ import annotations
 
 import itertools
+import math
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Image, InputError, Ints, bools, choice, integer, integers, real, reals
+from planes.arrays import Bools, Image, InputError, Ints, array_of, bools, choice, integer, integers, real, reals
 from planes.constants import (
     ALPHA_THRESHOLD,
     HALF,
@@ -127,6 +128,7 @@ class Sprite:
             Naming the field: not bytes, not an image, frames that leave it, a sheet that the grid does not divide.
         """
         rgba = _as_rgba(image)
+        source = {"alpha_threshold": alpha_threshold} | (source or {})
         mask = rgba[:, :, 3] > integer("alpha_threshold", alpha_threshold, 0, 255)
         if color_key is not None:
             key = integers("color_key", color_key, (3,), 0, 255)
@@ -190,10 +192,7 @@ def as_sprite(value: object) -> Sprite:
     """Take a Sprite, a boolean array (h, w) or an image (h, w, 3 or 4): whatever `numpy.asarray` takes."""
     if isinstance(value, Sprite):
         return value
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise InputError("sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4)") from error
+    array = array_of("sprite", value)
     if array.ndim == 2:
         return Sprite.from_mask(array)
     if array.ndim == 3:
@@ -277,15 +276,16 @@ def _shape_spans(outline: Outline, form: Form) -> Spans:
     for _ in range(form.quarter):
         c, s = -s, c
     if outline.radius is not None:
-        radii = [int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y)]
-        _check_size("scale", *(2 * v // SUB + 1 for v in radii))
-        return ellipse(radii[0], radii[1], c, s)
+        a, b = (int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y))
+        half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
+        _check_size("scale", *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
+        return ellipse(a, b, c, s)
     sign = np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
     scale = np.array([form.scale_x, form.scale_y])
-    rings = [rounded_div(r * sign * scale, ONE) for r in outline.rings]
+    rings = [turned(rounded_div(r * sign * scale, ONE), c, s) for r in outline.rings]
     every = np.concatenate(rings)
     _check_size("scale", *(int(v) // SUB + 1 for v in every.max(axis=0) - every.min(axis=0)))
-    return polygon([turned(r, c, s) for r in rings])
+    return polygon(rings)
 
 
 def _source_pixels(mask: Bools, pivot_256: tuple[int, int], form: Form) -> tuple[Ints, int, int]:
@@ -372,7 +372,7 @@ def _color(color: Sequence[int] | None) -> tuple[int, int, int] | None:
 
 
 def _as_rgba(image: object) -> Image:
-    array = np.asarray(image)
+    array = array_of("image", image)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] not in (3, 4):
         raise InputError(f"image: expected bytes of shape (h, w, 3 or 4), got {array.dtype} {array.shape}")
     _check_size("image", array.shape[1], array.shape[0])
@@ -404,8 +404,8 @@ def _frame_rects(
 
 
 def _check_size(name: str, width: int, height: int) -> None:
-    if max(width, height) > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
-        limit = f"a mask of sides up to {MASK_SIDE_MAX} px and {MASK_AREA_MAX} px in all"
+    if min(width, height) < 1 or max(width, height) > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
+        limit = f"a mask of sides up to {MASK_SIDE_MAX} px and {MASK_AREA_MAX} px in all, not empty"
         raise InputError(f"{name}: expected {limit}, got {width} x {height}")
 
 

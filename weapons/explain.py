@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.constants import MARGIN_PX, MASK_AREA_MAX, NEAR_PX
+from planes.constants import CHUNK_SAMPLES, MARGIN_PX, MASK_AREA_MAX, NEAR_PX
 from planes.items import Stack
 from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Runs, Verdict, walk
 from planes.scene import Scene
@@ -72,13 +72,17 @@ class WhyNot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Detail:
-    """One shot sample by sample; the last column is a place in the stack, -1 for none."""
+    """One shot sample by sample.
+
+    `place` is what decided the verdict, `ended` what ended the walk, as places in the stack, -1 for none.
+    """
 
     runs: Runs
     run: Ints
     x: Ints
     verdict: Ints
     place: Ints
+    ended: Ints
 
 
 def pierces(weapon: Weapon) -> bool:
@@ -100,8 +104,10 @@ def samples_of(scene: Scene, weapon: Weapon, shot: Shots) -> Samples:
 
 def blockers_of(scene: Scene, weapon: Weapon, shot: Shots) -> list[Blocked]:
     """Occluders that ended samples, most first, then by id."""
-    samples = samples_of(scene, weapon, shot)
-    ids, counts = np.unique(samples.item[samples.verdict == Verdict.OCCLUDED], return_counts=True)
+    stack = scene.items.stack()
+    ended = _detail(scene, weapon, volley_of(weapon, shot), shot).ended
+    ended = ended[ended >= 0]
+    ids, counts = np.unique(stack.ids[ended[stack.occluder[ended]]], return_counts=True)
     found = [Blocked(*pair) for pair in zip(ids.tolist(), counts.tolist(), strict=True)]
     return sorted(found, key=lambda b: (-b.samples, b.occluder))
 
@@ -150,22 +156,32 @@ def margins_of(scene: Scene, weapon: Weapon, shot: Shots) -> dict[int, float]:
     shift = shift[(shift**2).sum(axis=1) <= MARGIN_PX**2]
     volley = volley_of(weapon, shot)
     stack = scene.items.stack()
-    n, placements = len(shift), len(volley.shot)
-    moved = np.repeat(shift, placements, axis=0)
-    every = replace(
-        volley,
-        pattern=np.tile(volley.pattern, n), xy=np.tile(volley.xy, (n, 1)) + moved,
-        origin_xy=np.tile(volley.origin_xy, (n, 1)), round=np.tile(volley.round, n), pellet=np.tile(volley.pellet, n),
-        shot=np.zeros(n * placements, np.int64),
-    )  # fmt: skip
-    met = direct(every, shot, Sight(stack, scene.bounds, pierces(weapon), "box"))
-    hit = np.zeros((n, len(stack)), np.bool_)
-    hit[met.owner // placements, met.place] = True
+    hit = np.zeros((len(shift), len(stack)), np.bool_)
+    placements = len(volley.shot)
+    sight = Sight(stack, scene.bounds, pierces(weapon), "box")
+    step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
+    for first in range(0, len(shift), step):
+        met = direct(_shifted(volley, shift[first : first + step]), shot, sight)
+        hit[first + met.owner // placements, met.place] = True
     length2 = (shift**2).sum(axis=1)
     flips = hit != hit[length2 == 0]
     shortest = np.where(flips, length2[:, None], MARGIN_PX**2 + 1).min(axis=0, initial=MARGIN_PX**2 + 1)
     found = [(int(stack.ids[p]), math.sqrt(int(shortest[p]))) for p in np.flatnonzero(shortest <= MARGIN_PX**2)]
     return dict(sorted(found))
+
+
+def _shifted(volley: Volley, shift: Ints) -> Volley:
+    """Place a volley once for each shift, with all placements as those of the first shot."""
+    n = len(shift)
+    return replace(
+        volley,
+        pattern=np.tile(volley.pattern, n),
+        xy=np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley.shot), axis=0),
+        origin_xy=np.tile(volley.origin_xy, (n, 1)),
+        shot=np.tile(volley.shot, n),
+        round=np.tile(volley.round, n),
+        pellet=np.tile(volley.pellet, n),
+    )
 
 
 def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detail:
@@ -179,17 +195,20 @@ def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detai
     events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
     place = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    ended = place.copy()
     for kind in (SKIP, BLOCK, HIT):  # of one kind the first counts; a hit outranks a block, a block a skip
         told = events.take(np.flatnonzero(events.kind == kind)[::-1])
         event, column = each_pixel(told.x_first, told.x_last)
         place[start[told.run][event] + column] = told.place[event]
+        if kind == BLOCK or (kind == HIT and not pierces(weapon)):
+            ended[start[told.run][event] + column] = told.place[event]
     verdict = VERDICT_OF[state]
     if bounds is not None:
         y = runs.y[run]
         outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)
-        place[outside] = -1
-    return _Detail(runs, run, x, verdict, place)
+        place[outside] = ended[outside] = -1
+    return _Detail(runs, run, x, verdict, place, ended)
 
 
 def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float) -> WhyNot:
@@ -199,8 +218,8 @@ def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float
     y = detail.runs.y[detail.run]
     inside = np.flatnonzero((detail.x >= x0) & (detail.x <= x1) & (y >= y0) & (y <= y1))
     on = inside[stack.mask(place)[y[inside] - y0, detail.x[inside] - x0]]
-    deciders = detail.place[on]
-    by_place = np.unique(deciders[(deciders >= 0) & (deciders != place)], return_counts=True)
+    ended = detail.ended[on]
+    by_place = np.unique(ended[ended >= 0], return_counts=True)
     by = {int(stack.ids[p]): int(n) for p, n in zip(*by_place, strict=True)}
     here = np.array([place])
     if refused(stack, here, shot, np.zeros(1, np.int64))[0]:

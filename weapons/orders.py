@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from planes.arrays import InputError, choice, integer, real, reals, within
-from planes.constants import ALL, POSITION_MAX
+from planes.constants import ALL, POSITION_MAX, SEED_MAX
 from planes.scene import Scene
 from planes.scenefile import keys_of, names_of
 from weapons.arsenal import Weapon
 from weapons.firing import fire
 from weapons.hits import Hits
-from weapons.volley import SEED_MAX
 
 __all__ = ["Order", "fire_order", "order_from_json", "orders_of"]
 

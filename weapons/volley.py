@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planes.arrays import InputError, Ints, integer, integers, reals
-from planes.constants import ALL, POSITION_MAX
+from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
+from planes.constants import ALL, POSITION_MAX, SEED_MAX
 from planes.grid256 import ONE, pixel, rounded_div, snap, unit, unit_toward
 from weapons.arsenal import Plain, Rounds, Spread, Weapon, pattern_of
 from weapons.draws import disc_offsets
@@ -15,7 +15,6 @@ from weapons.pattern import PatternTable
 
 __all__ = ["Shots", "Volley", "checked_shots", "volley_of"]
 
-SEED_MAX = 2**64 - 1
 OWNER_MAX = 2**31
 
 
@@ -101,7 +100,7 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    given = np.asarray(at)
+    given = array_of("at", at)
     single = given.shape == (2,)
     at_256 = snap(reals("at", given.reshape(1, 2) if single else given, (None, 2), POSITION_MAX))
     n = len(at_256)
@@ -109,9 +108,9 @@ def checked_shots(
     return Shots(
         at_256,
         _directions(weapon, at_256, aim, toward),
-        integers("accept", _each(accept, n, "accept"), (n,), 0, ALL),
+        integers("accept", each("accept", accept, n), (n,), 0, ALL),
         _owners(exclude, n, single),
-        integers("shot", _each(numbers, n, "shot"), (n,), 0, 2**63 - 1),
+        integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
         integer("seed", seed, 0, SEED_MAX),
         single,
     )
@@ -149,10 +148,10 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
 def _directions(weapon: Weapon, at_256: Ints, aim: object, toward: object) -> Ints:
     n = len(at_256)
     if toward is None:
-        return np.stack(unit(reals("aim", _each(0.0 if aim is None else aim, n, "aim"), (n,))), axis=1)
+        return np.stack(unit(reals("aim", each("aim", 0.0 if aim is None else aim, n), (n,))), axis=1)
     if aim is not None:
         raise InputError("aim: expected aim or toward, got both")
-    points = np.asarray(toward)
+    points = array_of("toward", toward)
     points = np.broadcast_to(points, (n, 2)) if points.shape == (2,) else points
     offset = snap(reals("toward", points, (n, 2), POSITION_MAX)) - at_256
     same = np.flatnonzero((offset == 0).all(axis=1))
@@ -171,16 +170,11 @@ def _recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
     return np.stack([rounded_div(x * c - y * s, ONE), rounded_div(x * s + y * c, ONE)], axis=1)
 
 
-def _each(value: object, n: int, name: str) -> object:
-    array = np.asarray(value)
-    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
-
-
 def _owners(exclude: object, n: int, single: bool) -> Ints:
     """Owners (n, K): a number, one for each shot (n,), or several for all (1, K) or for each (n, K); -1 for none."""
     if exclude is None:
         return np.zeros((n, 0), np.int64)
-    array = np.asarray(exclude)
+    array = array_of("exclude", exclude)
     if array.ndim == 0:
         array = np.broadcast_to(array, (n, 1))
     elif array.ndim == 1:
