@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Bools, Image, InputError, bools, choice, integer, integers, reals, within
-from planes.constants import ITEMS_MAX, POSITION_MAX, SUB
+from planes.constants import ITEMS_MAX, MASK_AREA_MAX, MASK_SIDE_MAX, POSITION_MAX, SUB
 from planes.image import read_png, write_png, write_text
 from planes.items import Role
 from planes.sprite import Sprite, rows_of
@@ -144,7 +144,9 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
     try:
         text = laid_out(data)
     except (TypeError, ValueError) as error:
-        raise InputError(f"weapons, shots: expected plain JSON, got a value that is not: {error}") from error
+        raise InputError(
+            f"scene: expected weapons and shots of plain JSON, got a value that is not: {error}"
+        ) from error
     write_text(folder / FILE_NAME, text + "\n")
 
 
@@ -350,7 +352,10 @@ def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
             x, y, tall = 0, y + tall, 0
         rects.append([x, y, w, h])
         x, tall = x + w, max(tall, h)
-    sheet = np.zeros((y + tall, max(r[0] + r[2] for r in rects), 4), np.uint8)
+    width, height = max(r[0] + r[2] for r in rects), y + tall
+    if height > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
+        raise InputError(f"frames: expected frames that fit one sheet of {MASK_AREA_MAX} px, got {width} x {height}")
+    sheet = np.zeros((height, width, 4), np.uint8)
     for frame, (left, top, w, h) in zip(sprite.frames, rects, strict=True):
         part = sheet[top : top + h, left : left + w]
         if frame.image is not None:

@@ -2,7 +2,8 @@
 
 A turn is 90 k + r degrees: k by exact turns of the array, r by inverse mapping in integers. A pixel of the result is
 set when its centre, mapped back, lies in a closed pixel square that is set; so a mirrored sprite turns into the mirror
-image. Picture and mask go through the same map: what is drawn is what is tested.
+image (but at odd multiples of 45 degrees where width and height are odd and even: there the quarter turn settles how
+the pixels lie). Picture and mask go through the same map: what is drawn is what is tested.
 """
 
 from __future__ import annotations
@@ -128,8 +129,8 @@ class Sprite:
             Naming the field: not bytes, not an image, frames that leave it, a sheet that the grid does not divide.
         """
         rgba = _as_rgba(image)
-        source = {"alpha_threshold": alpha_threshold} | (source or {})
-        mask = rgba[:, :, 3] > integer("alpha_threshold", alpha_threshold, 0, 255)
+        threshold = integer("alpha_threshold", alpha_threshold, 0, 255)
+        mask = rgba[:, :, 3] > threshold
         if color_key is not None:
             key = integers("color_key", color_key, (3,), 0, 255)
             mask &= (rgba[:, :, :3] != key).any(axis=2)
@@ -138,7 +139,7 @@ class Sprite:
         frames = tuple(
             Frame(_frozen(mask[y : y + h, x : x + w]), _frozen(rgba[y : y + h, x : x + w])) for x, y, w, h in rects
         )
-        return cls(frames, _pivot(pivot_xy), source=source)
+        return cls(frames, _pivot(pivot_xy), source={"alpha_threshold": threshold} | (source or {}))
 
     @classmethod
     def from_mask(
@@ -165,7 +166,7 @@ class Sprite:
                 raise InputError(f"{name}: expected 3 points or more, got {len(checked)}")
             rings.append(snap(checked))
         source: dict[str, Any] = {"polygon": (rings[0] / SUB).tolist()}
-        if holes:
+        if len(rings) > 1:
             source["holes"] = [(r / SUB).tolist() for r in rings[1:]]
         return cls((), (0, 0), Outline(tuple(rings)), _color(color), source)
 

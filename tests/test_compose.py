@@ -1,0 +1,300 @@
+"""Planes against a reference that asks each pixel by itself, after any change, and redrawn only where one was."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planes import compose
+from planes.arrays import InputError
+from planes.compose import CodePlane, label_plane, plane_fits
+from planes.items import HITTABLE, OCCLUDER, ROLES, Role
+from planes.scene import Scene
+
+BOUNDS = (-6, 2, 17, 16)
+SIZE = (24, 15)
+MASKS = [np.random.default_rng(n).random((1 + n % 6, 1 + n % 7)) < 0.75 for n in range(14)]
+MASKS += [np.ones((9, 9), np.bool_), np.pad(np.zeros((4, 4), np.bool_), 2, constant_values=True)]
+
+
+def front_to_back(scene: Scene) -> list[int]:
+    """Greater layer, then occluders before objects, then the later added."""
+    items = scene.items
+    deciding = [i for i in scene.ids().tolist() if items.role[i] in (HITTABLE, OCCLUDER)]
+    return sorted(deciding, key=lambda i: (-items.layer[i], items.role[i] != OCCLUDER, -i))
+
+
+def brute_codes(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.ndarray:
+    """Ask each pixel what lies in front there, and whether anything lies behind it."""
+    order = front_to_back(scene)
+    covered = {}
+    for item in order:
+        mask, (left, top) = scene.mask(item)
+        covered[item] = {(int(x) + left, int(y) + top) for y, x in np.argwhere(mask)}
+    x, y, x_max, y_max = box
+    codes = np.zeros((y_max - y + 1, x_max - x + 1), np.int64)
+    for row, column in np.ndindex(codes.shape):
+        here = [item for item in order if (column + x, row + y) in covered[item]]
+        if here:
+            codes[row, column] = 2 * (here[0] + 1) + (len(here) > 1)
+    return codes
+
+
+def random_scene(rng: np.random.Generator, count: int) -> Scene:
+    scene = Scene(SIZE, BOUNDS[:2])
+    for _ in range(count):
+        add_one(scene, rng)
+    return scene
+
+
+def add_one(scene: Scene, rng: np.random.Generator) -> None:
+    role = ROLES[rng.choice(5, p=[0.05, 0.55, 0.05, 0.3, 0.05])]
+    layer, angle = int(rng.integers(-1, 2)), float(rng.choice([0, 90, 37]))
+    scene.add(MASKS[rng.integers(len(MASKS))], place(rng), role=role, layer=layer, angle=angle)
+
+
+def place(rng: np.random.Generator) -> np.ndarray:
+    """Somewhere in the bounds, over their edge, or out of them."""
+    return np.array([rng.uniform(-12, 24), rng.uniform(-4, 22)])
+
+
+def change(scene: Scene, rng: np.random.Generator) -> None:
+    """One random change of a few objects."""
+    ids = scene.ids()
+    some = rng.choice(ids, rng.integers(1, min(len(ids), 3) + 1), replace=False) if len(ids) else ids
+    kind = rng.choice(["add", "remove", "move", "angle", "scale", "flip", "layer", "role", "all"])
+    if kind == "add" or not len(ids):
+        add_one(scene, rng)
+    elif kind == "remove":
+        scene.remove(some)
+    else:
+        values: dict[str, Any] = {
+            "position_xy": place(rng),
+            "angle": float(rng.uniform(0, 360)),
+            "scale": float(rng.choice([0.4, 1, 2])),
+            "flip": str(rng.choice(["none", "x", "xy"])),
+            "layer": int(rng.integers(-2, 3)),
+            "role": ROLES[rng.integers(5)],
+        }
+        wanted = {"move": "position_xy"}.get(kind, kind)
+        scene.set(some, **(values if kind == "all" else {wanted: values[wanted]}))
+
+
+# The code plane
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 12))
+def test_the_code_plane_follows_every_change(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, count)
+    plane = CodePlane(BOUNDS)
+    for _ in range(8):
+        assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+        for _ in range(rng.integers(0, 4)):
+            change(scene, rng)
+    assert np.array_equal(plane.read(scene.items), CodePlane(BOUNDS).read(scene.items))
+
+
+def test_a_small_plane_by_hand() -> None:
+    scene = Scene((4, 2))
+    scene.add([[1, 1, 1]], (1, 0))
+    scene.add([[1, 1]], (1.5, 0), role="occluder")
+    scene.add([[1], [1]], (3, 0.5), layer=-1)
+    scene.add([[1, 1, 1, 1]], (1.5, 1), role="hud")
+    assert CodePlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 5, 6], [0, 0, 0, 6]]
+    scene.set(2, layer=1)
+    scene.move(2, (2, 0.5))
+    assert CodePlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 7, 0], [0, 0, 6, 0]]
+
+
+def test_only_what_changed_is_redrawn() -> None:
+    scene = Scene((100, 100))
+    for x in range(5):
+        scene.add(np.ones((4, 6), np.bool_), (10 * x + 2.5, 11.5))
+    plane = scene.code_plane()
+    assert plane is not None
+    assert plane.cost(scene.items) == 10_000
+    plane.read(scene.items)
+    assert plane.redrawn == 10_000
+    changes: list[tuple[dict[str, Any], int]] = [
+        ({"position_xy": (3.5, 11.5)}, 48),  # where it was and where it is
+        ({"angle": 90}, 48),
+        ({"layer": 1}, 48),
+        ({"role": "mover"}, 24),
+        ({"position_xy": (50.5, 50.5)}, 0),  # what a mover does changes no plane
+        ({"role": "occluder"}, 24),
+        ({"position_xy": (-0.5, 50.5)}, 24 + 2 * 6),  # turned, and cut by the bounds
+        ({"position_xy": (-90, 50.5)}, 2 * 6),
+        ({"position_xy": (-80, 50.5)}, 0),
+    ]
+    for values, pixels in changes:
+        scene.set(0, **values)
+        assert plane.cost(scene.items) == pixels, values
+        assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99))), values
+        assert plane.redrawn == pixels, values
+        assert plane.cost(scene.items) == 0
+    plane.read(scene.items)
+    assert plane.redrawn == 0
+    scene.remove([1, 2])
+    scene.add(np.ones((2, 2), np.bool_), (90.5, 90.5))
+    assert plane.cost(scene.items) == 24 + 24 + 4
+    plane.read(scene.items)
+    assert plane.redrawn == 52
+
+
+def test_pixels_outside_the_dirty_boxes_are_not_touched() -> None:
+    scene = Scene((20, 20))
+    scene.add(np.ones((2, 2), np.bool_), (5.5, 5.5))
+    plane = CodePlane((0, 0, 19, 19))
+    codes = plane.read(scene.items)
+    codes[15, 15] = 999
+    scene.move(0, (6.5, 5.5))
+    assert plane.read(scene.items) is codes
+    assert codes[15, 15] == 999
+    assert (codes[5:7, 5] == 0).all()
+    assert (codes[5:7, 6:8] == 2).all()
+
+
+def test_more_dirt_than_plane_is_a_whole_plane() -> None:
+    scene = Scene((6, 6))
+    scene.add(np.ones((5, 5), np.bool_), (2, 2))
+    plane = CodePlane((0, 0, 5, 5))
+    plane.read(scene.items)
+    scene.move(0, (3, 3))
+    assert plane.cost(scene.items) == 36
+    assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 5, 5)))
+    assert plane.redrawn == 36
+
+
+def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.items.JOURNAL_ROWS", 3)
+    scene = random_scene(np.random.default_rng(1), 6)
+    plane = CodePlane(BOUNDS)
+    plane.read(scene.items)
+    for x in range(5):
+        scene.move(1, (x, 5))
+    assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
+    assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+
+
+def test_masks_that_are_laid_out_anew_are_read_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many forms that nothing uses any more; a stack that was handed out keeps its masks."""
+    monkeypatch.setattr("planes.items.ATLAS_SLACK_BYTES", 100)
+    scene = random_scene(np.random.default_rng(2), 5)
+    plane = CodePlane(BOUNDS)
+    old = scene.items.stack()
+    before = [old.mask(place).copy() for place in range(len(old))]
+    atlases = set()
+    for angle in range(0, 350, 7):
+        scene.set(scene.ids(), angle=angle)
+        assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+        atlases.add(id(scene.items.atlas))
+        assert scene.items.atlas.used <= 2 * scene.items.atlas.live + 100 + 2000
+    assert len(atlases) > 1
+    assert all(np.array_equal(old.mask(place), mask) for place, mask in enumerate(before))
+
+
+def test_equal_masks_are_stored_once() -> None:
+    scene = Scene()
+    scene.add(np.ones((10, 10), np.bool_))
+    used = scene.items.atlas.used
+    for x in range(5):
+        scene.add(scene.items.sprites[0], (x, 0))
+    assert scene.items.atlas.used == used == 100
+
+
+# Sixteen and thirty-two bits
+
+
+def test_codes_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compose, "ITEMS_UINT16", 6)
+    scene = random_scene(np.random.default_rng(3), 6)
+    plane = CodePlane(BOUNDS)
+    assert plane.read(scene.items).dtype == np.uint16
+    add_one(scene, np.random.default_rng(4))
+    assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
+    codes = plane.read(scene.items)
+    assert codes.dtype == np.uint32
+    assert np.array_equal(codes, brute_codes(scene))
+    scene.move(2, (3, 3))
+    assert plane.cost(scene.items) < SIZE[0] * SIZE[1]
+    assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+
+
+@pytest.mark.parametrize("count", [32_767, 32_768])
+def test_the_last_id_of_sixteen_bits(count: int) -> None:
+    """The ids before it were left out by a scene file."""
+    scene = Scene((4, 1))
+    scene.items.skip_to(count - 1)
+    last = scene.add([[1, 1]], (0.5, 0))
+    assert last == count - 1
+    scene.set(last, layer=1)
+    plane = CodePlane((0, 0, 3, 0))
+    codes = plane.read(scene.items)
+    assert codes.dtype == (np.uint16 if count == 32_767 else np.uint32)
+    assert codes.tolist() == [[2 * count, 2 * count, 0, 0]]
+
+
+def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
+    scene = Scene((2, 1))
+    scene.items.skip_to(32_765)
+    for _ in range(2):
+        scene.add([[1]], (0, 0))
+    codes = CodePlane((0, 0, 1, 0)).read(scene.items)
+    assert (codes.dtype, codes.tolist()) == (np.uint16, [[65_535, 0]])
+
+
+# The label plane, and limits
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32), st.tuples(*2 * [st.integers(-9, 9)]), st.tuples(*2 * [st.integers(1, 20)]))
+def test_the_label_plane_of_any_box(seed: int, corner: tuple[int, int], size: tuple[int, int]) -> None:
+    scene = random_scene(np.random.default_rng(seed), 8)
+    box = (*corner, corner[0] + size[0] - 1, corner[1] + size[1] - 1)
+    labels = label_plane(scene.items.stack(), box)
+    assert labels.dtype == np.int32
+    assert np.array_equal(labels, brute_codes(scene, box) >> 1)
+
+
+def test_the_label_plane_of_one_role() -> None:
+    scene = Scene((3, 1))
+    scene.add([[1, 1]], (0.5, 0), layer=3)
+    scene.add([[1, 1]], (1.5, 0), role="occluder")
+    scene.add([[1]], (1, 0), role="mover", layer=9)
+    labels = {role: label_plane(scene.items.stack_of(role), (0, 0, 2, 0)).tolist() for role in Role}
+    assert labels[Role.HITTABLE] == [[1, 1, 0]]
+    assert labels[Role.OCCLUDER] == [[0, 2, 2]]
+    assert labels[Role.MOVER] == [[0, 3, 0]]
+    assert labels[Role.HUD] == labels[Role.BACKGROUND] == [[0, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("size", "fits"),
+    [
+        ((65_535, 1), True),
+        ((65_536, 1), False),
+        ((1, 65_536), False),
+        ((2**14, 2**14), True),
+        ((2**14, 2**14 + 1), False),
+    ],
+)
+def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
+    box = (-5, 10**9, size[0] - 6, 10**9 + size[1] - 1)
+    assert plane_fits(box) is fits
+    scene = Scene(size, box[:2])
+    if fits:
+        assert scene.code_plane() is scene.code_plane() is not None
+        return
+    assert scene.code_plane() is None
+    message = f"bounds: expected a plane of sides up to 65535 px .*got {size[0]} x {size[1]}"
+    for make in (lambda: CodePlane(box), lambda: label_plane(scene.items.stack(), box), scene.planes):
+        with pytest.raises(InputError, match=message):
+            make()
+
+
+def test_a_world_without_bounds_has_no_code_plane() -> None:
+    assert Scene().code_plane() is None

@@ -1,0 +1,117 @@
+"""The layout that the code promises: who may import whom, what lies at the top, and what importing costs."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+ORDER = {
+    "planes": (
+        "constants", "arrays", "grid256", "spans", "rasterise", "image", "sprite", "items", "compose", "labels",
+        "scenefile", "scene", "render", "sampling",
+    ),
+    "weapons": (
+        "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",
+        "orders", "facts", "marks", "panel", "picture", "cli", "__main__",
+    ),
+}  # fmt: skip
+"""Each module imports only from those before it, here or in the package above."""
+
+TOP = {"pyproject.toml", "planes", "weapons", "tests", "fixtures", "README.md"}
+PLACES = [(package, name) for package, names in ORDER.items() for name in names]
+
+
+def imported(source: str) -> Iterator[str]:
+    """Modules that a source imports anywhere, also inside functions: a package's own as package.module."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "a relative import"
+            module = node.module or ""
+            if module in ORDER:
+                yield from (f"{module}.{alias.name}" for alias in node.names)
+            else:
+                yield module
+
+
+def inner_imports(path: Path) -> list[str]:
+    return [name for name in imported(path.read_text()) if name.split(".")[0] in ORDER]
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_every_module_has_its_place(package: str) -> None:
+    found = {path.stem for path in (ROOT / package).rglob("*.py")} - {"__init__"}
+    assert found <= set(ORDER[package])
+
+
+@pytest.mark.parametrize(("package", "name"), PLACES, ids=lambda v: v)
+def test_a_module_imports_only_those_before_it(package: str, name: str) -> None:
+    path = ROOT / package / f"{name}.py"
+    if not path.exists():
+        pytest.skip("not in this version")
+    known = [f"{p}.{n}" for p, n in PLACES]
+    before = known[: known.index(f"{package}.{name}")]
+    assert [module for module in inner_imports(path) if module not in before] == []
+
+
+def test_sampling_knows_no_scene() -> None:
+    """Kernels read stacks and planes of codes."""
+    allowed = {"planes.arrays", "planes.constants", "planes.spans", "planes.items", "planes.compose"}
+    assert set(inner_imports(ROOT / "planes" / "sampling.py")) <= allowed
+
+
+def test_planes_never_import_weapons() -> None:
+    for path in (ROOT / "planes").glob("*.py"):
+        assert not [name for name in imported(path.read_text()) if name.startswith("weapons")], path.name
+
+
+def test_the_reader_of_imports_sees_them_all() -> None:
+    source = """
+import numpy as np, planes.scene
+from planes import spans, arrays
+def late():
+    from weapons.cli import main
+if True:
+    import weapons
+"""
+    assert sorted(imported(source)) == [
+        "numpy", "planes.arrays", "planes.scene", "planes.spans", "weapons", "weapons.cli",
+    ]  # fmt: skip
+
+
+def test_top_level() -> None:
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    try:
+        listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("no git, or no repository")
+    names = {line.split("/")[0] for line in listed.stdout.splitlines()}
+    assert {name for name in names if not name.startswith(".")} <= TOP
+    assert {"pyproject.toml", "planes", "weapons", "tests"} <= names
+
+
+def loaded_by(code: str) -> set[str]:
+    script = f"import sys\n{code}\nprint(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(run.stdout.split())
+
+
+def test_importing_costs_little() -> None:
+    extra = loaded_by("import planes, weapons") - loaded_by("pass")
+    assert not {name for name in extra if name.split(".")[0] in ("numpy", "cv2")}
+    assert {name for name in extra if name.split(".")[0] in ORDER} == set(ORDER)
+    assert len(extra) < 60
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_whatever_a_package_lists_is_there(package: str) -> None:
+    code = f"import {package}\nassert dir({package}) and all(getattr({package}, n) is not None for n in dir({package}))"
+    assert f"{package}.{ORDER[package][0]}" in loaded_by(code)
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        __import__(package).nothing  # noqa: B018

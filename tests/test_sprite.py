@@ -1,0 +1,517 @@
+"""Images and shapes to placed masks, against a reference that asks one pixel at a time, and the laws of placement."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import oracle_raster
+import oracle_sprite as oracle
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from planes import sprite as module
+from planes.arrays import InputError
+from planes.scene import Scene
+from planes.sprite import Form, Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
+
+AGAINST = settings(max_examples=120, deadline=None)
+LAWS = settings(max_examples=80, deadline=None)
+
+FULL = 1 << 16
+FLIPS = ("none", "x", "y", "xy")
+FLIPPED_X = {"none": "x", "x": "none", "y": "xy", "xy": "y"}
+SCALES = ((1.0, 1.0), (2.0, 2.0), (0.5, 0.5), (1.5, 1.5), (2.0, 0.5), (0.3, 0.3), (1.0, 3.0), (0.7, 1.0), (0.01, 0.01))
+WHITE = (255, 255, 255)
+
+Pixels = set[tuple[int, int]]
+
+angles = st.one_of(
+    st.integers(-8, 8).map(lambda n: 45.0 * n), st.integers(-24, 24).map(lambda n: 15.0 * n), st.floats(-400, 400)
+)
+scales = st.one_of(st.sampled_from(SCALES), st.tuples(st.floats(0.2, 2.5), st.floats(0.2, 2.5)))
+positions = st.tuples(*2 * [st.one_of(st.integers(-5, 5).map(lambda n: 128 * n), st.integers(-2000, 2000))])
+pivots = st.none() | st.tuples(*2 * [st.one_of(st.integers(-3, 9).map(lambda n: 128 * n), st.integers(-700, 2000))])
+
+
+@st.composite
+def masks(draw: st.DrawFn, most: int = 6) -> np.ndarray:
+    """Draw masks: any pixels, a single one, a ring around a hole, a full one, an empty one."""
+    height, width = draw(st.integers(1, most)), draw(st.integers(1, most))
+    kind = draw(st.sampled_from(["any", "any", "any", "single", "hole", "full", "empty"]))
+    mask = np.zeros((height, width), np.bool_)
+    if kind == "any":
+        mask[:] = np.array(draw(st.lists(st.booleans(), min_size=mask.size, max_size=mask.size))).reshape(mask.shape)
+    elif kind == "single":
+        mask[draw(st.integers(0, height - 1)), draw(st.integers(0, width - 1))] = True
+    elif kind in ("hole", "full"):
+        mask[:] = True
+        mask[1:-1, 1:-1] = kind == "full"
+    return mask
+
+
+def pixels_of(variant: Variant, position: tuple[int, int]) -> Pixels:
+    """World pixels of a variant at a position, by the rule of the top-left corner."""
+    left, top = (position[0] - variant.pivot_x + 128) // 256, (position[1] - variant.pivot_y + 128) // 256
+    return {(int(x) + left, int(y) + top) for y, x in np.argwhere(variant.mask)}
+
+
+def placed(sprite: Sprite, position: tuple[int, int], **pose: Any) -> Pixels:
+    return pixels_of(variant_of(sprite, posed(sprite, **pose)), position)
+
+
+def posed(
+    sprite: Sprite, flip: str = "none", scale: tuple[float, float] = (1, 1), angle: float = 0.0, frame: int = 0
+) -> Form:
+    return form_of(sprite, frame, flip, scale, angle)
+
+
+def turn_of(flip: str, scale: tuple[float, float], angle: float) -> oracle.Turn:
+    sx, sy = (round(v * FULL) for v in scale)
+    return oracle.Turn(flip, (sx, sy), *oracle_raster.quarter_turns(angle))
+
+
+def sprite_of(mask: np.ndarray, pivot: tuple[int, int] | None = None) -> Sprite:
+    return Sprite.from_mask(mask, pivot_xy=None if pivot is None else (pivot[0] / 256, pivot[1] / 256))
+
+
+# Placement against the reference
+
+
+@AGAINST
+@given(masks(), pivots, st.sampled_from(FLIPS), scales, angles, positions)
+@example(np.ones((3, 2), np.bool_), None, "x", (1.0, 1.0), 45.0, (128, -128))
+@example(np.eye(5, dtype=np.bool_), None, "none", (2.0, 0.5), -45.0, (0, 0))
+@example(np.ones((1, 1), np.bool_), (2000, -700), "xy", (0.3, 0.3), 135.0, (1, 1))
+@example(np.ones((4, 3), np.bool_), (129, 127), "y", (1.5, 1.5), 90.0, (64, 192))
+def test_placed_mask_is_the_reference(
+    mask: np.ndarray,
+    pivot: tuple[int, int] | None,
+    flip: str,
+    scale: tuple[float, float],
+    angle: float,
+    position: tuple[int, int],
+) -> None:
+    expected = oracle.placed_mask(mask.tolist(), pivot, turn_of(flip, scale, angle), position)
+    assert placed(sprite_of(mask, pivot), position, flip=flip, scale=scale, angle=angle) == expected
+
+
+@pytest.mark.parametrize("flip", FLIPS)
+@pytest.mark.parametrize("angle", [0, 90, 180, 270, 45, -45, 135, 30])
+@pytest.mark.parametrize("scale", SCALES)
+def test_every_form_of_an_uneven_mask_is_the_reference(scale: tuple[float, float], angle: float, flip: str) -> None:
+    mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [1, 1, 1, 0]], np.bool_)
+    expected = oracle.placed_mask(mask.tolist(), None, turn_of(flip, scale, angle), (77, -300))
+    assert placed(sprite_of(mask), (77, -300), flip=flip, scale=scale, angle=angle) == expected
+
+
+@pytest.mark.parametrize("pivot", [(37, 200), (-60, 300), (513, 449), (64, 65)])
+@pytest.mark.parametrize("angle", [30, 45, 107.5, -12])
+def test_a_turn_keeps_the_pivot_where_it_is_between_the_pixels(angle: float, pivot: tuple[int, int]) -> None:
+    mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [1, 1, 1, 0]], np.bool_)
+    for scale in ((1.0, 1.0), (1.0, 1.5)):
+        expected = oracle.placed_mask(mask.tolist(), pivot, turn_of("x", scale, angle), (77, -300))
+        assert placed(sprite_of(mask, pivot), (77, -300), flip="x", scale=scale, angle=angle) == expected
+
+
+def test_the_scene_places_by_the_same_rule() -> None:
+    mask = np.array([[1, 0], [1, 1], [0, 1]], np.bool_)
+    scene = Scene()
+    item = scene.add(mask, (3.5, -2.25), angle=100, scale=(1.5, 2), flip="x")
+    found, (x, y) = scene.mask(item)
+    expected = oracle.placed_mask(mask.tolist(), None, turn_of("x", (1.5, 2), 100), (896, -576))
+    assert {(int(j) + x, int(i) + y) for i, j in np.argwhere(found)} == expected
+
+
+def test_a_diagonal_turn_as_a_picture() -> None:
+    """A plus turned by 45 degrees; a centre on the border of a set pixel is in."""
+    plus = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.bool_)
+    assert rows_of(variant_of(as_sprite(plus), posed(as_sprite(plus), angle=45)).mask) == ["#.#", ".#.", "#.#"]
+    square = as_sprite(np.ones((3, 3), np.bool_))
+    assert rows_of(variant_of(square, posed(square, angle=45)).mask) == ["..#..", ".###.", "#####", ".###.", "..#.."]
+
+
+# Laws
+
+
+@LAWS
+@given(masks(), pivots, st.sampled_from(FLIPS), scales, angles)
+def test_four_quarter_turns_are_the_identity(
+    mask: np.ndarray, pivot: tuple[int, int] | None, flip: str, scale: tuple[float, float], angle: float
+) -> None:
+    """One quarter turn more turns the variant and its pivot by the array; four of them give it back."""
+    sprite = sprite_of(mask, pivot)
+    base = form_of(sprite, 0, flip, scale, angle)
+    forms = [Form(0, flip, base.scale_x, base.scale_y, (base.quarter + k) % 4, base.c, base.s) for k in range(5)]
+    made = [variant_of(sprite, form) for form in forms]
+    assert (made[4].pivot_x, made[4].pivot_y) == (made[0].pivot_x, made[0].pivot_y)
+    assert np.array_equal(made[4].mask, made[0].mask)
+    for before, after in itertools.pairwise(made):
+        assert np.array_equal(after.mask, np.rot90(before.mask, -1))
+        if before.area:
+            height = before.mask.shape[0]
+            assert (after.pivot_x, after.pivot_y) == (256 * (height - 1) - before.pivot_y, before.pivot_x)
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0, 180.0, 270.0, 37.5])
+def test_whole_turns_change_nothing(angle: float) -> None:
+    sprite = as_sprite(np.tri(5, 3, dtype=np.bool_))
+    assert {posed(sprite, angle=angle + 360 * k) for k in (-1, 0, 1, 2)} == {posed(sprite, angle=angle)}
+
+
+@LAWS
+@given(masks(), st.sampled_from(FLIPS), scales, angles)
+@example(np.eye(3, dtype=np.bool_), "none", (1.5, 1.5), 30.0)
+@example(np.eye(4, dtype=np.bool_), "y", (1.5, 1.5), -45.0)
+def test_a_mirrored_sprite_turns_into_the_mirror_image(
+    mask: np.ndarray, flip: str, scale: tuple[float, float], angle: float
+) -> None:
+    """At odd multiples of 45 degrees, which belong to one of two quarters, only where both lie on the same grid."""
+    assume(angle % 90 != 45 or (mask.shape[0] == mask.shape[1] and scale[0] == scale[1]))
+    sprite = sprite_of(mask)
+    one = variant_of(sprite, posed(sprite, flip=flip, scale=scale, angle=angle))
+    other = variant_of(sprite, posed(sprite, flip=FLIPPED_X[flip], scale=scale, angle=-angle))
+    assert np.array_equal(other.mask, one.mask[:, ::-1])
+    if one.area:
+        assert (other.pivot_x, other.pivot_y) == (256 * (one.mask.shape[1] - 1) - one.pivot_x, one.pivot_y)
+
+
+@LAWS
+@given(masks(), pivots, st.integers(1, 5), st.integers(1, 5))
+def test_whole_scales_repeat_pixels(mask: np.ndarray, pivot: tuple[int, int] | None, across: int, down: int) -> None:
+    sprite = sprite_of(mask, pivot)
+    variant = variant_of(sprite, posed(sprite, scale=(across, down)))
+    repeated = np.repeat(np.repeat(mask, down, axis=0), across, axis=1)
+    assert np.array_equal(variant.mask, cropped(repeated))
+
+
+def cropped(mask: np.ndarray) -> np.ndarray:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else np.zeros((0, 0), np.bool_)
+
+
+def test_variants_are_cropped_counted_and_read_only() -> None:
+    mask = np.zeros((7, 9), np.bool_)
+    mask[2:5, 3:8] = [[1, 0, 1, 1, 0], [0, 0, 0, 0, 1], [1, 1, 0, 0, 0]]
+    sprite = as_sprite(mask)
+    variant = variant_of(sprite, Form())
+    assert np.array_equal(variant.mask, mask[2:5, 3:8])
+    assert (variant.pivot_x, variant.pivot_y, variant.area) == (256, 256, 6)
+    assert not variant.mask.flags.writeable
+
+
+def test_an_empty_mask_stays_empty() -> None:
+    sprite = as_sprite(np.zeros((4, 4), np.bool_))
+    for form in (Form(), posed(sprite, angle=30), posed(sprite, scale=(3, 2), angle=91)):
+        variant = variant_of(sprite, form)
+        assert (variant.mask.shape, variant.area) == ((0, 0), 0)
+
+
+@LAWS
+@given(masks(), st.integers(0, 2**32), pivots, st.sampled_from(FLIPS), scales, angles)
+def test_what_is_drawn_is_what_is_tested(
+    mask: np.ndarray, seed: int, pivot: tuple[int, int] | None, flip: str, scale: tuple[float, float], angle: float
+) -> None:
+    """The drawn image is opaque where the mask is set and nowhere else, on the same pixels of the world."""
+    image = np.random.default_rng(seed).integers(0, 256, (*mask.shape, 4)).astype(np.uint8)
+    image[:, :, 3] = np.where(mask, image[:, :, 3] | 128, image[:, :, 3] & 127)
+    sprite = Sprite.from_image(image, pivot_xy=None if pivot is None else (pivot[0] / 256, pivot[1] / 256))
+    form = posed(sprite, flip=flip, scale=scale, angle=angle)
+    drawn, pivot_x, pivot_y = picture_of(sprite, form, WHITE)
+    opaque = drawn[:, :, 3] > 127
+    left, top = (128 - pivot_x) // 256, (128 - pivot_y) // 256
+    drawn_at = {(int(x) + left, int(y) + top) for y, x in np.argwhere(opaque)}
+    assert drawn_at == pixels_of(variant_of(sprite, form), (0, 0))
+    known = {tuple(pixel) for pixel in image.reshape(-1, 4).tolist()} | {(0, 0, 0, 0)}
+    assert {tuple(pixel) for pixel in drawn.reshape(-1, 4).tolist()} <= known
+
+
+def test_a_plain_image_is_drawn_as_it_is() -> None:
+    image = np.arange(3 * 4 * 4, dtype=np.uint8).reshape(3, 4, 4) * 5
+    sprite = Sprite.from_image(image)
+    for form, expected in ((Form(), image), (Form(flip="x"), image[:, ::-1]), (Form(quarter=1), np.rot90(image, -1))):
+        assert np.array_equal(picture_of(sprite, form, WHITE)[0], expected)
+
+
+@pytest.mark.parametrize(("own", "used"), [(None, (1, 2, 3)), ((9, 8, 7), (9, 8, 7))])
+def test_bare_masks_and_shapes_are_drawn_in_one_colour(
+    own: tuple[int, int, int] | None, used: tuple[int, int, int]
+) -> None:
+    for sprite in (Sprite.from_mask([[True, False], [True, True]], color=own), Sprite.circle(3, color=own)):
+        variant = variant_of(sprite, Form())
+        image, pivot_x, pivot_y = picture_of(sprite, Form(), (1, 2, 3))
+        assert np.array_equal(image[:, :, 3] == 255, variant.mask)
+        assert (pivot_x, pivot_y) == (variant.pivot_x, variant.pivot_y)
+        assert {tuple(p) for p in image[variant.mask].tolist()} == {(*used, 255)}
+
+
+# Shapes
+
+POINTS = st.tuples(*2 * [st.integers(-1500, 1500)])
+
+
+@AGAINST
+@given(
+    st.lists(st.lists(POINTS, min_size=3, max_size=5), min_size=1, max_size=2),
+    st.sampled_from(FLIPS),
+    scales,
+    angles,
+    positions,
+)
+def test_placed_polygon_is_the_reference(
+    rings: list[list[tuple[int, int]]],
+    flip: str,
+    scale: tuple[float, float],
+    angle: float,
+    position: tuple[int, int],
+) -> None:
+    first, *holes = [np.array(ring) / 256 for ring in rings]
+    expected = oracle.placed_polygon(rings, turn_of(flip, scale, angle), position)
+    assert placed(Sprite.polygon(first, holes), position, flip=flip, scale=scale, angle=angle) == expected
+
+
+@AGAINST
+@given(st.integers(0, 1800), st.sampled_from(FLIPS), scales, angles, positions)
+@example(0, "none", (1.0, 1.0), 45.0, (0, 0))
+@example(1280, "x", (2.0, 0.01), 90.0, (128, 128))
+def test_placed_circle_is_the_reference(
+    radius: int, flip: str, scale: tuple[float, float], angle: float, position: tuple[int, int]
+) -> None:
+    expected = oracle.placed_circle(radius, turn_of(flip, scale, angle), position)
+    assert placed(Sprite.circle(radius / 256), position, flip=flip, scale=scale, angle=angle) == expected
+
+
+def test_a_square_of_one_pixel() -> None:
+    """Edges are in: a box of 2 px has three centres across, one of less than 2 px has one."""
+    assert placed(Sprite.box(1, 1), (0, 0)) == {(0, 0)}
+    assert placed(Sprite.box(0, 0), (255, 128)) == {(1, 1)}
+    assert len(placed(Sprite.box(2, 2), (0, 0))) == 9
+    assert len(placed(Sprite.box(2 - 2 / 256, 2), (0, 0))) == 3
+    assert placed(as_sprite([[True]]), (0, 0), angle=33) == {(0, 0)}
+
+
+def test_a_scaled_circle_is_an_ellipse_and_turns() -> None:
+    circle = Sprite.circle(4)
+    upright = variant_of(circle, posed(circle, scale=(1, 0.5)))
+    assert rows_of(upright.mask) == ["....#....", ".#######.", "#########", ".#######.", "....#...."]
+    turned = variant_of(circle, posed(circle, scale=(1, 0.5), angle=90))
+    assert np.array_equal(turned.mask, upright.mask.T)
+
+
+def test_a_polygon_with_a_hole_turns_by_quarters() -> None:
+    ring = Sprite.polygon([(-3, -2), (3, -2), (3, 2), (-1, 2)], [[(-1.5, -0.5), (1.5, -0.5), (1.5, 1.5)]])
+    made = [variant_of(ring, posed(ring, angle=90 * k)) for k in range(4)]
+    assert 0 < made[0].area < made[0].mask.size
+    assert not made[0].mask[2, 3]
+    for before, after in itertools.pairwise([*made, made[0]]):
+        assert np.array_equal(after.mask, np.rot90(before.mask, -1))
+
+
+@LAWS
+@given(st.integers(0, 900), st.integers(0, 900), st.sampled_from(FLIPS), angles)
+def test_a_box_is_its_polygon(width: int, height: int, flip: str, angle: float) -> None:
+    w, h = width / 128, height / 128
+    corners = [(-w / 2, -h / 2), (w / 2, -h / 2), (w / 2, h / 2), (-w / 2, h / 2)]
+    pose = {"flip": flip, "angle": angle}
+    assert placed(Sprite.box(w, h), (5, 9), **pose) == placed(Sprite.polygon(corners), (5, 9), **pose)
+
+
+# Frames, transparency, what is taken
+
+
+SHEET = np.arange(4 * 6 * 4).reshape(4, 6, 4).astype(np.uint8)
+SHEET[:, :, 3] = np.where(np.arange(24).reshape(4, 6) % 3 == 0, 0, 255)
+
+
+def test_a_grid_cuts_left_to_right_then_down() -> None:
+    sprite = Sprite.from_image(SHEET, grid_wh=(3, 2))
+    assert sprite.frame_count == 4
+    for number, (x, y) in enumerate([(0, 0), (3, 0), (0, 2), (3, 2)]):
+        frame = sprite.frames[number]
+        assert np.array_equal(frame.image, SHEET[y : y + 2, x : x + 3])
+        assert np.array_equal(frame.mask, SHEET[y : y + 2, x : x + 3, 3] > 127)
+        assert placed(sprite, (256, 128), frame=number) == placed(as_sprite(frame.mask), (256, 128))
+
+
+def test_rectangles_cut_what_they_say() -> None:
+    rects = [[1, 0, 2, 4], [0, 3, 6, 1], [5, 3, 1, 1], [0, 0, 6, 4]]
+    sprite = Sprite.from_image(SHEET, rects_xywh=rects)
+    assert sprite.frame_count == 4
+    for frame, (x, y, w, h) in zip(sprite.frames, rects, strict=True):
+        assert np.array_equal(frame.image, SHEET[y : y + h, x : x + w])
+
+
+def test_a_pivot_holds_for_every_frame() -> None:
+    sprite = Sprite.from_image(SHEET, rects_xywh=[[0, 0, 6, 4], [2, 0, 2, 4]], pivot_xy=(1, 0.5))
+    for frame in range(2):
+        mask = sprite.frames[frame].mask
+        expected = oracle.placed_mask(mask.tolist(), (256, 128), turn_of("none", (1, 1), 90), (0, 0))
+        assert placed(sprite, (0, 0), frame=frame, angle=90) == expected
+
+
+@pytest.mark.parametrize("threshold", [0, 1, 127, 128, 254, 255])
+def test_alpha_must_be_greater_than_the_threshold(threshold: int) -> None:
+    image = np.zeros((1, 256, 4), np.uint8)
+    image[0, :, 3] = np.arange(256)
+    mask = Sprite.from_image(image, alpha_threshold=threshold).frames[0].mask
+    assert np.flatnonzero(mask[0]).tolist() == list(range(threshold + 1, 256))
+
+
+def test_a_colour_key_is_transparent_in_mask_and_picture() -> None:
+    image = np.full((2, 3, 3), 200, np.uint8)
+    image[0, 1] = image[1, 2] = (255, 0, 255)
+    image[1, 0] = (255, 0, 254)
+    sprite = Sprite.from_image(image, color_key=(255, 0, 255))
+    assert rows_of(sprite.frames[0].mask) == ["#.#", "##."]
+    assert np.array_equal(picture_of(sprite, Form(), WHITE)[0][:, :, 3] > 0, sprite.frames[0].mask)
+
+
+def test_an_image_without_alpha_is_all_mask() -> None:
+    image = np.arange(5 * 3 * 3, dtype=np.uint8).reshape(5, 3, 3)
+    sprite = as_sprite(image)
+    assert sprite.frames[0].mask.all()
+    assert np.array_equal(picture_of(sprite, Form(), WHITE)[0][:, :, :3], image)
+
+
+def _kinds(array: np.ndarray) -> Iterator[tuple[str, Any]]:
+    wide = np.repeat(array, 2, axis=1)
+    frozen = array.copy()
+    frozen.flags.writeable = False
+    yield "Fortran order", np.asfortranarray(array)
+    yield "strided", wide[:, ::2]
+    yield "reversed view", array[::-1, ::-1].copy()[::-1, ::-1]
+    yield "read-only", frozen
+    yield "memoryview", memoryview(np.ascontiguousarray(array))
+    if array.dtype == np.bool_:
+        yield "lists", array.tolist()
+        yield "tuples", tuple(map(tuple, array.tolist()))
+        yield "0 and 1", array.astype(np.int8)
+        yield "unsigned", array.astype(np.uint64)
+
+
+MASK = np.array([[1, 0, 1, 1], [0, 0, 1, 0], [1, 1, 1, 0]], np.bool_)
+PICTURE = np.dstack([np.arange(12).reshape(3, 4) * 9, np.zeros((3, 4)), np.ones((3, 4)), MASK * 255]).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("kind", "given"), list(_kinds(MASK)), ids=lambda v: v if isinstance(v, str) else "")
+def test_masks_of_every_kind_are_taken(kind: str, given: Any) -> None:
+    before = np.array(given)
+    sprite = as_sprite(given)
+    found = variant_of(sprite, posed(sprite, flip="x", scale=(2, 1), angle=30))
+    same = as_sprite(MASK)
+    expected = variant_of(same, posed(same, flip="x", scale=(2, 1), angle=30))
+    assert np.array_equal(found.mask, expected.mask), kind
+    assert np.array_equal(np.array(given), before)
+
+
+@pytest.mark.parametrize(("kind", "given"), list(_kinds(PICTURE)), ids=lambda v: v if isinstance(v, str) else "")
+def test_images_of_every_kind_are_taken(kind: str, given: Any) -> None:
+    before = np.array(given)
+    sprite = Sprite.from_image(given, color_key=(9, 0, 1), grid_wh=(2, 3))
+    assert np.array_equal(np.hstack([f.mask for f in sprite.frames]), MASK & (PICTURE[:, :, 0] != 9)), kind
+    assert np.array_equal(np.array(given), before)
+
+
+def test_a_sprite_keeps_what_it_was_given() -> None:
+    """What happens to an array later does not reach the sprite, and the sprite cannot be written to."""
+    mask, image = MASK.copy(), PICTURE.copy()
+    sprites = as_sprite(mask), as_sprite(image)
+    mask[:], image[:] = False, 0
+    for sprite in sprites:
+        assert np.array_equal(sprite.frames[0].mask, MASK)
+        assert not sprite.frames[0].mask.flags.writeable
+    assert as_sprite(sprites[0]) is sprites[0]
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: as_sprite(None), r"sprite: expected a Sprite, a mask .*got \(\)"),
+        (lambda: as_sprite([True]), r"sprite: .*got \(1,\)"),
+        (lambda: as_sprite([[True], [True, False]]), "sprite: expected"),
+        (lambda: as_sprite([[0.0, 1.0]]), "mask: expected booleans, got float64"),
+        (lambda: as_sprite([[0, 2]]), r"mask\[0\]\[1\]: expected 0 or 1, got 2"),
+        (lambda: as_sprite(np.zeros((2, 2, 3))), r"image: expected bytes .*got float64 \(2, 2, 3\)"),
+        (lambda: as_sprite(np.zeros((2, 2, 2), np.uint8)), r"image: expected bytes .*got uint8 \(2, 2, 2\)"),
+        (lambda: Sprite.from_mask(np.zeros((1, 32769), np.bool_)), "mask: .*sides up to 32768 px .*got 32769 x 1"),
+        (lambda: Sprite.from_image(np.zeros((32769, 1, 3), np.uint8)), "image: .*got 1 x 32769"),
+        (lambda: Sprite.from_mask(MASK, pivot_xy=(1, math.nan)), r"pivot_xy\[1\]: expected a finite number"),
+        (lambda: Sprite.from_mask(MASK, pivot_xy=(1, 2, 3)), r"pivot_xy: expected shape \(2,\), got \(3,\)"),
+        (lambda: Sprite.from_mask(MASK, color=(1, 2, 256)), r"color\[2\]: .*from 0 to 255, got 256"),
+        (lambda: Sprite.from_image(PICTURE, alpha_threshold=256), "alpha_threshold: .*from 0 to 255, got 256"),
+        (lambda: Sprite.from_image(PICTURE, alpha_threshold=True), "alpha_threshold: .*got True"),
+        (lambda: Sprite.from_image(PICTURE, color_key=(1, 2)), r"color_key: expected shape \(3,\)"),
+        (lambda: Sprite.from_image(PICTURE, grid_wh=(3, 3)), r"grid_wh: expected to divide .*4 x 3, got \[3, 3\]"),
+        (lambda: Sprite.from_image(PICTURE, grid_wh=(0, 3)), r"grid_wh\[0\]: .*got 0"),
+        (lambda: Sprite.from_image(PICTURE, rects_xywh=[]), "rects_xywh: expected"),
+        (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 1, 1], [3, 0, 2, 1]]), r"rects_xywh\[1\]: .*4 x 3"),
+        (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 0, 1]]), r"rects_xywh\[0\]:"),
+        (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 1, 1]], grid_wh=(1, 1)), "frames: .*got both"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1)]), "polygon: expected 3 points or more, got 2"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1), (2, math.inf)]), r"polygon\[2\]\[1\]: expected a finite number"),
+        (lambda: Sprite.polygon([(0, 0, 0)] * 3), r"polygon: expected shape \(any, 2\), got \(3, 3\)"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1), (2, 0)], [[(0, 0)]]), r"holes\[0\]: expected 3 points"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1), (2**16, 0)]), r"polygon\[2\]\[0\]: expected a number within"),
+        (lambda: Sprite.circle(-1), "circle: expected a number from 0 to 32768, got -1"),
+        (lambda: Sprite.circle("3"), "circle: expected numbers"),  # type: ignore[arg-type]
+        (lambda: Sprite.box(1, -1), r"box_wh\[1\]: expected a number from 0"),
+        (lambda: posed(as_sprite(MASK), flip="left"), "flip: expected one of 'none', 'x', 'y', 'xy', got 'left'"),
+        (lambda: posed(as_sprite(MASK), frame=1), "frame: .*from 0 to 0, got 1"),
+        (lambda: posed(Sprite.circle(1), frame=1), "frame: .*from 0 to 0, got 1"),
+        (lambda: posed(as_sprite(MASK), scale=(1, 257)), r"scale\[1\]: expected a number from .*256, got 257"),
+        (lambda: posed(as_sprite(MASK), scale=(0, 1)), r"scale\[0\]: .*got 0"),
+        (lambda: Sprite.from_image([[1], [1, 2]]), "image: expected"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_named(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_a_pose_that_makes_a_mask_too_large_is_refused() -> None:
+    large = as_sprite(np.ones((300, 300), np.bool_))
+    for sprite in (large, Sprite.circle(300), Sprite.box(300, 300)):
+        with pytest.raises(InputError, match="scale: expected a mask of sides up to"):
+            variant_of(sprite, posed(sprite, scale=(256, 256)))
+
+
+@pytest.mark.parametrize("sprite", [Sprite.box(60, 1), Sprite.circle(30)], ids=["box", "ellipse"])
+def test_a_thin_shape_that_turns_into_a_large_mask_is_refused(sprite: Sprite, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lying flat it is 60 x 1; turned by 45 degrees its mask is 43 x 43."""
+    monkeypatch.setattr(module, "MASK_AREA_MAX", 600)
+    flat = (1.0, 1 / 64)
+    assert variant_of(sprite, posed(sprite, scale=flat)).area > 0
+    with pytest.raises(InputError, match="scale: expected a mask"):
+        variant_of(sprite, posed(sprite, scale=flat, angle=45))
+
+
+# The cache
+
+
+def test_variants_are_made_once() -> None:
+    sprite = as_sprite(MASK)
+    assert variant_of(sprite, posed(sprite, angle=30)) is variant_of(sprite, posed(sprite, angle=390))
+    other = as_sprite(MASK)
+    assert variant_of(other, posed(other, angle=30)) is not variant_of(sprite, posed(sprite, angle=30))
+
+
+def test_the_cache_is_bounded_and_forgets_the_longest_unused(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = module._Kept()
+    monkeypatch.setattr(module, "_kept", kept)
+    monkeypatch.setattr(module, "VARIANT_CACHE_BYTES", 5000)
+    sprite = as_sprite(np.ones((20, 20), np.bool_))
+    first = variant_of(sprite, Form())
+    for angle in range(1, 90):
+        variant_of(sprite, posed(sprite, angle=angle))
+        assert variant_of(sprite, Form()) is first  # used all the time, so it stays
+        assert kept.bytes == sum(v.mask.nbytes for v in kept.variants.values()) <= 5000
+    assert len(kept.variants) > 3
+    assert posed(sprite, angle=1) not in {form for _, form in kept.variants}
+    large = as_sprite(np.ones((100, 100), np.bool_))
+    assert variant_of(large, Form()).area == 10_000  # one that is larger than the cache is made all the same
+    assert kept.bytes == 10_000
