@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError, Ints, array_of, choice, each, integer, integers, reals, within
+from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
+from planes.poses import changed_forms, points, scale_pair
 from planes.scenefile import FileObject, SceneFile, read_scene, text_of, write_scene
 from planes.spans import Box
-from planes.sprite import Form, as_sprite, form_of
+from planes.sprite import as_sprite, form_of
 
 __all__ = ["Planes", "Scene", "load_scene"]
 
@@ -157,7 +158,7 @@ class Scene:
         kind = _role(role)
         number = self.items.count
         turn = float(reals("angle", angle, ()))
-        form = form_of(made, frame, flip, _scale_pair(scale), turn)
+        form = form_of(made, frame, flip, scale_pair(scale), turn)
         values: dict[str, object] = {
             "role": ROLES.index(kind),
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
@@ -198,7 +199,7 @@ class Scene:
         n = len(rows)
         columns: dict[str, Any] = {}
         if position_xy is not None:
-            columns["position_256"] = snap(_per_row("position_xy", position_xy, n, 2))
+            columns["position_256"] = snap(points("position_xy", position_xy, n))
         if layer is not None:
             columns["layer"] = integers("layer", each("layer", layer, n), (n,), -LAYER_MAX, LAYER_MAX)
         if categories is not None:
@@ -207,7 +208,7 @@ class Scene:
             columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
         if role is not None:
             columns["role"] = ROLES.index(_role(role))
-        angles, forms = self._new_forms(rows, angle, scale, flip, frame)
+        angles, forms = changed_forms(self.items, rows, angle, scale, flip, frame)
         before = self.items.deciding_boxes(rows)
         if forms is not None:
             self.items.reform(rows.tolist(), forms)
@@ -343,36 +344,6 @@ class Scene:
             raise InputError(f"ids: expected each object once, got {rows.tolist()!r:.60}")
         return rows
 
-    def _new_forms(
-        self, rows: Ints, angle: object, scale: object, flip: object, frame: object
-    ) -> tuple[list[float], list[Form] | None]:
-        """Angles and forms of objects after a change; no forms if nothing of them changes."""
-        n = len(rows)
-        old = [self.items.forms[item] for item in rows.tolist()]
-        angles = [self.items.angles[item] for item in rows.tolist()]
-        if angle is None and scale is None and flip is None and frame is None:
-            return angles, None
-        if angle is not None:
-            angles = reals("angle", each("angle", angle, n), (n,)).tolist()
-        one = 1 << SCALE_BITS
-        scales = [(form.scale_x / one, form.scale_y / one) for form in old]
-        if scale is not None:
-            scales = [(sx, sy) for sx, sy in _scale_rows(scale, n).tolist()]
-        frames = [form.frame for form in old]
-        if frame is not None:
-            frames = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
-        flips = [form.flip for form in old]
-        if flip is not None:
-            flips = each("flip", flip, n).tolist()
-            if len(flips) != n:
-                raise InputError(f"flip: expected one for all or {n}, got {len(flips)}")
-        sprites = [self.items.sprites[item] for item in rows.tolist()]
-        forms = []
-        for row, values in enumerate(zip(sprites, frames, flips, scales, angles, strict=True)):
-            with within(f"row {row}"):
-                forms.append(form_of(*values))
-        return angles, forms
-
     def _bits(self, categories: object, default: int) -> int:
         if categories is None:
             return default
@@ -448,24 +419,3 @@ def _role(role: object) -> Role:
 
 def _default_bits(role: Role) -> int:
     return ALL if role is Role.OCCLUDER else 1
-
-
-def _scale_pair(scale: object) -> tuple[float, float]:
-    values = array_of("scale", scale)
-    pair = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
-    return pair[0], pair[1]
-
-
-def _scale_rows(scale: object, n: int) -> Floats:
-    values = array_of("scale", scale)
-    if values.ndim < 2:
-        values = each("scale", values, n)[:, None]
-    shape = (n, 2) if values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2) else values.shape
-    return reals("scale", np.broadcast_to(values, shape), (n, 2))
-
-
-def _per_row(name: str, values: object, n: int, width: int) -> Floats:
-    array = array_of(name, values)
-    if array.shape == (width,):
-        array = np.broadcast_to(array, (n, width))
-    return reals(name, array, (n, width), POSITION_MAX)

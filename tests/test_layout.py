@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "grid256", "spans", "rasterise", "image", "sprite", "items", "compose", "labels",
-        "scenefile", "scene", "render", "sampling",
+        "poses", "scenefile", "scene", "render", "sampling",
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",
@@ -48,6 +48,12 @@ def inner_imports(path: Path) -> list[str]:
 def test_every_module_has_its_place(package: str) -> None:
     found = {path.stem for path in (ROOT / package).rglob("*.py")} - {"__init__"}
     assert found <= set(ORDER[package])
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_the_readme_lists_the_modules_in_order(package: str) -> None:
+    listed = (ROOT / "README.md").read_text().split(f"\n- `{package}`: ")[1].split("\n- ")[0]
+    assert [name.strip() for name in listed.split(",")] == [name for name in ORDER[package] if name != "__main__"]
 
 
 @pytest.mark.parametrize(("package", "name"), PLACES, ids=lambda v: v)

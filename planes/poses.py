@@ -1,0 +1,65 @@
+"""Arguments of a pose, one for all objects or one for each, to what the columns hold."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, within
+from planes.constants import POSITION_MAX, SCALE_BITS
+from planes.items import Items
+from planes.sprite import Form, form_of
+
+__all__ = ["changed_forms", "points", "scale_pair"]
+
+ONE = 1 << SCALE_BITS
+
+
+def points(field: str, values: object, n: int) -> Floats:
+    """Positions (n, 2), or one (2,) for all, px."""
+    array = array_of(field, values)
+    return reals(field, np.broadcast_to(array, (n, 2)) if array.shape == (2,) else array, (n, 2), POSITION_MAX)
+
+
+def scale_pair(scale: object) -> tuple[float, float]:
+    """One number, or (sx, sy)."""
+    values = array_of("scale", scale)
+    sx, sy = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
+    return sx, sy
+
+
+def changed_forms(
+    items: Items, rows: Ints, angle: object, scale: object, flip: object, frame: object
+) -> tuple[list[float], list[Form] | None]:
+    """Angles and forms of objects after a change; no forms if nothing of them changes."""
+    n, ids = len(rows), rows.tolist()
+    old = [items.forms[item] for item in ids]
+    angles = [items.angles[item] for item in ids]
+    if angle is None and scale is None and flip is None and frame is None:
+        return angles, None
+    if angle is not None:
+        angles = reals("angle", each("angle", angle, n), (n,)).tolist()
+    scales = [[form.scale_x / ONE, form.scale_y / ONE] for form in old]
+    if scale is not None:
+        scales = _scale_rows(scale, n).tolist()
+    frames = [form.frame for form in old]
+    if frame is not None:
+        frames = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
+    flips = [form.flip for form in old]
+    if flip is not None:
+        flips = each("flip", flip, n).tolist()
+        if len(flips) != n:
+            raise InputError(f"flip: expected one for all or {n}, got {len(flips)}")
+    forms = []
+    for row, (item, number, side, pair, turn) in enumerate(zip(ids, frames, flips, scales, angles, strict=True)):
+        with within(f"row {row}"):
+            forms.append(form_of(items.sprites[item], number, side, (pair[0], pair[1]), turn))
+    return angles, forms
+
+
+def _scale_rows(scale: object, n: int) -> Floats:
+    """One number, one for each (n,), or pairs (n, 2) or (1, 2)."""
+    values = array_of("scale", scale)
+    if values.ndim < 2:
+        values = each("scale", values, n)[:, None]
+    fits = values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2)
+    return reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
