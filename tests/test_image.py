@@ -264,9 +264,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_part(
 
 @pytest.mark.parametrize("write", WRITERS, ids=["png", "text"])
 @pytest.mark.parametrize("name", ["missing/a.png", "file.txt/a.png", "folder", "n" * 250])
-def test_a_place_that_cannot_be_written_is_an_error(
-    tmp_path: Path, write: Callable[[Path], None], name: str
-) -> None:
+def test_a_place_that_cannot_be_written_is_an_error(tmp_path: Path, write: Callable[[Path], None], name: str) -> None:
     (tmp_path / "file.txt").write_text("text")
     (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match="output: cannot write"):

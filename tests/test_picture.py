@@ -90,7 +90,7 @@ def test_any_scene_has_a_picture(scene: Scene, shots: list[Order]) -> None:
 
 
 def test_long_and_foreign_names_and_many_objects_are_drawn() -> None:
-    scene = Scene((200, 100), name="a very long name " * 12)
+    scene = Scene((200, 100), name="a very long name " * 11)
     for i in range(300):
         scene.add(Sprite.circle(4), (5 + i % 20 * 10, 5 + i // 20 * 6), name=f"objet numéro {i} " + "x" * 80)
     picture = picture_of_report(report_of(scene, [order(Disc(60), (100, 50))]), scene)

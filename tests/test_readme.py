@@ -37,7 +37,8 @@ def test_each_command_is_one_block_of_one_line(heading: str) -> None:
 def test_ten_lines_print_what_is_shown() -> None:
     code, shown = blocks("python")[0], blocks("text")[0]
     assert len([line for line in code.splitlines() if line]) <= 10
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    words = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout == shown
 
 

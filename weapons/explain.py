@@ -232,11 +232,20 @@ def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float
 
 
 def _distance2(runs: Runs, stack: Stack, place: int) -> int:
-    """Least squared distance between the pixels of a pattern and those of an item, px^2."""
-    x, y = stack.box_xyxy[place, :2].tolist()
+    """Least squared distance between the pixels of a pattern and those of an item, px^2; beyond NEAR_PX, any."""
+    x, y, x_max, y_max = stack.box_xyxy[place].tolist()
     spans = Spans.from_mask(stack.mask(place), (x, y))
-    gap = np.maximum(np.maximum(runs.x_first[:, None] - spans.x_last, spans.x_first - runs.x_last[:, None]), 0)
-    return int((gap**2 + (runs.y[:, None] - spans.y) ** 2).min(initial=(2 * NEAR_PX) ** 2))
+    near = (runs.y >= y - NEAR_PX) & (runs.y <= y_max + NEAR_PX)
+    near &= (runs.x_last >= x - NEAR_PX) & (runs.x_first <= x_max + NEAR_PX)
+    runs = runs.take(near)
+    least = (2 * NEAR_PX) ** 2
+    step = max(1, CHUNK_SAMPLES // len(spans))
+    for first in range(0, len(runs), step):
+        part = runs.take(slice(first, first + step))
+        gap = np.maximum(part.x_first[:, None] - spans.x_last, spans.x_first - part.x_last[:, None])
+        apart = np.maximum(gap, 0) ** 2 + (part.y[:, None] - spans.y) ** 2
+        least = min(least, int(apart.min()))
+    return least
 
 
 def _visible(scene: Scene, place: int, pierce: bool, shot: Shots) -> int:

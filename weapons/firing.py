@@ -11,7 +11,7 @@ from planes.arrays import InputError, choice
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import Verdict
 from planes.scene import Scene
-from weapons.arsenal import Weapon
+from weapons.arsenal import KINDS, Weapon
 from weapons.candidates import PREFILTERS
 from weapons.explain import pierces
 from weapons.hits import Hits, Rows, rows_of_met
@@ -59,7 +59,9 @@ def fire(
     InputError
         Naming the argument and the row.
     """
-    if not isinstance(weapon, Weapon):
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    if not isinstance(weapon, tuple(KINDS.values())):
         raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
     choice("prefilter", prefilter, PREFILTERS)
     shots = checked_shots(weapon, at, aim, toward, accept, exclude, seed, shot)

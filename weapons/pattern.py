@@ -85,6 +85,10 @@ class PatternTable:
             self.prefix = np.concatenate([p.prefix for p in patterns if p.prefix is not None])
             ordinal = ordinal + np.repeat(np.arange(len(patterns)), np.diff(self.begin))  # each prefix begins with a 0
         self.ordinal = ordinal - self.x_first
+        # One rising number for each row of each pattern finds the spans of a range of rows.
+        self._top = int(self.y.min(initial=0))
+        self._rows = int(self.y.max(initial=0)) - self._top + 1
+        self._row = np.repeat(np.arange(len(patterns)), np.diff(self.begin)) * (self._rows + 2) + self.y - self._top
 
     @property
     def nbytes(self) -> int:
@@ -93,14 +97,17 @@ class PatternTable:
 
     def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
         """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""
-        lengths = np.diff(self.begin)[pattern]
-        owner, place = ragged(lengths)
-        span = self.begin[pattern][owner] + place
+        rows = self._rows
+        low, high = (np.clip(boxes_xyxy[:, side] - y - self._top, -1, rows) for side in (1, 3))
+        first = np.searchsorted(self._row, pattern * (rows + 2) + low)
+        last = np.searchsorted(self._row, pattern * (rows + 2) + high, side="right")
+        owner, place = ragged(np.maximum(last - first, 0))
+        span = first[owner] + place
         box = boxes_xyxy[owner]
-        row = self.y[span] + y[owner]
         x_first = np.maximum(self.x_first[span] + x[owner], box[:, 0])
         x_last = np.minimum(self.x_last[span] + x[owner], box[:, 2])
-        some = (x_first <= x_last) & (row >= box[:, 1]) & (row <= box[:, 3])
+        some = x_first <= x_last
+        row = self.y[span] + y[owner]
         ordinal = self.ordinal[span] - x[owner]
         return Runs(owner[some], row[some], x_first[some], x_last[some], ordinal[some])
 

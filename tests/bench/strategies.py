@@ -1,6 +1,6 @@
 """Direct against composed, in one run: microseconds a shot, their ratio, and whether the planner chose well.
 
-    python tests/bench/strategies.py
+python tests/bench/strategies.py
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def main() -> None:
                 _, hits = timed(scene, weapon, "auto", shots, rng)
                 chosen = "composed" if any(stage.name == "code plane" for stage in hits.plan.ran) else "direct"
                 lost = {"direct": direct, "composed": composed}[chosen] / min(direct, composed)
-                ratio = direct / composed
-                print(f"{objects:8} {shots:6} {name:16} {direct:10.2f} {composed:12.2f} {ratio:6.2f}  {chosen} {lost:.2f}")
+                times = f"{direct:10.2f} {composed:12.2f} {direct / composed:6.2f}"
+                print(f"{objects:8} {shots:6} {name:16} {times}  {chosen} {lost:.2f}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,395 @@
+"""A scene that changes: planes, caches and journals follow, and every answer is that of the scene as it is."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import hypothesis.strategies as st
+import numpy as np
+import oracle_stack
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from test_fire import Volley, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
+
+import planes.items
+import weapons.firing
+import weapons.resolve
+from planes import InputError, Role, Scene, Sprite, load_scene
+from planes.compose import CodePlane
+from weapons import Disc, Hits, Point, fire
+
+SPRITES = [
+    *(some_sprite(random.Random(seed)) for seed in range(12)),
+    Sprite.from_mask(np.zeros((3, 2), bool)),
+    Sprite.from_mask([[True]]),
+    Sprite.from_image(np.random.default_rng(0).integers(0, 256, (6, 15, 4), np.uint8), grid_wh=(5, 6)),
+]
+SIZE_WH, ORIGIN_XY = (24, 18), (-5, 7)
+
+sprites = st.sampled_from(SPRITES)
+places = st.tuples(st.integers(-9, 21), st.integers(3, 28), st.sampled_from([0, 0.5, -0.5, 1 / 256])).map(
+    lambda p: (p[0] + p[2], p[1] - p[2])
+)
+poses = {
+    "angle": st.sampled_from([0.0, 90.0, -180.0, 45.0, 30.0, 271.5]),
+    "scale": st.sampled_from([1.0, 0.5, 2.0, 1.25]),
+    "flip": st.sampled_from(["none", "x", "y", "xy"]),
+    "layer": st.sampled_from([0, 1, -2]),
+    "categories": st.sampled_from([0, 1, 2, 3, 6, 2**31 + 1]),
+    "role": st.sampled_from([*["hittable"] * 4, *["occluder"] * 2, "mover", "background", "hud"]),
+}
+
+
+@dataclass
+class Model:
+    """One object as it was last told to be."""
+
+    sprite: Sprite
+    position: tuple[float, float]
+    pose: dict[str, Any] = field(default_factory=dict)
+
+    def item(self, number: int) -> oracle_stack.Item | None:
+        """The object for the oracle; its pixels are those of a scene that never changed."""
+        role, pose = self.pose["role"], dict(self.pose)
+        if role not in ("hittable", "occluder"):
+            return None
+        owner = pose.pop("owner")
+        mask, (x, y) = (fresh := Scene()).mask(fresh.add(self.sprite, self.position, **pose))
+        pixels = frozenset((x + i, y + j) for j, i in np.argwhere(mask).tolist())
+        return oracle_stack.Item(number, role == "occluder", pose["layer"], pose["categories"], owner, pixels)
+
+
+def codes_of(items: Sequence[oracle_stack.Item]) -> np.ndarray:
+    """The code plane, one pixel at a time: twice the number of the front item, and 1 more if one lies behind it."""
+    codes = np.zeros(SIZE_WH[::-1], np.int64)
+    order = oracle_stack.front_to_back(items)
+    for (y, x), _ in np.ndenumerate(codes):
+        here = [item for item in order if (x + ORIGIN_XY[0], y + ORIGIN_XY[1]) in item.pixels]
+        codes[y, x] = 2 * (here[0].id + 1) + (len(here) > 1) if here else 0
+    return codes
+
+
+def stale_calls(hits: Hits) -> list[Any]:
+    """Everything that looks at the scene again."""
+    return [hits.shares, hits.why_not, hits.blockers, hits.margins, hits.samples_at, hits.by_owner]
+
+
+class ChangingScene(RuleBasedStateMachine):
+    """Add, remove, move, set, save and load, and fire in between."""
+
+    @initialize(size=st.sampled_from([SIZE_WH, SIZE_WH, SIZE_WH, None]), shared=st.lists(places, max_size=5))
+    def begin(self, size: tuple[int, int] | None, shared: list[tuple[float, float]]) -> None:
+        self.scene = Scene(size, ORIGIN_XY)
+        self.models: dict[int, Model] = {}
+        self.old: Hits | None = None
+        for place in shared:
+            self._add(SPRITES[0], place, {"role": "hittable", "layer": 0, "categories": 1}, None)
+
+    def _add(self, sprite: Sprite, place: tuple[float, float], pose: dict[str, Any], owner: int | None) -> None:
+        number = self.scene.add(sprite, place, owner=owner, **pose)
+        assert number not in self.models, "an id was used again"
+        self.models[number] = Model(sprite, place, {**pose, "owner": number if owner is None else owner})
+
+    def _some(self, data: st.DataObject) -> list[int]:
+        return data.draw(st.lists(st.sampled_from(sorted(self.models)), min_size=1, max_size=4, unique=True))
+
+    @rule(sprite=sprites, place=places, pose=st.fixed_dictionaries(poses), data=st.data())
+    def add(self, sprite: Sprite, place: tuple[float, float], pose: dict[str, Any], data: st.DataObject) -> None:
+        pose = {**pose, "frame": data.draw(st.integers(0, sprite.frame_count - 1))}
+        self._add(sprite, place, pose, data.draw(st.sampled_from([None, *self.models])))
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data())
+    def remove(self, data: st.DataObject) -> None:
+        ids = self._some(data)[:2]
+        self.scene.remove(ids)
+        for number in ids:
+            del self.models[number]
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data(), together=st.booleans())
+    def move(self, data: st.DataObject, together: bool) -> None:
+        ids = self._some(data)
+        targets = [data.draw(places)] * len(ids) if together else [data.draw(places) for _ in ids]
+        self.scene.move(ids, targets[0] if together else targets)
+        for number, place in zip(ids, targets, strict=True):
+            self.models[number].position = place
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data(), names=st.lists(st.sampled_from(sorted(poses)), min_size=1, max_size=3, unique=True))
+    def change(self, data: st.DataObject, names: list[str]) -> None:
+        ids = self._some(data)
+        values: dict[str, Any] = {}
+        for name in names:
+            one_for_all = name == "role" or data.draw(st.booleans())
+            rows = [data.draw(poses[name])] * len(ids) if one_for_all else [data.draw(poses[name]) for _ in ids]
+            values[name] = rows[0] if one_for_all else rows
+            for number, value in zip(ids, rows, strict=True):
+                self.models[number].pose[name] = value
+        self.scene.set(ids, **values)
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data())
+    def change_frame_and_owner(self, data: st.DataObject) -> None:
+        ids = self._some(data)
+        frames = [data.draw(st.integers(0, self.models[number].sprite.frame_count - 1)) for number in ids]
+        owners = [data.draw(st.sampled_from(sorted(self.models))) for _ in ids]
+        self.scene.set(np.array(ids), frame=frames, owner=owners)
+        for number, frame, owner in zip(ids, frames, owners, strict=True):
+            self.models[number].pose |= {"frame": frame, "owner": owner}
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data())
+    def a_bad_change_changes_nothing(self, data: st.DataObject) -> None:
+        """All at once or not at all: the last row is bad."""
+        ids = self._some(data)
+        version, content = self.scene.version, self.scene.content_hash()
+        with pytest.raises(InputError, match="frame"):
+            self.scene.set(ids, layer=7, role="mover", position_xy=(0, 0), frame=[*[0] * (len(ids) - 1), 99])
+        with pytest.raises(InputError, match="scale"):
+            self.scene.set(ids, categories=1, angle=12, scale=[*[1] * (len(ids) - 1), 1e9])
+        assert (self.scene.version, self.scene.content_hash()) == (version, content)
+
+    @rule(seed=st.integers(0, 500))
+    def fire(self, seed: int) -> None:
+        rng = random.Random(seed)
+        where = [(0.0, 9.0), *(model.position for model in self.models.values())]
+        volley = some_volley(rng, some_weapon(rng), where, len(self.models))
+        self.old = self._compare(self.scene, volley)
+
+    def _items(self) -> list[oracle_stack.Item]:
+        return [item for n, model in sorted(self.models.items()) if (item := model.item(n)) is not None]
+
+    def _compare(self, scene: Scene, volley: Volley) -> Hits:
+        truth = expected(scene, volley, self._items())
+        hits = volley.fired(scene, strategy="direct")
+        assert told(hits) == truth
+        if scene.bounds is not None:
+            assert volley.fired(scene, strategy="composed") == hits
+        return hits
+
+    @rule()
+    def planes_are_up_to_date(self) -> None:
+        items = self._items()
+        plane = self.scene.code_plane()
+        assert (plane is None) == (self.scene.bounds is None)
+        if plane is None:
+            return
+        np.testing.assert_array_equal(plane.read(self.scene.items), codes_of(items))
+        whole = self.scene.planes()
+        np.testing.assert_array_equal(whole.hittable, codes_of([i for i in items if not i.occluder]) >> 1)
+        np.testing.assert_array_equal(whole.occluders, codes_of([i for i in items if i.occluder]) >> 1)
+        assert not whole.hittable.flags.writeable
+
+    @rule()
+    def scene_counts_what_is_there(self) -> None:
+        assert len(self.scene) == len(self.models) and self.scene.ids().tolist() == sorted(self.models)
+        for role in Role:
+            here = [n for n, model in sorted(self.models.items()) if model.pose["role"] == role.value]
+            assert self.scene.ids(role).tolist() == here
+
+    @precondition(lambda self: self.old is not None)
+    @rule()
+    def an_old_answer_is_stale(self) -> None:
+        assert self.old is not None
+        stale = self.old.version != self.scene.version
+        for call in stale_calls(self.old):
+            if stale:
+                with pytest.raises(InputError, match="fire again"):
+                    call()
+            else:
+                call()
+
+    @rule(seed=st.integers(0, 99), go_on=st.booleans())
+    def save_and_load(self, seed: int, go_on: bool) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            self.scene.save(folder)
+            loaded = load_scene(folder)
+        assert loaded.content_hash() == self.scene.content_hash()
+        rng = random.Random(seed)
+        self._compare(loaded, some_volley(rng, some_weapon(rng), [(0.0, 9.0)], len(self.models)))
+        if go_on:
+            self.scene, self.old = loaded, None
+
+    def teardown(self) -> None:
+        if hasattr(self, "scene"):
+            self.fire(1)
+            self.planes_are_up_to_date()
+
+
+QUIET: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large]}
+
+
+def test_a_changing_scene() -> None:
+    """Fails at once, with the steps as they came; the long run takes minutes to make them few."""
+    phases = [Phase.explicit, Phase.reuse, Phase.generate]
+    few = settings(max_examples=100, stateful_step_count=25, phases=phases, **QUIET)
+    run_state_machine_as_test(ChangingScene, settings=few)
+
+
+@pytest.mark.long
+def test_a_scene_that_changes_for_long() -> None:
+    run_state_machine_as_test(ChangingScene, settings=settings(max_examples=400, stateful_step_count=60, **QUIET))
+
+
+def crowd(count: int = 12) -> tuple[Scene, random.Random]:
+    rng = random.Random(count)
+    scene = Scene((40, 30))
+    for number in range(count):
+        role = "occluder" if number % 4 == 3 else "hittable"
+        scene.add(some_sprite(rng), (rng.randint(0, 39), rng.randint(0, 29)), role=role, layer=number % 3)
+    return scene, rng
+
+
+def redrawn(scene: Scene) -> np.ndarray:
+    """Codes of a plane that was never read before."""
+    assert scene.bounds is not None
+    return np.array(CodePlane(scene.bounds).read(scene.items))
+
+
+@pytest.mark.parametrize("rows", [0, 1, 3, 7])
+def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", rows)
+    scene, rng = crowd()
+    plane = scene.code_plane()
+    assert plane is not None
+    whole = plane.read(scene.items).size
+    forgotten = caught_up = 0
+    for _ in range(60):
+        changes = rng.randint(1, 5)
+        for _ in range(changes):
+            scene.move(rng.randrange(12), (rng.randint(0, 39), rng.randint(0, 29)))
+        codes = plane.read(scene.items)
+        np.testing.assert_array_equal(codes, redrawn(scene))
+        forgotten += changes > rows and plane.redrawn == whole
+        caught_up += plane.redrawn < whole
+        assert changes <= rows or plane.redrawn == whole
+    assert forgotten > 0 or rows == 7
+    assert caught_up > 0 or rows == 0
+
+
+def test_one_change_of_more_than_the_journal_remembers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", 3)
+    scene, _ = crowd()
+    plane = scene.code_plane()
+    assert plane is not None
+    plane.read(scene.items)
+    scene.move(range(12), (5, 5))
+    np.testing.assert_array_equal(plane.read(scene.items), redrawn(scene))
+    scene.move(0, (9, 9))
+    np.testing.assert_array_equal(plane.read(scene.items), redrawn(scene))
+    assert plane.redrawn < redrawn(scene).size
+
+
+def test_only_what_changed_is_drawn_anew() -> None:
+    scene = Scene((100, 100))
+    ids = [scene.add(square(5), (10 * i, 10 * i)) for i in range(9)]
+    plane = scene.code_plane()
+    assert plane is not None
+    plane.read(scene.items)
+    assert plane.redrawn == 100 * 100
+    plane.read(scene.items)
+    assert plane.redrawn == 0
+    scene.move(ids[4], (44, 40))
+    assert plane.cost(scene.items) == 2 * 25
+    plane.read(scene.items)
+    assert plane.redrawn == 2 * 25
+    for role in ("mover", "background", "hud"):
+        scene.add(square(50), role=role)
+    plane.read(scene.items)
+    assert plane.redrawn == 0
+    np.testing.assert_array_equal(plane.read(scene.items), redrawn(scene))
+
+
+def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows stay right over many compactions of the atlas, and a stack that was handed out keeps its masks."""
+    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    scene, rng = crowd()
+    atlases, largest = {id(scene.items.atlas): scene.items.atlas}, 0
+    for _ in range(40):
+        before = scene.items.stack()
+        masks = [before.mask(place).copy() for place in range(len(before))]
+        scene.set(rng.sample(range(12), 3), angle=[rng.uniform(0, 360) for _ in range(3)], scale=rng.choice([1, 1.5]))
+        volley = some_volley(rng, Disc(5), [(20, 15)], 12)
+        assert told(volley.fired(scene, strategy=rng.choice(["direct", "composed"]))) == expected(scene, volley)
+        for place, mask in enumerate(masks):
+            np.testing.assert_array_equal(before.mask(place), mask)
+        atlas = scene.items.atlas
+        atlases[id(atlas)] = atlas
+        in_use = {variant.key: variant.mask.size for variant in scene.items.variants}
+        assert atlas.live == sum(in_use.values())
+        assert atlas.used <= 2 * atlas.live
+        largest = max(largest, atlas.used)
+    assert len(atlases) > 5 and largest > 0
+
+
+def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    scene = Scene((9, 9))
+    for _ in range(20):
+        a, b = scene.add(SPRITES[-2], (4, 4)), scene.add(square(4), (3, 3))
+        assert fire(scene, Point(), (4, 4)).object.tolist() == [b]
+        scene.remove(b)
+        assert fire(scene, Point(), (4, 4)).object.tolist() == [a]
+        scene.remove([a])
+        assert not fire(scene, Disc(9), (4, 4), strategy="composed")
+    assert scene.items.atlas.live == 0 and scene.items.atlas.used <= 17
+
+
+@pytest.mark.parametrize("samples, pairs", [(1, 1), (7, 10), (40, 3), (2**18, 1), (3, 2**21)])
+def test_the_size_of_the_parts_changes_no_row(samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = {}
+    battles = [(seed, battle, battle.scene()) for seed in range(0, 240, 3) if (battle := some_battle(seed))]
+    for part in ("whole", "small"):
+        for seed, battle, scene in battles:
+            for strategy in ("direct", "composed") if scene.bounds else ("direct",):
+                hits = battle.volley.fired(scene, strategy=strategy)
+                if part == "whole":
+                    whole[seed, strategy] = hits
+                else:
+                    assert hits == whole[seed, strategy], f"{seed=} {strategy}"
+        monkeypatch.setattr(weapons.firing, "CHUNK_SAMPLES", samples)
+        monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", pairs)
+        monkeypatch.setattr(weapons.resolve, "CHUNK_SAMPLES", samples)
+    assert sum(map(len, whole.values())) > 100
+
+
+def removed_owner() -> Scene:
+    scene = Scene((9, 9))
+    a, b = scene.add(square(1), (1, 1)), scene.add(square(1), (2, 1))
+    scene.set(a, owner=b)
+    scene.remove(b)
+    return scene
+
+
+def one_object(sprite: object, categories: Sequence[str] = (), bits: int = 1) -> Scene:
+    scene = Scene((9, 9), categories=categories)
+    scene.add(sprite, (4, 4), categories=bits)
+    return scene
+
+
+FAINT = np.full((3, 3, 4), 100, np.uint8)
+SAVED = {
+    "an owner that was removed": removed_owner,
+    "a threshold of alpha": lambda: one_object(Sprite.from_image(FAINT, alpha_threshold=50)),
+    "a category named like a bit": lambda: one_object(square(1), ["bit 2"], 4),
+}
+
+
+@pytest.mark.parametrize("what", SAVED)
+def test_saved_and_loaded(what: str) -> None:
+    scene = SAVED[what]()
+    with tempfile.TemporaryDirectory() as folder:
+        scene.save(folder)
+        assert load_scene(folder).content_hash() == scene.content_hash()
+
+
+def test_a_wrong_number_of_flips() -> None:
+    scene, _ = crowd(3)
+    with pytest.raises(InputError, match="flip"):
+        scene.set([0, 1, 2], flip=["x", "y"])

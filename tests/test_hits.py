@@ -1,0 +1,625 @@
+"""What can be asked of hits: laws of the result, and every derived answer against brute force."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import time
+import tracemalloc
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import oracle_stack
+import pytest
+from test_fire import Battle, Shot, Volley, expected, items_of, parts_of, rounds_of, some_battle, square, told
+
+from planes import ALL, InputError, Scene
+from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Verdict, fire
+from weapons.arsenal import Plain
+
+SEEDS = range(0, 600, 6)
+MARGIN_SEEDS = range(0, 600, 12)
+VERDICT_OF = {verdict.name.lower(): verdict for verdict in Verdict}
+
+
+def fired(seed: int) -> tuple[Battle, Scene, Hits]:
+    battle = some_battle(seed)
+    scene = battle.scene()
+    return battle, scene, battle.volley.fired(scene)
+
+
+def wide(seed: int) -> tuple[Battle, Scene, Hits]:
+    """The same, its objects four times as far apart, some of them out of sight."""
+    battle = some_battle(seed)
+    battle.objects = [
+        (sprite, tuple(4 * p - 3 * at for p, at in zip(place, battle.volley.shots[0].at, strict=True)), pose)  # type: ignore[misc]
+        for sprite, place, pose in battle.objects
+    ]
+    scene = battle.scene()
+    return battle, scene, battle.volley.fired(scene)
+
+
+def samples_of(volley: Volley, shot: Shot) -> list[tuple[int, int, int, int]]:
+    """Samples of one shot as (round, pellet, y, x), in that order."""
+    every = rounds_of(volley.weapon, shot.at, shot.aim, shot.toward, volley.seed, shot.number)
+    return sorted(
+        (number, pellet, y, x)
+        for number, (_, pellets) in enumerate(every)
+        for pellet, samples in enumerate(pellets)
+        for (x, y), _ in samples
+    )
+
+
+def walks_of(battle: Battle, scene: Scene, shot: Shot) -> list[oracle_stack.Walk]:
+    """The oracle's walk of every sample of one shot."""
+    items, pierce = items_of(scene), parts_of(battle.volley.weapon)[2].pierce
+    options = {"accept": shot.accept, "exclude": shot.exclude, "pierce": pierce, "bounds": scene.bounds}
+    return [oracle_stack.at_pixel(items, (x, y), **options) for _, _, y, x in samples_of(battle.volley, shot)]  # type: ignore[arg-type]
+
+
+def pierced(battle: Battle) -> bool:
+    return parts_of(battle.volley.weapon)[2].pierce
+
+
+# Laws of the result
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rows_by_shot(seed: int) -> None:
+    battle, _, hits = fired(seed)
+    rows = list(hits)
+    assert len(hits) == len(rows) and bool(hits) == bool(rows)
+    assert hits.starts.shape == (len(battle.volley.shots) + 1,)
+    assert (hits.starts[0], hits.starts[-1]) == (0, len(rows))
+    assert [row for i in range(len(battle.volley.shots)) for row in hits.of(i)] == rows
+    assert all(row.shot == i for i in range(len(battle.volley.shots)) for row in hits.of(i))
+    for name in ("shot", "round", "object", "samples", "pixels", "weight", "pellets", "distance2"):
+        column = getattr(hits, name)
+        assert column.dtype == np.int64 and column.tolist() == [getattr(row, name) for row in rows]
+    assert hits.first_xy.tolist() == [list(row.first_xy) for row in rows]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rows_have_a_total_order(seed: int) -> None:
+    _, scene, hits = fired(seed)
+    place = {int(item): i for i, item in enumerate(scene.items.stack().ids)}
+    keys = [(r.shot, r.round, r.distance2, r.first_xy[1], r.first_xy[0], place[r.object]) for r in hits]
+    assert keys == sorted(keys) and len(set(keys)) == len(keys)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_verdicts_add_up_to_the_samples_fired(seed: int) -> None:
+    battle, _, hits = fired(seed)
+    fired_samples = [len(samples_of(battle.volley, shot)) for shot in battle.volley.shots]
+    assert hits.fired.tolist() == fired_samples
+    each = [hits.verdict_counts(i) for i in range(len(fired_samples))]
+    assert [sum(counts.values()) for counts in each] == fired_samples
+    assert hits.verdict_counts() == {name: sum(counts[name] for counts in each) for name in VERDICT_OF}
+    for i, counts in enumerate(each):
+        samples = sum(row.samples for row in hits.of(i))
+        assert samples >= counts["hit"] if pierced(battle) else samples == counts["hit"]
+    for row in hits:
+        assert 1 <= row.pellets <= row.samples and 1 <= row.pixels <= row.samples
+        assert 0 <= row.weight <= 65535 * row.samples
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_bodies_add_up(seed: int) -> None:
+    """`samples`, `pixels` and `weight` of a body are those of its rows added up: over parts and rounds."""
+    _, scene, hits = fired(seed)
+    keys = list(dict.fromkeys((row.shot, int(scene.items.owner[row.object])) for row in hits))
+    bodies = hits.by_owner()
+    assert [(body.shot, body.owner) for body in bodies] == keys
+    for body in bodies:
+        rows = [r for r in hits.of(body.shot) if scene.items.owner[r.object] == body.owner]
+        for name in ("samples", "pixels", "weight"):
+            assert getattr(body, name) == sum(getattr(row, name) for row in rows)
+        assert body.objects == tuple(dict.fromkeys(row.object for row in rows))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_json(seed: int) -> None:
+    _, _, hits = fired(seed)
+    data = json.loads(json.dumps(hits.to_dict(), allow_nan=False))
+    rows = [tuple({**row, "first_xy": tuple(row["first_xy"])}.values()) for row in data["rows"]]
+    assert rows == [tuple(row) for row in hits]
+    assert all(tuple(row) == type(one)._fields for row, one in zip(data["rows"], hits, strict=True))
+    assert data["verdicts"] == [hits.verdict_counts(i) for i in range(len(hits.shots))]
+    assert data["plan"] == hits.plan.to_dict()
+
+
+def test_equality_leaves_out_plan_and_version() -> None:
+    scene = Scene((9, 9))
+    item = scene.add(square(5), (1, 1))
+    direct, composed = (fire(scene, Disc(2), (3, 3), strategy=s) for s in ("direct", "composed"))
+    assert direct == composed and direct.plan != composed.plan
+    scene.move(item, (1, 1))
+    again = fire(scene, Disc(2), (3, 3))
+    assert again == direct and again.version != direct.version
+    assert direct != fire(scene, Disc(2), (3, 4))
+    assert direct != fire(scene, Disc(2), [(3, 3), (8, 8)])
+    for name in ("samples", "first_xy", "weight", "verdicts", "object"):
+        other = copy.copy(direct)
+        setattr(other, name, getattr(direct, name) + 1)
+        assert other != direct, name
+    assert direct != [*direct] and direct != 1
+    with pytest.raises(TypeError):
+        hash(direct)
+    assert "1 rows of 1 shots" in repr(direct)
+
+
+def test_what_is_not_a_shot_of_the_batch() -> None:
+    hits = fire(Scene(), Point(), [(0, 0), (1, 1)])
+    for number in (2, -1, 0.5, "0", True):
+        for call in (hits.of, hits.verdict_counts, hits.samples_at, hits.why_not, hits.blockers, hits.margins):
+            with pytest.raises(InputError, match="shot"):
+                call(number)
+
+
+# Derived answers against brute force
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_samples_at(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    for i, shot in enumerate(battle.volley.shots):
+        walks = walks_of(battle, scene, shot)
+        decided = [(*walk.hit, *filter(None, [walk.ended_by]), *walk.skipped) for walk in walks]
+        found = hits.samples_at(i)
+        assert list(zip(found.round, found.pellet, found.xy[:, 1], found.xy[:, 0], strict=True)) == samples_of(
+            battle.volley, shot
+        )
+        assert found.verdict.tolist() == [VERDICT_OF[walk.verdict] for walk in walks]
+        assert found.item.tolist() == [by[0].id if by else -1 for by in decided]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_blockers(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    for i, shot in enumerate(battle.volley.shots):
+        ends = [walk.ended_by for walk in walks_of(battle, scene, shot)]
+        counts = Counter(item.id for item in ends if item is not None and item.occluder)
+        assert hits.blockers(i) == sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_shares(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    items = {item.id: item for item in items_of(scene)}
+    shares = hits.shares()
+    assert len(shares) == len(hits)
+    for row, share in zip(hits, shares, strict=True):
+        shot, item = battle.volley.shots[row.shot], items[row.object]
+        in_round = sum(number == row.round for number, *_ in samples_of(battle.volley, shot))
+        visible = 0
+        for pixel in item.pixels:
+            walk = oracle_stack.at_pixel(
+                list(items.values()), pixel, accept=shot.accept, exclude=shot.exclude, pierce=pierced(battle),
+                bounds=scene.bounds,
+            )  # fmt: skip
+            visible += item in walk.hit
+        assert share == (row.samples / in_round, row.pixels / visible, row.pixels / len(item.pixels))
+        assert max(share) <= 1
+
+
+def why_not(battle: Battle, scene: Scene, which: int, hit: set[int]) -> list[tuple[Any, ...]]:
+    """What `why_not` answers, from the walk of every sample."""
+    shot = battle.volley.shots[which]
+    samples = np.array([(x, y) for _, _, y, x in samples_of(battle.volley, shot)]).reshape(-1, 2)
+    walks = walks_of(battle, scene, shot)
+    found = []
+    for item in items_of(scene):
+        if item.occluder or item.id in hit or not item.pixels or not len(samples):
+            continue
+        pixels = np.array(sorted(item.pixels))
+        distance2 = int(((samples[:, None] - pixels[None]) ** 2).sum(axis=-1).min())
+        if distance2 > 32**2:
+            continue
+        on = [walk for walk, xy in zip(walks, samples.tolist(), strict=True) if tuple(xy) in item.pixels]
+        ended = Counter(walk.ended_by.id for walk in on if walk.ended_by is not None)
+        if oracle_stack.refused(item, shot.accept, shot.exclude):
+            reason = "excluded" if item.categories & shot.accept else "category"
+        elif not on:
+            reason = "missed"
+        else:
+            reason = "outside" if all(walk.verdict == "outside" for walk in on) else "behind"
+        found.append((math.sqrt(distance2), item.id, reason, len(on), dict(ended)))
+    return sorted(found, key=lambda why: why[:2])
+
+
+def check_why_not(battle: Battle, scene: Scene, hits: Hits) -> Counter[str]:
+    """Compare, and return how often each reason came up."""
+    reasons: Counter[str] = Counter()
+    for which in range(len(battle.volley.shots)):
+        truth = why_not(battle, scene, which, {row.object for row in hits.of(which)})
+        found = [(why.distance, why.object, why.reason, why.samples, why.by) for why in hits.why_not(which)]
+        assert found == truth
+        reasons.update(why[2] for why in found)
+    return reasons
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_why_not(seed: int) -> None:
+    check_why_not(*fired(seed))
+    check_why_not(*wide(seed))
+
+
+def test_why_not_behind_what_was_pierced() -> None:
+    """Front to back: an object that is pierced, a wall that ends the walk, an object that is not reached."""
+    scene = Scene()
+    behind = scene.add(square(3))
+    wall = scene.add(square(3), layer=1, role="occluder")
+    front = scene.add(square(3), layer=2)
+    hits = fire(scene, Disc(1, pierce=True), (1, 1))
+    assert hits.object.tolist() == [front]
+    assert hits.why_not() == [(behind, "behind", 5, {wall: 5}, 0.0)] and hits.blockers() == [(wall, 5)]
+
+
+def test_every_reason_comes_up() -> None:
+    reasons = sum((check_why_not(*fired(seed)) + check_why_not(*wide(seed)) for seed in SEEDS), Counter())
+    assert set(reasons) == {"missed", "category", "excluded", "behind", "outside"}
+    assert min(reasons.values()) >= 5, reasons
+
+
+def test_why_not_tells_each_reason() -> None:
+    """One object for each reason, at distances that are known."""
+    scene = Scene((60, 20))
+    hit = scene.add(square(2), (10, 10))
+    wall = scene.add(square(2), (12, 10), role="occluder", layer=1)
+    behind = scene.add(square(2), (12, 10))
+    foreign = scene.add(square(1), (9, 10), categories=2)
+    own = scene.add(square(1), (8, 10))
+    outside = scene.add(square(1), (11, -2))
+    missed = scene.add(square(1), (15, 14))
+    at_32 = scene.add(square(1), (45, 10))
+    scene.add(square(1), (46, 9))
+    hits = fire(scene, Polygon([(-3, -12), (3, -12), (3, 0), (-3, 0)]), (10, 10), accept=ALL & ~2, exclude=own)
+    assert hits.object.tolist() == [hit] and hits.blockers() == [(wall, 2)]
+    assert hits.why_not() == [
+        (behind, "behind", 2, {wall: 2}, 0.0),
+        (foreign, "category", 1, {}, 0.0),
+        (own, "excluded", 1, {}, 0.0),
+        (outside, "outside", 1, {}, 0.0),
+        (missed, "missed", 0, {}, math.sqrt(2**2 + 4**2)),
+        (at_32, "missed", 0, {}, 32.0),
+    ]
+
+
+def hit_at_shifts(volley: Volley, scene: Scene, which: int) -> dict[tuple[int, int], set[int]]:
+    """Objects hit when one shot is fired elsewhere, for all whole-pixel shifts of up to 8 px."""
+    shot = volley.shots[which]
+    shifts = [(dx, dy) for dx in range(-8, 9) for dy in range(-8, 9) if dx * dx + dy * dy <= 64]
+    moved = []
+    for dx, dy in shifts:
+        target = None if shot.toward is None else (shot.toward[0] + dx, shot.toward[1] + dy)
+        moved.append(Shot((shot.at[0] + dx, shot.at[1] + dy), shot.aim, target, shot.accept, shot.exclude, shot.number))
+    hits = Volley(volley.weapon, moved, volley.seed).fired(scene)
+    return {shift: {row.object for row in hits.of(i)} for i, shift in enumerate(shifts)}
+
+
+@pytest.mark.parametrize("seed", MARGIN_SEEDS)
+def test_margins(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    for which in range(len(battle.volley.shots)):
+        by_shift = hit_at_shifts(battle.volley, scene, which)
+        still = by_shift[0, 0]
+        truth: dict[int, float] = {}
+        for (dx, dy), objects in by_shift.items():
+            for item in objects ^ still:
+                truth[item] = min(truth.get(item, 99.0), math.sqrt(dx * dx + dy * dy))
+        assert hits.margins(which) == truth
+
+
+def test_margins_of_a_small_picture() -> None:
+    """A 3x3 object shot in its middle is lost after 2 px; one 8 px away is found after 8, one 9 px away is not."""
+    scene = Scene()
+    middle, near = scene.add(square(3), (-1, -1)), scene.add(square(1), (8, 0))
+    scene.add(square(1), (0, 9))
+    assert fire(scene, Point(), (0, 0)).margins() == {middle: 2.0, near: 8.0}
+
+
+# Extremes
+
+
+GIANTS = [
+    (Disc(2**20), (5, 5)),
+    (Disc(2**20), (2**20 + 12, 10)),
+    (Ring(2**19, 2**20), (2**19 + 10, 10)),
+    (Cone(2**20, 90), (-5, 10)),
+    (Beam(2**20, 0), (-5, 12)),
+    (Beam(2**20 - 1, 2), (-(2**19), 12)),
+    (Box(2**20, 3), (0, 11)),
+]
+
+
+@pytest.mark.parametrize("bounded", [True, False])
+@pytest.mark.parametrize("weapon, at", GIANTS, ids=lambda v: getattr(v, "kind", str(v)))
+def test_giant_patterns(weapon: Any, at: tuple[int, int], bounded: bool) -> None:
+    """A pattern of up to 10^12 samples over a scene of 40 x 30 px takes about as long as its rows are many."""
+    scene = Scene((40, 30) if bounded else None)
+    a, b = scene.add(square(5), (10, 10)), scene.add(square(5), (20, 10))
+    scene.add(square(2, 5), (20, 10), role="occluder", layer=1)
+    spans = weapon.spans(2**30, 0)
+    began = time.perf_counter()
+    results = [fire(scene, weapon, at, strategy=s) for s in (("direct", "composed") if bounded else ("direct",))]
+    shares = results[0].shares()
+    assert time.perf_counter() - began < 20
+    assert all(hits == results[0] for hits in results)
+    counts = {}
+    for item, x_first in ((a, 10), (b, 22)):
+        on_row = (spans.y + at[1] >= 10) & (spans.y + at[1] <= 14)
+        x = np.minimum(spans.x_last + at[0], 14 if item == a else 24) - np.maximum(spans.x_first + at[0], x_first) + 1
+        counts[item] = int(np.maximum(x, 0)[on_row].sum())
+    assert {row.object: row.samples for row in results[0]} == {item: n for item, n in counts.items() if n}
+    assert sum(counts.values()) > 0
+    assert int(results[0].fired[0]) == spans.count == sum(results[0].verdict_counts().values())
+    for row, share in zip(results[0], shares, strict=True):
+        assert share.of_pattern == row.samples / spans.count
+
+
+def test_margins_of_a_large_pattern_need_little_memory() -> None:
+    scene = Scene((40, 30))
+    item = scene.add(square(5), (10, 10))
+    hits = fire(scene, Disc(2**13), (2**13 + 12, 12))
+    tracemalloc.start()
+    try:
+        assert hits.margins() == {item: 3.0}
+        assert tracemalloc.get_traced_memory()[1] < 64 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_too_many_samples_are_refused_not_tried() -> None:
+    hits = fire(Scene((40, 30)), Disc(2**20), (0, 0))
+    for call in (hits.samples_at, hits.why_not, hits.blockers):
+        with pytest.raises(InputError, match="samples: expected a shot of at most"):
+            call()
+
+
+@pytest.mark.parametrize("x", [-(2**40), 2**40])
+@pytest.mark.parametrize("y", [-(2**40), 2**40])
+@pytest.mark.parametrize("bounded", [True, False])
+def test_the_ends_of_the_world(x: int, y: int, bounded: bool) -> None:
+    """All that can be asked near the origin can be asked there, with the same answer."""
+    answers = []
+    for left, top in ((0, 0), (x, y)):
+        scene = Scene((20, 20) if bounded else None, (max(left - 10, -(2**40)), max(top - 10, -(2**40))))
+        if not left:
+            scene = Scene((20, 20) if bounded else None, (-10 if x > 0 else 0, -10 if y > 0 else 0))
+        scene.add(square(3), (left, top))
+        scene.add(square(2), (left, top), role="occluder", layer=1, categories=3)
+        scene.add(square(1), (left, top))
+        volley = Volley(Rounds(Spread(Disc(2, falloff="linear"), 3, 2), 2, (0.5, 0)), [Shot((left, top))] * 2)
+        hits = volley.fired(scene)
+        assert told(hits) == expected(scene, volley)
+        rows = [(*row[:7], (row.first_xy[0] - left, row.first_xy[1] - top), row.distance2) for row in hits]
+        derived = (hits.shares(), hits.why_not(), hits.blockers(), hits.margins(), hits.by_owner())
+        answers.append((rows, hits.verdict_counts(), derived, hits.samples_at().xy - (left, top)))
+    assert answers[0][:3] == answers[1][:3]
+    np.testing.assert_array_equal(answers[0][3], answers[1][3])
+
+
+def test_far_apart_in_one_batch() -> None:
+    scene = Scene()
+    ends = [(-(2**40), 2**40), (0, 0), (2**40, -(2**40))]
+    ids = [scene.add(square(1), end) for end in ends]
+    hits = fire(scene, Spread(Disc(1), 2, 1), ends)
+    assert hits.object.tolist() == ids
+    assert told(hits) == expected(scene, Volley(hits.weapon, [Shot(end, number=i) for i, end in enumerate(ends)]))
+
+
+@pytest.mark.parametrize("weapon", [Point(), Beam(5, 1), Spread(Disc(2), 3, 2), Rounds(Beam(3, 1), 2, (1, 0), 5.0)])
+@pytest.mark.parametrize("strategy", ["auto", "direct", "composed"])
+def test_no_shots(weapon: Any, strategy: str) -> None:
+    scene = Scene((9, 9))
+    scene.add(square(3), (3, 3))
+    at = np.zeros((0, 2))
+    hits = fire(scene, weapon, at, strategy=strategy)
+    assert not hits and hits.starts.tolist() == [0] and hits.verdicts.shape == (0, 5) and hits.first_xy.shape == (0, 2)
+    assert list(hits) == hits.by_owner() == hits.shares() == [] and sum(hits.verdict_counts().values()) == 0
+    assert json.loads(json.dumps(hits.to_dict()))["rows"] == []
+    assert hits == fire(scene, weapon, at, toward=np.zeros((0, 2)), accept=[], exclude=np.zeros((0, 1)), shot=[])
+    with pytest.raises(InputError, match="shot"):
+        hits.of(0)
+
+
+@pytest.mark.parametrize("bounded", [True, False])
+def test_an_empty_scene(bounded: bool) -> None:
+    """Nothing at all, nothing that decides, nothing of any pixel, or nothing any more: nothing is hit."""
+    scene = Scene((9, 9) if bounded else None)
+    for change in (
+        lambda: None,
+        lambda: scene.add(square(3), role="mover"),
+        lambda: scene.add(np.zeros((3, 3), bool)),
+        lambda: scene.remove(scene.add(square(3))),
+    ):
+        change()
+        for strategy in ("auto", "direct", *(["composed"] if bounded else [])):
+            hits = fire(scene, Disc(3, pierce=True), [(4, 4), (0, 0)], strategy=strategy)
+            assert not hits and hits.verdicts[:, 1:4].sum() == 0 and hits.fired.tolist() == [29, 29]
+            assert hits.margins() == {} and hits.why_not() == hits.blockers() == hits.shares() == []
+
+
+def test_a_pattern_of_no_pixel() -> None:
+    scene = Scene((9, 9))
+    scene.add(square(9))
+    for strategy in ("direct", "composed"):
+        hits = fire(scene, Stencil([".."], falloff="linear"), (4, 4), strategy=strategy)
+        assert not hits and hits.fired.tolist() == [0]
+        assert hits.why_not() == hits.shares() == [] and hits.margins() == {} and len(hits.samples_at().xy) == 0
+
+
+# The plan
+
+
+def stages(hits: Hits) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
+    """Why each stage ran, why each was left out, and the bytes made."""
+    ran = {stage.name: stage.why for stage in hits.plan.ran}
+    return ran, {s.name: s.why for s in hits.plan.left_out}, {s.name: s.bytes_made for s in hits.plan.ran}
+
+
+def test_direct_makes_no_plane() -> None:
+    scene = Scene((50, 40))
+    scene.add(square(5), (3, 3))
+    ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
+    plane = scene.code_plane()
+    assert plane is not None and plane.codes is None and plane.version == -1
+    assert {"patterns", "pre-filter", "walk"} == set(ran) and "code plane" in left_out and "read" not in ran
+    assert ran["walk"] == "direct: asked for"
+
+
+def test_composed_tells_what_it_drew() -> None:
+    scene = Scene((50, 40))
+    item = scene.add(square(5), (3, 3))
+    made = []
+    for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20)), lambda: scene.move(item, (0, 0))):
+        change()
+        ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="composed"))
+        assert {"patterns", "code plane", "read"} == set(ran) and "walk" not in ran and "pre-filter" in left_out
+        made.append(bytes_made["code plane"])
+    assert made == [2 * 50 * 40, 0, 2 * 2 * 25, 2 * 2 * 25]
+
+
+def test_what_a_scene_does_not_need_is_left_out() -> None:
+    scene = Scene()
+    hits = fire(scene, Disc(3), (4, 4))
+    _, left_out, bytes_made = stages(hits)
+    assert {"weights", "outside", "occluders", "walk", "code plane"} == set(left_out) and bytes_made["patterns"] > 0
+    for role in ("background", "mover", "hud"):
+        scene.add(square(3), role=role)
+    assert {"background", "mover", "hud"} <= set(stages(fire(scene, Disc(3), (4, 4)))[1])
+    scene.add(square(3), role="occluder")
+    ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4)))
+    assert "walk" in ran and not {"weights", "occluders", "walk"} & set(left_out)
+    bounded = Scene((9, 9))
+    assert "outside" not in stages(fire(bounded, Disc(3), (4, 4)))[1]
+
+
+def test_auto_says_why_and_changes_no_row() -> None:
+    """A single point is not worth a plane; a million samples over a crowd are."""
+    scene = Scene((64, 64))
+    for number in range(200):
+        scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
+    one = fire(scene, Point(), (5, 5))
+    assert stages(one)[0]["walk"].startswith("direct: about")
+    at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
+    many = fire(scene, Disc(8), at)
+    assert stages(many)[0]["read"].startswith("composed: about")
+    assert many == fire(scene, Disc(8), at, strategy="direct")
+    assert "no bounds" in stages(fire(Scene(), Point(), (0, 0)))[1]["code plane"]
+
+
+# Bad arguments
+
+
+NAN, INF = math.nan, math.inf
+AT = [(0, 0), (1, 1)]
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"weapon": "disc"}, r"weapon: expected a weapon, got str"),
+    ({"at": (0, 0, 0)}, r"at: expected shape \(any, 2\)"),
+    ({"at": []}, r"at: expected shape"),
+    ({"at": "x"}, r"at: "),
+    ({"at": None}, r"at: expected numbers"),
+    ({"at": [(0, 0), (NAN, 0)]}, r"at\[1\]\[0\]: expected a finite number, got nan"),
+    ({"at": [(0, 0), (0, 2.0**40 + 1)]}, r"at\[1\]\[1\]: expected a number within"),
+    ({"at": [(1j, 0)]}, r"at: expected numbers"),
+    ({"aim": [0, INF]}, r"aim\[1\]: expected a finite number, got inf"),
+    ({"aim": [0, 1, 2]}, r"aim: expected shape \(2,\), got \(3,\)"),
+    ({"aim": "up"}, r"aim: expected numbers"),
+    ({"aim": 0, "toward": (5, 5)}, r"aim: expected aim or toward, got both"),
+    ({"toward": [(5, 5), (1, 1)]}, r"toward\[1\]: expected a point other than the shot's own"),
+    ({"toward": [(5, 5)] * 3}, r"toward: expected shape \(2, 2\)"),
+    ({"toward": (NAN, 0)}, r"toward\[0\]\[0\]: expected a finite number"),
+    ({"accept": [1, -1]}, r"accept\[1\]: expected a whole number from 0 to 4294967295, got -1"),
+    ({"accept": 2**32}, r"accept\[0\]: expected"),
+    ({"accept": 0.5}, r"accept\[0\]: expected a whole number"),
+    ({"accept": True}, r"accept: expected numbers, got bool"),
+    ({"accept": "default"}, r"accept: expected numbers"),
+    ({"accept": None}, r"accept: expected numbers"),
+    ({"exclude": [1, 2, 3]}, r"exclude: expected shape \(2, any\)"),
+    ({"exclude": [[0], [0.5]]}, r"exclude\[1\]\[0\]: expected a whole number"),
+    ({"exclude": -2}, r"exclude\[0\]\[0\]: expected a whole number from -1"),
+    ({"exclude": "me"}, r"exclude: expected numbers"),
+    ({"seed": -1}, r"seed: expected a whole number"),
+    ({"seed": 2**64}, r"seed: expected a whole number"),
+    ({"seed": 1.5}, r"seed: expected a whole number"),
+    ({"seed": None}, r"seed: expected a whole number"),
+    ({"shot": [0, -1]}, r"shot\[1\]: expected a whole number from 0"),
+    ({"shot": [0, 1, 2]}, r"shot: expected shape \(2,\)"),
+    ({"strategy": "fast"}, r"strategy: expected one of 'auto', 'direct', 'composed', got 'fast'"),
+    ({"prefilter": "bax"}, r"prefilter: expected one of .* \(did you mean 'box'\?\)"),
+]
+
+
+@pytest.mark.parametrize("bad, message", BAD, ids=[str(bad)[:40] for bad, _ in BAD])
+def test_bad_arguments(bad: dict[str, Any], message: str) -> None:
+    scene = Scene()
+    scene.add(square(3))
+    arguments = {"weapon": Spread(Disc(1), 2, 1), "at": AT, **bad}
+    with pytest.raises(InputError, match=message):
+        fire(scene, arguments.pop("weapon"), arguments.pop("at"), **arguments)
+
+
+@pytest.mark.parametrize("name", ["at", "aim", "toward", "accept", "exclude", "shot"])
+def test_rows_of_different_length(name: str) -> None:
+    arguments: dict[str, Any] = {"at": AT, name: [[1, 2], [3]]}
+    with pytest.raises(InputError, match=name):
+        fire(Scene(), Disc(1), arguments.pop("at"), **arguments)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Disc(-1),
+        lambda: Disc(2**20 + 1),
+        lambda: Disc(NAN),
+        lambda: Disc(1, falloff="cubic"),
+        lambda: Disc(1, pierce=1),
+        lambda: Ring(3, 2),
+        lambda: Box(0, 1),
+        lambda: Box(1.5, 1),
+        lambda: Polygon([(0, 0), (1, 1)]),
+        lambda: Cone(1, 361),
+        lambda: Beam(1, -1),
+        lambda: Stencil(["#.", "#"]),
+        lambda: Spread(Spread(Point(), 1, 1), 1, 1),
+        lambda: Spread(Point(), 0, 1),
+        lambda: Rounds(Rounds(Point(), 1), 1),
+        lambda: Rounds(Point(), 65_537),
+        lambda: Rounds(Point(), 1, (0, 0, 0)),
+    ],
+)
+def test_bad_weapons(make: Any) -> None:
+    with pytest.raises(InputError, match=r"^[a-z_]+(\[\d+\])*: expected .*, got "):
+        make()
+
+
+@pytest.mark.parametrize("weapon", [None, "laser", Disc, {"kind": "point"}, Plain()])
+def test_what_is_no_weapon_is_refused(weapon: Any) -> None:
+    with pytest.raises(InputError, match="weapon: expected a weapon, got"):
+        fire(Scene(), weapon, (0, 0))
+
+
+def test_what_is_no_scene_is_refused() -> None:
+    with pytest.raises(InputError, match="scene: expected a Scene, got str"):
+        fire("scene", Disc(1), (0, 0))  # type: ignore[arg-type]
+
+
+def test_giants_need_little_memory() -> None:
+    """Only the rows of a pattern that can meet something are laid out."""
+    scene = Scene((40, 30))
+    item = scene.add(square(5), (10, 10))
+    noisy = Scene()
+    noisy.add(np.indices((60, 60)).sum(axis=0) % 2 == 0, (400, 0))
+    giant = fire(scene, Disc(2**18), (2**18 + 12, 12))
+    crowd = fire(noisy, Spread(Disc(20), 400, 150), (0, 0))
+    tracemalloc.start()
+    try:
+        assert giant.margins() == {item: 3.0}
+        assert fire(scene, Spread(Disc(2**16), 20, 3), (10, 10)).object.tolist() == [item]
+        crowd.why_not()
+        assert tracemalloc.get_traced_memory()[1] < 128 * 2**20
+    finally:
+        tracemalloc.stop()
