@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planes.arrays import InputError as InputError
     from planes.constants import ALL as ALL
+    from planes.image import read_png as read_png
     from planes.items import Role as Role
     from planes.scene import Planes as Planes
     from planes.scene import Scene as Scene
@@ -24,9 +25,10 @@ _HOME = {
     "Spans": "spans",
     "Sprite": "sprite",
     "load_scene": "scene",
+    "read_png": "image",
 }
 
-__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene"]
+__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene", "read_png"]
 
 
 def __getattr__(name: str) -> Any:

@@ -72,7 +72,7 @@ def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> 
     """
     array = _numeric(field, values, shape, "iuf").astype(np.float64)
     _first_bad(field, array, np.isfinite(array), "a finite number")
-    _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:g}")
+    _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
     return array
 
 
@@ -81,7 +81,7 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     array = _numeric(field, values, shape, "iuf")
     whole = f"a whole number from {low} to {high}"
     if array.dtype.kind == "f":
-        _first_bad(field, array, np.isfinite(array) & (np.rint(array) == array), whole)
+        _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
     _first_bad(field, array, (array >= low) & (array <= high), whole)
     return array.astype(np.int64)
 
@@ -98,7 +98,7 @@ def real(field: str, value: object, low: float, high: float) -> float:
     """Check one finite number in [low, high]."""
     number = float(reals(field, value, ()))
     if not low <= number <= high:
-        raise InputError(f"{field}: expected a number from {low:g} to {high:g}, got {_shown(value)}")
+        raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {_shown(value)}")
     return number
 
 
@@ -131,7 +131,7 @@ def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArra
     array = array_of(field, values, shape)
     if array.size and array.dtype.kind not in kinds:
         kind = "booleans" if kinds.startswith("b") else "numbers"
-        raise InputError(f"{field}: expected {kind}, got {array.dtype} ({_shown(values)})")
+        raise InputError(f"{field}: expected {kind}, got {_shown(array.tolist())}")
     if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
         raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
     return array
@@ -150,5 +150,5 @@ def _spelled(shape: Shape) -> str:
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."

@@ -7,6 +7,7 @@ The code plane answers "what does a sample meet first" in one read:
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -37,47 +38,63 @@ def label_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
 
 
 class CodePlane:
-    """The code plane of a box of the world, kept up to date from the journal."""
+    """The code plane of a box of the world, kept up to date from the journal.
+
+    Threads may read the plane of a scene that none of them changes.
+    """
 
     def __init__(self, box_xyxy: Box) -> None:
         _check_plane(box_xyxy)
         self.box_xyxy = box_xyxy
         self.codes: Codes | None = None
-        self.version = -1
         self.redrawn = 0
+        self._pending: list[Ints] = []
+        self._seen = -1
+        self._cost = 0
+        self._lock = threading.Lock()
 
-    def dirty(self, items: Items) -> Ints | None:
-        """Boxes (n, 4) to redraw, within the plane; None for the whole of it."""
-        if self.codes is None or (self.codes.dtype == np.uint16 and items.count > ITEMS_UINT16):
-            return None
-        boxes = items.changed_boxes(self.version)
-        if boxes is None:
-            return None
+    @property
+    def size(self) -> int:
+        """Pixels of the whole plane."""
         x, y, x_max, y_max = self.box_xyxy
-        boxes = np.concatenate([np.maximum(boxes[:, :2], (x, y)), np.minimum(boxes[:, 2:], (x_max, y_max))], axis=1)
-        boxes = boxes[(boxes[:, :2] <= boxes[:, 2:]).all(axis=1)]
-        return boxes if area(boxes) < self.codes.size else None
+        return (x_max - x + 1) * (y_max - y + 1)
 
     def cost(self, items: Items) -> int:
-        """Pixels that must be redrawn before the plane can be read."""
-        boxes = self.dirty(items)
-        x, y, x_max, y_max = self.box_xyxy
-        return (x_max - x + 1) * (y_max - y + 1) if boxes is None else area(boxes)
+        """Pixels that must be drawn anew before the plane can be read; each change is looked at once."""
+        if self.codes is None or (self.codes.dtype == np.uint16 and items.count > ITEMS_UINT16):
+            return self.size
+        if self._seen != items.version:
+            boxes = items.changed_boxes(self._seen)
+            if boxes is not None:
+                self._pending.append(self._clipped(boxes))
+                self._cost += area(self._pending[-1])
+            self._seen = items.version
+            if boxes is None or self._cost >= self.size:
+                self.codes, self._pending, self._cost = None, [], 0
+                return self.size
+        return self._cost
 
     def read(self, items: Items) -> Codes:
-        """Codes (h, w) of the present version."""
-        boxes = self.dirty(items)
-        stack = items.stack()
-        if boxes is None or self.codes is None:
-            x, y, x_max, y_max = self.box_xyxy
-            kind = np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
-            self.codes = np.zeros((y_max - y + 1, x_max - x + 1), kind)
-            boxes = np.array([self.box_xyxy])
-        for box in boxes.tolist():
-            _paint(self.codes, self.box_xyxy, stack, box)
-        self.redrawn = area(boxes)
-        self.version = items.version
-        return self.codes
+        """Codes (h, w) of the present version; `redrawn` tells how many pixels were drawn for it."""
+        with self._lock:
+            self.redrawn = self.cost(items)
+            if self.codes is None or self.redrawn == self.size:
+                x, y, x_max, y_max = self.box_xyxy
+                kind = np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
+                self.codes = np.zeros((y_max - y + 1, x_max - x + 1), kind)
+                boxes = np.array([self.box_xyxy])
+            else:
+                boxes = np.concatenate([np.zeros((0, 4), np.int64), *self._pending])
+            for box in boxes.tolist():
+                _paint(self.codes, self.box_xyxy, items.stack(), box)
+            self._seen = items.version
+            self._pending, self._cost = [], 0
+            return self.codes
+
+    def _clipped(self, boxes: Ints) -> Ints:
+        x, y, x_max, y_max = self.box_xyxy
+        boxes = np.concatenate([np.maximum(boxes[:, :2], (x, y)), np.minimum(boxes[:, 2:], (x_max, y_max))], axis=1)
+        return boxes[(boxes[:, :2] <= boxes[:, 2:]).all(axis=1)]
 
 
 def area(boxes_xyxy: Ints) -> int:

@@ -56,7 +56,7 @@ SEED_MAX = 2**64 - 1
 """Largest seed."""
 
 PELLETS_MAX = 65_536
-"""Pellets of one spread, and rounds of one burst: beyond it a loop was forgotten."""
+"""Pellets of one shot, over all its rounds: beyond it a loop was forgotten."""
 
 NEAR_PX = 32
 """How far from the pattern `why_not` looks for objects, px."""
@@ -67,11 +67,18 @@ MARGIN_PX = 8
 VARIANT_CACHE_BYTES = 64 * 2**20
 """Turned and scaled masks kept for the next who asks, bytes."""
 
+VARIANT_BYTES = 1536
+"""What a kept mask costs beside its pixels, bytes."""
+
+PATTERN_CACHE_BYTES = 64 * 2**20
+"""Patterns kept for the next shot of the same aim, bytes."""
+
 ATLAS_SLACK_BYTES = 2**20
 """Masks no longer in use that an atlas tolerates beside half of its size, bytes."""
 
 CHUNK_SAMPLES = 2**18
-"""Samples worked on at a time: about the level-2 cache with their indices."""
+"""Samples worked on at a time: about the level-2 cache with their indices. With CHUNK_PAIRS it keeps numbers of rows
+(placement * rows, group * rows) below 2**62."""
 
 CHUNK_PAIRS = 2**21
 """(placement, item) box tests made at a time: 2 MB of booleans."""

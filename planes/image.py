@@ -13,7 +13,7 @@ import numpy.typing as npt
 from planes.arrays import Image, InputError
 from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX
 
-__all__ = ["read_png", "write_png", "write_text"]
+__all__ = ["check_output", "read_png", "write_png", "write_text"]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 GREY = 0
@@ -57,7 +57,16 @@ def write_text(path: Path, text: str) -> None:
     _replace(path, text.encode("utf-8"))
 
 
+def check_output(path: Path) -> None:
+    """Refuse, before any work is done, a place where no file can be written."""
+    if not path.name or (path.exists() and not path.is_file()):
+        raise InputError(f"output: cannot write {path}: expected the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"output: cannot write {path}: no folder {path.parent}")
+
+
 def _replace(path: Path, data: bytes) -> None:
+    check_output(path)
     aside = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         aside.write_bytes(data)

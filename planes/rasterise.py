@@ -17,14 +17,14 @@ from planes.constants import HALF, SUB
 from planes.grid256 import isqrt, turned
 from planes.spans import Spans, ragged
 
+Runs = tuple[Ints, Ints, Ints]
+
 __all__ = ["beam", "cone", "disc", "ellipse", "polygon", "ring", "segment"]
 
 
 def disc(radius: int) -> Spans:
     """Centres at most `radius` from the origin."""
-    y = _rows(-radius, radius)
-    half = isqrt(radius * radius - (SUB * y) ** 2)
-    return _closed(y, -half, half)
+    return _union([_disc_runs(np.zeros(2, np.int64), radius)])
 
 
 def ring(inner: int, outer: int) -> Spans:
@@ -35,8 +35,7 @@ def ring(inner: int, outer: int) -> Spans:
     # The hole is open: the first centre outside it has x * x >= rest, so x >= the root rounded up.
     root = isqrt(np.maximum(rest, 0))
     hole = np.where(rest > 0, root + (root * root < rest), 0)
-    left = _closed(y, -edge, -hole)
-    return left.union(_closed(y, hole, edge))
+    return _union([_closed(y, -edge, -hole), _closed(y, hole, edge)])
 
 
 def ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
@@ -77,23 +76,22 @@ def polygon(rings: Sequence[Ints]) -> Spans:
     y = first[edge] + place
     flat = top[edge, 1] == low[edge, 1]
     left, right = _crossings(top[edge], low[edge], y)
-    touching = Spans.from_runs(y, left, right)
+    touching = (y, left, right)
     crossing = ~flat & (SUB * y < low[edge, 1])  # half-open in y: a vertex between two edges counts once
     y, x = y[crossing], left[crossing]
     order = np.lexsort((x, y))
     y, x = y[order], x[order]
-    return touching.union(Spans.from_runs(y[::2], x[::2], x[1::2] - 1))
+    return _union([touching, (y[::2], x[::2], x[1::2] - 1)])
 
 
 def beam(a: Ints, b: Ints, radius: int) -> Spans:
     """Centres at most `radius` from the segment ab, and the closed supercover of ab."""
     (ax, ay), (bx, by) = np.asarray(a).tolist(), np.asarray(b).tolist()
-    axis = segment(a, b)
-    ends = disc_at(a, radius).union(disc_at(b, radius))
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
+    parts = [_segment_runs(a, b), _disc_runs(a, radius), _disc_runs(b, radius)]
     if length2 == 0:
-        return axis.union(ends)
+        return _union(parts)
     # Beside the segment: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|.
     side = math.isqrt(radius * radius * length2)
     y = _rows(min(ay, by) - radius, max(ay, by) + radius)
@@ -102,7 +100,7 @@ def beam(a: Ints, b: Ints, radius: int) -> Spans:
     x_min, x_max = ax * np.ones_like(y) + min(0, dx) - radius, ax * np.ones_like(y) + max(0, dx) + radius
     for slope, low, high in ((dx, along, along + length2), (dy, across - side, across + side)):
         x_min, x_max = _between(slope, low, high, x_min, x_max)
-    return axis.union(ends).union(_closed(y, x_min, x_max))
+    return _union([*parts, _closed(y, x_min, x_max)])
 
 
 def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
@@ -114,24 +112,26 @@ def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
     """
     y = _rows(-reach, reach)
     half = isqrt(reach * reach - (SUB * y) ** 2)
-    axis = segment(np.zeros(2, np.int64), turned(np.array([reach, 0]), c, s))
+    axis = _segment_runs(np.zeros(2, np.int64), turned(np.array([reach, 0]), c, s))
     if s_half == 0 and c_half > 0:
-        return axis
-    parts = []
+        return _union([axis])
+    sides = []
     for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
         slope = -sign * s * c_half - c * s_half
         limit = (s * s_half - sign * c * c_half) * SUB
-        parts.append(_half_plane(slope, y.astype(object) * limit, -half, half))
-    (a_min, a_max), (b_min, b_max) = parts
+        sides.append(_half_plane(slope, y.astype(object) * limit, -half, half))
+    (a_min, a_max), (b_min, b_max) = sides
     if c_half >= 0:
-        sector = _closed(y, np.maximum(a_min, b_min), np.minimum(a_max, b_max))
-    else:
-        sector = _closed(y, a_min, a_max).union(_closed(y, b_min, b_max))
-    return sector.union(axis)
+        return _union([axis, _closed(y, np.maximum(a_min, b_min), np.minimum(a_max, b_max))])
+    return _union([axis, _closed(y, a_min, a_max), _closed(y, b_min, b_max)])
 
 
 def segment(a: Ints, b: Ints) -> Spans:
     """Closed supercover: every pixel whose closed square meets the closed segment, the ends in either order."""
+    return _union([_segment_runs(a, b)])
+
+
+def _segment_runs(a: Ints, b: Ints) -> Runs:
     (x0, y0), (x1, y1) = sorted([np.asarray(a).tolist(), np.asarray(b).tolist()], key=lambda p: (p[1], p[0]))
     y = np.arange(-((HALF - y0) // SUB), (y1 + HALF) // SUB + 1)
     dx, dy = x1 - x0, y1 - y0
@@ -141,10 +141,10 @@ def segment(a: Ints, b: Ints) -> Spans:
         enter = x0 * dy + (np.maximum(y0, SUB * y - HALF) - y0) * dx
         leave = x0 * dy + (np.minimum(y1, SUB * y + HALF) - y0) * dx
         low, high, per = np.minimum(enter, leave), np.maximum(enter, leave), dy
-    return Spans.from_runs(y, -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per))
+    return y, -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
 
-def disc_at(center: Ints, radius: int) -> Spans:
+def _disc_runs(center: Ints, radius: int) -> Runs:
     """Centres at most `radius` from a point."""
     cx, cy = np.asarray(center).tolist()
     y = _rows(cy - radius, cy + radius)
@@ -152,14 +152,20 @@ def disc_at(center: Ints, radius: int) -> Spans:
     return _closed(y, cx - half, cx + half)
 
 
+def _union(parts: Sequence[Runs]) -> Spans:
+    """Merge all runs at once."""
+    y, x_first, x_last = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Spans.from_runs(y, x_first, x_last)
+
+
 def _rows(low: int, high: int) -> Ints:
     """Rows whose centres lie in [low, high]."""
     return np.arange(-(-low // SUB), high // SUB + 1, dtype=np.int64)
 
 
-def _closed(y: Ints, low: Ints, high: Ints) -> Spans:
+def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
     """Centres of rows y from low to high."""
-    return Spans.from_runs(y, -(-low // SUB), high // SUB)
+    return y, -(-low // SUB), high // SUB
 
 
 def _crossings(top: Ints, low: Ints, y: Ints) -> tuple[Ints, Ints]:

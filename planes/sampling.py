@@ -1,7 +1,7 @@
 """Kernels: runs of samples through the stack, front to back, or through the code plane in one read.
 
-Everything is in row runs. A run is one piece of one row of one placed pattern; `owner` numbers the placement. A sample
-is a pixel of a run.
+Everything is in row runs. A run is one piece of one row of one placed pattern, its `placement`; the `rank` of an item
+is its place in the stack, 0 in front. A sample is a pixel of a run.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from planes.compose import Codes
 from planes.items import Stack
 from planes.spans import Box, each_pixel, ragged
 
-__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "split", "tally", "walk"]
+__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "split", "walk"]
 
 HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
 """What happened to a sample: an object was hit, an occluder ended its walk, an item was skipped; it still walks."""
@@ -44,22 +44,22 @@ VERDICT_OF = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Runs of samples, sorted by (owner, y, x_first), disjoint within an owner.
+    """Runs of samples, sorted by (placement, y, x_first), disjoint within a placement.
 
     Parameters
     ----------
-    owner, y, x_first, x_last : (n,) int64
+    placement, y, x_first, x_last : (n,) int64
     ordinal : (n,) number of the run's pixel x = 0 in its pattern's prefix sums
     """
 
-    owner: Ints
+    placement: Ints
     y: Ints
     x_first: Ints
     x_last: Ints
     ordinal: Ints
 
     def __len__(self) -> int:
-        return len(self.owner)
+        return len(self.placement)
 
     @classmethod
     def joined(cls, parts: list[Runs]) -> Runs:
@@ -80,26 +80,25 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Pairs of a placement and an item that may touch, sorted by (owner, place).
+    """Pairs of a placement and an item that may touch, sorted by (placement, rank).
 
     Parameters
     ----------
-    owner : (k,) placement
-    place : (k,) place of the item in the stack, 0 in front
+    placement, rank : (k,) int64
     refused : (k,) whether the shot's filter refuses the item
     """
 
-    owner: Ints
-    place: Ints
+    placement: Ints
+    rank: Ints
     refused: Bools
 
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """What happened on the way, in runs: kind, item, where, and number of the run of samples that it is a part of."""
+    """What happened on the way, in runs: kind, rank of the item, number of the run that it is a part of, and where."""
 
     kind: Ints
-    place: Ints
+    rank: Ints
     run: Ints
     x_first: Ints
     x_last: Ints
@@ -132,14 +131,14 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     """
     start = np.cumsum(runs.lengths) - runs.lengths
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
-    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.place], BLOCK, HIT))
+    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.rank], BLOCK, HIT))
     ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
     keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
-    depth = np.arange(len(pairs.owner)) - np.searchsorted(pairs.owner, pairs.owner)
+    depth = np.arange(len(pairs.placement)) - np.searchsorted(pairs.placement, pairs.placement)
     order = np.argsort(depth[pair], kind="stable")
     steps = np.flatnonzero(np.diff(depth[pair][order], prepend=-1, append=-1))
-    box, item = stack.box_xyxy, pairs.place[pair]
+    box, item = stack.box_xyxy, pairs.rank[pair]
     sample = start[run] - runs.x_first[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
     events = []
@@ -156,19 +155,14 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
 
 
 def read_codes(runs: Runs, codes: Codes, plane_xyxy: Box) -> tuple[Ints, Ints, Ints, Ints]:
-    """Read the code plane under runs that lie in it, as runs of one code: (run, x_first, x_last, code)."""
+    """Read the code plane under runs that lie in it, as runs of one item: (run, x_first, x_last, code)."""
     x, y = plane_xyxy[:2]
     run, column = each_pixel(runs.x_first, runs.x_last)
     found = codes.reshape(-1)[((runs.y - y) * codes.shape[1] - x)[run] + column]
+    some = found != 0
+    run, column, found = run[some], column[some], found[some]
     first, last = _stretches(run, column, found)
     return run[first], column[first], column[last], found[first].astype(np.int64)
-
-
-def tally(owner: Ints, verdict: Ints, samples: Ints, owners: int) -> Ints:
-    """Add up samples (owners, 5) by owner and verdict."""
-    counts = np.zeros((owners, len(Verdict)), np.int64)
-    np.add.at(counts, (owner, verdict), samples)
-    return counts
 
 
 def split(lengths: Ints, samples: int) -> list[slice]:
@@ -188,11 +182,11 @@ def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints,
         return none, none, none, none
     low, high = int(runs.y.min()), int(runs.y.max())
     rows = high - low + 1
-    row = runs.owner * rows + (runs.y - low)
-    box = stack.box_xyxy[pairs.place]
+    row = runs.placement * rows + (runs.y - low)
+    box = stack.box_xyxy[pairs.rank]
     top, bottom = np.maximum(box[:, 1], low), np.minimum(box[:, 3], high)
-    first = np.searchsorted(row, pairs.owner * rows + (top - low))
-    last = np.searchsorted(row, pairs.owner * rows + (bottom - low), side="right")
+    first = np.searchsorted(row, pairs.placement * rows + (top - low))
+    last = np.searchsorted(row, pairs.placement * rows + (bottom - low), side="right")
     pair, place = ragged(np.where(top <= bottom, last - first, 0))
     run = first[pair] + place
     x_first = np.maximum(runs.x_first[run], box[pair, 0])
@@ -208,7 +202,7 @@ def _told(meeting: Ints, x: Ints, now: Ints, pair: Ints, run: Ints, kind: Ints, 
     kinds = kind[pair[which]]
     told = (kinds & emit) != 0
     which, first, last = which[told], first[told], last[told]
-    return Events(kinds[told], pairs.place[pair[which]], run[which], x[first], x[last])
+    return Events(kinds[told], pairs.rank[pair[which]], run[which], x[first], x[last])
 
 
 def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic]) -> tuple[Ints, Ints]:

@@ -18,14 +18,14 @@ from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
-from planes.scenefile import FileObject, SceneFile, read_scene, text_of, write_scene
+from planes.scenefile import FILE_NAME, FileObject, SceneFile, read_scene, text_of, write_scene
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
 __all__ = ["Planes", "Scene", "load_scene"]
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
-LAYER_MAX = 2**31
+LAYER_MAX = 2**31 - 1
 DEFAULT_CATEGORY = "default"
 """Name of the first category bit: the one that objects have unless told otherwise."""
 
@@ -62,16 +62,18 @@ class Scene:
         name: str = "scene",
     ) -> None:
         self.name = text_of("name", name)
+        if isinstance(categories, str) or not isinstance(categories, Iterable):
+            raise InputError(f"categories: expected a list of names, got {categories!r}")
         self.categories = (DEFAULT_CATEGORY, *(text_of("categories", category) for category in categories))
         if len(self.categories) > CATEGORY_BITS:
             raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
         if len(set(self.categories)) < len(self.categories):
             raise InputError(f"categories: expected distinct names, got {list(self.categories)}")
-        self.bounds: Box | None = None
+        self._bounds: Box | None = None
         if size_wh is not None:
             x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
             w, h = integers("size_wh", size_wh, (2,), 1, POSITION_MAX).tolist()
-            self.bounds = (x, y, x + w - 1, y + h - 1)
+            self._bounds = (x, y, x + w - 1, y + h - 1)
         self.items = Items()
         self.weapons: dict[str, Any] = {}
         self.shots: list[Any] = []
@@ -109,6 +111,11 @@ class Scene:
             for name, sprite, left, top in plane_objects(role, array):
                 scene.add(sprite, (left, top) if in_picture else (x + left, y + top), role=role, name=name)
         return scene
+
+    @property
+    def bounds(self) -> Box | None:
+        """First and last pixel of the world (x_min, y_min, x_max, y_max); None if it has no end."""
+        return self._bounds
 
     @property
     def version(self) -> int:
@@ -207,7 +214,12 @@ class Scene:
         if owner is not None:
             columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
         if role is not None:
-            columns["role"] = ROLES.index(_role(role))
+            kind = _role(role)
+            columns["role"] = ROLES.index(kind)
+            if categories is None:  # what has the categories that its old role gave it gets those of the new one
+                old = np.where(self.items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
+                now = self.items.categories[rows]
+                columns["categories"] = np.where(now == old, _default_bits(kind), now)
         angles, forms = changed_forms(self.items, rows, angle, scale, flip, frame)
         before = self.items.deciding_boxes(rows)
         if forms is not None:
@@ -361,7 +373,7 @@ class Scene:
 
 
 def load_scene(folder: str | Path) -> Scene:
-    """Read a scene folder: scene.json and the PNGs that it names.
+    """Read a scene folder: scene.json and the PNGs that it names. The path of scene.json will do, too.
 
     Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
 
@@ -370,8 +382,11 @@ def load_scene(folder: str | Path) -> Scene:
     InputError
         Naming the file, the section, the row and the field.
     """
-    file = read_scene(Path(folder))
-    with within(str(Path(folder) / "scene.json")):
+    path = Path(folder)
+    if path.name == FILE_NAME:
+        path = path.parent
+    file = read_scene(path)
+    with within(str(path / FILE_NAME)):
         x, y = file.origin_xy
         scene = Scene(file.size_wh, (x, y), categories=file.categories, name=file.name)
         scene.weapons, scene.shots = file.weapons, file.shots

@@ -30,20 +30,24 @@ def each_pixel(x_first: Ints, x_last: Ints) -> tuple[Ints, Ints]:
 
 
 def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:
-    """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); an empty run is dropped."""
-    some = x_first <= x_last
-    order = np.lexsort((x_first[some], row[some]))
-    row, x_first, x_last = row[some][order], x_first[some][order], x_last[some][order]
+    """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); an empty run is dropped.
+
+    Returns
+    -------
+    number of the first of the runs that went into each, x_first, x_last
+    """
+    some = np.flatnonzero(x_first <= x_last)
+    order = some[np.lexsort((x_first[some], row[some]))]
+    row, x_first, x_last = row[order], x_first[order], x_last[order]
     if not len(row):
-        return row, x_first, x_last
+        return order, x_first, x_last
     # Lay all rows on one line, two pixels apart, so that one running maximum serves them all.
     left = x_first.min()
-    _, rank = np.unique(row, return_inverse=True)
-    shift = rank * (x_last.max() - left + 3) - left
+    shift = np.cumsum(np.diff(row, prepend=row[0]) != 0) * (x_last.max() - left + 3) - left
     reach = np.maximum.accumulate(x_last + shift)
     begins = np.concatenate(([True], (x_first + shift)[1:] > reach[:-1] + 1))
     ends = np.concatenate((begins[1:], [True]))
-    return row[begins], x_first[begins], (reach - shift)[ends]
+    return order[begins], x_first[begins], (reach - shift)[ends]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +66,9 @@ class Spans:
     @classmethod
     def from_runs(cls, y: Ints, x_first: Ints, x_last: Ints) -> Spans:
         """Union of any runs: unsorted, overlapping, or empty (x_first > x_last)."""
-        runs = (np.asarray(v, np.int64) for v in (y, x_first, x_last))
-        return cls(*merged_runs(*runs))
+        row = np.asarray(y, np.int64)
+        which, first, last = merged_runs(row, np.asarray(x_first, np.int64), np.asarray(x_last, np.int64))
+        return cls(row[which], first, last)
 
     @classmethod
     def empty(cls) -> Spans:

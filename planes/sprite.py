@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,6 +30,7 @@ from planes.constants import (
     SCALE_MIN,
     SUB,
     TRIG_BITS,
+    VARIANT_BYTES,
     VARIANT_CACHE_BYTES,
 )
 from planes.grid256 import quarter_turns, rounded_div, snap, turned
@@ -158,6 +160,8 @@ class Sprite:
     @classmethod
     def polygon(cls, points_xy: object, holes: Sequence[object] = (), *, color: Sequence[int] | None = None) -> Sprite:
         """Shape of points (n, 2) in px about the position; holes by the even-odd rule; edges belong to it."""
+        if isinstance(holes, str) or not isinstance(holes, Sequence | np.ndarray):
+            raise InputError(f"holes: expected a list of rings, got {holes!r:.60}")
         given = [("polygon", points_xy), *((f"holes[{i}]", hole) for i, hole in enumerate(holes))]
         rings = []
         for name, points in given:
@@ -239,17 +243,20 @@ class _Kept:
     def __init__(self) -> None:
         self.variants: OrderedDict[tuple[int, Form], Variant] = OrderedDict()
         self.bytes = 0
+        self.lock = threading.Lock()
 
     def get(self, sprite: Sprite, form: Form) -> Variant:
+        """Find or make a variant."""
         key = (sprite.uid, form)
-        found = self.variants.pop(key, None)
-        if found is None:
-            found = _make_variant(sprite, form)
-            self.bytes += found.mask.nbytes
-        self.variants[key] = found
-        while self.bytes > VARIANT_CACHE_BYTES and len(self.variants) > 1:
-            self.bytes -= self.variants.popitem(last=False)[1].mask.nbytes
-        return found
+        with self.lock:
+            found = self.variants.pop(key, None)
+            if found is None:
+                found = _make_variant(sprite, form)
+                self.bytes += found.mask.nbytes + VARIANT_BYTES
+            self.variants[key] = found
+            while self.bytes > VARIANT_CACHE_BYTES and len(self.variants) > 1:
+                self.bytes -= self.variants.popitem(last=False)[1].mask.nbytes + VARIANT_BYTES
+            return found
 
 
 _kept = _Kept()

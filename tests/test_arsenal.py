@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 from math import floor, isqrt
 from typing import Any
@@ -26,6 +27,7 @@ from weapons import (
     Spread,
     Stencil,
     Weapon,
+    arsenal,
     fire,
     weapon_from_json,
 )
@@ -202,3 +204,36 @@ def test_a_shot_aimed_toward_a_point_passes_through_it() -> None:
     for x, y in ((30, 40), (-7.2, 2.1), (0.25, -60), (-50, -50), (3.4, 90.3)):
         xy = fire(Scene(), Beam(100, 0), (0, 0), toward=(x, y)).samples_at(0).xy.tolist()
         assert [floor(x + 0.5), floor(y + 0.5)] in xy
+
+
+@pytest.mark.parametrize(
+    ("weapon", "plain"),
+    [
+        (Disc(np.int64(3), pierce=np.bool_(True)), Disc(3, pierce=True)),  # type: ignore[arg-type]
+        (Disc(np.float32(2.5)), Disc(2.5)),  # type: ignore[arg-type]
+        (Box(3.0, np.int8(4)), Box(3, 4)),  # type: ignore[arg-type]
+        (Cone(np.array(9), 40), Cone(9.0, 40.0)),  # type: ignore[arg-type]
+        (Spread(Point(), np.int64(4), 3), Spread(Point(), 4, 3.0)),  # type: ignore[arg-type]
+        (Rounds(Point(), np.uint8(2), np.array([1, 2])), Rounds(Point(), 2, (1.0, 2.0))),  # type: ignore[arg-type]
+    ],
+)
+def test_numbers_of_numpy_are_kept_as_plain_ones(weapon: Weapon, plain: Weapon) -> None:
+    assert weapon == plain and hash(weapon) == hash(plain)
+    assert json.loads(json.dumps(weapon.to_json())) == plain.to_json()
+    assert fire(Scene(), weapon, (0, 0)) == fire(Scene(), plain, (0, 0))
+
+
+def test_pellets_of_a_burst_are_limited_as_a_whole() -> None:
+    assert Rounds(Spread(Point(), 256, 5), 256).count == 256
+    with pytest.raises(InputError, match="count: expected a whole number from 1 to 256, got 257"):
+        Rounds(Spread(Point(), 256, 5), 257)
+
+
+def test_patterns_that_are_kept_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = arsenal._Kept()
+    monkeypatch.setattr(arsenal, "_kept", kept)
+    monkeypatch.setattr(arsenal, "PATTERN_CACHE_BYTES", 20_000)
+    for degrees in range(60):
+        pattern_of(Beam(40, 2), *(int(v) for v in unit(degrees)))
+        assert kept.bytes == sum(p.nbytes for p in kept.patterns.values()) <= 20_000
+    assert len(kept.patterns) > 3

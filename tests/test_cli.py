@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -46,8 +47,13 @@ def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFi
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
-        (["report", str(GALLERY), "--at", "1,2"], "--at: expected together with --weapon"),
+        (["report", str(GALLERY), "--at", "1,2"], "--at: expected only together with --weapon"),
         (["report", str(GALLERY), "-o", "/no/such/folder/r.png"], "cannot write /no/such/folder/r.png"),
+        (["report", str(GALLERY), "-o", "/"], "output: cannot write /: expected the name of a file"),
+        (["report", str(GALLERY), "--json", "."], "output: cannot write .: expected the name of a file"),
+        (["report", str(GALLERY), "--json", "/no/such/r.json"], "cannot write /no/such/r.json"),
+        (["report", str(GALLERY), "-o", "a.png", "--json", "a.png"], "--json: expected another file"),
+        (["report", str(GALLERY), "-o", "a.jpg"], "--output: expected a name that ends in .png"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(
@@ -58,6 +64,30 @@ def test_bad_input_is_one_line_and_exit_2(
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_file_is_never_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.png"
+    os.mkfifo(pipe)
+    assert main(["report", str(GALLERY), "-o", str(pipe)]) == 2
+    assert pipe.is_fifo() and sorted(tmp_path.iterdir()) == [pipe]
+
+
+def test_an_interrupt_is_one_line_and_leaves_the_old_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    png = tmp_path / "r.png"
+    assert main(["report", str(GALLERY), "-o", str(png)]) == 0
+    before = png.read_bytes()
+
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("weapons.cli.picture_of_report", interrupted)
+    capsys.readouterr()
+    assert main(["report", str(GALLERY), "-o", str(png)]) == 130
+    assert capsys.readouterr().err == "hitplanes: interrupted\n"
+    assert png.read_bytes() == before and list(tmp_path.iterdir()) == [png]
 
 
 def test_help_shows_examples_and_bad_words_exit_2() -> None:

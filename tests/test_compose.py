@@ -298,3 +298,19 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
 
 def test_a_world_without_bounds_has_no_code_plane() -> None:
     assert Scene().code_plane() is None
+
+
+def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:
+    """Each change is looked at once, and a plane that lags behind by its own size is given up."""
+    scene = Scene((100, 100))
+    item = scene.add(np.ones((10, 10), np.bool_), (20, 20))
+    plane = CodePlane((0, 0, 99, 99))
+    plane.read(scene.items)
+    costs = []
+    for step in range(60):
+        scene.move(item, (20 + step % 3, 20))
+        costs.append(plane.cost(scene.items))
+        assert plane.cost(scene.items) == costs[-1]
+    assert costs[:3] == [200, 400, 600] and costs[-1] == 10_000
+    assert plane.codes is None
+    assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99)))

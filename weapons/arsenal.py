@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import threading
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from planes.arrays import InputError, Ints, choice, flag, integer, real, reals, within
-from planes.constants import HALF, MASK_SIDE_MAX, PELLETS_MAX, REACH_MAX, SUB
+from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from planes.grid256 import pixel, snap, turned, unit
 from planes.rasterise import beam, cone, disc, polygon, ring
 from planes.scenefile import keys_of, mask_of_rows
@@ -22,7 +24,7 @@ from weapons.pattern import FALLOFFS, Pattern, make_pattern
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
-    "arsenal_of", "pattern_of", "weapon_from_json",
+    "arsenal_of", "parts_of", "pattern_of", "pierces", "weapon_from_json",
 ]  # fmt: skip
 
 ORIGIN = np.zeros(2, np.int64)
@@ -43,6 +45,9 @@ class Weapon:
 
     def __hash__(self) -> int:
         return hash(self._text)
+
+    def _keep(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
 
     def to_json(self) -> dict[str, Any]:
         """The weapon as a scene file has it; fields at their defaults are left out."""
@@ -70,12 +75,12 @@ class Plain(Weapon):
     falloff: str | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Check the fields that all kinds share, and the lengths."""
-        flag("pierce", self.pierce)
+        """Check the fields that all kinds share, and the lengths; keep plain Python values."""
+        self._keep("pierce", flag("pierce", self.pierce))
         if self.falloff is not None:
             choice("falloff", self.falloff, FALLOFFS)
         for name in self.lengths:
-            real(name, getattr(self, name), 0, REACH_MAX)
+            self._keep(name, real(name, getattr(self, name), 0, REACH_MAX))
 
     @property
     def reach_256(self) -> int:
@@ -154,7 +159,7 @@ class Box(Plain):
         """Check that the sides are whole."""
         super().__post_init__()
         for name in ("width", "height"):
-            integer(name, getattr(self, name), 1, REACH_MAX)
+            self._keep(name, integer(name, getattr(self, name), 1, REACH_MAX))
 
     @property
     def reach_256(self) -> int:
@@ -189,10 +194,10 @@ class Polygon(Plain):
     def __post_init__(self) -> None:
         """Check the rings and keep them as tuples."""
         super().__post_init__()
-        object.__setattr__(self, "points", _ring_of("points", self.points))
+        self._keep("points", _ring_of("points", self.points))
         if isinstance(self.holes, str) or not isinstance(self.holes, Sequence):
             raise InputError(f"holes: expected a list of rings, got {self.holes!r:.60}")
-        object.__setattr__(self, "holes", tuple(_ring_of(f"holes[{i}]", r) for i, r in enumerate(self.holes)))
+        self._keep("holes", tuple(_ring_of(f"holes[{i}]", r) for i, r in enumerate(self.holes)))
 
     @property
     def reach_256(self) -> int:
@@ -223,7 +228,7 @@ class Cone(Plain):
     def __post_init__(self) -> None:
         """Check the angle."""
         super().__post_init__()
-        real("angle", self.angle, 0, 360)
+        self._keep("angle", real("angle", self.angle, 0, 360))
 
     @property
     def reach_256(self) -> int:
@@ -274,10 +279,10 @@ class Stencil(Plain):
     def __post_init__(self) -> None:
         """Check the mask and keep a copy that cannot be written."""
         super().__post_init__()
-        object.__setattr__(self, "mask", tuple(rows_of(mask_of_rows("mask", self.mask))))
+        self._keep("mask", tuple(rows_of(mask_of_rows("mask", self.mask))))
         if self.pivot_xy is not None:
             pivot = reals("pivot_xy", self.pivot_xy, (2,), MASK_SIDE_MAX)
-            object.__setattr__(self, "pivot_xy", tuple(pivot.tolist()))
+            self._keep("pivot_xy", tuple(pivot.tolist()))
 
     @cached_property
     def _sprite(self) -> Sprite:
@@ -311,8 +316,8 @@ class Spread(Weapon):
         """Check the parts."""
         if not isinstance(self.pellet, Plain):
             raise InputError(f"pellet: expected a weapon of one pattern, got {self.pellet!r:.60}")
-        integer("count", self.count, 1, PELLETS_MAX)
-        real("radius", self.radius, 0, REACH_MAX)
+        self._keep("count", integer("count", self.count, 1, PELLETS_MAX))
+        self._keep("radius", real("radius", self.radius, 0, REACH_MAX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,10 +340,11 @@ class Rounds(Weapon):
         """Check the parts."""
         if not isinstance(self.weapon, Plain | Spread):
             raise InputError(f"weapon: expected a weapon other than rounds, got {self.weapon!r:.60}")
-        integer("count", self.count, 1, PELLETS_MAX)
+        pellets = self.weapon.count if isinstance(self.weapon, Spread) else 1
+        self._keep("count", integer("count", self.count, 1, PELLETS_MAX // pellets))
         recoil = reals("recoil_xy", self.recoil_xy, (2,), REACH_MAX)
-        object.__setattr__(self, "recoil_xy", tuple(recoil.tolist()))
-        real("recoil_deg", self.recoil_deg, -360, 360)
+        self._keep("recoil_xy", tuple(recoil.tolist()))
+        self._keep("recoil_deg", real("recoil_deg", self.recoil_deg, -360, 360))
 
 
 KINDS: dict[str, type[Weapon]] = {
@@ -346,10 +352,49 @@ KINDS: dict[str, type[Weapon]] = {
 }
 
 
-@lru_cache(maxsize=1024)
+def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, Plain]:
+    """Take a weapon apart: its burst, its spread and its one pattern."""
+    burst = weapon if isinstance(weapon, Rounds) else None
+    inner = burst.weapon if burst else weapon
+    spread = inner if isinstance(inner, Spread) else None
+    plain = spread.pellet if spread else inner
+    if type(plain) not in KINDS.values() or not isinstance(plain, Plain):
+        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    return burst, spread, plain
+
+
+def pierces(weapon: Weapon) -> bool:
+    """Whether the samples of a weapon go on through objects."""
+    return parts_of(weapon)[2].pierce
+
+
+class _Kept:
+    """Patterns by last use, within PATTERN_CACHE_BYTES."""
+
+    def __init__(self) -> None:
+        self.patterns: OrderedDict[tuple[Plain, int, int], Pattern] = OrderedDict()
+        self.bytes = 0
+        self.lock = threading.Lock()
+
+    def get(self, weapon: Plain, c: int, s: int) -> Pattern:
+        """Find or make a pattern."""
+        with self.lock:
+            found = self.patterns.pop((weapon, c, s), None)
+            if found is None:
+                found = make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256)
+                self.bytes += found.nbytes
+            self.patterns[weapon, c, s] = found
+            while self.bytes > PATTERN_CACHE_BYTES and len(self.patterns) > 1:
+                self.bytes -= self.patterns.popitem(last=False)[1].nbytes
+            return found
+
+
+_kept = _Kept()
+
+
 def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
     """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept."""
-    return make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256)
+    return _kept.get(weapon, c, s)
 
 
 def weapon_from_json(data: object, name: str = "weapon") -> Weapon:

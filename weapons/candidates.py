@@ -27,16 +27,16 @@ def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack, prefilter
     prefilter : "none" pairs everything; "box" (and "auto") what shares a pixel of its box
     """
     if prefilter == "none":
-        owner = np.repeat(np.arange(len(boxes_xyxy)), len(stack))
-        place = np.tile(np.arange(len(stack)), len(boxes_xyxy))
+        placement = np.repeat(np.arange(len(boxes_xyxy)), len(stack))
+        rank = np.tile(np.arange(len(stack)), len(boxes_xyxy))
     else:
-        owner, place = np.nonzero(overlapping(boxes_xyxy[:, None], stack.box_xyxy[None]))
-    return Pairs(owner, place, refused(stack, place, shots, shot[owner]))
+        placement, rank = np.nonzero(overlapping(boxes_xyxy[:, None], stack.box_xyxy[None]))
+    return Pairs(placement, rank, refused(stack, rank, shots, shot[placement]))
 
 
-def refused(stack: Stack, place: Ints, shots: Shots, shot: Ints) -> Bools:
+def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
     """Whether shots refuse items: no category in common with `accept`, or an excluded owner."""
-    foreign = (stack.categories[place] & shots.accept[shot]) == 0
+    foreign = (stack.categories[rank] & shots.accept[shot]) == 0
     if not shots.exclude.shape[1]:
         return np.asarray(foreign)
-    return np.asarray(foreign | (stack.owner[place][:, None] == shots.exclude[shot]).any(axis=1))
+    return np.asarray(foreign | (stack.owner[rank][:, None] == shots.exclude[shot]).any(axis=1))

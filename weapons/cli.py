@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from planes.arrays import InputError
-from planes.image import write_png, write_text
+from planes.image import check_output, write_png, write_text
 from planes.scene import load_scene
 from weapons.arsenal import arsenal_of
 from weapons.facts import report_of
@@ -20,6 +20,9 @@ from weapons.picture import picture_of_report
 __all__ = ["main"]
 
 DESCRIPTION = "What does a shot hit in a 2-D scene? Decided by pixels, exactly, and shown why."
+
+NAMED = 8
+"""Objects that a line of output names."""
 
 REPORT_HELP = """\
 Fire shots at a scene folder and write a picture, and the facts as JSON, that say what was hit and why.
@@ -36,13 +39,16 @@ examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; exit codes: 0 done, 2 bad input."""
+    """Run the command; exit codes: 0 done, 2 bad input, 130 interrupted."""
     arguments = parser().parse_args(argv)
     try:
         arguments.run(arguments)
     except InputError as error:
         print(f"hitplanes: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("hitplanes: interrupted", file=sys.stderr)
+        return 130
     return 0
 
 
@@ -71,22 +77,37 @@ def parser() -> argparse.ArgumentParser:
 
 def report(arguments: argparse.Namespace) -> None:
     """Write the picture, and the facts, of the scene's shots or of one shot."""
+    _check_outputs(arguments.output, arguments.json)
     scene = load_scene(arguments.scene)
     arsenal = arsenal_of(scene)
     if arguments.weapon is None:
         for name in ("at", "aim", "seed"):
             if getattr(arguments, name) is not None:
-                raise InputError(f"--{name}: expected together with --weapon")
+                raise InputError(f"--{name}: expected only together with --weapon, got no weapon")
         orders = orders_of(scene, arsenal)
     else:
-        orders = [order_from_json(_shot(arguments), scene, arsenal)]
+        orders = [order_from_json(_shot(arguments), scene, arsenal, "command line")]
     facts = report_of(scene, orders)
     write_png(arguments.output, picture_of_report(facts, scene))
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
+    if not orders:
+        print(f"{scene.name}: no shots in its scene.json; name one with --weapon and --at")
     for shot in facts["shots"]:
-        hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"]) or "nothing"
+        hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
+        if len(shot["rows"]) > NAMED:
+            hit += f" and {len(shot['rows']) - NAMED} more"
         print(f"{shot['weapon']} at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}: {hit}")
+
+
+def _check_outputs(picture: Path, facts: Path | None) -> None:
+    check_output(picture)
+    if picture.suffix.lower() != ".png":
+        raise InputError(f"--output: expected a name that ends in .png, got {picture.name!r}")
+    if facts is not None:
+        check_output(facts)
+        if facts.resolve() == picture.resolve():
+            raise InputError(f"--json: expected another file than --output, got {str(facts)!r} for both")
 
 
 def _shot(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -15,13 +15,14 @@ from planes.items import Stack
 from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Runs, Verdict, walk
 from planes.scene import Scene
 from planes.spans import Spans, each_pixel
-from weapons.arsenal import Plain, Rounds, Weapon
+from weapons.arsenal import Weapon, pierces
 from weapons.candidates import pairs_of, refused
+from weapons.plan import Plan
 from weapons.resolve import Sight, direct
 from weapons.volley import Shots, Volley, volley_of
 
 __all__ = [
-    "Blocked", "Samples", "Share", "WhyNot", "blockers_of", "margins_of", "pierces", "samples_of", "shares_of",
+    "Blocked", "Samples", "Share", "WhyNot", "blockers_of", "margins_of", "samples_of", "shares_of",
     "why_not_of",
 ]  # fmt: skip
 
@@ -74,32 +75,25 @@ class WhyNot(NamedTuple):
 class _Detail:
     """One shot sample by sample.
 
-    `place` is what decided the verdict, `ended` what ended the walk, as places in the stack, -1 for none.
+    `rank` is what decided the verdict, `ended` what ended the walk, as ranks in the stack, -1 for none.
     """
 
     runs: Runs
     run: Ints
     x: Ints
     verdict: Ints
-    place: Ints
+    rank: Ints
     ended: Ints
-
-
-def pierces(weapon: Weapon) -> bool:
-    """Whether the samples of a weapon go on through objects."""
-    inner = weapon.weapon if isinstance(weapon, Rounds) else weapon
-    plain = inner if isinstance(inner, Plain) else getattr(inner, "pellet", inner)
-    return bool(getattr(plain, "pierce", False))
 
 
 def samples_of(scene: Scene, weapon: Weapon, shot: Shots) -> Samples:
     """All samples of one shot."""
     volley = volley_of(weapon, shot)
     detail = _detail(scene, weapon, volley, shot)
-    owner = detail.runs.owner[detail.run]
+    placement = detail.runs.placement[detail.run]
     ids = np.append(scene.items.stack().ids, -1)
     xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
-    return Samples(xy, volley.round[owner], volley.pellet[owner], detail.verdict, ids[detail.place])
+    return Samples(xy, volley.round[placement], volley.pellet[placement], detail.verdict, ids[detail.rank])
 
 
 def blockers_of(scene: Scene, weapon: Weapon, shot: Shots) -> list[Blocked]:
@@ -115,20 +109,22 @@ def blockers_of(scene: Scene, weapon: Weapon, shot: Shots) -> list[Blocked]:
 def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; what an object shows is worked out once for each filter."""
     stack = scene.items.stack()
-    place_of = {item: place for place, item in enumerate(stack.ids.tolist())}
+    rank_of = {item: rank for rank, item in enumerate(stack.ids.tolist())}
     visible: dict[tuple[object, ...], int] = {}
     shares = []
     in_round: dict[int, Ints] = {}
     for row in rows:
-        place = place_of[row.object]
-        key = (place, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
+        rank = rank_of[row.object]
+        key = (rank, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
-            visible[key] = _visible(scene, place, pierces(weapon), shots.take(row.shot, row.shot + 1))
+            visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
         if row.shot not in in_round:
             volley = volley_of(weapon, shots.take(row.shot, row.shot + 1))
             in_round[row.shot] = np.bincount(volley.round, volley.count).astype(np.int64)
         fired = int(in_round[row.shot][row.round])
-        shares.append(Share(row.samples / fired, row.pixels / visible[key], row.pixels / int(stack.mask(place).sum())))
+        shares.append(
+            Share(row.samples / fired, row.pixels / visible[key], row.pixels / scene.items.variants[row.object].area)
+        )
     return shares
 
 
@@ -138,14 +134,14 @@ def why_not_of(scene: Scene, weapon: Weapon, shot: Shots, hit: Set[int]) -> list
     stack = scene.items.stack()
     detail = _detail(scene, weapon, volley, shot)
     boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
-    near = np.unique(pairs_of(boxes, volley.shot, shot, stack, "box").place)
+    near = np.unique(pairs_of(boxes, volley.shot, shot, stack, "box").rank)
     found = []
-    for place in near.tolist():
-        if stack.occluder[place] or int(stack.ids[place]) in hit:
+    for rank in near.tolist():
+        if stack.occluder[rank] or int(stack.ids[rank]) in hit:
             continue
-        distance = math.sqrt(_distance2(detail.runs, stack, place))
+        distance = math.sqrt(_distance2(detail.runs, stack, rank))
         if distance <= NEAR_PX:
-            found.append(_why(stack, place, shot, detail, distance))
+            found.append(_why(stack, rank, shot, detail, distance))
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
@@ -158,11 +154,11 @@ def margins_of(scene: Scene, weapon: Weapon, shot: Shots) -> dict[int, float]:
     stack = scene.items.stack()
     hit = np.zeros((len(shift), len(stack)), np.bool_)
     placements = len(volley.shot)
-    sight = Sight(stack, scene.bounds, pierces(weapon), "box")
+    sight = Sight(stack, scene.bounds, pierces(weapon), "box", Plan())
     step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
     for first in range(0, len(shift), step):
         met = direct(_shifted(volley, shift[first : first + step]), shot, sight)
-        hit[first + met.owner // placements, met.place] = True
+        hit[first + met.placement // placements, met.rank] = True
     length2 = (shift**2).sum(axis=1)
     flips = hit != hit[length2 == 0]
     shortest = np.where(flips, length2[:, None], MARGIN_PX**2 + 1).min(axis=0, initial=MARGIN_PX**2 + 1)
@@ -193,37 +189,37 @@ def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detai
     run, x = each_pixel(runs.x_first, runs.x_last)
     pairs = pairs_of(volley.boxes, volley.shot, shot, stack, "box")
     events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
-    place = np.full(len(x), -1, np.int64)
+    rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
-    ended = place.copy()
+    ended = rank.copy()
     for kind in (SKIP, BLOCK, HIT):  # of one kind the first counts; a hit outranks a block, a block a skip
         told = events.take(np.flatnonzero(events.kind == kind)[::-1])
         event, column = each_pixel(told.x_first, told.x_last)
-        place[start[told.run][event] + column] = told.place[event]
+        rank[start[told.run][event] + column] = told.rank[event]
         if kind == BLOCK or (kind == HIT and not pierces(weapon)):
-            ended[start[told.run][event] + column] = told.place[event]
+            ended[start[told.run][event] + column] = told.rank[event]
     verdict = VERDICT_OF[state]
     if bounds is not None:
         y = runs.y[run]
         outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)
-        place[outside] = ended[outside] = -1
-    return _Detail(runs, run, x, verdict, place, ended)
+        rank[outside] = ended[outside] = -1
+    return _Detail(runs, run, x, verdict, rank, ended)
 
 
-def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float) -> WhyNot:
+def _why(stack: Stack, rank: int, shot: Shots, detail: _Detail, distance: float) -> WhyNot:
     """Reason of one object that was not hit."""
-    item = int(stack.ids[place])
-    x0, y0, x1, y1 = stack.box_xyxy[place].tolist()
+    item = int(stack.ids[rank])
+    x0, y0, x1, y1 = stack.box_xyxy[rank].tolist()
     y = detail.runs.y[detail.run]
     inside = np.flatnonzero((detail.x >= x0) & (detail.x <= x1) & (y >= y0) & (y <= y1))
-    on = inside[stack.mask(place)[y[inside] - y0, detail.x[inside] - x0]]
+    on = inside[stack.mask(rank)[y[inside] - y0, detail.x[inside] - x0]]
     ended = detail.ended[on]
-    by_place = np.unique(ended[ended >= 0], return_counts=True)
-    by = {int(stack.ids[p]): int(n) for p, n in zip(*by_place, strict=True)}
-    here = np.array([place])
+    by_rank = np.unique(ended[ended >= 0], return_counts=True)
+    by = {int(stack.ids[p]): int(n) for p, n in zip(*by_rank, strict=True)}
+    here = np.array([rank])
     if refused(stack, here, shot, np.zeros(1, np.int64))[0]:
-        foreign = not int(stack.categories[place]) & int(shot.accept[0])
+        foreign = not int(stack.categories[rank]) & int(shot.accept[0])
         return WhyNot(item, "category" if foreign else "excluded", len(on), by, distance)
     if not len(on):
         return WhyNot(item, "missed", 0, {}, distance)
@@ -231,10 +227,10 @@ def _why(stack: Stack, place: int, shot: Shots, detail: _Detail, distance: float
     return WhyNot(item, "outside" if outside else "behind", len(on), by, distance)
 
 
-def _distance2(runs: Runs, stack: Stack, place: int) -> int:
+def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     """Least squared distance between the pixels of a pattern and those of an item, px^2; beyond NEAR_PX, any."""
-    x, y, x_max, y_max = stack.box_xyxy[place].tolist()
-    spans = Spans.from_mask(stack.mask(place), (x, y))
+    x, y, x_max, y_max = stack.box_xyxy[rank].tolist()
+    spans = Spans.from_mask(stack.mask(rank), (x, y))
     near = (runs.y >= y - NEAR_PX) & (runs.y <= y_max + NEAR_PX)
     near &= (runs.x_last >= x - NEAR_PX) & (runs.x_first <= x_max + NEAR_PX)
     runs = runs.take(near)
@@ -248,19 +244,19 @@ def _distance2(runs: Runs, stack: Stack, place: int) -> int:
     return least
 
 
-def _visible(scene: Scene, place: int, pierce: bool, shot: Shots) -> int:
+def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
     """Pixels of an object that a pattern covering everything would hit."""
     stack, bounds = scene.items.stack(), scene.bounds
-    x, y = stack.box_xyxy[place, :2].tolist()
-    spans = Spans.from_mask(stack.mask(place), (x, y))
+    x, y = stack.box_xyxy[rank, :2].tolist()
+    spans = Spans.from_mask(stack.mask(rank), (x, y))
     zero = np.zeros(len(spans), np.int64)
     runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
     if bounds is not None:
         first, last = np.maximum(spans.x_first, bounds[0]), np.minimum(spans.x_last, bounds[2])
         some = (first <= last) & (spans.y >= bounds[1]) & (spans.y <= bounds[3])
         runs = Runs(zero, spans.y, first, last, zero).take(some)
-    box = stack.box_xyxy[place][None]
+    box = stack.box_xyxy[rank][None]
     pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack, "box")
     events, _ = walk(runs, pairs, stack, pierce, HIT)
-    own = events.place == place
+    own = events.rank == rank
     return int((events.x_last - events.x_first + 1)[own].sum())

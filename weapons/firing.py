@@ -11,11 +11,10 @@ from planes.arrays import InputError, choice
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import Verdict
 from planes.scene import Scene
-from weapons.arsenal import KINDS, Weapon
+from weapons.arsenal import Weapon, pierces
 from weapons.candidates import PREFILTERS
-from weapons.explain import pierces
 from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import chosen_strategy, plan_of
+from weapons.plan import Plan, chosen_strategy, leave_out_unused
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Volley, checked_shots, volley_of
 
@@ -45,8 +44,9 @@ def fire(
     at : (2,) position of one shot, or (N, 2) of a batch, px
     aim : degrees, 0 along +x, clockwise on the screen; or
     toward : (2,) or (N, 2) point that the weapon is aimed at, px
-    accept : category bits of what may be hit and of what may block; all by default
-    exclude : owners that are passed over, the shooter's for one: a number, or (N,), or (N, K) padded with -1
+    accept : names, or bits, of the categories of what may be hit and of what may block; all by default
+    exclude : owners that are passed over, the shooter's for one: a number; for one shot a list (K,); for a batch one
+        for each shot (N,), or several for each (N, K) or for all (1, K), padded with -1
     seed : of the pellets, 0 .. 2**64 - 1
     shot : numbers of the shots, 0 .. N-1 by default: a shot of a batch fired again alone under its number is the same
     prefilter : "auto", "none", "box": what goes before the pixels; it changes no row
@@ -61,35 +61,39 @@ def fire(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    if not isinstance(weapon, tuple(KINDS.values())):
-        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
     choice("prefilter", prefilter, PREFILTERS)
+    plan, stack = Plan(), scene.items.stack()
+    sight = Sight(stack, scene.bounds, pierces(weapon), prefilter, plan)
+    if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
+        accept = scene.category_bits(*accept)
     shots = checked_shots(weapon, at, aim, toward, accept, exclude, seed, shot)
-    stack = scene.items.stack()
-    sight = Sight(stack, scene.bounds, pierces(weapon), prefilter)
-    probe = volley_of(weapon, shots.take(0, 1))
-    name, why = chosen_strategy(strategy, scene, stack, probe.table, len(probe.shot) * len(shots))
+    first = volley_of(weapon, shots.take(0, 1))
+    name, why = chosen_strategy(strategy, scene, stack, first.table, len(first.shot) * len(shots))
     plane = scene.code_plane() if name == "composed" else None
     codes = plane.read(scene.items) if plane else None
+    if plane and codes is not None:
+        plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * codes.itemsize)
     rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
-    step = _shots_per_part(probe, len(stack))
-    for first in range(0, len(shots), step):
-        part = shots.take(first, min(first + step, len(shots)))
-        volley = volley_of(weapon, part)
+    step = _shots_per_part(first, len(stack))
+    for begin in range(0, len(shots), step):
+        part = shots.take(begin, min(begin + step, len(shots)))
+        volley = first if len(shots) == 1 else volley_of(weapon, part)
+        plan.run("patterns", f"{len(volley.table.count)} distinct", volley.table.nbytes)
         if plane and codes is not None:
             met = composed(volley, part, sight, codes, plane.box_xyxy)
         else:
             met = direct(volley, part, sight)
-        rows.append(rows_of_met(met, volley, stack.ids, first))
-        counts = np.zeros((len(part), len(Verdict)), np.int64)
-        np.add.at(counts, volley.shot, met.counts)
-        verdicts.append(counts)
-    plan = plan_of(scene, stack, probe, name, why, prefilter, plane)
+        rows.append(rows_of_met(met, volley, stack.ids, begin))
+        verdicts.append(met.counts.reshape(len(part), -1, len(Verdict)).sum(axis=1))
+    leave_out_unused(plan, scene, stack, first.table, why)
     return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
 
 
-def _shots_per_part(probe: Volley, items: int) -> int:
-    """Shots worked on at a time, so that samples and pairs of a part stay within their chunks."""
-    placements = max(len(probe.shot), 1)
-    samples = max(int(probe.count.sum()), placements)
+def _shots_per_part(first: Volley, items: int) -> int:
+    """Shots worked on at a time, so that samples and pairs of a part stay within their chunks.
+
+    All shots of a call have the weapon of the first, and patterns of about its size.
+    """
+    placements = max(len(first.shot), 1)
+    samples = max(int(first.count.sum()), placements)
     return max(1, min(CHUNK_SAMPLES // samples, CHUNK_PAIRS // (placements * max(items, 1))))

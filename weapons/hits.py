@@ -24,9 +24,9 @@ __all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
 class HitRow(NamedTuple):
     """One object hit by one round of one shot.
 
-    `samples` counts pixels of all pellets, `pixels` each pixel once, `weight` adds whole weights (65,535 a sample at
-    full strength), `pellets` counts those that hit; `first_xy` is the hit pixel nearest to the round's pixel and
-    `distance2` its squared distance, px^2.
+    `shot` counts within the batch; `samples` counts pixels of all pellets, `pixels` each pixel once; `weight` adds
+    whole weights (65,535 a sample at full strength); `pellets` counts those that hit; `first_xy` is the hit pixel
+    nearest to the round's pixel and `distance2` its squared distance, px^2.
     """
 
     shot: int
@@ -101,6 +101,8 @@ class Hits:
         self.weapon, self.shots, self.plan = weapon, shots, plan
         self.version = scene.version
         self._scene = scene
+        for name in (*HitRow._fields, "verdicts", "fired", "starts"):
+            getattr(self, name).flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.shot)
@@ -126,7 +128,8 @@ class Hits:
 
     def of(self, shot: int) -> list[HitRow]:
         """Rows of one shot."""
-        first, last = self.starts[self._checked(shot)], self.starts[shot + 1]
+        row = self._checked(shot)
+        first, last = self.starts[row], self.starts[row + 1]
         columns = [getattr(self, name)[first:last].tolist() for name in HitRow._fields]
         return [_named(row) for row in zip(*columns, strict=True)]
 
@@ -137,10 +140,10 @@ class Hits:
 
     def by_owner(self) -> list[OwnerRow]:
         """Rows added up by body: one event for one shot and owner, ordered by (shot, first row of the owner)."""
+        owner = self._fresh().items.owner
         bodies: dict[tuple[int, int], list[HitRow]] = {}
         for row in self:
-            bodies.setdefault((row.shot, int(self._scene.items.owner[row.object])), []).append(row)
-        self._fresh()
+            bodies.setdefault((row.shot, int(owner[row.object])), []).append(row)
         return [
             OwnerRow(
                 shot, owner, sum(r.samples for r in rows), sum(r.pixels for r in rows), sum(r.weight for r in rows),
@@ -184,7 +187,8 @@ class Hits:
         return margins_of(self._fresh(), self.weapon, self._one(shot))
 
     def _one(self, shot: int) -> Shots:
-        return self.shots.take(self._checked(shot), shot + 1)
+        row = self._checked(shot)
+        return self.shots.take(row, row + 1)
 
     def _checked(self, shot: int) -> int:
         return integer("shot", shot, 0, len(self.shots) - 1)
@@ -204,8 +208,8 @@ def _named(row: tuple[Any, ...]) -> HitRow:
 def rows_of_met(met: Met, volley: Volley, ids: Ints, first_shot: int) -> Rows:
     """Gather runs of hit pixels into rows; pixels hit by several pellets count once in `pixels`."""
     rounds = int(volley.round.max(initial=0)) + 1
-    group = (volley.shot[met.owner] * rounds + volley.round[met.owner]) * max(len(ids), 1) + met.place
-    origin = volley.origin_xy[met.owner]
+    group = (volley.shot[met.placement] * rounds + volley.round[met.placement]) * max(len(ids), 1) + met.rank
+    origin = volley.origin_xy[met.placement]
     x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
     distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
     order = np.lexsort((x, met.y, distance2, group))
@@ -218,21 +222,21 @@ def rows_of_met(met: Met, volley: Volley, ids: Ints, first_shot: int) -> Rows:
     pellets, pixels = np.ones_like(samples), samples
     if int(volley.pellet.max(initial=0)):
         pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
-    owner, place = met.owner[best], met.place[best]
-    columns = (volley.shot[owner], volley.round[owner], distance2[first], met.y[best], x[best], place)
+    placement, rank = met.placement[best], met.rank[best]
+    columns = (volley.shot[placement], volley.round[placement], distance2[first], met.y[best], x[best], rank)
     sort = np.lexsort(columns[::-1])
     first_xy = np.stack([x[best], met.y[best]], axis=1)
     return Rows(
-        volley.shot[owner][sort] + first_shot, volley.round[owner][sort], ids[place][sort], samples[sort], pixels[sort],
-        weight[sort], pellets[sort], first_xy[sort], distance2[first][sort],
+        volley.shot[placement][sort] + first_shot, volley.round[placement][sort], ids[rank][sort], samples[sort],
+        pixels[sort], weight[sort], pellets[sort], first_xy[sort], distance2[first][sort],
     )  # fmt: skip
 
 
 def _distinct(met: Met, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
     """Pellets that hit, and pixels counted once, of each group."""
-    pairs = np.unique(np.stack([group, met.owner[order]]), axis=1)
+    pairs = np.unique(np.stack([group, met.placement[order]]), axis=1)
     y = met.y[order] - met.y.min(initial=0)
     rows = int(y.max(initial=0)) + 1
-    row, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
-    pixels = np.bincount(row // rows, x_last - x_first + 1, groups).astype(np.int64)
+    which, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
+    pixels = np.bincount(group[which], x_last - x_first + 1, groups).astype(np.int64)
     return np.bincount(pairs[0], minlength=groups), pixels

@@ -37,18 +37,26 @@ class Order:
 
 def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[Order]:
     """Shots of a scene's file, numbered in their order unless they say otherwise."""
-    return [order_from_json(data, scene, arsenal, row) for row, data in enumerate(scene.shots)]
+    return [order_from_json(data, scene, arsenal, f"shots[{row}]", row) for row, data in enumerate(scene.shots)]
 
 
-def order_from_json(data: object, scene: Scene, arsenal: Mapping[str, Weapon], row: int = 0) -> Order:
+def order_from_json(
+    data: object, scene: Scene, arsenal: Mapping[str, Weapon], place: str = "shot", number: int = 0
+) -> Order:
     """Check one shot.
+
+    Parameters
+    ----------
+    data : JSON of the shot
+    place : in front of errors
+    number : of the shot, unless the JSON has one
 
     Raises
     ------
     InputError
-        Naming the row and the field.
+        Naming the place and the field.
     """
-    with within(f"shots[{row}]"):
+    with within(place):
         shot = keys_of("shot", data, KEYS)
         for key in ("weapon", "at"):
             if key not in shot:
@@ -64,7 +72,7 @@ def order_from_json(data: object, scene: Scene, arsenal: Mapping[str, Weapon], r
             None if accept is None else tuple(accept),
             tuple(_owner(scene, value, i) for i, value in enumerate(_listed("exclude", shot.get("exclude", [])))),
             integer("seed", shot.get("seed", 0), 0, SEED_MAX),
-            integer("shot", shot.get("shot", row), 0, 2**63 - 1),
+            integer("shot", shot.get("shot", number), 0, 2**63 - 1),
             ALL if accept is None else scene.category_bits(*accept),
         )
 

@@ -30,11 +30,14 @@ ENTRY = 124
 SIZE = 0.42
 """Scale of OpenCV's font, about 8 px a letter."""
 
+HIT_LINES = 24
+"""Rows of a card; the JSON has them all."""
+
 WHY_NOT_LINES = 3
 """Objects that a card names as not hit; the JSON has them all."""
 
 
-HEADER = ["object", "pixels", "of seen", "first at"]
+HEADER = ["object hit", "pixels", "of visible", "nearest"]
 
 
 class Text(NamedTuple):
@@ -105,9 +108,9 @@ def _legend(page: Image, report: Mapping[str, Any], y: int) -> list[Text]:
             texts.append(Text(x + 20, y + 12, verdict, FAINT))
             x += ENTRY
     hit = any(shot["rows"] for shot in report["shots"])
-    for color, name, there in ((OUTLINE_HIT, "object hit", hit), (OUTLINE, "other target", True)):
+    for color, name, thick, there in ((OUTLINE_HIT, "object hit", 3, hit), (OUTLINE, "other target", 1, True)):
         if there:
-            cv2.rectangle(page, (x, y), (x + 13, y + 13), color, 1)
+            cv2.rectangle(page, (x, y), (x + 13, y + 13), color, thick)
             texts.append(Text(x + 20, y + 12, name, FAINT))
             x += ENTRY
     if report["scene"]["occluders"]:
@@ -143,15 +146,20 @@ def _card(
 
 def _card_lines(shot: Mapping[str, Any]) -> list[list[str]]:
     """Lines of a card: verdict counts, a table of the objects hit, and some that were not."""
-    counts = [f"{n} {verdict}" for verdict, n in shot["verdicts"].items() if n]
+    counts = [f"{shot['verdicts'][verdict]} {verdict}" for verdict in reversed(MARKS) if shot["verdicts"][verdict]]
     lines = [[", ".join(counts) or "no samples"]]
     if shot["rows"]:
         lines.append(HEADER)
     rounds = len({row["round"] for row in shot["rows"]}) > 1
-    for row in shot["rows"]:
+    for row in shot["rows"][:HIT_LINES]:
         name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]
         distance = f"{row['distance2'] ** 0.5:.1f} px"
         lines.append([name, str(row["pixels"]), _percent(row["shares"]["of_visible"]), distance])
+    if len(shot["rows"]) > HIT_LINES:
+        lines.append([f"and {len(shot['rows']) - HIT_LINES} more"])
+    if shot["blockers"]:
+        blocked = [f"{entry['name']} ({entry['samples']})" for entry in shot["blockers"]]
+        lines.append(["blocked by " + ", ".join(blocked)])
     for entry in shot["why_not"][:WHY_NOT_LINES]:
         lines.append([f"not {entry['name']}: {_reason(entry)}"])
     if len(shot["why_not"]) > WHY_NOT_LINES:
@@ -202,7 +210,7 @@ def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
     left = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
     return [
         Text(EDGE, height - 12, left, FAINT),
-        Text(width - EDGE, height - 12, "ran: " + ", ".join(ran) if ran else "", FAINT, right=True),
+        Text(width - EDGE, height - 12, "stages: " + ", ".join(ran) if ran else "", FAINT, right=True),
     ]
 
 

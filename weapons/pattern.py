@@ -25,6 +25,11 @@ class Pattern:
     spans: Spans
     prefix: Ints | None
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it holds, with those of its own objects."""
+        return 3 * self.spans.y.nbytes + (0 if self.prefix is None else self.prefix.nbytes) + 1024
+
 
 def make_pattern(spans: Spans, falloff: str | None, reach_256: int) -> Pattern:
     """Weigh the pixels of a set by their distance from the origin."""

@@ -129,7 +129,7 @@ def _hatch(world: Image, occluding: Bools, factor: int) -> None:
 
 
 def _outline(world: Image, scene: Scene, item: int, view: Box, factor: int, *, hit: bool) -> None:
-    """Draw the border of an object's mask, inside of its pixels; a dark line beside it keeps it clear on any ground."""
+    """Draw the border of an object's mask, inside of its pixels."""
     mask, (x, y) = scene.mask(item)
     left, top = max(x, view[0]), max(y, view[1])
     right, low = min(x + mask.shape[1], view[2] + 1), min(y + mask.shape[0], view[3] + 1)
@@ -140,10 +140,9 @@ def _outline(world: Image, scene: Scene, item: int, view: Box, factor: int, *, h
     columns = slice((left - view[0]) * factor, (right - view[0]) * factor)
     window = world[rows, columns]
     core = _core(inside)
-    line = (inside & ~core)[2:-2, 2:-2]
     if hit and factor > 1:
-        _lay(window, (core & ~_core(core))[2:-2, 2:-2], (20, 16, 0), 200)
-    _lay(window, line, OUTLINE_HIT if hit else OUTLINE, 255 if hit else 130)
+        core = _core(core)  # a thicker line, so that hits stand out in grey, too
+    _lay(window, (inside & ~core)[2:-2, 2:-2], OUTLINE_HIT if hit else OUTLINE, 255 if hit else 130)
 
 
 def _core(inside: Bools) -> Bools:

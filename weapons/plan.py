@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from planes.arrays import InputError, choice
-from planes.compose import CodePlane, area
+from planes.compose import area
 from planes.items import Role, Stack
 from planes.scene import Scene
 from weapons.pattern import PatternTable
-from weapons.volley import Volley
 
-__all__ = ["STRATEGIES", "Plan", "Stage", "chosen_strategy", "plan_of"]
+__all__ = ["STRATEGIES", "Plan", "Stage", "chosen_strategy", "leave_out_unused"]
 
 STRATEGIES = ("auto", "direct", "composed")
 
@@ -38,8 +37,16 @@ class Plan:
     left_out: list[Stage] = field(default_factory=list)
 
     def run(self, name: str, why: str, bytes_made: int = 0) -> None:
-        """Record a stage that ran."""
+        """Record a stage that ran; the bytes of its runs for the parts of a batch add up."""
+        for i, stage in enumerate(self.ran):
+            if stage.name == name:
+                self.ran[i] = Stage(name, stage.why, stage.bytes_made + bytes_made)
+                return
         self.ran.append(Stage(name, why, bytes_made))
+
+    def has_run(self, name: str) -> bool:
+        """Whether a stage ran."""
+        return any(stage.name == name for stage in self.ran)
 
     def leave_out(self, name: str, why: str) -> None:
         """Record that a stage was not needed."""
@@ -81,32 +88,20 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
     return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
 
 
-def plan_of(
-    scene: Scene, stack: Stack, volley: Volley, strategy: str, why: str, prefilter: str, plane: CodePlane | None
-) -> Plan:
-    """Record of a call, from what it used."""
-    plan = Plan()
-    table = volley.table
-    plan.run("patterns", f"{len(table.count)} made for the first shot", table.nbytes)
+def leave_out_unused(plan: Plan, scene: Scene, stack: Stack, table: PatternTable, why_strategy: str) -> None:
+    """Complete a plan with what this scene and this weapon did not need."""
     if table.prefix is None:
         plan.leave_out("weights", "the weapon has no falloff")
     if scene.bounds is None:
         plan.leave_out("outside", "the scene has no bounds")
     if not stack.occluder.any():
         plan.leave_out("occluders", "the scene has none")
-    if plane is not None and plane.codes is not None:
-        redrawn = plane.redrawn * plane.codes.itemsize
-        plan.run("code plane", f"{plane.redrawn} px drawn anew", redrawn)
-        plan.run("read", f"composed: {why}")
-        plan.leave_out("pre-filter", "only for samples that look behind the front item")
-    else:
-        plan.leave_out("code plane", f"direct: {why}")
-        if not len(stack):
-            plan.leave_out("walk", "nothing in the scene can be hit or blocks")
-        else:
-            plan.run("pre-filter", f"{'box' if prefilter == 'auto' else prefilter}: each against {len(stack)} items")
-            plan.run("walk", f"direct: {why}")
+    if not plan.has_run("code plane"):
+        plan.leave_out("code plane", f"direct: {why_strategy}")
+    if not plan.has_run("pre-filter"):
+        plan.leave_out("pre-filter", "no sample needed the stack")
+    if not plan.has_run("walk"):
+        plan.leave_out("walk", "no sample lay where it needed one")
     for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
         if len(scene.ids(role)):
             plan.leave_out(role.value, "drawn only for a picture")
-    return plan

@@ -7,25 +7,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from planes.arrays import Ints
-from planes.compose import Codes
+from planes.compose import Codes, area
 from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack
 from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, split, walk
-from planes.spans import Box
+from planes.spans import Box, merged_runs
 from weapons.candidates import pairs_of, refused
+from weapons.plan import Plan
 from weapons.volley import Shots, Volley
 
 __all__ = ["Met", "Sight", "composed", "direct"]
 
+SPARSE = 4
+"""Items that fill less than one part in so many of the box around them are laid under one by one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a volley looks at: the stack, the bounds, and how."""
+    """What a volley looks at, how, and where what was done is recorded."""
 
     stack: Stack
     bounds: Box | None
     pierce: bool
     prefilter: str
+    plan: Plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +39,12 @@ class Met:
 
     Parameters
     ----------
-    owner, place, y, x_first, x_last, weight : (n,) int64; place of the object in the stack
+    placement, rank, y, x_first, x_last, weight : (n,) int64; rank of the object in the stack
     counts : (P, 5) samples by verdict
     """
 
-    owner: Ints
-    place: Ints
+    placement: Ints
+    rank: Ints
     y: Ints
     x_first: Ints
     x_last: Ints
@@ -51,15 +56,11 @@ def direct(volley: Volley, shots: Shots, sight: Sight) -> Met:
     """Walk the stack under every placement; only where an item may be is looked at all."""
     boxes = volley.boxes
     counts = _inside(volley, boxes, sight.bounds)
-    pairs = pairs_of(boxes, volley.shot, shots, sight.stack, sight.prefilter)
-    busy, first = np.unique(pairs.owner, return_index=True)
-    if not len(busy):
+    if not len(sight.stack):
         return _met(volley, Runs.joined([]), [], counts)
-    items = sight.stack.box_xyxy[pairs.place]
-    hull = np.concatenate(
-        [np.minimum.reduceat(items[:, :2], first, axis=0), np.maximum.reduceat(items[:, 2:], first, axis=0)], axis=1
-    )
-    runs = _laid(volley, busy, _clipped(hull, sight.bounds))
+    pairs = pairs_of(boxes, volley.shot, shots, sight.stack, sight.prefilter)
+    sight.plan.run("pre-filter", "which items each pattern may touch", pairs.rank.nbytes * 2)
+    runs = _under_items(volley, pairs, sight)
     return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
 
 
@@ -68,36 +69,54 @@ def composed(volley: Volley, shots: Shots, sight: Sight, codes: Codes, plane_xyx
     counts = _inside(volley, volley.boxes, sight.bounds)
     every = np.arange(len(volley.shot))
     runs = _laid(volley, every, np.broadcast_to(np.array(plane_xyxy), (len(every), 4)))
-    place_of = np.zeros(int(sight.stack.ids.max(initial=-1)) + 2, np.int64)
-    place_of[sight.stack.ids + 1] = np.arange(len(sight.stack))
+    sight.plan.run("read", "one code for each sample inside the bounds", int(runs.lengths.sum()) * codes.itemsize)
+    rank_of = np.zeros(int(sight.stack.ids.max(initial=-1)) + 2, np.int64)
+    rank_of[sight.stack.ids + 1] = np.arange(len(sight.stack))
     events, behind = [], []
     for strip in split(runs.lengths, CHUNK_SAMPLES):
         part = runs.take(strip)
         run, x_first, x_last, code = read_codes(part, codes, plane_xyxy)
-        some = code > 0
-        run, x_first, x_last, code = run[some], x_first[some], x_last[some], code[some]
-        place = place_of[code >> 1]
-        skip = refused(sight.stack, place, shots, volley.shot[part.owner[run]])
-        kind = np.where(skip, SKIP, np.where(sight.stack.occluder[place], BLOCK, HIT))
+        rank = rank_of[code >> 1]
+        skip = refused(sight.stack, rank, shots, volley.shot[part.placement[run]])
+        kind = np.where(skip, SKIP, np.where(sight.stack.occluder[rank], BLOCK, HIT))
         more = (code & 1 == 1) & (skip | (sight.pierce & (kind == HIT)))
-        _count(counts, part.owner[run[~more]], kind[~more], (x_last - x_first + 1)[~more])
+        _count(counts, part.placement[run[~more]], kind[~more], (x_last - x_first + 1)[~more])
         told = ~more & (kind == HIT)
-        events.append(Events(kind[told], place[told], run[told] + strip.start, x_first[told], x_last[told]))
+        events.append(Events(kind[told], rank[told], run[told] + strip.start, x_first[told], x_last[told]))
         seen = part.take(run[more])
-        behind.append(Runs(seen.owner, seen.y, x_first[more], x_last[more], seen.ordinal))
+        behind.append(Runs(seen.placement, seen.y, x_first[more], x_last[more], seen.ordinal))
     front = _met(volley, runs, events, counts)
     rest = Runs.joined(behind)
     return _joined(front, _look_behind(volley, rest, shots, sight, counts)) if len(rest) else front
 
 
+def _under_items(volley: Volley, pairs: Pairs, sight: Sight) -> Runs:
+    """Runs of the placements where the items are that they are paired with."""
+    busy, first = np.unique(pairs.placement, return_index=True)
+    if not len(busy):
+        return Runs.joined([])
+    items = sight.stack.box_xyxy[pairs.rank]
+    low = np.minimum.reduceat(items[:, :2], first, axis=0)
+    hull = np.concatenate([low, np.maximum.reduceat(items[:, 2:], first, axis=0)], axis=1)
+    if area(hull) <= SPARSE * area(items):
+        return _laid(volley, busy, _clipped(hull, sight.bounds))
+    runs = _laid(volley, pairs.placement, _clipped(items, sight.bounds))
+    y = runs.y - runs.y.min(initial=0)
+    rows = int(y.max(initial=0)) + 1
+    which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
+    runs = runs.take(which)
+    return Runs(runs.placement, runs.y, x_first, x_last, runs.ordinal)
+
+
 def _look_behind(volley: Volley, runs: Runs, shots: Shots, sight: Sight, counts: Ints) -> Met:
     """Walk the stack under the samples that the code plane could not answer."""
-    busy, first = np.unique(runs.owner, return_index=True)
+    busy, first = np.unique(runs.placement, return_index=True)
     last = np.append(first[1:], len(runs)) - 1
     left, right = np.minimum.reduceat(runs.x_first, first), np.maximum.reduceat(runs.x_last, first)
     boxes = np.stack([left, runs.y[first], right, runs.y[last]], axis=1)
     near = pairs_of(boxes, volley.shot[busy], shots, sight.stack, sight.prefilter)
-    pairs = Pairs(busy[near.owner], near.place, near.refused)
+    sight.plan.run("pre-filter", "for samples that look behind the front item", near.rank.nbytes * 2)
+    pairs = Pairs(busy[near.placement], near.rank, near.refused)
     return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
 
 
@@ -106,20 +125,20 @@ def _walked(runs: Runs, pairs: Pairs, sight: Sight, counts: Ints) -> list[Events
     found = []
     for strip in split(runs.lengths, CHUNK_SAMPLES):
         part = runs.take(strip)
-        near = slice(*np.searchsorted(pairs.owner, [part.owner[0], part.owner[-1] + 1]).tolist())
-        events, state = walk(
-            part, Pairs(pairs.owner[near], pairs.place[near], pairs.refused[near]), sight.stack, sight.pierce, HIT
-        )
-        found.append(Events(events.kind, events.place, events.run + strip.start, events.x_first, events.x_last))
+        near = slice(*np.searchsorted(pairs.placement, [part.placement[0], part.placement[-1] + 1]).tolist())
+        here = Pairs(pairs.placement[near], pairs.rank[near], pairs.refused[near])
+        events, state = walk(part, here, sight.stack, sight.pierce, HIT)
+        sight.plan.run("walk", "samples through the stack, front to back", state.nbytes)
+        found.append(Events(events.kind, events.rank, events.run + strip.start, events.x_first, events.x_last))
         met = state != LIVE
-        _count(counts, np.repeat(part.owner, part.lengths)[met], state[met], None)
+        _count(counts, np.repeat(part.placement, part.lengths)[met], state[met], None)
     return found
 
 
-def _count(counts: Ints, owner: Ints, state: Ints, samples: Ints | None) -> None:
+def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> None:
     """Move samples from EMPTY to the verdicts of their states."""
-    size = counts.size
-    added = np.bincount(owner * len(Verdict) + VERDICT_OF[state], samples, size).astype(np.int64).reshape(counts.shape)
+    column = placement * len(Verdict) + VERDICT_OF[state]
+    added = np.bincount(column, samples, counts.size).astype(np.int64).reshape(counts.shape)
     counts += added
     counts[:, Verdict.EMPTY] -= added.sum(axis=1)
 
@@ -133,17 +152,17 @@ def _inside(volley: Volley, boxes: Ints, bounds: Box | None) -> Ints:
     x, y, x_max, y_max = bounds
     over = np.flatnonzero((boxes[:, :2] < (x, y)).any(axis=1) | (boxes[:, 2:] > (x_max, y_max)).any(axis=1))
     runs = _laid(volley, over, np.broadcast_to(np.array(bounds), (len(over), 4)))
-    inside = np.bincount(runs.owner, runs.lengths, len(boxes)).astype(np.int64)[over]
+    inside = np.bincount(runs.placement, runs.lengths, len(boxes)).astype(np.int64)[over]
     counts[over, Verdict.OUTSIDE] = counts[over, Verdict.EMPTY] - inside
     counts[over, Verdict.EMPTY] = inside
     return counts
 
 
 def _laid(volley: Volley, placements: Ints, boxes: Ints) -> Runs:
-    """Runs of some of the placements, clipped to boxes."""
+    """Runs of some of the placements, each clipped to a box."""
     x, y = volley.xy[placements].T
     runs = volley.table.laid(volley.pattern[placements], x, y, boxes)
-    return Runs(placements[runs.owner], runs.y, runs.x_first, runs.x_last, runs.ordinal)
+    return Runs(placements[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
 
 
 def _clipped(boxes: Ints, bounds: Box | None) -> Ints:
@@ -156,9 +175,10 @@ def _met(volley: Volley, runs: Runs, events: list[Events], counts: Ints) -> Met:
     hit = Events.joined(events)
     under = runs.take(hit.run)
     weight = volley.table.weight(under.ordinal, hit.x_first, hit.x_last)
-    return Met(under.owner, hit.place, under.y, hit.x_first, hit.x_last, weight, counts)
+    return Met(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)
 
 
 def _joined(a: Met, b: Met) -> Met:
-    names = ("owner", "place", "y", "x_first", "x_last", "weight")
+    """Met before and behind; both hold the same counts."""
+    names = ("placement", "rank", "y", "x_first", "x_last", "weight")
     return Met(**{n: np.concatenate([getattr(a, n), getattr(b, n)]) for n in names}, counts=a.counts)

@@ -9,7 +9,7 @@ import numpy as np
 from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
 from planes.constants import ALL, POSITION_MAX, SEED_MAX
 from planes.grid256 import ONE, pixel, rounded_div, snap, unit, unit_toward
-from weapons.arsenal import Plain, Rounds, Spread, Weapon, pattern_of
+from weapons.arsenal import Weapon, parts_of, pattern_of
 from weapons.draws import disc_offsets
 from weapons.pattern import PatternTable
 
@@ -80,7 +80,7 @@ class Volley:
 
     @property
     def boxes(self) -> Ints:
-        """Inclusive boxes (P, 4); far from everything for an empty pattern."""
+        """Inclusive boxes (P, 4); an empty pattern has x_max < x_min."""
         return np.asarray(self.table.box_xyxy[self.pattern] + np.concatenate([self.xy, self.xy], axis=1))
 
     @property
@@ -118,12 +118,7 @@ def checked_shots(
 
 def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
-    burst = weapon if isinstance(weapon, Rounds) else None
-    inner = burst.weapon if burst else weapon
-    spread = inner if isinstance(inner, Spread) else None
-    plain = spread.pellet if spread else inner
-    if not isinstance(plain, Plain):
-        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    burst, spread, plain = parts_of(weapon)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
     round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
