@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import threading
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -34,6 +32,7 @@ from planes.constants import (
     VARIANT_CACHE_BYTES,
 )
 from planes.grid256 import quarter_turns, rounded_div, snap, turned
+from planes.kept import Kept
 from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
 
@@ -213,9 +212,12 @@ def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, 
     return Form(number, choice("flip", flip, FLIPS), sx, sy, *quarter_turns(angle))
 
 
+_kept: Kept[tuple[int, Form], Variant] = Kept(VARIANT_CACHE_BYTES, lambda variant: variant.mask.nbytes + VARIANT_BYTES)
+
+
 def variant_of(sprite: Sprite, form: Form) -> Variant:
     """Mask of a sprite in a form; the last ones asked for are kept, up to a number of bytes."""
-    return _kept.get(sprite, form)
+    return _kept.get((sprite.uid, form), lambda: _make_variant(sprite, form))
 
 
 def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple[Image, int, int]:
@@ -235,31 +237,6 @@ def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple
 def rows_of(mask: Bools) -> list[str]:
     """A mask as rows of '#' and '.', as scene files have it."""
     return ["".join("#" if v else "." for v in row) for row in mask.tolist()]
-
-
-class _Kept:
-    """Variants by last use, within VARIANT_CACHE_BYTES."""
-
-    def __init__(self) -> None:
-        self.variants: OrderedDict[tuple[int, Form], Variant] = OrderedDict()
-        self.bytes = 0
-        self.lock = threading.Lock()
-
-    def get(self, sprite: Sprite, form: Form) -> Variant:
-        """Find or make a variant."""
-        key = (sprite.uid, form)
-        with self.lock:
-            found = self.variants.pop(key, None)
-            if found is None:
-                found = _make_variant(sprite, form)
-                self.bytes += found.mask.nbytes + VARIANT_BYTES
-            self.variants[key] = found
-            while self.bytes > VARIANT_CACHE_BYTES and len(self.variants) > 1:
-                self.bytes -= self.variants.popitem(last=False)[1].mask.nbytes + VARIANT_BYTES
-            return found
-
-
-_kept = _Kept()
 
 
 def _make_variant(sprite: Sprite, form: Form) -> Variant:

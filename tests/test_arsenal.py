@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from planes import InputError, Scene
 from planes.grid256 import ONE, unit
+from planes.kept import Kept
 from planes.spans import Spans
 from weapons import (
     Beam,
@@ -230,10 +231,9 @@ def test_pellets_of_a_burst_are_limited_as_a_whole() -> None:
 
 
 def test_patterns_that_are_kept_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = arsenal._Kept()
+    kept = Kept(20_000, arsenal._kept.size)
     monkeypatch.setattr(arsenal, "_kept", kept)
-    monkeypatch.setattr(arsenal, "PATTERN_CACHE_BYTES", 20_000)
     for degrees in range(60):
         pattern_of(Beam(40, 2), *(int(v) for v in unit(degrees)))
-        assert kept.bytes == sum(p.nbytes for p in kept.patterns.values()) <= 20_000
-    assert len(kept.patterns) > 3
+        assert kept.bytes == sum(p.nbytes for p in kept.values.values()) <= 20_000
+    assert len(kept.values) > 3

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 
 ORDER = {
     "planes": (
-        "constants", "arrays", "grid256", "spans", "rasterise", "image", "sprite", "items", "compose", "labels",
+        "constants", "arrays", "grid256", "spans", "rasterise", "image", "kept", "sprite", "items", "compose", "labels",
         "poses", "scenefile", "scene", "render", "sampling",
     ),
     "weapons": (

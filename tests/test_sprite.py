@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from planes import sprite as module
 from planes.arrays import InputError
 from planes.constants import VARIANT_BYTES
+from planes.kept import Kept
 from planes.scene import Scene
 from planes.sprite import Form, Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
 
@@ -502,18 +503,17 @@ def test_variants_are_made_once() -> None:
 
 
 def test_the_cache_is_bounded_and_forgets_the_longest_unused(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = module._Kept()
+    kept = Kept(20_000, module._kept.size)
     monkeypatch.setattr(module, "_kept", kept)
-    monkeypatch.setattr(module, "VARIANT_CACHE_BYTES", 20_000)
     sprite = as_sprite(np.ones((20, 20), np.bool_))
     first = variant_of(sprite, Form())
     for angle in range(1, 90):
         variant_of(sprite, posed(sprite, angle=angle))
         assert variant_of(sprite, Form()) is first  # used all the time, so it stays
-        held = sum(v.mask.nbytes + VARIANT_BYTES for v in kept.variants.values())
+        held = sum(v.mask.nbytes + VARIANT_BYTES for v in kept.values.values())
         assert kept.bytes == held <= 20_000
-    assert len(kept.variants) > 3
-    assert posed(sprite, angle=1) not in {form for _, form in kept.variants}
+    assert len(kept.values) > 3
+    assert posed(sprite, angle=1) not in {form for _, form in kept.values}
     large = as_sprite(np.ones((200, 200), np.bool_))
     assert variant_of(large, Form()).area == 40_000  # one that is larger than the cache is made all the same
     assert kept.bytes == 40_000 + VARIANT_BYTES

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import threading
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
@@ -16,6 +14,7 @@ import numpy as np
 from planes.arrays import InputError, Ints, choice, flag, integer, real, reals, within
 from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from planes.grid256 import pixel, snap, turned, unit
+from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
 from planes.scenefile import keys_of, mask_of_rows
 from planes.spans import Spans
@@ -368,33 +367,12 @@ def pierces(weapon: Weapon) -> bool:
     return parts_of(weapon)[2].pierce
 
 
-class _Kept:
-    """Patterns by last use, within PATTERN_CACHE_BYTES."""
-
-    def __init__(self) -> None:
-        self.patterns: OrderedDict[tuple[Plain, int, int], Pattern] = OrderedDict()
-        self.bytes = 0
-        self.lock = threading.Lock()
-
-    def get(self, weapon: Plain, c: int, s: int) -> Pattern:
-        """Find or make a pattern."""
-        with self.lock:
-            found = self.patterns.pop((weapon, c, s), None)
-            if found is None:
-                found = make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256)
-                self.bytes += found.nbytes
-            self.patterns[weapon, c, s] = found
-            while self.bytes > PATTERN_CACHE_BYTES and len(self.patterns) > 1:
-                self.bytes -= self.patterns.popitem(last=False)[1].nbytes
-            return found
-
-
-_kept = _Kept()
+_kept: Kept[tuple[Plain, int, int], Pattern] = Kept(PATTERN_CACHE_BYTES, lambda pattern: pattern.nbytes)
 
 
 def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
     """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept."""
-    return _kept.get(weapon, c, s)
+    return _kept.get((weapon, c, s), lambda: make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256))
 
 
 def weapon_from_json(data: object, name: str = "weapon") -> Weapon:

@@ -13,7 +13,7 @@ MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
     "outside": ((240, 228, 66), 220),
     "filtered": ((230, 140, 200), 235),
     "occluded": ((86, 180, 233), 245),
-    "hit": ((235, 96, 10), 225),
+    "hit": ((255, 125, 15), 240),
 }
 """Colour (after Okabe and Ito) and opacity of each verdict, in the order of drawing."""
 

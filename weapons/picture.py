@@ -31,7 +31,7 @@ VIEW_MAX = 2048
 NEAR_OUTSIDE = 48
 """How far beyond the bounds samples are shown, px."""
 
-DIM = 150
+DIM = 125
 """How much of the scene's light is left, of 255."""
 
 
