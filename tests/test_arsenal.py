@@ -115,6 +115,14 @@ def test_weights_are_exact(distance2: int, reach_256: int, falloff: str) -> None
     assert falloff_weights(np.array([distance2]), falloff, reach_256).tolist() == [weight]
 
 
+@given(st.integers(2**15, 65535), st.integers(2**27, 2**28))
+def test_weights_are_exact_just_short_of_a_whole_number(lost: int, reach_256: int) -> None:
+    """The greatest distance that loses less than `lost`: the float is often nearer to it than its error."""
+    distance2 = ((lost * reach_256) ** 2 - 1) // (65535 * 256) ** 2
+    weights = falloff_weights(np.array([distance2, distance2 + 1]), "linear", reach_256)
+    assert weights.tolist() == [65535 - (lost - 1), 65535 - lost]
+
+
 def test_weights_at_whole_parts_of_the_reach() -> None:
     distances = np.array([0, 1, 9, 25, 225, 226])
     assert falloff_weights(distances, "linear", 15 * 256).tolist() == [65535, 61166, 52428, 43690, 0, 0]
