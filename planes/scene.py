@@ -18,7 +18,7 @@ from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
-from planes.scenefile import FILE_NAME, FileObject, SceneFile, read_scene, text_of, write_scene
+from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, text_of, write_scene
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
@@ -173,7 +173,8 @@ class Scene:
             "owner": number if owner is None else integer("owner", owner, 0, number),
             "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
         }
-        called = f"{kind.value} {number}" if name in (None, "") else text_of("name", name)
+        unnamed = name is None or (isinstance(name, str) and not name)
+        called = f"{kind.value} {number}" if unnamed else text_of("name", name)
         return self.items.add(made, form, turn, called, values)
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
@@ -242,9 +243,9 @@ class Scene:
 
     def find(self, name: str) -> int:
         """Id of the only object of a name."""
-        named = [i for i in self.ids().tolist() if self.items.names[i] == name]
-        if not named:
-            choice("name", name, [self.items.names[i] for i in self.ids().tolist()])
+        names = {i: self.items.names[i] for i in self.ids().tolist()}
+        choice("name", name, names.values())
+        named = [i for i, other in names.items() if other == name]
         if len(named) > 1:
             raise InputError(f"name: expected one object named {name!r}, got {len(named)}")
         return int(named[0])
@@ -258,7 +259,7 @@ class Scene:
 
     def mask(self, item: int) -> tuple[Bools, tuple[int, int]]:
         """Mask (h, w) of an object as it is tested, read-only, and the pixel (x, y) of the world at [0, 0]."""
-        row = int(self._existing(item)[0])
+        row = int(self._existing(integer("id", item, 0, self.items.count - 1))[0])
         return self.items.variants[row].mask, self.items.corner(row)
 
     def extent(self) -> Box:
@@ -309,7 +310,7 @@ class Scene:
         names = self._bit_names()
         used = [names.index(name) + 1 for entry in objects for name in entry.categories or ()]
         names = names[1 : max([len(self.categories), *used])]
-        write_scene(Path(folder), SceneFile(self.name, (x, y), size, names, objects, self.weapons, self.shots))
+        write_scene(folder_of(folder), SceneFile(self.name, (x, y), size, names, objects, self.weapons, self.shots))
 
     def _bit_names(self) -> list[str]:
         """A name for every bit, each its own."""
@@ -382,7 +383,7 @@ def load_scene(folder: str | Path) -> Scene:
     InputError
         Naming the file, the section, the row and the field.
     """
-    path = Path(folder)
+    path = folder_of(folder)
     if path.name == FILE_NAME:
         path = path.parent
     file = read_scene(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from planes.sprite import Sprite, rows_of
 __all__ = [
     "FileObject",
     "SceneFile",
+    "folder_of",
     "keys_of",
     "laid_out",
     "mask_of_rows",
@@ -148,6 +149,13 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
             f"scene: expected weapons and shots of plain JSON, got a value that is not: {error}"
         ) from error
     write_text(folder / FILE_NAME, text + "\n")
+
+
+def folder_of(folder: object) -> Path:
+    """Take a folder's path as a text or a path."""
+    if not isinstance(folder, str | PurePath):
+        raise InputError(f"folder: expected a path, got {folder!r:.60}")
+    return Path(folder)
 
 
 def laid_out(value: Any, depth: int = 0) -> str:

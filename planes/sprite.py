@@ -201,7 +201,8 @@ def as_sprite(value: object) -> Sprite:
         return Sprite.from_mask(array)
     if array.ndim == 3:
         return Sprite.from_image(array)
-    raise InputError(f"sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4), got {array.shape}")
+    got = array.shape if array.ndim else type(value).__name__
+    raise InputError(f"sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4), got {got}")
 
 
 def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Form:

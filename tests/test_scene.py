@@ -1,6 +1,7 @@
 """The scene: what is placed, how it is changed, all or nothing, and what it gives out."""
 
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from planes.arrays import InputError
 from planes.constants import ALL
 from planes.items import Role
-from planes.scene import Planes, Scene
+from planes.scene import Planes, Scene, load_scene
 from planes.sprite import Sprite
 from weapons import Point, fire
 
@@ -652,3 +653,30 @@ def test_a_whole_float_beyond_int64_is_refused() -> None:
         Scene().add(np.ones((3, 3), np.bool_), owner=float(2**63))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"shot\[0\]: expected a whole number"):
         fire(Scene(), Point(), (0, 0), shot=[float(2**63)])
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda s: s.mask([]), "id: expected a whole number"),
+        (lambda s: s.mask("x"), "id: expected a whole number"),
+        (lambda s: s.add(np.ones((2, 2), np.bool_), name=np.ones(3)), "name: expected a text"),
+        (lambda s: s.add("frog.png"), "sprite: expected a Sprite, .* got str"),
+        (lambda s: s.find(np.ones(3)), "name: expected one of"),
+        (lambda s: s.find(None), "name: expected one of"),
+        (lambda s: s.save(3), "folder: expected a path, got 3"),
+        (lambda s: load_scene(None), "folder: expected a path, got None"),
+    ],
+)
+def test_what_is_of_the_wrong_kind_is_named(call: Any, told: str) -> None:
+    scene = Scene()
+    scene.add(np.ones((2, 2), np.bool_), name="one")
+    with pytest.raises(InputError, match=told):
+        call(scene)
+    assert len(scene) == 1
+
+
+def test_the_path_of_the_file_will_do_for_its_folder(tmp_path: Path) -> None:
+    scene = Scene((9, 9))
+    scene.save(tmp_path)
+    assert load_scene(tmp_path / "scene.json").content_hash() == scene.content_hash()

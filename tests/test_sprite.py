@@ -433,7 +433,7 @@ def test_a_sprite_keeps_what_it_was_given() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: as_sprite(None), r"sprite: expected a Sprite, a mask .*got \(\)"),
+        (lambda: as_sprite(None), r"sprite: expected a Sprite, a mask .*got NoneType"),
         (lambda: as_sprite([True]), r"sprite: .*got \(1,\)"),
         (lambda: as_sprite([[True], [True, False]]), "sprite: expected"),
         (lambda: as_sprite([[0.0, 1.0]]), r"mask: expected booleans, got \[\[0\.0"),
