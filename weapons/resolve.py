@@ -59,7 +59,8 @@ def direct(volley: Volley, shots: Shots, sight: Sight) -> Met:
     if not len(sight.stack):
         return _met(volley, Runs.joined([]), [], counts)
     pairs = pairs_of(boxes, volley.shot, shots, sight.stack, sight.prefilter)
-    sight.plan.run("pre-filter", "which items each pattern may touch", pairs.rank.nbytes * 2)
+    how = "none: every item" if sight.prefilter == "none" else "box: items whose box shares a pixel with the pattern's"
+    sight.plan.run("pre-filter", how, pairs.rank.nbytes * 2)
     runs = _under_items(volley, pairs, sight)
     return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
 
