@@ -36,6 +36,14 @@ def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFi
     assert [row["name"] for row in shot["rows"]] == ["duck 1", "duck 2", "duck 3"]
 
 
+def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> None:
+    facts = tmp_path / "r.json"
+    words = ["report", str(GALLERY), "--weapon", "pistol", "--at=-5,3", "-o", str(tmp_path / "r.png")]
+    assert main([*words, "--json", str(facts)]) == 0
+    (shot,) = json.loads(facts.read_text())["shots"]
+    assert shot["at_xy"] == [-5, 3] and shot["verdicts"]["outside"] == 1
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

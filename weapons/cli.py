@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     )
     one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
-    one.add_argument("--at", metavar="X,Y", help="where it is fired, px")
+    one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
     one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
     one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
     one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
