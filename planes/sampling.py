@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -97,7 +98,7 @@ class Pairs:
 class Events:
     """What happened on the way, in runs: kind, rank of the item, number of the run that it is a part of, and where."""
 
-    kind: Ints
+    kind: npt.NDArray[np.integer[Any]]
     rank: Ints
     run: Ints
     x_first: Ints
@@ -131,7 +132,7 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     """
     start = np.cumsum(runs.lengths) - runs.lengths
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
-    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.rank], BLOCK, HIT))
+    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.rank], BLOCK, HIT)).astype(np.uint8)
     ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
     keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
@@ -141,17 +142,21 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     box, item = stack.box_xyxy, pairs.rank[pair]
     sample = start[run] - runs.x_first[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
-    events = []
-    for first, last in pairwise(steps):
-        now = order[first:last]
-        meeting, x = each_pixel(x_first[now], x_last[now])
-        index = sample[now][meeting] + x
-        on = stack.masks[texel[now][meeting] + x] & (state[index] >= LIVE)
+    told = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    for begin, end in pairwise(steps):
+        now = order[begin:end]
+        piece, x = each_pixel(x_first[now], x_last[now])
+        meeting = now[piece]
+        index = sample[meeting] + x
+        on = stack.masks[texel[meeting] + x] & (state[index] >= LIVE)
         meeting, x, index = meeting[on], x[on], index[on]
-        met = pair[now][meeting]
-        state[index] = (state[index] | kind[met].astype(np.uint8)) & keep[met]
-        events.append(_told(meeting, x, now, pair, run, kind, pairs, emit))
-    return Events.joined(events), state
+        state[index] = (state[index] | kind[pair[meeting]]) & keep[pair[meeting]]
+        wanted = (kind[pair[meeting]] & emit) != 0
+        told.append((meeting[wanted], x[wanted]))
+    meeting, x = (np.concatenate(column) for column in zip(*told, strict=True))
+    first, last = _stretches(meeting, x)
+    met = meeting[first]
+    return Events(kind[pair[met]], pairs.rank[pair[met]], run[met], x[first], x[last]), state
 
 
 def read_codes(runs: Runs, codes: Codes, plane_xyxy: Box) -> tuple[Ints, Ints, Ints, Ints]:
@@ -195,21 +200,13 @@ def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints,
     return pair[some], run[some], x_first[some], x_last[some]
 
 
-def _told(meeting: Ints, x: Ints, now: Ints, pair: Ints, run: Ints, kind: Ints, pairs: Pairs, emit: int) -> Events:
-    """Events of one step, as runs."""
-    first, last = _stretches(meeting, x, np.zeros(len(x), np.int8))
-    which = now[meeting[first]]
-    kinds = kind[pair[which]]
-    told = (kinds & emit) != 0
-    which, first, last = which[told], first[told], last[told]
-    return Events(kinds[told], pairs.rank[pair[which]], run[which], x[first], x[last])
-
-
-def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic]) -> tuple[Ints, Ints]:
-    """First and last index of each stretch of neighbours in one group with one value."""
+def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic] | None = None) -> tuple[Ints, Ints]:
+    """First and last index of each stretch of neighbours in one group, with one value."""
     if not len(x):
         none = np.zeros(0, np.int64)
         return none, none
-    apart = (group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1) | (value[1:] != value[:-1])
+    apart = (group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1)
+    if value is not None:
+        apart |= value[1:] != value[:-1]
     cut = np.flatnonzero(apart)
     return np.concatenate([[0], cut + 1]), np.concatenate([cut, [len(x) - 1]])
