@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from planes.arrays import InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
-from planes.items import Items, Stack, overlapping
+from planes.items import Items, Stack, clipped, overlapping
 from planes.spans import Box
 
 __all__ = ["CodePlane", "area", "label_plane", "plane_fits"]
@@ -61,12 +61,17 @@ class CodePlane:
 
     def cost(self, items: Items) -> int:
         """Pixels that must be drawn anew before the plane can be read; each change is looked at once."""
+        with self._lock:
+            return self._owed(items)
+
+    def _owed(self, items: Items) -> int:
         if self.codes is None or (self.codes.dtype == np.uint16 and items.count > ITEMS_UINT16):
             return self.size
         if self._seen != items.version:
             boxes = items.changed_boxes(self._seen)
             if boxes is not None:
-                self._pending.append(self._clipped(boxes))
+                boxes = clipped(boxes, self.box_xyxy)
+                self._pending.append(boxes[(boxes[:, :2] <= boxes[:, 2:]).all(axis=1)])
                 self._cost += area(self._pending[-1])
             self._seen = items.version
             if boxes is None or self._cost >= self.size:
@@ -77,7 +82,7 @@ class CodePlane:
     def read(self, items: Items) -> Codes:
         """Codes (h, w) of the present version; `redrawn` tells how many pixels were drawn for it."""
         with self._lock:
-            self.redrawn = self.cost(items)
+            self.redrawn = self._owed(items)
             if self.codes is None or self.redrawn == self.size:
                 x, y, x_max, y_max = self.box_xyxy
                 kind = np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
@@ -91,11 +96,6 @@ class CodePlane:
             self._pending, self._cost = [], 0
             return self.codes
 
-    def _clipped(self, boxes: Ints) -> Ints:
-        x, y, x_max, y_max = self.box_xyxy
-        boxes = np.concatenate([np.maximum(boxes[:, :2], (x, y)), np.minimum(boxes[:, 2:], (x_max, y_max))], axis=1)
-        return boxes[(boxes[:, :2] <= boxes[:, 2:]).all(axis=1)]
-
 
 def area(boxes_xyxy: Ints) -> int:
     """Pixels of inclusive boxes, added up."""
@@ -107,12 +107,12 @@ def _paint(codes: Codes, plane_xyxy: Box, stack: Stack, box_xyxy: Box) -> None:
     x, y = plane_xyxy[:2]
     left, top, right, low = box_xyxy
     codes[top - y : low - y + 1, left - x : right - x + 1] = 0
-    for place in np.flatnonzero(overlapping(np.array(box_xyxy), stack.box_xyxy))[::-1].tolist():
-        ix, iy, ix_max, iy_max = stack.box_xyxy[place].tolist()
+    for rank in np.flatnonzero(overlapping(np.array(box_xyxy), stack.box_xyxy))[::-1].tolist():
+        ix, iy, ix_max, iy_max = stack.box_xyxy[rank].tolist()
         x0, y0, x1, y1 = max(left, ix), max(top, iy), min(right, ix_max), min(low, iy_max)
-        mask = stack.mask(place)[y0 - iy : y1 - iy + 1, x0 - ix : x1 - ix + 1]
+        mask = stack.mask(rank)[y0 - iy : y1 - iy + 1, x0 - ix : x1 - ix + 1]
         part = codes[y0 - y : y1 - y + 1, x0 - x : x1 - x + 1]
-        code = (part != 0) + codes.dtype.type(2 * (int(stack.ids[place]) + 1))
+        code = (part != 0) + codes.dtype.type(2 * (int(stack.ids[rank]) + 1))
         np.copyto(part, code, where=mask, casting="same_kind")
 
 

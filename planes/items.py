@@ -13,9 +13,10 @@ import numpy.typing as npt
 from planes.arrays import Bools, InputError, Ints
 from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
+from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
 
-__all__ = ["Items", "MaskAtlas", "Role", "Stack", "overlapping"]
+__all__ = ["Items", "MaskAtlas", "Role", "Stack", "clipped", "overlapping"]
 
 
 class Role(Enum):
@@ -62,11 +63,11 @@ class Stack:
         """Pixels in a row of each mask."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
 
-    def mask(self, place: int) -> Bools:
-        """Mask (h, w) of the item at a place in the stack."""
-        x, y, x_max, y_max = self.box_xyxy[place].tolist()
+    def mask(self, rank: int) -> Bools:
+        """Mask (h, w) of the item of a rank, 0 in front."""
+        x, y, x_max, y_max = self.box_xyxy[rank].tolist()
         size = (x_max - x + 1) * (y_max - y + 1)
-        return self.masks[self.offset[place] : self.offset[place] + size].reshape(y_max - y + 1, x_max - x + 1)
+        return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
 
 
 def overlapping(box_xyxy: Ints, boxes_xyxy: Ints) -> Bools:
@@ -75,6 +76,12 @@ def overlapping(box_xyxy: Ints, boxes_xyxy: Ints) -> Bools:
     return np.asarray(
         (a[..., 0] <= b[..., 2]) & (b[..., 0] <= a[..., 2]) & (a[..., 1] <= b[..., 3]) & (b[..., 1] <= a[..., 3])
     )
+
+
+def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
+    """Cut inclusive boxes (n, 4) to a box; what lies outside of it ends before it begins."""
+    low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
+    return np.concatenate([low, high], axis=1)
 
 
 @dataclass
@@ -177,16 +184,18 @@ class Items:
 
     def skip_to(self, item: int) -> None:
         """Leave ids unused, as if their items had been removed; a scene file keeps the ids of what it saved."""
+        missing = item - self.count
+        if missing <= 0:
+            return
         self._reserve(item)
         empty = Sprite(frames=())
-        missing = item - self.count
         blank = Variant((empty.uid, Form()), np.zeros((0, 0), np.bool_), 0, 0, 0)
         self.sprites += [empty] * missing
         self.forms += [Form()] * missing
         self.angles += [0.0] * missing
         self.variants += [blank] * missing
         self.names += [""] * missing
-        self.count = max(self.count, item)
+        self.count = item
 
     def remove(self, ids: Ints) -> None:
         """Take items away; their ids stay unused."""

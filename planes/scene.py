@@ -298,8 +298,8 @@ class Scene:
         digest = hashlib.sha256(repr(self.bounds).encode())
         for column in (stack.ids, stack.occluder, stack.categories, stack.owner, stack.box_xyxy):
             digest.update(np.ascontiguousarray(column).tobytes())
-        for place in range(len(stack)):
-            digest.update(np.packbits(stack.mask(place)).tobytes())
+        for rank in range(len(stack)):
+            digest.update(np.packbits(stack.mask(rank)).tobytes())
         return digest.hexdigest()[:16]
 
     def save(self, folder: str | Path) -> None:

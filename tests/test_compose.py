@@ -1,5 +1,6 @@
 """Planes against a reference that asks each pixel by itself, after any change, and redrawn only where one was."""
 
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
@@ -314,3 +315,16 @@ def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:
     assert costs[:3] == [200, 400, 600] and costs[-1] == 10_000
     assert plane.codes is None
     assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99)))
+
+
+def test_a_plane_that_is_being_drawn_is_not_asked_what_it_lacks() -> None:
+    scene = Scene((30, 20))
+    item = scene.add(np.ones((5, 5), np.bool_), (9, 9))
+    plane = CodePlane((0, 0, 29, 19))
+    plane.read(scene.items)
+    scene.move(item, (3, 3))
+    with ThreadPoolExecutor(1) as pool:
+        with plane._lock:
+            asked = pool.submit(plane.cost, scene.items)
+            assert not wait([asked], timeout=0.2).done
+        assert asked.result() == 50

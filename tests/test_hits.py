@@ -668,7 +668,8 @@ def test_far_apart_items_under_a_giant_are_laid_one_by_one() -> None:
     assert walked.bytes_made == 75
 
 
-def test_threads_that_fire_at_once_agree() -> None:
+@pytest.mark.parametrize("strategy", ["composed", "auto"])
+def test_threads_that_fire_at_once_agree(strategy: str) -> None:
     rng = np.random.default_rng(5)
     scene = Scene((300, 200))
     ids = [scene.add(rng.random((20, 20)) < 0.7, rng.uniform((0, 0), (300, 200))) for _ in range(40)]
@@ -676,6 +677,6 @@ def test_threads_that_fire_at_once_agree() -> None:
     with ThreadPoolExecutor(4) as pool:
         for _ in range(12):
             scene.move(ids, rng.uniform((0, 0), (300, 200), (40, 2)))
-            asked = [pool.submit(fire, scene, Disc(9), at, strategy="composed") for _ in range(4)]
+            asked = [pool.submit(fire, scene, Disc(9), at, strategy=strategy) for _ in range(4)]
             truth = fire(scene, Disc(9), at, strategy="direct")
             assert all(answer.result() == truth for answer in asked)

@@ -9,7 +9,7 @@ import numpy as np
 from planes.arrays import Ints
 from planes.compose import Codes, area
 from planes.constants import CHUNK_SAMPLES
-from planes.items import Stack
+from planes.items import Stack, clipped
 from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, split, walk
 from planes.spans import Box, merged_runs
 from weapons.candidates import pairs_of, refused
@@ -100,8 +100,8 @@ def _under_items(volley: Volley, pairs: Pairs, sight: Sight) -> Runs:
     low = np.minimum.reduceat(items[:, :2], first, axis=0)
     hull = np.concatenate([low, np.maximum.reduceat(items[:, 2:], first, axis=0)], axis=1)
     if area(hull) <= SPARSE * area(items):
-        return _laid(volley, busy, _clipped(hull, sight.bounds))
-    runs = _laid(volley, pairs.placement, _clipped(items, sight.bounds))
+        return _laid(volley, busy, hull if sight.bounds is None else clipped(hull, sight.bounds))
+    runs = _laid(volley, pairs.placement, items if sight.bounds is None else clipped(items, sight.bounds))
     y = runs.y - runs.y.min(initial=0)
     rows = int(y.max(initial=0)) + 1
     which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
@@ -164,12 +164,6 @@ def _laid(volley: Volley, placements: Ints, boxes: Ints) -> Runs:
     x, y = volley.xy[placements].T
     runs = volley.table.laid(volley.pattern[placements], x, y, boxes)
     return Runs(placements[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
-
-
-def _clipped(boxes: Ints, bounds: Box | None) -> Ints:
-    if bounds is None:
-        return boxes
-    return np.concatenate([np.maximum(boxes[:, :2], bounds[:2]), np.minimum(boxes[:, 2:], bounds[2:])], axis=1)
 
 
 def _met(volley: Volley, runs: Runs, events: list[Events], counts: Ints) -> Met:
