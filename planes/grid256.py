@@ -89,8 +89,8 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
     return k % 4, int(c), int(s)
 
 
-def turned(points_256: Ints, c: int, s: int) -> Ints:
-    """Turn points (N, 2) by a direction about the origin; each coordinate is rounded once, half to even."""
+def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
+    """Turn points (N, 2) by a direction, or each by its own (N,), about the origin; rounded once, half to even."""
     x, y = points_256[..., 0], points_256[..., 1]
     return np.stack([rounded_div(x * c - y * s, ONE), rounded_div(x * s + y * c, ONE)], axis=-1)
 

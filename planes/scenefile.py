@@ -26,6 +26,7 @@ __all__ = [
     "names_of",
     "read_scene",
     "text_of",
+    "typed",
     "write_scene",
 ]
 
@@ -100,16 +101,16 @@ def read_scene(folder: Path) -> SceneFile:
         scene = SceneFile(
             name=text_of("name", data.get("name", folder.resolve().name)),
             categories=names_of("categories", data.get("categories", [])),
-            weapons=_typed("weapons", data.get("weapons", {}), dict),
-            shots=_typed("shots", data.get("shots", []), list),
+            weapons=typed("weapons", data.get("weapons", {}), dict),
+            shots=typed("shots", data.get("shots", []), list),
         )
         if data.get("bounds") is not None:
             scene.origin_xy, scene.size_wh = _bounds(data["bounds"])
         sprites: dict[str, Sprite] = {}
-        sections = _typed("objects", data.get("objects", {}), dict)
+        sections = typed("objects", data.get("objects", {}), dict)
         keys_of("objects", sections, SECTIONS)
         for section, role in SECTIONS.items():
-            for row, entry in enumerate(_typed(f"objects.{section}", sections.get(section, []), list)):
+            for row, entry in enumerate(typed(f"objects.{section}", sections.get(section, []), list)):
                 place = f"objects.{section}[{row}]"
                 with within(place):
                     scene.objects.append(_object(entry, role, folder, sprites))
@@ -173,7 +174,7 @@ def laid_out(value: Any, depth: int = 0) -> str:
 
 def keys_of(what: str, data: object, known: object) -> dict[str, Any]:
     """Check that a JSON object has no key but the known ones."""
-    checked = _typed(what, data, dict)
+    checked = typed(what, data, dict)
     for key in checked:
         choice("key", key, list(known))  # type: ignore[call-overload]
     return dict(checked)
@@ -188,7 +189,7 @@ def text_of(name: str, value: object) -> str:
 
 def names_of(name: str, value: object) -> list[str]:
     """Check a list of distinct texts."""
-    names = [text_of(f"{name}[{i}]", v) for i, v in enumerate(_typed(name, value, list))]
+    names = [text_of(f"{name}[{i}]", v) for i, v in enumerate(typed(name, value, list))]
     if len(set(names)) < len(names):
         raise InputError(f"{name}: expected distinct names, got {names}")
     return names
@@ -224,10 +225,11 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON in UTF-8: {error}") from error
-    return _typed("scene", data, dict)  # type: ignore[no-any-return]
+    return typed("scene", data, dict)  # type: ignore[no-any-return]
 
 
-def _typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
+def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
+    """Check that JSON is an object, or a list."""
     if not isinstance(value, kind):
         raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {value!r:.60}")
     return value
@@ -242,7 +244,7 @@ def _bounds(value: object) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
-    data = _typed("object", entry, dict)
+    data = typed("object", entry, dict)
     kinds = [key for key in SOURCES if key in data]
     if len(kinds) != 1:
         raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {' and '.join(kinds) or 'none'}")
@@ -276,7 +278,7 @@ def _image_sprite(source: dict[str, Any], folder: Path) -> Sprite:
 
 
 def _polygon_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    holes = _typed("holes", source.get("holes", []), list)
+    holes = typed("holes", source.get("holes", []), list)
     return Sprite.polygon(source["polygon"], holes, color=source.get("color"))
 
 

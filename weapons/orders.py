@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 from planes.arrays import InputError, choice, integer, real, reals, within
 from planes.constants import ALL, POSITION_MAX, SEED_MAX
 from planes.scene import Scene
-from planes.scenefile import keys_of, names_of
+from planes.scenefile import keys_of, names_of, typed
 from weapons.arsenal import Weapon
 from weapons.firing import fire
 from weapons.hits import Hits
@@ -32,7 +31,7 @@ class Order:
     exclude: tuple[int, ...] = ()
     seed: int = 0
     shot: int = 0
-    categories: int = field(default=ALL)
+    categories: int = ALL
 
 
 def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[Order]:
@@ -70,7 +69,7 @@ def order_from_json(
             None if shot.get("aim") is None else real("aim", shot["aim"], -(10**9), 10**9),
             None if shot.get("toward") is None else _point("toward", shot["toward"]),
             None if accept is None else tuple(accept),
-            tuple(_owner(scene, value, i) for i, value in enumerate(_listed("exclude", shot.get("exclude", [])))),
+            tuple(_owner(scene, value, i) for i, value in enumerate(typed("exclude", shot.get("exclude", []), list))),
             integer("seed", shot.get("seed", 0), 0, SEED_MAX),
             integer("shot", shot.get("shot", number), 0, 2**63 - 1),
             ALL if accept is None else scene.category_bits(*accept),
@@ -95,12 +94,6 @@ def fire_order(scene: Scene, order: Order) -> Hits:
 def _point(name: str, value: object) -> tuple[float, float]:
     x, y = reals(name, value, (2,), POSITION_MAX).tolist()
     return x, y
-
-
-def _listed(name: str, value: object) -> list[Any]:
-    if not isinstance(value, list):
-        raise InputError(f"{name}: expected a list, got {value!r:.60}")
-    return value
 
 
 def _owner(scene: Scene, value: object, row: int) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from planes.arrays import Image
 from weapons.marks import MARKS, glyph
 
-__all__ = ["EDGE", "TOP", "Text", "draw_texts", "page_of"]
+__all__ = ["HATCH", "OUTLINE", "OUTLINE_HIT", "Text", "draw_texts", "page_of"]
 
 Color = tuple[int, int, int]
 

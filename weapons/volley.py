@@ -8,7 +8,8 @@ import numpy as np
 
 from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
 from planes.constants import ALL, POSITION_MAX, SEED_MAX
-from planes.grid256 import ONE, pixel, rounded_div, snap, unit, unit_toward
+from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
+from planes.poses import points
 from weapons.arsenal import Weapon, parts_of, pattern_of
 from weapons.draws import disc_offsets
 from weapons.pattern import PatternTable
@@ -30,7 +31,6 @@ class Shots:
     exclude : (N, K) owners, -1 for none
     number : (N,) shot numbers, for the draws
     seed : of the draws
-    single : the caller gave one position, not a batch
     """
 
     at_256: Ints
@@ -39,7 +39,6 @@ class Shots:
     exclude: Ints
     number: Ints
     seed: int
-    single: bool
 
     def __len__(self) -> int:
         return len(self.number)
@@ -112,7 +111,6 @@ def checked_shots(
         _owners(exclude, n, single),
         integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
         integer("seed", seed, 0, SEED_MAX),
-        single,
     )
 
 
@@ -146,12 +144,11 @@ def _directions(weapon: Weapon, at_256: Ints, aim: object, toward: object) -> In
         return np.stack(unit(reals("aim", each("aim", 0.0 if aim is None else aim, n), (n,))), axis=1)
     if aim is not None:
         raise InputError("aim: expected aim or toward, got both")
-    points = array_of("toward", toward)
-    points = np.broadcast_to(points, (n, 2)) if points.shape == (2,) else points
-    offset = snap(reals("toward", points, (n, 2), POSITION_MAX)) - at_256
+    targets = points("toward", toward, n)
+    offset = snap(targets) - at_256
     same = np.flatnonzero((offset == 0).all(axis=1))
     if len(same):
-        got = points[same[0]].tolist()
+        got = targets[same[0]].tolist()
         raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
     return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
 
@@ -160,9 +157,7 @@ def _recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
     if not degrees:
         return direction
     c, s = unit(degrees * np.arange(int(round_.max(initial=0)) + 1))
-    c, s = c[round_], s[round_]
-    x, y = direction[:, 0], direction[:, 1]
-    return np.stack([rounded_div(x * c - y * s, ONE), rounded_div(x * s + y * c, ONE)], axis=1)
+    return turned(direction, c[round_], s[round_])
 
 
 def _owners(exclude: object, n: int, single: bool) -> Ints:
