@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from planes.arrays import InputError as InputError
     from planes.constants import ALL as ALL
     from planes.image import read_png as read_png
+    from planes.image import write_png as write_png
     from planes.items import Role as Role
     from planes.scene import Planes as Planes
     from planes.scene import Scene as Scene
@@ -26,9 +27,10 @@ _HOME = {
     "Sprite": "sprite",
     "load_scene": "scene",
     "read_png": "image",
+    "write_png": "image",
 }
 
-__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene", "read_png"]
+__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene", "read_png", "write_png"]
 
 
 def __getattr__(name: str) -> Any:

@@ -257,6 +257,11 @@ class Scene:
             bits |= 1 << self.categories.index(choice("category", name, self.categories))
         return bits
 
+    def category_names(self, bits: int) -> list[str]:
+        """Names of bits; one that has none is called by its number."""
+        bits = integer("bits", bits, 0, ALL)
+        return [name for bit, name in enumerate(self._bit_names()) if bits >> bit & 1]
+
     def mask(self, item: int) -> tuple[Bools, tuple[int, int]]:
         """Mask (h, w) of an object as it is tested, read-only, and the pixel (x, y) of the world at [0, 0]."""
         row = int(self._existing(integer("id", item, 0, self.items.count - 1))[0])
@@ -341,7 +346,7 @@ class Scene:
         x, y = (items.position_256[item] / SUB).tolist()
         categories = None
         if bits != _default_bits(role):
-            categories = [name for bit, name in enumerate(self._bit_names()) if bits >> bit & 1]
+            categories = self.category_names(bits)
         part_of = None if owner == item else owner
         return FileObject(role, items.sprites[item], (x, y), pose, items.names[item], categories, part_of, item)
 

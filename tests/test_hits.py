@@ -181,7 +181,46 @@ def test_blockers(seed: int) -> None:
     for i, shot in enumerate(battle.volley.shots):
         ends = [walk.ended_by for walk in walks_of(battle, scene, shot)]
         counts = Counter(item.id for item in ends if item is not None and item.occluder)
-        assert hits.blockers(i) == sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+        found = hits.blockers(i)
+        assert [entry[:2] for entry in found] == sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_blockers_name_what_is_behind_them(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    items = oracle_stack.front_to_back(items_of(scene))
+    for i, shot in enumerate(battle.volley.shots):
+        behind: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for walk, (*_, y, x) in zip(walks_of(battle, scene, shot), samples_of(battle.volley, shot), strict=True):
+            wall = walk.ended_by
+            if wall is None or not wall.occluder:
+                continue
+            for item in items[items.index(wall) + 1 :]:
+                refused = oracle_stack.refused(item, shot.accept, shot.exclude)
+                if not item.occluder and not refused and (x, y) in item.pixels:
+                    behind.setdefault((wall.id, item.id), []).append((x, y))
+        found = {(b.occluder, o.object): o for b in hits.blockers(i) for o in b.behind}
+        assert {pair: hidden.samples for pair, hidden in found.items()} == {p: len(at) for p, at in behind.items()}
+        for pair, hidden in found.items():
+            middle = [sum(v) // len(v) for v in zip(*behind[pair], strict=True)]
+            away = [(x - middle[0]) ** 2 + (y - middle[1]) ** 2 for x, y in behind[pair]]
+            x, y = hidden.at_xy
+            assert hidden.at_xy in behind[pair] and (x - middle[0]) ** 2 + (y - middle[1]) ** 2 == min(away)
+        for blocked in hits.blockers(i):
+            assert list(blocked.behind) == sorted(blocked.behind, key=lambda b: (-b.samples, b.object))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pixels_at(seed: int) -> None:
+    battle, scene, hits = fired(seed)
+    for i, shot in enumerate(battle.volley.shots):
+        struck: dict[tuple[int, int], set[tuple[int, int]]] = {}
+        for walk, (number, _, y, x) in zip(walks_of(battle, scene, shot), samples_of(battle.volley, shot), strict=True):
+            for item in walk.hit:
+                struck.setdefault((number, item.id), set()).add((x, y))
+        found = hits.pixels_at(i)
+        assert {key: {tuple(p) for p in spans.pixels().tolist()} for key, spans in found.items()} == struck
+        assert {(row.round, row.object): row.pixels for row in hits.of(i)} == {k: s.count for k, s in found.items()}
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -254,7 +293,9 @@ def test_why_not_behind_what_was_pierced() -> None:
     front = scene.add(square(3), layer=2)
     hits = fire(scene, Disc(1, pierce=True), (1, 1))
     assert hits.object.tolist() == [front]
-    assert hits.why_not() == [(behind, "behind", 5, {wall: 5}, 0.0)] and hits.blockers() == [(wall, 5)]
+    assert hits.why_not() == [(behind, "behind", 5, {wall: 5}, 0.0)] and hits.blockers() == [
+        (wall, 5, ((behind, 5, (1, 1)),))
+    ]
 
 
 def test_every_reason_comes_up() -> None:
@@ -276,7 +317,7 @@ def test_why_not_tells_each_reason() -> None:
     at_32 = scene.add(square(1), (45, 10))
     scene.add(square(1), (46, 9))
     hits = fire(scene, Polygon([(-3, -12), (3, -12), (3, 0), (-3, 0)]), (10, 10), accept=ALL & ~2, exclude=own)
-    assert hits.object.tolist() == [hit] and hits.blockers() == [(wall, 2)]
+    assert hits.object.tolist() == [hit] and hits.blockers() == [(wall, 2, ((behind, 2, (12, 10)),))]
     assert hits.why_not() == [
         (behind, "behind", 2, {wall: 2}, 0.0),
         (foreign, "category", 1, {}, 0.0),
@@ -396,7 +437,9 @@ def test_the_ends_of_the_world(x: int, y: int, bounded: bool) -> None:
         hits = volley.fired(scene)
         assert told(hits) == expected(scene, volley)
         rows = [(*row[:7], (row.first_xy[0] - left, row.first_xy[1] - top), row.distance2) for row in hits]
-        derived = (hits.shares(), hits.why_not(), hits.blockers(), hits.margins(), hits.by_owner())
+        behind = [[(*o[:2], o.at_xy[0] - left, o.at_xy[1] - top) for o in b.behind] for b in hits.blockers()]
+        blocked = [b[:2] for b in hits.blockers()], behind
+        derived = (hits.shares(), hits.why_not(), blocked, hits.margins(), hits.by_owner())
         answers.append((rows, hits.verdict_counts(), derived, hits.samples_at().xy - (left, top)))
     assert answers[0][:3] == answers[1][:3]
     np.testing.assert_array_equal(answers[0][3], answers[1][3])

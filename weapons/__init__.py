@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from weapons.arsenal import Weapon as Weapon
     from weapons.arsenal import arsenal_of as arsenal_of
     from weapons.arsenal import weapon_from_json as weapon_from_json
+    from weapons.facts import report_of as report_of
     from weapons.firing import fire as fire
     from weapons.hits import Hits as Hits
+    from weapons.picture import picture_of_report as picture_of_report
 
 _HOME = {
     **dict.fromkeys(
@@ -32,12 +34,15 @@ _HOME = {
     "weapon_from_json": "weapons.arsenal",
     "fire": "weapons.firing",
     "Hits": "weapons.hits",
+    "report_of": "weapons.facts",
+    "picture_of_report": "weapons.picture",
     "Verdict": "planes.sampling",
 }
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
-    "arsenal_of", "weapon_from_json", "fire", "Hits", "Verdict",
+    "arsenal_of", "weapon_from_json", "fire", "Hits", "Verdict", "report_of",
+    "picture_of_report",
 ]  # fmt: skip
 
 

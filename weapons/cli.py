@@ -14,7 +14,7 @@ from planes.image import check_output, write_png, write_text
 from planes.scene import load_scene
 from weapons.arsenal import arsenal_of
 from weapons.facts import report_of
-from weapons.orders import order_from_json, orders_of
+from weapons.orders import fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
 
 __all__ = ["main"]
@@ -87,7 +87,8 @@ def report(arguments: argparse.Namespace) -> None:
         orders = orders_of(scene, arsenal)
     else:
         orders = [order_from_json(_shot(arguments), scene, arsenal, "command line")]
-    facts = report_of(scene, orders)
+    fired = [fire_order(scene, order) for order in orders]
+    facts = report_of(scene, fired, [order.name for order in orders])
     write_png(arguments.output, picture_of_report(facts, scene))
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")

@@ -12,9 +12,9 @@ import numpy as np
 from planes.arrays import InputError, Ints
 from planes.constants import CHUNK_SAMPLES, MARGIN_PX, MASK_AREA_MAX, NEAR_PX
 from planes.items import Stack
-from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Runs, Verdict, walk
+from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from planes.scene import Scene
-from planes.spans import Spans, each_pixel
+from planes.spans import Box, Spans, each_pixel
 from weapons.arsenal import Weapon, pierces
 from weapons.candidates import pairs_of, refused
 from weapons.plan import Plan
@@ -22,8 +22,8 @@ from weapons.resolve import Sight, direct
 from weapons.volley import Shots, Volley, volley_of
 
 __all__ = [
-    "Blocked", "Samples", "Share", "WhyNot", "blockers_of", "margins_of", "samples_of", "shares_of",
-    "why_not_of",
+    "Behind", "Blocked", "Detail", "Samples", "Share", "WhyNot", "blockers_of", "detail_of", "hit_spans", "margins_of",
+    "samples_of", "shares_of", "why_not_of",
 ]  # fmt: skip
 
 
@@ -49,11 +49,20 @@ class Share(NamedTuple):
     of_mask: float
 
 
+class Behind(NamedTuple):
+    """An object behind an occluder: samples on it that the occluder ended, and the one nearest their mean."""
+
+    object: int
+    samples: int
+    at_xy: tuple[int, int]
+
+
 class Blocked(NamedTuple):
-    """An occluder and the samples whose walk it ended."""
+    """An occluder, the samples whose walk it ended, and the accepted objects behind it on those samples."""
 
     occluder: int
     samples: int
+    behind: tuple[Behind, ...]
 
 
 class WhyNot(NamedTuple):
@@ -72,38 +81,90 @@ class WhyNot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Detail:
-    """One shot sample by sample.
+class Detail:
+    """Shots sample by sample, of one walk.
 
-    `rank` is what decided the verdict, `ended` what ended the walk, as ranks in the stack, -1 for none.
+    Parameters
+    ----------
+    stack, shots, volley : what was walked, by whom, with what
+    runs, run, x : runs of pixels; for each sample its run and its column
+    hit : runs that hit an object, all of them where the weapon pierces
+    verdict : of each sample
+    rank, ended : what decided its verdict, and what ended its walk, as ranks in the stack, -1 for none
     """
 
+    stack: Stack
+    shots: Shots
+    volley: Volley
     runs: Runs
     run: Ints
     x: Ints
+    hit: Events
     verdict: Ints
     rank: Ints
     ended: Ints
 
+    @property
+    def y(self) -> Ints:
+        """Row of each sample."""
+        return np.asarray(self.runs.y[self.run])
 
-def samples_of(scene: Scene, weapon: Weapon, shot: Shots) -> Samples:
+    def on(self, rank: int) -> Ints:
+        """Samples that lie on an item of the stack."""
+        x0, y0, x1, y1 = self.stack.box_xyxy[rank].tolist()
+        y = self.y
+        inside = np.flatnonzero((self.x >= x0) & (self.x <= x1) & (y >= y0) & (y <= y1))
+        covered = self.stack.mask(rank)[y[inside] - y0, self.x[inside] - x0]
+        return np.asarray(inside[covered])
+
+
+def samples_of(detail: Detail) -> Samples:
     """All samples of one shot."""
-    volley = volley_of(weapon, shot)
-    detail = _detail(scene, weapon, volley, shot)
+    volley = detail.volley
     placement = detail.runs.placement[detail.run]
-    ids = np.append(scene.items.stack().ids, -1)
-    xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
+    ids = np.append(detail.stack.ids, -1)
+    xy = np.stack([detail.x, detail.y], axis=1)
     return Samples(xy, volley.round[placement], volley.pellet[placement], detail.verdict, ids[detail.rank])
 
 
-def blockers_of(scene: Scene, weapon: Weapon, shot: Shots) -> list[Blocked]:
-    """Occluders that ended samples, most first, then by id."""
-    stack = scene.items.stack()
-    ended = _detail(scene, weapon, volley_of(weapon, shot), shot).ended
-    ended = ended[ended >= 0]
-    ids, counts = np.unique(stack.ids[ended[stack.occluder[ended]]], return_counts=True)
-    found = [Blocked(*pair) for pair in zip(ids.tolist(), counts.tolist(), strict=True)]
+def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
+    """Pixels that each round hit of each object, as {(round, object): pixels}, each pixel once."""
+    under = detail.runs.take(detail.hit.run)
+    found: dict[tuple[int, int], Spans] = {}
+    keys = np.stack([detail.volley.round[under.placement], detail.stack.ids[detail.hit.rank]], axis=1)
+    for round_, item in np.unique(keys, axis=0).tolist():
+        own = (keys == (round_, item)).all(axis=1)
+        found[round_, item] = Spans.from_runs(under.y[own], detail.hit.x_first[own], detail.hit.x_last[own])
+    return found
+
+
+def blockers_of(detail: Detail) -> list[Blocked]:
+    """Occluders that ended samples, most first, then by id, with what they hid."""
+    stack, ended = detail.stack, detail.ended
+    blocked = np.where((ended >= 0) & stack.occluder[ended], ended, -1) if len(stack) else ended
+    ranks, counts = np.unique(blocked[blocked >= 0], return_counts=True)
+    if not len(ranks):
+        return []
+    behind: dict[int, list[Behind]] = {rank: [] for rank in ranks.tolist()}
+    every = np.unique(pairs_of(detail.volley.boxes, detail.volley.shot, detail.shots, stack, "box").rank)
+    refuses = refused(stack, every, detail.shots, np.zeros(len(every), np.int64))
+    for rank in every[~refuses & ~stack.occluder[every]].tolist():
+        on = detail.on(rank)
+        on = on[(blocked[on] >= 0) & (blocked[on] < rank)]
+        for front in np.unique(blocked[on]).tolist():
+            behind[front].append(_behind(detail, rank, on[blocked[on] == front]))
+    found = [
+        Blocked(int(stack.ids[rank]), count, tuple(sorted(behind[rank], key=lambda b: (-b.samples, b.object))))
+        for rank, count in zip(ranks.tolist(), counts.tolist(), strict=True)
+    ]
     return sorted(found, key=lambda b: (-b.samples, b.occluder))
+
+
+def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
+    x, y = detail.x[samples], detail.y[samples]
+    dx, dy = (v - v.min() - int((v - v.min()).sum()) // len(v) for v in (x, y))  # from the pixel of their mean
+    nearest = int(np.lexsort((x, y, dx**2 + dy**2))[0])
+    return Behind(int(detail.stack.ids[rank]), len(samples), (int(x[nearest]), int(y[nearest])))
 
 
 def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
@@ -128,20 +189,18 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
     return shares
 
 
-def why_not_of(scene: Scene, weapon: Weapon, shot: Shots, hit: Set[int]) -> list[WhyNot]:
-    """Objects within NEAR_PX of the pattern that were not hit, nearest first, then by id."""
-    volley = volley_of(weapon, shot)
-    stack = scene.items.stack()
-    detail = _detail(scene, weapon, volley, shot)
+def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
+    """Objects within NEAR_PX of the pattern of one shot that were not hit, nearest first, then by id."""
+    stack, volley = detail.stack, detail.volley
     boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
-    near = np.unique(pairs_of(boxes, volley.shot, shot, stack, "box").rank)
+    near = np.unique(pairs_of(boxes, volley.shot, detail.shots, stack, "box").rank)
     found = []
     for rank in near.tolist():
         if stack.occluder[rank] or int(stack.ids[rank]) in hit:
             continue
         distance = math.sqrt(_distance2(detail.runs, stack, rank))
         if distance <= NEAR_PX:
-            found.append(_why(stack, rank, shot, detail, distance))
+            found.append(_why(detail, rank, distance))
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
@@ -180,14 +239,15 @@ def _shifted(volley: Volley, shift: Ints) -> Volley:
     )
 
 
-def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detail:
-    """Walk every sample of one shot and keep what decided it."""
+def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
+    """Walk every sample of shots and keep what decided it."""
     stack, bounds = scene.items.stack(), scene.bounds
+    volley = volley_of(weapon, shots)
     if int(volley.count.sum()) > MASK_AREA_MAX:
         raise InputError(f"samples: expected a shot of at most {MASK_AREA_MAX} samples, got {int(volley.count.sum())}")
     runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
-    pairs = pairs_of(volley.boxes, volley.shot, shot, stack, "box")
+    pairs = pairs_of(volley.boxes, volley.shot, shots, stack, "box")
     events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
@@ -204,21 +264,28 @@ def _detail(scene: Scene, weapon: Weapon, volley: Volley, shot: Shots) -> _Detai
         outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)
         rank[outside] = ended[outside] = -1
-    return _Detail(runs, run, x, verdict, rank, ended)
+    hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
+    return Detail(stack, shots, volley, runs, run, x, hit, verdict, rank, ended)
 
 
-def _why(stack: Stack, rank: int, shot: Shots, detail: _Detail, distance: float) -> WhyNot:
+def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
+    """Events cut to the bounds."""
+    if bounds is None:
+        return events
+    y = runs.y[events.run]
+    first, last = np.maximum(events.x_first, bounds[0]), np.minimum(events.x_last, bounds[2])
+    some = (first <= last) & (y >= bounds[1]) & (y <= bounds[3])
+    return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(some))
+
+
+def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
     """Reason of one object that was not hit."""
-    item = int(stack.ids[rank])
-    x0, y0, x1, y1 = stack.box_xyxy[rank].tolist()
-    y = detail.runs.y[detail.run]
-    inside = np.flatnonzero((detail.x >= x0) & (detail.x <= x1) & (y >= y0) & (y <= y1))
-    on = inside[stack.mask(rank)[y[inside] - y0, detail.x[inside] - x0]]
+    stack, shot = detail.stack, detail.shots
+    item, on = int(stack.ids[rank]), detail.on(rank)
     ended = detail.ended[on]
     by_rank = np.unique(ended[ended >= 0], return_counts=True)
     by = {int(stack.ids[p]): int(n) for p, n in zip(*by_rank, strict=True)}
-    here = np.array([rank])
-    if refused(stack, here, shot, np.zeros(1, np.int64))[0]:
+    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
         foreign = not int(stack.categories[rank]) & int(shot.accept[0])
         return WhyNot(item, "category" if foreign else "excluded", len(on), by, distance)
     if not len(on):

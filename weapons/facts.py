@@ -2,32 +2,64 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from planes.arrays import Ints
-from planes.constants import TRIG_BITS
+from planes.arrays import InputError, Ints
+from planes.constants import ALL, SUB
 from planes.grid256 import pixel
 from planes.items import Role
 from planes.sampling import Verdict
 from planes.scene import Scene
-from planes.spans import Spans
-from weapons.hits import Hits
-from weapons.orders import Order, fire_order
+from planes.spans import Box, Spans
+from weapons.arsenal import parts_of
+from weapons.heat import heat_of
+from weapons.hits import HitRow, Hits
+from weapons.volley import volley_of
 
-__all__ = ["FORMAT", "report_of"]
+__all__ = ["FORMAT", "SHOTS_MAX", "report_of"]
 
 FORMAT = "hitplanes-report/1"
 
+SHOTS_MAX = 24
+"""More shots than these are told as a batch: the page would be longer than one reads."""
 
-def report_of(scene: Scene, orders: Sequence[Order]) -> dict[str, Any]:
-    """Fire shots and tell all that a picture needs, as JSON.
+VIEW_MAX = 2048
+"""A longer side of the world is not shown whole: the view is then what the shots reach, px."""
 
-    Samples are runs [y, x_first, x_last] by verdict, each pixel once under its strongest verdict.
+SHOTS_AT_A_TIME = 1024
+
+NEAR_OUTSIDE = 48
+"""How far beyond the bounds samples are shown, px."""
+
+
+def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None = None) -> dict[str, Any]:
+    """Tell, as JSON, all that a picture of shots needs.
+
+    Up to 24 shots are told one by one, with their samples as runs [y, x_first, x_last] by verdict, each pixel once
+    under its strongest verdict; more are told as a batch.
+
+    Parameters
+    ----------
+    scene : what was fired on
+    fired : answers of `fire` on it, of one shot or of many
+    names : of their weapons; by default the kinds
+
+    Raises
+    ------
+    InputError
+        If hits are of another scene, or of another version of it, or are told under one name with different weapons.
     """
+    _check(scene, fired)
+    called = _weapon_names(fired, names)
+    shots = sum(len(hits.shots) for hits in fired)
+    each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
+    told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
+    view = view_of(scene, fired)
     return {
         "format": FORMAT,
         "version": version("hitplanes"),
@@ -35,81 +67,195 @@ def report_of(scene: Scene, orders: Sequence[Order]) -> dict[str, Any]:
             "name": scene.name,
             "hash": scene.content_hash(),
             "version": scene.version,
-            "occluders": len(scene.ids(Role.OCCLUDER)),
             "bounds_xyxy": None if scene.bounds is None else list(scene.bounds),
+            "hittable": len(scene.ids(Role.HITTABLE)),
+            "occluders": len(scene.ids(Role.OCCLUDER)),
         },
-        "weapons": {order.name: order.weapon.to_json() for order in orders},
-        "shots": [_shot(scene, order) for order in orders],
+        "view_xyxy": list(view),
+        "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
+        "shots": told,
+        "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
     }
 
 
-def _shot(scene: Scene, order: Order) -> dict[str, Any]:
-    hits = fire_order(scene, order)
-    c, s = hits.shots.direction[0].tolist()
+def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
+    """Box of the world that a picture shows: the scene, and samples a little outside of it."""
+    x, y, x_max, y_max = scene.extent()
+    reach = np.concatenate([np.zeros((0, 4), np.int64), *(_boxes(hits) for hits in fired)])
+    if not len(reach):
+        return x, y, min(x_max, x + VIEW_MAX), min(y_max, y + VIEW_MAX)
+    low, high = reach[:, :2].min(axis=0).tolist(), reach[:, 2:].max(axis=0).tolist()
+    if max(x_max - x, y_max - y) >= VIEW_MAX:
+        middle = np.concatenate([pixel(hits.shots.at_256) for hits in fired])
+        low, high = (middle.min(axis=0) - VIEW_MAX // 8).tolist(), (middle.max(axis=0) + VIEW_MAX // 8).tolist()
+        x, y = max(x, low[0]), max(y, low[1])
+        return x, y, max(x, min(x_max, high[0], x + VIEW_MAX)), max(y, min(y_max, high[1], y + VIEW_MAX))
+    over = VIEW_MAX // 4 if scene.bounds is None else NEAR_OUTSIDE
+    x, y = max(min(x, low[0] - 2), x - over), max(min(y, low[1] - 2), y - over)
+    return x, y, min(max(x_max, high[0] + 2), x_max + over), min(max(y_max, high[1] + 2), y_max + over)
+
+
+def _boxes(hits: Hits) -> Ints:
+    """Box (n, 4) around the samples of each part of a batch that has any."""
+    found = []
+    for first in range(0, len(hits.shots), SHOTS_AT_A_TIME):
+        boxes = volley_of(hits.weapon, hits.shots.take(first, first + SHOTS_AT_A_TIME)).boxes
+        boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
+        if len(boxes):
+            found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
+    return np.array(found, np.int64).reshape(-1, 4)
+
+
+def _check(scene: Scene, fired: Sequence[Hits]) -> None:
+    for row, hits in enumerate(fired):
+        if not isinstance(hits, Hits):
+            raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
+        if hits.scene is not scene or hits.version != scene.version:
+            got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
+            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")
+
+
+def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[str]:
+    """Name of each weapon; equal weapons share one, others of the same kind are numbered."""
+    if names is not None:
+        if len(names) != len(fired):
+            raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(names)}")
+        known: dict[str, Any] = {}
+        for name, hits in zip(names, fired, strict=True):
+            if known.setdefault(name, hits.weapon) != hits.weapon:
+                raise InputError(f"names: expected one weapon for each name, got two for {name!r}")
+        return list(names)
+    given: dict[Any, str] = {}
+    for hits in fired:
+        same = sum(weapon.kind == hits.weapon.kind for weapon in given)
+        given.setdefault(hits.weapon, f"{hits.weapon.kind} {same + 1}" if same else hits.weapon.kind)
+    return [given[hits.weapon] for hits in fired]
+
+
+def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
+    shots = hits.shots
+    accept = int(shots.accept[row])
+    owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     return {
-        "shot": order.shot,
-        "weapon": order.name,
-        "at": list(order.at),
-        "at_xy": pixel(hits.shots.at_256[0]).tolist(),
-        "aim": order.aim,
-        "toward": None if order.toward is None else list(order.toward),
-        "direction": [c / (1 << TRIG_BITS), s / (1 << TRIG_BITS)],
-        "seed": order.seed,
-        "accept": None if order.accept is None else list(order.accept),
-        "exclude": [{"owner": owner, "name": scene.name_of(owner)} for owner in order.exclude],
-        "verdicts": hits.verdict_counts(0),
-        "rows": _rows(scene, hits),
+        "shot": int(shots.number[row]),
+        "weapon": weapon,
+        "at": (shots.at_256[row] / SUB).tolist(),
+        "at_xy": pixel(shots.at_256[row]).tolist(),
+        "aim": _degrees(hits, row),
+        "seed": int(np.broadcast_to(np.asarray(shots.seed, np.uint64), len(shots))[row]),
+        "accept": None if accept == ALL else scene.category_names(accept),
+        "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
+        "verdicts": hits.verdict_counts(row),
+        "rows": _rows(scene, hits, row),
         "why_not": [
             {
-                "object": entry.object,
-                "name": scene.name_of(entry.object),
+                **_item(scene, entry.object),
                 "reason": entry.reason,
                 "samples": entry.samples,
-                "by": [{"object": i, "name": scene.name_of(i), "samples": n} for i, n in entry.by.items()],
+                "by": [{**_item(scene, item), "samples": n} for item, n in entry.by.items()],
                 "distance": round(entry.distance, 3),
             }
-            for entry in hits.why_not(0)
+            for entry in hits.why_not(row)
         ],
         "blockers": [
-            {"object": b.occluder, "name": scene.name_of(b.occluder), "samples": b.samples} for b in hits.blockers(0)
+            {
+                **_item(scene, entry.occluder),
+                "samples": entry.samples,
+                "blocked": [
+                    {**_item(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
+                ],
+            }
+            for entry in hits.blockers(row)
         ],
-        "samples": _sample_runs(hits),
+        "samples": _sample_runs(hits, row),
         "plan": hits.plan.to_dict(),
     }
 
 
-def _rows(scene: Scene, hits: Hits) -> list[dict[str, Any]]:
-    rows = []
-    for row, share in zip(hits, hits.shares(), strict=True):
-        rows.append(
-            {
-                "object": row.object,
-                "name": scene.name_of(row.object),
-                "round": row.round,
-                "samples": row.samples,
-                "pixels": row.pixels,
-                "weight": row.weight,
-                "pellets": row.pellets,
-                "first_xy": list(row.first_xy),
-                "distance2": row.distance2,
-                "shares": {name: round(value, 6) for name, value in share._asdict().items()},
-            }
-        )
-    return rows
+def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
+    pixels = hits.pixels_at(shot)
+    return [
+        {
+            **_item(scene, row.object),
+            "round": row.round,
+            "samples": row.samples,
+            "pixels": row.pixels,
+            "weight": row.weight,
+            "pellets": row.pellets,
+            "first_xy": list(row.first_xy),
+            "distance2": row.distance2,
+            "shares": {name: round(value, 6) for name, value in share._asdict().items()},
+            "runs": _runs(pixels[row.round, row.object]),
+        }
+        for row, share in zip(hits.of(shot), hits.shares(shot), strict=True)
+    ]
 
 
-def _sample_runs(hits: Hits) -> dict[str, list[list[int]]]:
-    """Runs [y, x_first, x_last] of the pixels of each verdict that occurs; every pellet sees a pixel alike."""
-    samples = hits.samples_at(0)
+def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
+    """Runs of the pixels of each verdict that occurs; every pellet sees a pixel alike."""
+    samples = hits.samples_at(row)
     runs = {}
     for verdict in Verdict:
-        here = samples.xy[samples.verdict == verdict]
-        if len(here):
-            runs[verdict.name.lower()] = _runs(here)
+        xy = samples.xy[samples.verdict == verdict]
+        if len(xy):
+            runs[verdict.name.lower()] = _runs(Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]))
     return runs
 
 
-def _runs(xy: Ints) -> list[list[int]]:
-    spans = Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0])
+def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
+    """Many shots: totals, each object's share of them, every row, and the heat of each pixel of the view."""
+    first = np.cumsum([0, *(len(hits.shots) for hits in fired)]).tolist()
+    rows = [[row.shot + begin, *_flat(row)] for begin, hits in zip(first, fired, strict=False) for row in hits]
+    verdicts = sum((hits.verdicts.sum(axis=0) for hits in fired), np.zeros(len(Verdict), np.int64))
+    return {
+        "shots": first[-1],
+        "shots_that_hit": len({row[0] for row in rows}),
+        "verdicts": {verdict.name.lower(): int(verdicts[verdict]) for verdict in Verdict},
+        "objects": _objects(scene, rows),
+        "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
+        "rows": rows,
+        "heat": heat_of(fired, view),
+        "plan": [hits.plan.to_dict() for hits in fired],
+    }
+
+
+def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
+    """Objects hit, by the number of shots that hit them, then by pixels and id."""
+    shots: dict[int, set[int]] = {}
+    pixels: dict[int, int] = {}
+    weight: dict[int, int] = {}
+    for shot, _, item, _, count, heft, *_ in rows:
+        shots.setdefault(item, set()).add(shot)
+        pixels[item] = pixels.get(item, 0) + count
+        weight[item] = weight.get(item, 0) + heft
+    order = sorted(shots, key=lambda item: (-len(shots[item]), -pixels[item], item))
+    return [
+        {**_item(scene, item), "shots": len(shots[item]), "pixels": pixels[item], "weight": weight[item]}
+        for item in order
+    ]
+
+
+def _flat(row: HitRow) -> list[int]:
+    return [row.round, row.object, row.samples, row.pixels, row.weight, row.pellets, *row.first_xy, row.distance2]
+
+
+def _item(scene: Scene, item: int) -> dict[str, Any]:
+    return {"object": item, "name": _name(scene, item)}
+
+
+def _name(scene: Scene, item: int) -> str:
+    """Name of an object; an owner may be one that the scene never had."""
+    return scene.name_of(item) if item < scene.items.count else f"id {item}"
+
+
+def _degrees(hits: Hits, row: int) -> float | None:
+    """Aim of a shot whose weapon has one, to a millionth of a degree."""
+    if not parts_of(hits.weapon)[2].directed:
+        return None
+    c, s = hits.shots.direction[row].tolist()
+    return round(math.degrees(math.atan2(s, c)), 6) + 0.0
+
+
+def _runs(spans: Spans) -> list[list[int]]:
     rows: list[list[int]] = np.stack([spans.y, spans.x_first, spans.x_last], axis=1).tolist()
     return rows

@@ -11,9 +11,22 @@ import numpy as np
 from planes.arrays import InputError, Ints, integer
 from planes.sampling import Verdict
 from planes.scene import Scene
-from planes.spans import merged_runs
+from planes.spans import Spans, merged_runs
 from weapons.arsenal import Weapon
-from weapons.explain import Blocked, Samples, Share, WhyNot, blockers_of, margins_of, samples_of, shares_of, why_not_of
+from weapons.explain import (
+    Blocked,
+    Detail,
+    Samples,
+    Share,
+    WhyNot,
+    blockers_of,
+    detail_of,
+    hit_spans,
+    margins_of,
+    samples_of,
+    shares_of,
+    why_not_of,
+)
 from weapons.plan import Plan
 from weapons.resolve import Met
 from weapons.volley import Shots, Volley
@@ -88,7 +101,8 @@ class Hits:
     verdicts : (N, 5) samples of each shot by verdict, in the order of `Verdict`
     fired : (N,) samples of each shot
     plan : what ran and what was left out
-    version : of the scene, when it was fired on
+    scene, version : what was fired on, and its version then
+    weapon, shots : what was fired
     """
 
     def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
@@ -99,8 +113,8 @@ class Hits:
         self.fired = verdicts.sum(axis=1)
         self.starts = np.searchsorted(rows.shot, np.arange(len(shots) + 1))
         self.weapon, self.shots, self.plan = weapon, shots, plan
-        self.version = scene.version
-        self._scene = scene
+        self.scene, self.version = scene, scene.version
+        self._walked: tuple[int, Detail] | None = None
         for name in (*HitRow._fields, "verdicts", "fired", "starts"):
             getattr(self, name).flags.writeable = False
 
@@ -163,20 +177,25 @@ class Hits:
 
     def samples_at(self, shot: int = 0) -> Samples:
         """Every sample of one shot: pixel, pellet, verdict, and the item that decided it."""
-        return samples_of(self._fresh(), self.weapon, self._one(shot))
+        return samples_of(self._detail(shot))
 
-    def shares(self) -> list[Share]:
-        """For each row its share of the pattern, of the visible object, and of the whole mask."""
-        return shares_of(self._fresh(), self.weapon, self.shots, list(self))
+    def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
+        """Pixels that each round of one shot hit of each object, as {(round, object): pixels}."""
+        return hit_spans(self._detail(shot))
+
+    def shares(self, shot: int | None = None) -> list[Share]:
+        """For each row, of one shot or of all, its share of the pattern, of the visible object, of the whole mask."""
+        rows = list(self) if shot is None else self.of(shot)
+        return shares_of(self._fresh(), self.weapon, self.shots, rows)
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
         """Objects within 32 px of one shot that it did not hit, and why."""
         hit = {row.object for row in self.of(shot)}
-        return why_not_of(self._fresh(), self.weapon, self._one(shot), hit)
+        return why_not_of(self._detail(shot), hit)
 
     def blockers(self, shot: int = 0) -> list[Blocked]:
-        """Occluders that ended samples of one shot, most samples first."""
-        return blockers_of(self._fresh(), self.weapon, self._one(shot))
+        """Occluders that ended samples of one shot, most samples first, and the objects behind them there."""
+        return blockers_of(self._detail(shot))
 
     def margins(self, shot: int = 0) -> dict[int, float]:
         """How far the verdicts of one shot are from flipping.
@@ -185,6 +204,13 @@ class Hits:
         whole-pixel shift, px. One of 1 px is fragile.
         """
         return margins_of(self._fresh(), self.weapon, self._one(shot))
+
+    def _detail(self, shot: int) -> Detail:
+        """One shot sample by sample; that of the last one asked for is kept."""
+        scene, row = self._fresh(), self._checked(shot)
+        if self._walked is None or self._walked[0] != row:
+            self._walked = row, detail_of(scene, self.weapon, self.shots.take(row, row + 1))
+        return self._walked[1]
 
     def _one(self, shot: int) -> Shots:
         row = self._checked(shot)
@@ -195,10 +221,10 @@ class Hits:
 
     def _fresh(self) -> Scene:
         """The scene, if it is still as it was fired on."""
-        if self._scene.version != self.version:
-            now = self._scene.version
+        if self.scene.version != self.version:
+            now = self.scene.version
             raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
-        return self._scene
+        return self.scene
 
 
 def _named(row: tuple[Any, ...]) -> HitRow:

@@ -6,7 +6,7 @@ import numpy as np
 
 from planes.arrays import Bools
 
-__all__ = ["MARKS", "TINT", "glyph", "tiled_glyph"]
+__all__ = ["HEAT", "MARKS", "TINT", "glyph", "tiled_glyph"]
 
 MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
     "empty": ((255, 255, 255), 190),
@@ -17,6 +17,11 @@ MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
 }
 """Colour (after Okabe and Ito) and opacity of each verdict, in the order of drawing."""
 
+HEAT = (
+    (66, 10, 104), (106, 23, 110), (147, 38, 103), (188, 55, 84), (221, 81, 58), (243, 120, 25), (252, 165, 10),
+    (246, 215, 70), (252, 255, 164),
+)  # fmt: skip
+"""Colours of heat, from the least to the most: after inferno (Smith, van der Walt 2015), rising in lightness."""
 
 TINT = 40
 """Opacity of a mark's ground: where samples are too small for a shape each, it shows all of them."""

@@ -1,43 +1,34 @@
-"""The page around a report's picture: title, legend of what is present, a card for each shot, footer."""
+"""The page around the pictures of a report: title, legend of what is present, cards in columns, footer."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
 
 from planes.arrays import Image
-from weapons.marks import MARKS, glyph
+from weapons.marks import HEAT, MARKS, glyph
+from weapons.world import HATCH, OUTLINES
 
-__all__ = ["HATCH", "OUTLINE", "OUTLINE_HIT", "Text", "draw_texts", "page_of"]
+__all__ = ["CARD", "FAINT", "INK", "LINE", "Text", "clipped", "draw_texts", "legend_of", "page_of"]
 
 Color = tuple[int, int, int]
 
 EDGE, TOP = 16, 44
 """Left edge of the picture on the page, and its top, px."""
 
-LINE, COLUMN, NARROWEST, GAP = 19, 420, 900, 12
+LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12
 """Height of a line, least width of a card, least width of a page, space between cards, px."""
 
 GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
-OUTLINE_HIT, OUTLINE, HATCH = (255, 200, 40), (240, 240, 240), (200, 212, 230)
 
 ENTRY = 124
 """Width of an entry of the legend, px; not taken from the text, whose width depends on the version of OpenCV."""
 
 SIZE = 0.42
 """Scale of OpenCV's font, about 8 px a letter."""
-
-HIT_LINES = 24
-"""Rows of a card; the JSON has them all."""
-
-WHY_NOT_LINES = 3
-"""Objects that a card names as not hit; the JSON has them all."""
-
-
-HEADER = ["object hit", "pixels", "of visible", "nearest"]
 
 
 class Text(NamedTuple):
@@ -51,28 +42,41 @@ class Text(NamedTuple):
     right: bool = False
 
 
-def page_of(report: Mapping[str, Any], world: Image, badges: Sequence[Text]) -> tuple[Image, list[Text]]:
+class Drawn(Protocol):
+    """A card: it knows its height and draws itself."""
+
+    @property
+    def height(self) -> int:
+        """Height, px."""
+
+    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
+        """Draw it with its top left at (x, y), and return its texts."""
+
+
+def page_of(
+    report: Mapping[str, Any], world: Image, texts: Sequence[Text], cards: Sequence[Drawn]
+) -> tuple[Image, list[Text]]:
     """Lay a page around the enlarged world; texts, with those of the world, are drawn later."""
     width = max(world.shape[1] + 2 * EDGE, NARROWEST)
     columns = max(1, (width - 2 * EDGE + GAP) // (COLUMN + GAP))
     wide = (width - 2 * EDGE - GAP * (columns - 1)) // columns
-    cards = [_card_lines(shot) for shot in report["shots"]]
-    bottoms = [TOP + world.shape[0] + 46] * columns
+    legend = legend_of(report, width)
+    bottoms = [TOP + world.shape[0] + 14 + legend.height] * columns
     places = []
-    for lines in cards:
+    for card in cards:
         column = bottoms.index(min(bottoms))
         places.append((EDGE + column * (wide + GAP), bottoms[column]))
-        bottoms[column] += len(lines) * LINE + 62 + GAP
-    page = np.empty((max(bottoms) + 34, width, 3), np.uint8)
+        bottoms[column] += card.height + GAP
+    page = np.empty((max(bottoms) + 46, width, 3), np.uint8)
     page[:] = GROUND
     left = (width - world.shape[1]) // 2
     page[TOP : TOP + world.shape[0], left : left + world.shape[1]] = world
-    texts = [badge._replace(x=badge.x + left, y=badge.y + TOP) for badge in badges]
-    texts += [Text(EDGE, 28, _clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
-    texts += _legend(page, report, TOP + world.shape[0] + 14)
-    for number, (shot, lines, (x, y)) in enumerate(zip(report["shots"], cards, places, strict=True), 1):
-        texts += _card(page, shot, number, lines, (x, y, wide))
-    return page, [*texts, *_footer(report, width, page.shape[0])]
+    every = [text._replace(x=text.x + left, y=text.y + TOP) for text in texts]
+    every += [Text(EDGE, 28, clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
+    every += legend.draw(page, EDGE, TOP + world.shape[0] + 14, width)
+    for card, (x, y) in zip(cards, places, strict=True):
+        every += card.draw(page, x, y, wide)
+    return page, [*every, *_footer(report, width, page.shape[0])]
 
 
 def draw_texts(page: Image, texts: Sequence[Text]) -> None:
@@ -89,142 +93,114 @@ def text_width(text: str) -> int:
     return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, SIZE, 1)[0][0])
 
 
-def _summary(report: Mapping[str, Any], width: int) -> Text:
-    shots = report["shots"]
-    objects = {row["object"] for shot in shots for row in shot["rows"]}
-    told = f"{_counted(len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
-    return Text(width - EDGE, 28, told, FAINT, right=True)
-
-
-def _legend(page: Image, report: Mapping[str, Any], y: int) -> list[Text]:
-    """Only what the picture has: verdicts, outlines, hatching."""
-    present = {verdict for shot in report["shots"] for verdict in shot["samples"]}
-    texts, x = [], EDGE
-    for verdict in reversed(MARKS):
-        if verdict in present:
-            color, _ = MARKS[verdict]
-            page[y : y + 14, x : x + 14] = (70, 74, 82)
-            page[y : y + 14, x : x + 14][glyph(verdict, 14)] = color
-            texts.append(Text(x + 20, y + 12, verdict, FAINT))
-            x += ENTRY
-    hit = any(shot["rows"] for shot in report["shots"])
-    for color, name, thick, there in ((OUTLINE_HIT, "object hit", 3, hit), (OUTLINE, "other target", 1, True)):
-        if there:
-            cv2.rectangle(page, (x, y), (x + 13, y + 13), color, thick)
-            texts.append(Text(x + 20, y + 12, name, FAINT))
-            x += ENTRY
-    if report["scene"]["occluders"]:
-        rows, columns = np.mgrid[:14, :14]
-        page[y : y + 14, x : x + 14] = (70, 74, 82)
-        page[y : y + 14, x : x + 14][(rows + columns) % 6 < 2] = HATCH
-        texts.append(Text(x + 20, y + 12, "occluder", FAINT))
-    return texts
-
-
-def _card(
-    page: Image, shot: Mapping[str, Any], number: int, lines: list[list[str]], at: tuple[int, int, int]
-) -> list[Text]:
-    """One shot: what was fired, a bar of its verdicts, and the lines."""
-    x, y, wide = at
-    page[y : y + len(lines) * LINE + 62, x : x + wide] = CARD
-    cv2.circle(page, (x + 18, y + 18), 10, (255, 255, 255), 1)
-    label = str(number)
-    texts = [
-        Text(x + 18 - 4 * len(label), y + 22, label, INK, bold=True),
-        Text(x + 36, y + 22, _clipped(shot["weapon"], wide // 3), INK, bold=True),
-        Text(x + wide - 10, y + 22, _clipped(_fired(shot), wide * 2 // 3 - 50), FAINT, right=True),
-    ]
-    _bar(page, shot["verdicts"], x + 10, y + 36, wide - 20)
-    for row, cells in enumerate(lines):
-        base = y + 66 + row * LINE
-        color = FAINT if len(cells) == 1 or cells == HEADER else INK
-        texts.append(Text(x + 10, base, _clipped(cells[0], wide - 20 if len(cells) == 1 else wide - 250), color))
-        for cell, offset in zip(cells[1:], (160, 90, 10), strict=False):
-            texts.append(Text(x + wide - offset, base, cell, color, right=True))
-    return texts
-
-
-def _card_lines(shot: Mapping[str, Any]) -> list[list[str]]:
-    """Lines of a card: verdict counts, a table of the objects hit, and some that were not."""
-    counts = [f"{shot['verdicts'][verdict]} {verdict}" for verdict in reversed(MARKS) if shot["verdicts"][verdict]]
-    lines = [[", ".join(counts) or "no samples"]]
-    if shot["rows"]:
-        lines.append(HEADER)
-    rounds = len({row["round"] for row in shot["rows"]}) > 1
-    for row in shot["rows"][:HIT_LINES]:
-        name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]
-        distance = f"{row['distance2'] ** 0.5:.1f} px"
-        lines.append([name, str(row["pixels"]), _percent(row["shares"]["of_visible"]), distance])
-    if len(shot["rows"]) > HIT_LINES:
-        lines.append([f"and {len(shot['rows']) - HIT_LINES} more"])
-    if shot["blockers"]:
-        blocked = [f"{entry['name']} ({entry['samples']})" for entry in shot["blockers"]]
-        lines.append(["blocked by " + ", ".join(blocked)])
-    for entry in shot["why_not"][:WHY_NOT_LINES]:
-        lines.append([f"not {entry['name']}: {_reason(entry)}"])
-    if len(shot["why_not"]) > WHY_NOT_LINES:
-        lines.append([f"and {len(shot['why_not']) - WHY_NOT_LINES} more near it"])
-    return lines
-
-
-def _reason(entry: Mapping[str, Any]) -> str:
-    if entry["reason"] == "missed":
-        return f"missed by {entry['distance']:.1f} px"
-    if entry["reason"] == "behind":
-        return "behind " + ", ".join(by["name"] for by in entry["by"])
-    return {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}[
-        entry["reason"]
-    ]
-
-
-def _fired(shot: Mapping[str, Any]) -> str:
-    parts = [f"at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}"]
-    if shot["aim"] is not None:
-        parts.append(f"aim {shot['aim']:g} deg")
-    if shot["toward"] is not None:
-        parts.append(f"toward {shot['toward'][0]:.12g}, {shot['toward'][1]:.12g}")
-    if shot["seed"]:
-        parts.append(f"seed {shot['seed']}")
-    if shot["accept"] is not None:
-        parts.append("accepts " + " ".join(shot["accept"]))
-    if shot["exclude"]:
-        parts.append("excludes " + " ".join(e["name"] for e in shot["exclude"]))
-    return ", ".join(parts)
-
-
-def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> None:
-    """Verdicts of a shot as parts of one bar."""
-    total = sum(verdicts.values())
-    page[y : y + 8, x : x + wide] = (58, 62, 70)
-    begun = 0
-    for verdict in ("hit", "occluded", "filtered", "outside"):
-        done = begun + verdicts[verdict]
-        if total:
-            page[y : y + 8, x + begun * wide // total : x + done * wide // total] = MARKS[verdict][0]
-        begun = done
-
-
-def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
-    scene = report["scene"]
-    ran = sorted({stage["stage"] for shot in report["shots"] for stage in shot["plan"]["ran"]})
-    left = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
-    return [
-        Text(EDGE, height - 12, left, FAINT),
-        Text(width - EDGE, height - 12, "stages: " + ", ".join(ran) if ran else "", FAINT, right=True),
-    ]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
-
-
-def _clipped(text: str, width: int) -> str:
-    """Shorten a text to a width."""
+def clipped(text: str, width: int) -> str:
+    """Shorten a text to a width, px."""
+    text = text[: max(width, 0)]  # a letter takes a pixel at least
     if text_width(text) <= width:
         return text
     while text and text_width(text + "...") > width:
         text = text[:-1]
     return text + "..."
+
+
+class Entry(NamedTuple):
+    """An entry of the legend: its word, and a picture (14, w, 3) of its mark."""
+
+    word: str
+    mark: Image
+
+
+class Legend:
+    """Entries side by side, in as many lines as they take."""
+
+    def __init__(self, entries: Sequence[Entry], width: int) -> None:
+        self.entries = entries
+        self.columns = max(1, (width - 2 * EDGE) // ENTRY)
+
+    @property
+    def height(self) -> int:
+        """Height with the space below, px."""
+        return 26 * -(-len(self.entries) // self.columns) + 8
+
+    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
+        """Draw the marks and return the words."""
+        texts = []
+        for i, entry in enumerate(self.entries):
+            left, top = x + i % self.columns * ENTRY, y + i // self.columns * 26
+            page[top : top + 14, left : left + entry.mark.shape[1]] = entry.mark
+            texts.append(Text(left + entry.mark.shape[1] + 6, top + 12, entry.word, FAINT))
+        return texts
+
+
+def legend_of(report: Mapping[str, Any], width: int) -> Legend:
+    """Only what the picture has: verdicts or their heat, outlines, rings, hatching."""
+    shots, batch = report["shots"], report["batch"]
+    present = {v for shot in shots for v in shot["samples"]} | set(batch["heat"]["counts"] if batch else ())
+    hit = {row["object"] for shot in shots for row in shot["rows"]}
+    blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]}
+    entries = [Entry(v, verdict_mark(v)) for v in reversed(MARKS) if v in present and not (batch and v == "hit")]
+    if batch and "hit" in present:
+        most = max(run[3] for run in batch["heat"]["counts"]["hit"])
+        scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
+        entries.insert(0, Entry(f"1 to {most}", np.repeat(scale, 5, axis=1)))
+    if hit:
+        entries.append(Entry("object hit", _outlined("hit")))
+    if blocked - hit:
+        entries.append(Entry("object blocked", _outlined("blocked")))
+    if report["scene"]["hittable"] > len(hit | blocked):
+        entries.append(Entry("other target" if hit | blocked else "target", _outlined("other")))
+    if report["scene"]["occluders"]:
+        rows, columns = np.mgrid[:14, :14]
+        mark = _blank()
+        mark[(rows + columns) % 6 < 2] = HATCH
+        entries.append(Entry("occluder", mark))
+    return Legend(entries, width)
+
+
+def verdict_mark(verdict: str) -> Image:
+    """Mark (14, 14, 3) of a verdict, for a legend."""
+    mark = _blank()
+    mark[glyph(verdict, 14)] = MARKS[verdict][0]
+    return mark
+
+
+def _blank() -> Image:
+    mark = np.empty((14, 14, 3), np.uint8)
+    mark[:] = (70, 74, 82)
+    return mark
+
+
+def _outlined(kind: str) -> Image:
+    mark, thick = _blank(), 1 if kind == "other" else 2
+    border = np.ones((14, 14), np.bool_)
+    border[thick:-thick, thick:-thick] = False
+    rows, columns = np.ogrid[:14, :14]
+    mark[border & ((kind != "blocked") | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
+    return mark
+
+
+def _of(batch: Mapping[str, Any] | None, key: str) -> Sequence[Any]:
+    found: Sequence[Any] = batch[key] if batch else ()
+    return found
+
+
+def _summary(report: Mapping[str, Any], width: int) -> Text:
+    shots, batch = report["shots"], report["batch"]
+    objects = {row["object"] for shot in shots for row in shot["rows"]} | {o["object"] for o in _of(batch, "objects")}
+    told = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
+    return Text(width - EDGE, 28, told, FAINT, right=True)
+
+
+def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
+    """Scene, version and plan; weapons and seeds are in the cards."""
+    scene = report["scene"]
+    plans = [shot["plan"] for shot in report["shots"]] + list(_of(report["batch"], "plan"))
+    ran = dict.fromkeys(stage["stage"] for plan in plans for stage in plan["ran"])
+    left = [s["stage"] for s in plans[0]["left_out"]] if plans else []
+    left = [name for name in left if all(name in [s["stage"] for s in plan["left_out"]] for plan in plans)]
+    told = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
+    plan = "; ".join(f"{word}: {', '.join(stages)}" for word, stages in (("ran", ran), ("left out", left)) if stages)
+    return [Text(EDGE, height - 30, told, FAINT), Text(EDGE, height - 12, clipped(plan, width - 2 * EDGE), FAINT)]
 
 
 def _counted(n: int, what: str) -> str:

@@ -1,0 +1,262 @@
+"""Facts of a report: one by one and as a batch; and what is written over the world covers nothing that it names."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planes import InputError, Scene, Sprite, load_scene
+from weapons import Beam, Disc, Point, Spread, arsenal_of, fire
+from weapons.cards import shot_card
+from weapons.facts import SHOTS_MAX, report_of
+from weapons.heat import heat_of
+from weapons.inset import CELL, COLUMNS, ROWS, inset_of
+from weapons.marks import HEAT, MARKS
+from weapons.overlay import BADGE, LETTER, ROW, Overlay
+from weapons.picture import picture_of_report
+from weapons.world import heat_step
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+
+
+def street() -> Scene:
+    """A wall before half of a target, and another target beside it."""
+    scene = Scene((60, 40), name="street")
+    scene.add(Sprite.circle(8), (20, 20), name="near")
+    scene.add(Sprite.box(9, 20), (24, 20), role="occluder", layer=1, name="wall")
+    scene.add(Sprite.circle(3), (50, 20), name="far")
+    return scene
+
+
+def pixels(runs: list[list[int]]) -> set[tuple[int, int]]:
+    return {(x, y) for y, first, last in runs for x in range(first, last + 1)}
+
+
+def test_rows_tell_their_pixels_and_blockers_what_they_hid() -> None:
+    scene = street()
+    hits = fire(scene, Disc(10), (20, 20))
+    (shot,) = report_of(scene, [hits])["shots"]
+    (row,) = shot["rows"]
+    assert row["name"] == "near" and len(pixels(row["runs"])) == row["pixels"]
+    assert pixels(row["runs"]) == pixels(shot["samples"]["hit"])
+    (blocker,) = shot["blockers"]
+    assert blocker["name"] == "wall" and blocker["samples"] == shot["verdicts"]["occluded"]
+    (blocked,) = blocker["blocked"]
+    near, at = scene.mask(scene.find("near"))
+    wall, corner = scene.mask(scene.find("wall"))
+    both = {(x + at[0], y + at[1]) for y, x in np.argwhere(near)}
+    both &= {(x + corner[0], y + corner[1]) for y, x in np.argwhere(wall)}
+    assert blocked["name"] == "near" and blocked["samples"] == len(both) and tuple(blocked["at_xy"]) in both
+
+
+def test_aim_and_filter_are_told_as_they_were_given() -> None:
+    scene = load_scene(GALLERY)
+    hits = fire(scene, Beam(50, 1), [(9, 9), (99, 9)], aim=[-24.5, 540], accept=["bonus"], exclude=scene.find("clown"))
+    first, second = report_of(scene, [hits], ["ray"])["shots"]
+    assert (first["aim"], second["aim"], first["weapon"]) == (-24.5, 180, "ray")
+    assert first["accept"] == ["bonus"] and first["exclude"] == [{"owner": scene.find("clown"), "name": "clown"}]
+    (plain,) = report_of(scene, [fire(scene, Point(), (9, 9))])["shots"]
+    assert (plain["aim"], plain["accept"], plain["exclude"]) == (None, None, [])
+
+
+def test_up_to_so_many_shots_are_told_one_by_one() -> None:
+    scene = street()
+    few, many = ([(i, 20) for i in range(n)] for n in (SHOTS_MAX, SHOTS_MAX + 1))
+    assert len(report_of(scene, [fire(scene, Point(), few)])["shots"]) == SHOTS_MAX
+    report = report_of(scene, [fire(scene, Point(), many)])
+    assert report["shots"] == [] and report["batch"]["shots"] == SHOTS_MAX + 1
+
+
+def test_a_batch_tells_every_row_and_each_object() -> None:
+    scene = load_scene(GALLERY)
+    rng = np.random.default_rng(5)
+    weapons = arsenal_of(scene)
+    fired = [fire(scene, weapons[n], rng.uniform(0, 300, (40, 2)), seed=3) for n in ("shotgun", "burst")]
+    report = report_of(scene, fired, ["shotgun", "burst"])
+    assert json.loads(json.dumps(report)) == report
+    batch = report["batch"]
+    rows = [dict(zip(batch["columns"], row, strict=True)) for row in batch["rows"]]
+    wanted = [(row, 0) for row in fired[0]] + [(row, 40) for row in fired[1]]
+    assert [(r["shot"], r["round"], r["object"], r["pixels"], r["x"], r["y"], r["distance2"]) for r in rows] == [
+        (row.shot + begin, row.round, row.object, row.pixels, *row.first_xy, row.distance2) for row, begin in wanted
+    ]
+    shots = Counter(item for _, item in {(row["shot"], row["object"]) for row in rows})
+    assert {told["object"]: told["shots"] for told in batch["objects"]} == shots
+    assert sum(told["pixels"] for told in batch["objects"]) == sum(hits.pixels.sum() for hits in fired)
+    assert batch["shots_that_hit"] == len({row["shot"] for row in rows})
+    assert sum(batch["verdicts"].values()) == sum(hits.fired.sum() for hits in fired)
+
+
+@pytest.mark.parametrize("view", [(0, 0, 59, 39), (-9, 5, 40, 60), (25, 18, 25, 18)])
+def test_heat_counts_every_sample(view: tuple[int, int, int, int]) -> None:
+    scene = street()
+    rng = np.random.default_rng(2)
+    fired = [fire(scene, Spread(Disc(2), 4, 6), rng.uniform(-5, 60, (30, 2))), fire(scene, Disc(9), [(20, 20)] * 3)]
+    counts: Counter[tuple[str, int, int]] = Counter()
+    beyond = 0
+    for hits in fired:
+        for shot in range(len(hits.shots)):
+            samples = hits.samples_at(shot)
+            for (x, y), verdict in zip(samples.xy.tolist(), samples.verdict.tolist(), strict=True):
+                if view[0] <= x <= view[2] and view[1] <= y <= view[3]:
+                    counts[("empty", "hit", "occluded", "filtered", "outside")[verdict], x, y] += 1
+                else:
+                    beyond += 1
+    heat = heat_of(fired, view)
+    assert heat["cell"] == 1 and heat["beyond"] == beyond
+    found = {
+        (verdict, x + view[0], row + view[1]): count
+        for verdict, runs in heat["counts"].items()
+        for row, first, last, count in runs
+        for x in range(first, last + 1)
+    }
+    assert found == dict(counts)
+
+
+def test_runs_of_heat_end_with_their_row() -> None:
+    scene = Scene((7, 5))
+    heat = heat_of([fire(scene, Disc(20), (3, 2))], (0, 0, 6, 4))
+    assert heat["counts"] == {"empty": [[row, 0, 6, 1] for row in range(5)]}
+
+
+def test_large_views_share_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("weapons.heat.CELLS_MAX", 100)
+    scene = street()
+    fired = [fire(scene, Disc(9), [(20, 20), (22, 20)])]
+    heat = heat_of(fired, (0, 0, 58, 38))
+    assert heat["cell"] == 8
+    total = sum((last - first + 1) * n for runs in heat["counts"].values() for _, first, last, n in runs)
+    assert total + heat["beyond"] == fired[0].fired.sum()
+    assert all(last < 8 and row < 5 for runs in heat["counts"].values() for row, _, last, _ in runs)
+
+
+def test_heat_rises_in_lightness_and_spans_the_scale() -> None:
+    lightness = [54 * r + 183 * g + 19 * b for r, g, b in HEAT]
+    assert lightness == sorted(set(lightness))
+    assert (heat_step(1, 1000), heat_step(1000, 1000), heat_step(1, 1)) == (0, len(HEAT) - 1, 0)
+    assert [heat_step(n, 1000) for n in range(1, 1001)] == sorted(heat_step(n, 1000) for n in range(1, 1001))
+
+
+def test_hits_of_another_scene_or_version_are_refused() -> None:
+    scene, other = street(), street()
+    hits = fire(scene, Point(), (1, 1))
+    with pytest.raises(InputError, match=r"fired\[0\]: expected 'street' at version 3, got hits of 'street'"):
+        report_of(other, [hits])
+    with pytest.raises(InputError, match=r"fired\[1\]: expected Hits, got int"):
+        report_of(scene, [hits, 5])  # type: ignore[list-item]
+    with pytest.raises(InputError, match="names: expected 1, one for each hits, got 0"):
+        report_of(scene, [hits], [])
+    with pytest.raises(InputError, match="names: expected one weapon for each name, got two for 'gun'"):
+        report_of(scene, [hits, fire(scene, Disc(2), (1, 1))], ["gun", "gun"])
+    scene.move(0, (1, 1))
+    with pytest.raises(InputError, match="expected 'street' at version 4, got version 3: fire again"):
+        report_of(scene, [hits])
+
+
+def test_weapons_without_names_are_called_by_their_kind() -> None:
+    scene = street()
+    fired = [fire(scene, weapon, (1, 1)) for weapon in (Disc(1), Disc(2), Disc(1), Point())]
+    report = report_of(scene, fired)
+    assert [shot["weapon"] for shot in report["shots"]] == ["disc", "disc 2", "disc", "point"]
+    assert report["weapons"]["disc 2"] == {"kind": "disc", "radius": 2.0}
+
+
+# Over the world
+
+
+def overlaid(scene: Scene, report: dict[str, Any], factor: int) -> Overlay:
+    x, y, x_max, y_max = view = tuple(report["view_xyxy"])
+    overlay = Overlay(np.zeros(((y_max - y + 1) * factor, (x_max - x + 1) * factor, 3), np.uint8), view, factor)
+    overlay.keep_free(report["shots"], scene)
+    before = np.zeros(overlay.world.shape[:2], np.bool_)  # pixels that no label may cover
+    named = {e["object"] for shot in report["shots"] for e in (*shot["rows"], *shot["blockers"])}
+    free = {p for shot in report["shots"] for runs in shot["samples"].values() for p in pixels(runs)}
+    for item in named:
+        mask, corner = scene.mask(item)
+        free |= {(int(c) + corner[0], int(r) + corner[1]) for r, c in np.argwhere(mask)}
+    for column, row in free:
+        if column >= x and row >= y:
+            before[(row - y) * factor :, (column - x) * factor :][:factor, :factor] = True
+    for number, shot in enumerate(report["shots"], 1):
+        overlay.shot(shot, number)
+    overlay.links(report["shots"])
+    overlay.names(report["shots"], scene)
+    for text in overlay.texts:  # what a label takes: its words at their widest
+        wide = BADGE if text.bold else (LETTER * len(text.text) + 8) // 2
+        tall = BADGE if text.bold else ROW // 2
+        left, top = (
+            (text.x + 4 * len(text.text) - wide, text.y - 4 - tall) if text.bold else (text.x - 4, text.y - 5 - tall)
+        )
+        assert not before[top + 1 : top + 2 * tall, left + 1 : left + 2 * wide - 1].any(), text.text
+        before[top + 1 : top + 2 * tall, left + 1 : left + 2 * wide - 1] = True
+    return overlay
+
+
+@pytest.mark.parametrize("factor", [4, 9, 20])
+def test_labels_cover_no_sample_no_target_and_no_label(factor: int) -> None:
+    scene = street()
+    report = report_of(scene, [fire(scene, Disc(10), (20, 20)), fire(scene, Beam(50, 3), (2, 30), aim=-12)])
+    overlay = overlaid(scene, report, factor)
+    assert {text.text for text in overlay.texts} == {"1", "2", "near", "far", "wall blocks near"} - (
+        {"far"} if all(row["name"] != "far" for shot in report["shots"] for row in shot["rows"]) else set()
+    )
+
+
+def test_labels_of_the_gallery_cover_nothing() -> None:
+    scene = load_scene(GALLERY)
+    weapons = arsenal_of(scene)
+    fired = [fire(scene, weapons[n], (390, 110)) for n in ("blast", "shotgun")]
+    fired.append(fire(scene, weapons["flame"], (356, 232), aim=-24))
+    texts = [text.text for text in overlaid(scene, report_of(scene, fired), 3).texts]
+    assert {"bandit", "can 1", "house blocks bandit", "1", "2", "3"} <= set(texts)
+
+
+def test_a_shot_out_of_view_is_pointed_at() -> None:
+    scene = street()
+    report = report_of(scene, [fire(scene, Point(), (10**6, 20)), fire(scene, Point(), (5, -(10**9)))])
+    right, up = overlaid(scene, report, 8).texts
+    width, height = (report["view_xyxy"][i + 2] - report["view_xyxy"][i] + 1 for i in (0, 1))
+    assert right.x > width * 8 - 60 and up.y < 60 and height
+
+
+def test_the_inset_shows_the_pixels_around_the_first_hit() -> None:
+    scene = street()
+    (shot,) = report_of(scene, [fire(scene, Disc(10), (20, 20))])["shots"]
+    inset = inset_of(shot, scene)
+    assert inset is not None
+    x, y = shot["rows"][0]["first_xy"]
+    assert inset.view == (x - COLUMNS // 2, y - ROWS // 2, x + COLUMNS // 2, y + ROWS // 2)
+    assert inset.image.shape == (ROWS * CELL, COLUMNS * CELL, 3)
+    hit = pixels(shot["samples"]["hit"])
+    for row in range(ROWS):
+        for column in range(COLUMNS):
+            middle = inset.image[row * CELL + CELL // 2 + 3, column * CELL + CELL // 2 + 3].astype(int)
+            orange = abs(middle - MARKS["hit"][0]).max() < 40
+            assert orange == ((inset.view[0] + column, inset.view[1] + row) in hit)
+    assert inset_of({"rows": []}, scene) is None
+
+
+def test_a_card_says_what_was_hit_what_blocked_and_why_not() -> None:
+    scene = street()
+    (shot,) = report_of(scene, [fire(scene, Disc(18), (8, 20))])["shots"]
+    lines = shot_card(shot, 1, scene).lines
+    row = shot["rows"][0]
+    assert lines[1] == ("near", str(row["pixels"]), *lines[1][2:5], "4.0 px")
+    assert [f"{100 * share:.1f} %" for share in row["shares"].values()] == list(lines[1][2:5])
+    assert lines[2][0].startswith("wall blocks") and lines[2][1].endswith("on near")
+    assert lines[3] == ("not far", "missed by 21.0 px")
+
+
+def test_a_batch_has_a_heat_picture() -> None:
+    scene = street()
+    report = report_of(scene, [fire(scene, Disc(1), [(18, 20)] * 40 + [(13, 20)])])
+    picture = picture_of_report(report, scene, text=False)
+    world = picture[44 : 44 + 40 * 24, 16 : 16 + 60 * 24]
+    for step, spot in ((len(HEAT) - 1, (18, 20)), (0, (12, 20))):
+        x, y = (24 * v + 12 for v in spot)
+        assert np.abs(world[y, x].astype(int) - HEAT[step]).max() < 30, step

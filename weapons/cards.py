@@ -1,0 +1,218 @@
+"""Cards of a report: for each shot what was fired, its verdicts, its first hit, what was hit, and why not the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+
+from planes.arrays import Image
+from planes.scene import Scene
+from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
+from weapons.marks import MARKS, glyph
+from weapons.overlay import short
+from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped
+
+__all__ = ["Card", "batch_cards", "shot_card"]
+
+HIT_LINES = 24
+"""Rows of a card; the JSON has them all."""
+
+NOT_LINES = 5
+"""Objects that a card names as blocked or as not hit; the JSON has them all."""
+
+CELL_WIDTH = 64
+"""Width of a column of numbers, px."""
+
+LETTER = 8
+"""About the width of a digit, px."""
+
+HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
+BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a card says.
+
+    Parameters
+    ----------
+    number : of the shot in the picture; None for none
+    title, told : left and right of its first line
+    verdicts : samples by verdict
+    inset : of the first hit
+    lines : below; of one cell a sentence, of two what and why, of more a row of a table
+    """
+
+    number: int | None
+    title: str
+    told: str
+    verdicts: Mapping[str, int]
+    inset: Inset | None
+    lines: Sequence[Sequence[str]]
+
+    @property
+    def height(self) -> int:
+        """Height of the card, px."""
+        return 52 + self._facts_height + LINE * len(self.lines) + 6
+
+    @property
+    def _facts_height(self) -> int:
+        counts = 6 + LINE * max(1, sum(n > 0 for n in self.verdicts.values()))
+        return max(counts, ROWS * CELL + 34) if self.inset else counts
+
+    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
+        """Draw the card with its top left at (x, y); its texts are drawn later."""
+        page[y : y + self.height, x : x + wide] = CARD
+        left = x + 10
+        texts = []
+        if self.number is not None:
+            cv2.circle(page, (x + 20, y + 18), 10, (255, 255, 255), 1)
+            label = str(self.number)
+            texts.append(Text(x + 20 - 4 * len(label), y + 22, label, INK, bold=True))
+            left = x + 38
+        texts.append(Text(left, y + 22, clipped(self.title, wide // 3), INK, bold=True))
+        texts.append(Text(x + wide - 10, y + 22, clipped(self.told, wide * 2 // 3 - 50), FAINT, right=True))
+        _bar(page, self.verdicts, x + 10, y + 36, wide - 20)
+        top = y + 52
+        counts_x = x + 10
+        if self.inset:
+            texts += _inset(page, self.inset, x + 10, top)
+            counts_x += _margin(self.inset) + COLUMNS * CELL + 14
+        texts += _counts(page, self.verdicts, counts_x, top)
+        return texts + self._table(x, top + self._facts_height, wide)
+
+    def _table(self, x: int, y: int, wide: int) -> list[Text]:
+        texts = []
+        for row, cells in enumerate(self.lines):
+            base = y + 14 + row * LINE
+            color = FAINT if len(cells) == 1 or cells in (HEADER, BATCH_HEADER) else INK
+            if len(cells) == 2:  # what, and why
+                texts.append(Text(x + wide - 10, base, clipped(cells[1], wide * 3 // 5), FAINT, right=True))
+                texts.append(Text(x + 10, base, clipped(cells[0], wide * 2 // 5 - 20), FAINT))
+                continue
+            room = wide - 20 - CELL_WIDTH * (len(cells) - 1)
+            texts.append(Text(x + 10, base, clipped(cells[0], room), color))
+            for column, cell in enumerate(reversed(cells[1:])):
+                texts.append(Text(x + wide - 10 - CELL_WIDTH * column, base, cell, color, right=True))
+        return texts
+
+
+def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
+    """Card of one shot."""
+    lines: list[Sequence[str]] = [HEADER] if shot["rows"] else []
+    rounds = len({row["round"] for row in shot["rows"]}) > 1
+    for row in shot["rows"][:HIT_LINES]:
+        name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]
+        shares = [percent(share) for share in row["shares"].values()]
+        lines.append((name, str(row["pixels"]), *shares, f"{row['distance2'] ** 0.5:.1f} px"))
+    lines += _rest(shot["rows"], HIT_LINES, "")
+    for entry in shot["blockers"][:NOT_LINES]:
+        behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
+        lines.append((f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"))
+    lines += _rest(shot["blockers"], NOT_LINES, " block")
+    lines += [(f"not {entry['name']}", reason(entry)) for entry in shot["why_not"][:NOT_LINES]]
+    lines += _rest(shot["why_not"], NOT_LINES, " near it")
+    return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines)
+
+
+def batch_cards(report: Mapping[str, Any]) -> list[Card]:
+    """Cards of a batch: its totals, and the objects that it hit."""
+    batch = report["batch"]
+    shots = batch["shots"]
+    told = f"{shots} shots, {batch['shots_that_hit']} hit something"
+    never = report["scene"]["hittable"] - len(batch["objects"])
+    lines: list[Sequence[str]] = [BATCH_HEADER] if batch["objects"] else []
+    for entry in batch["objects"][:HIT_LINES]:
+        share = percent(entry["shots"] / shots)
+        lines.append(
+            (entry["name"], str(entry["shots"]), share, str(entry["pixels"]), f"{entry['weight'] / 65535:.6g}")
+        )
+    lines += _rest(batch["objects"], HIT_LINES, " hit")
+    lines.append([f"{never} of {report['scene']['hittable']} objects never hit"])
+    if batch["heat"]["beyond"]:
+        lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
+    return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
+
+
+def reason(entry: Mapping[str, Any]) -> str:
+    """Why an object was not hit, in words."""
+    if entry["reason"] == "missed":
+        return f"missed by {entry['distance']:.1f} px"
+    if entry["reason"] == "behind":
+        return "behind " + ", ".join(short(by["name"]) for by in entry["by"])
+    return {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}[
+        entry["reason"]
+    ]
+
+
+def percent(share: float) -> str:
+    """A share, short."""
+    return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
+
+
+def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:
+    return [[f"and {len(entries) - shown} more{what}"]] if len(entries) > shown else []
+
+
+def _fired(shot: Mapping[str, Any]) -> str:
+    parts = [f"at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}"]
+    if shot["aim"] is not None:
+        parts.append(f"aim {shot['aim']:g} deg")
+    if shot["seed"]:
+        parts.append(f"seed {shot['seed']}")
+    if shot["accept"] is not None:
+        parts.append("accepts " + (" ".join(shot["accept"]) or "nothing"))
+    if shot["exclude"]:
+        parts.append("excludes " + " ".join(e["name"] for e in shot["exclude"]))
+    return ", ".join(parts)
+
+
+def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> None:
+    """Verdicts of a shot as parts of one bar."""
+    total = sum(verdicts.values())
+    page[y : y + 8, x : x + wide] = (58, 62, 70)
+    begun = 0
+    for verdict in ("hit", "occluded", "filtered", "outside"):
+        done = begun + verdicts[verdict]
+        if total:
+            page[y : y + 8, x + begun * wide // total : x + done * wide // total] = MARKS[verdict][0]
+        begun = done
+
+
+def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int) -> list[Text]:
+    """Samples of each verdict that occurs, beside its mark."""
+    total = sum(verdicts.values())
+    if not total:
+        return [Text(x, y + 14, "no samples", FAINT)]
+    texts = []
+    for row, verdict in enumerate(v for v in reversed(MARKS) if verdicts[v]):
+        top = y + 3 + row * LINE
+        page[top : top + 12, x : x + 12] = (70, 74, 82)
+        page[top : top + 12, x : x + 12][glyph(verdict, 12)] = MARKS[verdict][0]
+        share = percent(verdicts[verdict] / total)
+        texts.append(Text(x + 18, top + 11, f"{verdicts[verdict]} {verdict}, {share}", FAINT))
+    return texts
+
+
+def _inset(page: Image, inset: Inset, x: int, y: int) -> list[Text]:
+    """Draw an inset, and the coordinates of its first, middle and last rows and columns."""
+    left = x + _margin(inset)
+    page[y : y + ROWS * CELL, left : left + COLUMNS * CELL] = inset.image
+    texts = []
+    widest = LETTER * max(len(str(v)) for v in inset.view[::2]) + LETTER
+    for column in (0, COLUMNS // 2, COLUMNS - 1) if 3 * widest < COLUMNS * CELL else (COLUMNS // 2,):
+        label = str(inset.view[0] + column)
+        middle = left + column * CELL + CELL // 2
+        start = min(max(middle - LETTER * len(label) // 2, left), left + COLUMNS * CELL - LETTER * len(label))
+        texts.append(Text(start, y + ROWS * CELL + 14, label, FAINT))
+    for row in (0, ROWS // 2, ROWS - 1):
+        texts.append(Text(left - 5, y + row * CELL + CELL - 2, str(inset.view[1] + row), FAINT, right=True))
+    return texts
+
+
+def _margin(inset: Inset) -> int:
+    """Room for the coordinates of rows, px."""
+    return 8 + LETTER * max(len(str(inset.view[1])), len(str(inset.view[3])))
