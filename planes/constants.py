@@ -40,6 +40,9 @@ ITEMS_MAX = 2**22
 ITEMS_UINT16 = 32_767
 """Item numbers that fit a uint16 code plane, whose lowest bit says "more behind"."""
 
+LAYER_MAX = 2**31 - 1
+"""Largest layer, either way: it fits 32 bits."""
+
 CATEGORY_BITS = 32
 """Categories are bits of one unsigned 32-bit number."""
 

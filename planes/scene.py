@@ -13,19 +13,19 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
-from planes.constants import ALL, CATEGORY_BITS, POSITION_MAX, SCALE_BITS, SUB
+from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
-from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, text_of, write_scene
+from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, write_scene
+from planes.schema import Text
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
 __all__ = ["Planes", "Scene", "load_scene"]
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
-LAYER_MAX = 2**31 - 1
 DEFAULT_CATEGORY = "default"
 """Name of the first category bit: the one that objects have unless told otherwise."""
 
@@ -61,10 +61,10 @@ class Scene:
         categories: Iterable[str] = (),
         name: str = "scene",
     ) -> None:
-        self.name = text_of("name", name)
+        self.name = Text().check("name", name)
         if isinstance(categories, str) or not isinstance(categories, Iterable):
             raise InputError(f"categories: expected a list of names, got {categories!r}")
-        self.categories = (DEFAULT_CATEGORY, *(text_of("categories", category) for category in categories))
+        self.categories = (DEFAULT_CATEGORY, *(Text().check("categories", category) for category in categories))
         if len(self.categories) > CATEGORY_BITS:
             raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
         if len(set(self.categories)) < len(self.categories):
@@ -174,7 +174,7 @@ class Scene:
             "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
         }
         unnamed = name is None or (isinstance(name, str) and not name)
-        called = f"{kind.value} {number}" if unnamed else text_of("name", name)
+        called = f"{kind.value} {number}" if unnamed else Text().check("name", name)
         return self.items.add(made, form, turn, called, values)
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:

@@ -10,23 +10,38 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Bools, Image, InputError, bools, choice, integer, integers, reals, within
-from planes.constants import ITEMS_MAX, MASK_AREA_MAX, MASK_SIDE_MAX, POSITION_MAX, SUB
+from planes.arrays import Image, InputError, within
+from planes.constants import ITEMS_MAX, LAYER_MAX, MASK_AREA_MAX, MASK_SIDE_MAX, POSITION_MAX, SCALE_MAX, SCALE_MIN, SUB
 from planes.image import read_png, write_png, write_text
 from planes.items import Role
-from planes.sprite import Sprite, rows_of
+from planes.schema import (
+    Const,
+    Either,
+    Keys,
+    Mapped,
+    Mask,
+    Names,
+    Number,
+    Numbers,
+    Optional,
+    Ref,
+    Rows,
+    Text,
+    Value,
+    Whole,
+    Wholes,
+    Within,
+    Word,
+    typed,
+)
+from planes.sprite import FLIPS, Sprite, rows_of
 
 __all__ = [
     "FileObject",
     "SceneFile",
     "folder_of",
-    "keys_of",
     "laid_out",
-    "mask_of_rows",
-    "names_of",
     "read_scene",
-    "text_of",
-    "typed",
     "write_scene",
 ]
 
@@ -39,16 +54,64 @@ SECTIONS = {
     "occluders": Role.OCCLUDER,
     "hud": Role.HUD,
 }
-SOURCES = {
-    "image": ("alpha_threshold", "color_key", "frames", "pivot_xy"),
-    "polygon": ("holes", "color"),
-    "circle": ("color",),
-    "box_wh": ("color",),
-    "mask": ("pivot_xy", "color"),
+POINT = Numbers((2,), POSITION_MAX)
+PIVOT = Numbers((2,), MASK_SIDE_MAX)
+COLOR = Wholes((3,), 0, 255)
+RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
+ID = Whole(0, ITEMS_MAX - 1)
+FRAMES = Keys(
+    {
+        "grid_wh": Wholes((2,), 1, MASK_SIDE_MAX),
+        "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX),
+    }
+)
+SOURCES: dict[str, dict[str, Value]] = {
+    "image": {
+        "image": Text(),
+        "alpha_threshold": Whole(0, 255),
+        "color_key": COLOR,
+        "frames": Within(FRAMES),
+        "pivot_xy": PIVOT,
+    },
+    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR},
+    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR},
+    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR},
+    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR},
 }
-POSE = ("angle", "scale", "flip", "frame", "layer")
-OBJECT_KEYS = ("id", "name", "position_xy", *POSE, "categories", "owner")
-SCENE_KEYS = ("format", "name", "bounds", "categories", "objects", "weapons", "shots")
+POSE: dict[str, Value] = {
+    "angle": Number(),
+    "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
+    "flip": Word(FLIPS),
+    "frame": Whole(0, 2**31 - 1),
+    "layer": Whole(-LAYER_MAX, LAYER_MAX),
+}
+PLACED: dict[str, Value] = {
+    "id": ID,
+    "name": Text(),
+    "position_xy": POINT,
+    **POSE,
+    "categories": Names(),
+    "owner": Either(str, Text(), ID),
+}
+OBJECT = {kind: Keys({**PLACED, **keys}, (kind, "position_xy")) for kind, keys in SOURCES.items()}
+BOUNDS = Keys(
+    {"origin_xy": Wholes((2,), -POSITION_MAX, POSITION_MAX), "size_wh": Wholes((2,), 1, POSITION_MAX)}, ("size_wh",)
+)
+SCENE = Keys(
+    {
+        "$schema": Text(),
+        "format": Const(FORMAT),
+        "name": Text(),
+        "bounds": Optional(Within(BOUNDS)),
+        "categories": Names(),
+        "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
+        "weapons": Mapped(Ref("weapon")),
+        "shots": Rows(Ref("shot")),
+    },
+    ("format",),
+)
+"""The tables of a scene file. Objects, weapons and shots are checked one by one, by who reads them."""
+
 SHEET_WIDTH = 4096
 """Frames of a saved sprite are laid in rows of about this width, px."""
 
@@ -94,23 +157,19 @@ def read_scene(folder: Path) -> SceneFile:
     """
     path = folder / FILE_NAME
     with within(str(path)):
-        data = _parsed(path)
-        keys_of("scene", data, SCENE_KEYS)
-        if data.get("format") != FORMAT:
-            raise InputError(f"format: expected {FORMAT!r}, got {data.get('format')!r}")
+        data = SCENE.check("scene", _parsed(path))
+        bounds = data.get("bounds") or {}
         scene = SceneFile(
-            name=text_of("name", data.get("name", folder.resolve().name)),
-            categories=names_of("categories", data.get("categories", [])),
-            weapons=typed("weapons", data.get("weapons", {}), dict),
-            shots=typed("shots", data.get("shots", []), list),
+            name=data.get("name") or Text().check("name", folder.resolve().name),
+            origin_xy=bounds.get("origin_xy", (0, 0)),
+            size_wh=bounds.get("size_wh"),
+            categories=data.get("categories", []),
+            weapons=data.get("weapons", {}),
+            shots=list(data.get("shots", [])),
         )
-        if data.get("bounds") is not None:
-            scene.origin_xy, scene.size_wh = _bounds(data["bounds"])
         sprites: dict[str, Sprite] = {}
-        sections = typed("objects", data.get("objects", {}), dict)
-        keys_of("objects", sections, SECTIONS)
         for section, role in SECTIONS.items():
-            for row, entry in enumerate(typed(f"objects.{section}", sections.get(section, []), list)):
+            for row, entry in enumerate(data.get("objects", {}).get(section, [])):
                 place = f"objects.{section}[{row}]"
                 with within(place):
                     scene.objects.append(_object(entry, role, folder, sprites))
@@ -172,39 +231,6 @@ def laid_out(value: Any, depth: int = 0) -> str:
     return "[" + ",".join(pad + laid_out(v, depth + 1) for v in value) + end + "]"
 
 
-def keys_of(what: str, data: object, known: object) -> dict[str, Any]:
-    """Check that a JSON object has no key but the known ones."""
-    checked = typed(what, data, dict)
-    for key in checked:
-        choice("key", key, list(known))  # type: ignore[call-overload]
-    return dict(checked)
-
-
-def text_of(name: str, value: object) -> str:
-    """Check a text of 1 to 200 characters."""
-    if not isinstance(value, str) or not 0 < len(value) <= 200 or any(0xD800 <= ord(c) < 0xE000 for c in value):
-        raise InputError(f"{name}: expected a text of 1 to 200 characters, got {value!r:.60}")
-    return value
-
-
-def names_of(name: str, value: object) -> list[str]:
-    """Check a list of distinct texts."""
-    names = [text_of(f"{name}[{i}]", v) for i, v in enumerate(typed(name, value, list))]
-    if len(set(names)) < len(names):
-        raise InputError(f"{name}: expected distinct names, got {names}")
-    return names
-
-
-def mask_of_rows(name: str, rows: object) -> Bools:
-    """Mask (h, w) of rows of '#' (set) and '.' (not), or an array of booleans."""
-    if not (isinstance(rows, list | tuple) and rows and isinstance(rows[0], str)):
-        return bools(name, rows, (None, None))
-    for i, row in enumerate(rows):
-        if not isinstance(row, str) or len(row) != len(rows[0]) or set(row) - set("#."):
-            raise InputError(f"{name}[{i}]: expected {len(rows[0])} of '#' and '.', got {row!r:.60}")
-    return np.array([[v == "#" for v in row] for row in rows], np.bool_)
-
-
 def _parsed(path: Path) -> dict[str, Any]:
     def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
@@ -228,75 +254,52 @@ def _parsed(path: Path) -> dict[str, Any]:
     return typed("scene", data, dict)  # type: ignore[no-any-return]
 
 
-def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
-    """Check that JSON is an object, or a list."""
-    if not isinstance(value, kind):
-        raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {value!r:.60}")
-    return value
-
-
-def _bounds(value: object) -> tuple[tuple[int, int], tuple[int, int]]:
-    with within("bounds"):
-        data = keys_of("bounds", value, ("origin_xy", "size_wh"))
-        x, y = integers("origin_xy", data.get("origin_xy", [0, 0]), (2,), -POSITION_MAX, POSITION_MAX).tolist()
-        w, h = integers("size_wh", data.get("size_wh"), (2,), 1, POSITION_MAX).tolist()
-        return (x, y), (w, h)
-
-
 def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
-    data = typed("object", entry, dict)
-    kinds = [key for key in SOURCES if key in data]
+    given = typed("object", entry, dict)
+    kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
         raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {' and '.join(kinds) or 'none'}")
     kind = kinds[0]
-    keys_of("object", data, (*OBJECT_KEYS, kind, *SOURCES[kind]))
-    if "position_xy" not in data:
-        raise InputError("position_xy: expected two numbers, got nothing")
-    x, y = reals("position_xy", data["position_xy"], (2,), POSITION_MAX).tolist()
-    source = {key: data[key] for key in (kind, *SOURCES[kind]) if key in data}
+    data = OBJECT[kind].check("object", given)
+    source = {key: given[key] for key in SOURCES[kind] if key in given}
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
-        sprites[shared] = READERS[kind](source, folder)
-    owner = data.get("owner")
+        sprites[shared] = READERS[kind]({key: data[key] for key in source}, folder, source)
     return FileObject(
         role=role,
         sprite=sprites[shared],
-        position_xy=(x, y),
+        position_xy=data["position_xy"],
         pose={key: data[key] for key in POSE if key in data},
-        name=text_of("name", data["name"]) if "name" in data else None,
-        categories=names_of("categories", data["categories"]) if "categories" in data else None,
-        owner=owner if owner is None or isinstance(owner, str) else integer("owner", owner, 0, ITEMS_MAX - 1),
-        id=integer("id", data["id"], 0, ITEMS_MAX - 1) if "id" in data else None,
+        name=data.get("name"),
+        categories=data.get("categories"),
+        owner=data.get("owner"),
+        id=data.get("id"),
     )
 
 
-def _image_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    frames = keys_of("frames", source.get("frames", {}), ("grid_wh", "rects_xywh"))
-    options = {key: source[key] for key in ("alpha_threshold", "color_key", "pivot_xy") if key in source}
-    image = read_png(_inside(folder, source["image"]))
-    return Sprite.from_image(image, **options, **frames, source=source)
+def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    options = {key: data[key] for key in ("alpha_threshold", "color_key", "pivot_xy") if key in data}
+    image = read_png(_inside(folder, data["image"]))
+    return Sprite.from_image(image, **options, **data.get("frames", {}), source=source)
 
 
-def _polygon_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    holes = typed("holes", source.get("holes", []), list)
-    return Sprite.polygon(source["polygon"], holes, color=source.get("color"))
+def _polygon_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.polygon(data["polygon"], data.get("holes", ()), color=data.get("color"))
 
 
-def _circle_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    return Sprite.circle(source["circle"], color=source.get("color"))
+def _circle_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.circle(data["circle"], color=data.get("color"))
 
 
-def _box_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    width, height = reals("box_wh", source["box_wh"], (2,)).tolist()
-    return Sprite.box(width, height, color=source.get("color"))
+def _box_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.box(*data["box_wh"], color=data.get("color"))
 
 
-def _mask_sprite(source: dict[str, Any], folder: Path) -> Sprite:
-    mask = mask_of_rows("mask", source["mask"])
-    return Sprite.from_mask(mask, pivot_xy=source.get("pivot_xy"), color=source.get("color"), source=source)
+def _mask_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.from_mask(data["mask"], pivot_xy=data.get("pivot_xy"), color=data.get("color"), source=source)
 
 
-READERS: dict[str, Callable[[dict[str, Any], Path], Sprite]] = {
+READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
     "image": _image_sprite,
     "polygon": _polygon_sprite,
     "circle": _circle_sprite,
@@ -305,9 +308,8 @@ READERS: dict[str, Callable[[dict[str, Any], Path], Sprite]] = {
 }
 
 
-def _inside(folder: Path, name: object) -> Path:
+def _inside(folder: Path, text: str) -> Path:
     """Path of a file of the scene's folder; one that leads out of it is refused."""
-    text = text_of("image", name)
     parts = PurePosixPath(text).parts
     path = folder.joinpath(*parts)
     if "\\" in text or ":" in text or text.startswith("/") or ".." in parts:

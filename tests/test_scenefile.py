@@ -13,7 +13,8 @@ from planes.arrays import InputError
 from planes.image import read_png, write_png
 from planes.items import Items, Role
 from planes.scene import Scene, load_scene
-from planes.scenefile import mask_of_rows, read_scene
+from planes.scenefile import read_scene
+from planes.schema import Mask
 from planes.sprite import Sprite
 
 FORMAT = "hitplanes-scene/1"
@@ -159,8 +160,8 @@ def test_ids_of_a_file_are_kept(tmp_path: Path) -> None:
 
 
 def test_masks_as_rows() -> None:
-    assert mask_of_rows("mask", ["#.", ".#", ".."]).tolist() == [[True, False], [False, True], [False, False]]
-    assert mask_of_rows("mask", [[1, 0]]).tolist() == [[True, False]]
+    assert Mask().check("mask", ["#.", ".#", ".."]).tolist() == [[True, False], [False, True], [False, False]]
+    assert Mask().check("mask", [[1, 0]]).tolist() == [[True, False]]
 
 
 # There and back again
@@ -397,7 +398,7 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
     "deep duplicate": ('{"weapons": {"w": {"kind": 1, "kind": 2}}}', "expected each key once, got 'kind' again"),
     "NaN": ('{"format": NaN}', "number: expected a finite number, got NaN"),
     "-Infinity": ('{"weapons": {"w": -Infinity}}', "number: expected a finite number, got -Infinity"),
-    "no format": ({}, "format: expected 'hitplanes-scene/1', got None"),
+    "no format": ({}, "format: expected 'hitplanes-scene/1', got nothing"),
     "wrong format": ({"format": "hitplanes-scene/2"}, "format: expected .*got 'hitplanes-scene/2'"),
     "unknown key": ({"format": FORMAT, "object": {}}, "key: .*got 'object' .did you mean 'objects'"),
     "name": ({"format": FORMAT, "name": 5}, "name: expected a text of 1 to 200 characters, got 5"),
@@ -416,7 +417,7 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
     "shots": ({"format": FORMAT, "shots": {}}, r"shots: expected a list, got \{\}"),
     "objects": ({"format": FORMAT, "objects": []}, r"objects: expected an object, got \[\]"),
     "section": ({"format": FORMAT, "objects": {"hitable": []}}, "got 'hitable' .did you mean 'hittable'"),
-    "section list": ({"format": FORMAT, "objects": {"hud": {}}}, r"objects\.hud: expected a list, got \{\}"),
+    "section list": ({"format": FORMAT, "objects": {"hud": {}}}, r"objects: hud: expected a list, got \{\}"),
     "object": ({"format": FORMAT, "objects": {"movers": [5]}}, r"objects\.movers\[0\]: object: expected an object"),
     "some ids": (
         {"format": FORMAT, "objects": {"movers": [{"circle": 1, "position_xy": [0, 0], "id": 1}],
@@ -459,7 +460,7 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "id text": ({**PLACED, "id": "1"}, "id: expected a whole number"),
     "angle": ({**PLACED, "angle": "up"}, "angle: expected numbers"),
     "angle null": ({**PLACED, "angle": None}, "angle: expected numbers"),
-    "scale": ({**PLACED, "scale": 0}, r"scale\[0\]: expected a number from"),
+    "scale": ({**PLACED, "scale": 0}, "scale: expected a number from"),
     "scale of three": ({**PLACED, "scale": [1, 2, 3]}, r"scale: expected shape \(2,\)"),
     "scale ragged": ({**PLACED, "scale": [1, [2, 3]]}, "scale: expected"),
     "scale object": ({**PLACED, "scale": {}}, "scale: expected numbers"),

@@ -11,12 +11,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planes.arrays import InputError, Ints, choice, flag, integer, real, reals, within
+from planes.arrays import InputError, Ints, choice, integer, within
 from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from planes.grid256 import pixel, snap, turned, unit
 from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
-from planes.scenefile import keys_of, mask_of_rows
+from planes.schema import Flag, Mask, Number, Numbers, Optional, Ref, Rows, Value, Whole, Word
 from planes.spans import Spans
 from planes.sprite import Form, Sprite, rows_of, variant_of
 from weapons.pattern import FALLOFFS, Pattern, make_pattern
@@ -27,6 +27,22 @@ __all__ = [
 ]  # fmt: skip
 
 ORIGIN = np.zeros(2, np.int64)
+LENGTH = Number(0, REACH_MAX)
+RING = Numbers((None, 2), REACH_MAX / 2, least=3)
+
+
+@dataclass(frozen=True)
+class Part(Ref):
+    """A weapon within a weapon; its JSON is made a weapon before it comes here."""
+
+    kinds: tuple[type, ...]
+    told: str
+
+    def check(self, name: str, value: object) -> object:
+        """Check that it is of a kind that may be a part."""
+        if not isinstance(value, self.kinds):
+            raise InputError(f"{name}: expected {self.told}, got {value!r:.60}")
+        return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +50,12 @@ class Weapon:
     """What is fired; two are equal when their JSON is."""
 
     kind: ClassVar[str]
+    table: ClassVar[dict[str, Value]]
+
+    def __post_init__(self) -> None:
+        """Check every field by the table, and keep plain Python values."""
+        for name, value in self.table.items():
+            self._keep(name, value.check(name, getattr(self, name)))
 
     @cached_property
     def _text(self) -> str:
@@ -68,18 +90,10 @@ class Plain(Weapon):
     falloff : None (full weight everywhere), "linear" or "smooth", from the shot's pixel to the end of the reach
     """
 
-    lengths: ClassVar[tuple[str, ...]] = ()
+    table: ClassVar[dict[str, Value]] = {"pierce": Flag(), "falloff": Optional(Word(FALLOFFS))}
     directed: ClassVar[bool] = False
     pierce: bool = field(default=False, kw_only=True)
     falloff: str | None = field(default=None, kw_only=True)
-
-    def __post_init__(self) -> None:
-        """Check the fields that all kinds share, and the lengths; keep plain Python values."""
-        self._keep("pierce", flag("pierce", self.pierce))
-        if self.falloff is not None:
-            choice("falloff", self.falloff, FALLOFFS)
-        for name in self.lengths:
-            self._keep(name, real(name, getattr(self, name), 0, REACH_MAX))
 
     @property
     def reach_256(self) -> int:
@@ -107,7 +121,7 @@ class Disc(Plain):
     """Centres at most `radius` px away: a blast."""
 
     kind: ClassVar[str] = "disc"
-    lengths: ClassVar[tuple[str, ...]] = ("radius",)
+    table: ClassVar[dict[str, Value]] = Plain.table | {"radius": LENGTH}
     radius: float
 
     @property
@@ -125,7 +139,7 @@ class Ring(Plain):
     """Centres from `inner_radius` to `outer_radius` px away: a shock wave."""
 
     kind: ClassVar[str] = "ring"
-    lengths: ClassVar[tuple[str, ...]] = ("inner_radius", "outer_radius")
+    table: ClassVar[dict[str, Value]] = Plain.table | {"inner_radius": LENGTH, "outer_radius": LENGTH}
     inner_radius: float
     outer_radius: float
 
@@ -151,14 +165,9 @@ class Box(Plain):
 
     kind: ClassVar[str] = "box"
     directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = Plain.table | {"width": Whole(1, REACH_MAX), "height": Whole(1, REACH_MAX)}
     width: int
     height: int
-
-    def __post_init__(self) -> None:
-        """Check that the sides are whole."""
-        super().__post_init__()
-        for name in ("width", "height"):
-            self._keep(name, integer(name, getattr(self, name), 1, REACH_MAX))
 
     @property
     def reach_256(self) -> int:
@@ -187,16 +196,9 @@ class Polygon(Plain):
 
     kind: ClassVar[str] = "polygon"
     directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = Plain.table | {"points": RING, "holes": Rows(RING)}
     points: Sequence[Sequence[float]]
     holes: Sequence[Sequence[Sequence[float]]] = ()
-
-    def __post_init__(self) -> None:
-        """Check the rings and keep them as tuples."""
-        super().__post_init__()
-        self._keep("points", _ring_of("points", self.points))
-        if isinstance(self.holes, str) or not isinstance(self.holes, Sequence):
-            raise InputError(f"holes: expected a list of rings, got {self.holes!r:.60}")
-        self._keep("holes", tuple(_ring_of(f"holes[{i}]", r) for i, r in enumerate(self.holes)))
 
     @property
     def reach_256(self) -> int:
@@ -219,15 +221,10 @@ class Cone(Plain):
     """
 
     kind: ClassVar[str] = "cone"
-    lengths: ClassVar[tuple[str, ...]] = ("reach",)
+    table: ClassVar[dict[str, Value]] = Plain.table | {"reach": LENGTH, "angle": Number(0, 360)}
     directed: ClassVar[bool] = True
     reach: float
     angle: float
-
-    def __post_init__(self) -> None:
-        """Check the angle."""
-        super().__post_init__()
-        self._keep("angle", real("angle", self.angle, 0, 360))
 
     @property
     def reach_256(self) -> int:
@@ -245,7 +242,7 @@ class Beam(Plain):
     """Centres at most `width` / 2 px from a segment of `length` px along the aim, and the segment's supercover."""
 
     kind: ClassVar[str] = "beam"
-    lengths: ClassVar[tuple[str, ...]] = ("length", "width")
+    table: ClassVar[dict[str, Value]] = Plain.table | {"length": LENGTH, "width": LENGTH}
     directed: ClassVar[bool] = True
     length: float
     width: float
@@ -272,20 +269,21 @@ class Stencil(Plain):
 
     kind: ClassVar[str] = "stencil"
     directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = Plain.table | {
+        "mask": Mask(),
+        "pivot_xy": Optional(Numbers((2,), MASK_SIDE_MAX)),
+    }
     mask: Any
     pivot_xy: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        """Check the mask and keep a copy that cannot be written."""
+        """Keep the mask as rows, which cannot be written."""
         super().__post_init__()
-        self._keep("mask", tuple(rows_of(mask_of_rows("mask", self.mask))))
-        if self.pivot_xy is not None:
-            pivot = reals("pivot_xy", self.pivot_xy, (2,), MASK_SIDE_MAX)
-            self._keep("pivot_xy", tuple(pivot.tolist()))
+        self._keep("mask", tuple(rows_of(self.mask)))
 
     @cached_property
     def _sprite(self) -> Sprite:
-        return Sprite.from_mask(mask_of_rows("mask", self.mask), pivot_xy=self.pivot_xy)
+        return Sprite.from_mask(Mask().check("mask", self.mask), pivot_xy=self.pivot_xy)
 
     @property
     def reach_256(self) -> int:
@@ -307,16 +305,14 @@ class Spread(Weapon):
     """A shotgun: `count` pellets of another pattern, their offsets uniform over a disc of `radius` px."""
 
     kind: ClassVar[str] = "spread"
+    table: ClassVar[dict[str, Value]] = {
+        "pellet": Part("plain", (Plain,), "a weapon of one pattern"),
+        "count": Whole(1, PELLETS_MAX),
+        "radius": LENGTH,
+    }
     pellet: Plain
     count: int
     radius: float
-
-    def __post_init__(self) -> None:
-        """Check the parts."""
-        if not isinstance(self.pellet, Plain):
-            raise InputError(f"pellet: expected a weapon of one pattern, got {self.pellet!r:.60}")
-        self._keep("count", integer("count", self.count, 1, PELLETS_MAX))
-        self._keep("radius", real("radius", self.radius, 0, REACH_MAX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,20 +326,22 @@ class Rounds(Weapon):
     """
 
     kind: ClassVar[str] = "rounds"
+    table: ClassVar[dict[str, Value]] = {
+        "weapon": Part("single", (Plain, Spread), "a weapon other than rounds"),
+        "count": Whole(1, PELLETS_MAX),
+        "recoil_xy": Numbers((2,), REACH_MAX),
+        "recoil_deg": Number(-360, 360),
+    }
     weapon: Plain | Spread
     count: int
     recoil_xy: Sequence[float] = (0.0, 0.0)
     recoil_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the parts."""
-        if not isinstance(self.weapon, Plain | Spread):
-            raise InputError(f"weapon: expected a weapon other than rounds, got {self.weapon!r:.60}")
-        pellets = self.weapon.count if isinstance(self.weapon, Spread) else 1
-        self._keep("count", integer("count", self.count, 1, PELLETS_MAX // pellets))
-        recoil = reals("recoil_xy", self.recoil_xy, (2,), REACH_MAX)
-        self._keep("recoil_xy", tuple(recoil.tolist()))
-        self._keep("recoil_deg", real("recoil_deg", self.recoil_deg, -360, 360))
+        """Check that all rounds together do not have too many pellets."""
+        super().__post_init__()
+        if isinstance(self.weapon, Spread):
+            integer("count", self.count, 1, PELLETS_MAX // self.weapon.count)
 
 
 KINDS: dict[str, type[Weapon]] = {
@@ -388,7 +386,8 @@ def weapon_from_json(data: object, name: str = "weapon") -> Weapon:
             raise InputError(f"expected an object with a kind, got {data!r:.60}")
         kind = KINDS[choice("kind", data.get("kind"), KINDS)]
         known = {f.name: f for f in fields(kind)}
-        keys_of(name, dict(data), ("kind", *known))
+        for key in data:
+            choice("key", key, ("kind", *known))
         missing = [key for key, f in known.items() if f.default is MISSING and key not in data]
         if missing:
             raise InputError(f"{missing[0]}: expected a value, got nothing")
@@ -412,13 +411,6 @@ def _farthest(points_256: Ints) -> int:
     if not len(points_256):
         return 0
     return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())
-
-
-def _ring_of(name: str, points: object) -> tuple[tuple[float, float], ...]:
-    ring = reals(name, points, (None, 2), REACH_MAX / 2)
-    if len(ring) < 3:
-        raise InputError(f"{name}: expected 3 points or more, got {len(ring)}")
-    return tuple((x, y) for x, y in ring.tolist())
 
 
 def _plain_json(value: object) -> Any:

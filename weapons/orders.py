@@ -5,17 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from planes.arrays import InputError, choice, integer, real, reals, within
-from planes.constants import ALL, POSITION_MAX, SEED_MAX
+from planes.arrays import choice, integer, within
+from planes.constants import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
 from planes.scene import Scene
-from planes.scenefile import keys_of, names_of, typed
+from planes.schema import Either, Keys, Names, Number, Numbers, Optional, Rows, Text, Whole
 from weapons.arsenal import Weapon
 from weapons.firing import fire
 from weapons.hits import Hits
 
 __all__ = ["Order", "fire_order", "order_from_json", "orders_of"]
 
-KEYS = ("weapon", "at", "aim", "toward", "accept", "exclude", "seed", "shot")
+AIM_MAX = 10**9
+"""Largest aim, degrees, either way: beyond it a float has lost the angle."""
+
+SHOT = Keys(
+    {
+        "weapon": Text(),
+        "at": Numbers((2,), POSITION_MAX),
+        "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
+        "toward": Optional(Numbers((2,), POSITION_MAX)),
+        "accept": Names(),
+        "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))),
+        "seed": Whole(0, SEED_MAX),
+        "shot": Whole(0, 2**63 - 1),
+    },
+    ("weapon", "at"),
+)
+"""The table of a shot."""
 
 
 @dataclass(frozen=True)
@@ -56,22 +72,19 @@ def order_from_json(
         Naming the place and the field.
     """
     with within(place):
-        shot = keys_of("shot", data, KEYS)
-        for key in ("weapon", "at"):
-            if key not in shot:
-                raise InputError(f"{key}: expected a value, got nothing")
+        shot = SHOT.check("shot", data)
         name = choice("weapon", shot["weapon"], arsenal)
-        accept = names_of("accept", shot["accept"]) if "accept" in shot else None
+        accept = shot.get("accept")
         return Order(
             name,
             arsenal[name],
-            _point("at", shot["at"]),
-            None if shot.get("aim") is None else real("aim", shot["aim"], -(10**9), 10**9),
-            None if shot.get("toward") is None else _point("toward", shot["toward"]),
+            shot["at"],
+            shot.get("aim"),
+            shot.get("toward"),
             None if accept is None else tuple(accept),
-            tuple(_owner(scene, value, i) for i, value in enumerate(typed("exclude", shot.get("exclude", []), list))),
-            integer("seed", shot.get("seed", 0), 0, SEED_MAX),
-            integer("shot", shot.get("shot", number), 0, 2**63 - 1),
+            tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ()))),
+            shot.get("seed", 0),
+            shot.get("shot", number),
             ALL if accept is None else scene.category_bits(*accept),
         )
 
@@ -89,11 +102,6 @@ def fire_order(scene: Scene, order: Order) -> Hits:
         seed=order.seed,
         shot=[order.shot],
     )
-
-
-def _point(name: str, value: object) -> tuple[float, float]:
-    x, y = reals(name, value, (2,), POSITION_MAX).tolist()
-    return x, y
 
 
 def _owner(scene: Scene, value: object, row: int) -> int:

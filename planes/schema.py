@@ -1,0 +1,360 @@
+"""What JSON may hold, as tables: one table checks values and tells itself as JSON Schema (draft 2020-12).
+
+A scene file, a weapon, a shot and a report each have one table, made of the parts below.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from planes.arrays import InputError, bools, choice, flag, integer, integers, real, reals, within
+
+__all__ = [
+    "Const", "Either", "Flag", "Keys", "Mapped", "Mask", "Names", "Number", "Numbers", "Optional", "Ref", "Rows",
+    "Text", "Value", "Whole", "Wholes", "Within", "Word", "typed",
+]  # fmt: skip
+
+TEXT_MAX = 200
+"""Longest name, letters: more would not fit a line of a report."""
+
+Shape = tuple[int | None, ...]
+
+
+class Value(Protocol):
+    """A part of a table: what one value may be."""
+
+    def check(self, name: str, value: object) -> Any:
+        """Return the value as plain Python, or raise InputError that begins with its name."""
+
+    def schema(self) -> dict[str, Any]:
+        """Tell the same as JSON Schema."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A finite number in [low, high]."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    def check(self, name: str, value: object) -> float:
+        """Check one number."""
+        return real(name, value, self.low, self.high)
+
+    def schema(self) -> dict[str, Any]:
+        """A number and its limits."""
+        return {"type": "number", **_limits(self.low, self.high)}
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number in [low, high]."""
+
+    low: int
+    high: int
+
+    def check(self, name: str, value: object) -> int:
+        """Check one whole number."""
+        return integer(name, value, self.low, self.high)
+
+    def schema(self) -> dict[str, Any]:
+        """An integer and its limits."""
+        return {"type": "integer", **_limits(self.low, self.high)}
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Finite numbers of a shape, None for any length, within ±limit or in [low, limit]; at least `least` points."""
+
+    shape: Shape
+    limit: float = math.inf
+    least: int = 0
+    low: float | None = None
+
+    def check(self, name: str, value: object) -> Any:
+        """Check an array of numbers, and return it as tuples."""
+        array = reals(name, value, self.shape, self.limit)
+        if len(array) < self.least:
+            raise InputError(f"{name}: expected {self.least} points or more, got {len(array)}")
+        if self.low is not None:
+            for i, number in enumerate(array.tolist()):
+                real(f"{name}[{i}]", number, self.low, self.limit)
+        return _tuples(array.tolist())
+
+    def schema(self) -> dict[str, Any]:
+        """Arrays in arrays."""
+        low = -self.limit if self.low is None else self.low
+        return _nested(self.shape, Number(low, self.limit).schema(), self.least)
+
+
+@dataclass(frozen=True)
+class Wholes:
+    """Whole numbers in [low, high] of a shape, None for any length."""
+
+    shape: Shape
+    low: int
+    high: int
+
+    def check(self, name: str, value: object) -> Any:
+        """Check an array of whole numbers, and return it as tuples."""
+        if isinstance(value, list) and not value and self.shape[0] is None:
+            return ()
+        return _tuples(integers(name, value, self.shape, self.low, self.high).tolist())
+
+    def schema(self) -> dict[str, Any]:
+        """Arrays in arrays."""
+        return _nested(self.shape, Whole(self.low, self.high).schema(), 0)
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text of 1 to 200 characters."""
+
+    def check(self, name: str, value: object) -> str:
+        """Check one text."""
+        if (
+            not isinstance(value, str)
+            or not 0 < len(value) <= TEXT_MAX
+            or any(0xD800 <= ord(c) < 0xE000 for c in value)
+        ):
+            raise InputError(f"{name}: expected a text of 1 to {TEXT_MAX} characters, got {value!r:.60}")
+        return value
+
+    def schema(self) -> dict[str, Any]:
+        """A string and its limits."""
+        return {"type": "string", "minLength": 1, "maxLength": TEXT_MAX}
+
+
+@dataclass(frozen=True)
+class Names:
+    """A list of distinct texts."""
+
+    def check(self, name: str, value: object) -> list[str]:
+        """Check a list of texts."""
+        names = [Text().check(f"{name}[{i}]", v) for i, v in enumerate(typed(name, value, list))]
+        if len(set(names)) < len(names):
+            raise InputError(f"{name}: expected distinct names, got {names}")
+        return names
+
+    def schema(self) -> dict[str, Any]:
+        """An array of strings."""
+        return {"type": "array", "items": Text().schema(), "uniqueItems": True}
+
+
+@dataclass(frozen=True)
+class Word:
+    """One of a few words."""
+
+    words: tuple[str, ...]
+
+    def check(self, name: str, value: object) -> str:
+        """Check one word; the error suggests the nearest."""
+        return choice(name, value, self.words)
+
+    def schema(self) -> dict[str, Any]:
+        """An enumeration."""
+        return {"enum": list(self.words)}
+
+
+@dataclass(frozen=True)
+class Const:
+    """One text and no other."""
+
+    value: str
+
+    def check(self, name: str, value: object) -> str:
+        """Check that it is the one."""
+        if value != self.value:
+            raise InputError(f"{name}: expected {self.value!r}, got {value!r:.60}")
+        return self.value
+
+    def schema(self) -> dict[str, Any]:
+        """A constant."""
+        return {"const": self.value}
+
+
+@dataclass(frozen=True)
+class Flag:
+    """True or false."""
+
+    def check(self, name: str, value: object) -> bool:
+        """Check one boolean."""
+        return flag(name, value)
+
+    def schema(self) -> dict[str, Any]:
+        """A boolean."""
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True)
+class Mask:
+    """A mask: rows of '#' (set) and '.' (not), or rows of 0 and 1."""
+
+    def check(self, name: str, value: object) -> Any:
+        """Check a mask and return it (h, w) as booleans."""
+        if not (isinstance(value, list | tuple) and value and isinstance(value[0], str)):
+            return bools(name, value, (None, None))
+        for i, row in enumerate(value):
+            if not isinstance(row, str) or len(row) != len(value[0]) or set(row) - set("#."):
+                raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {row!r:.60}")
+        return bools(name, [[v == "#" for v in row] for row in value], (len(value), len(value[0])))
+
+    def schema(self) -> dict[str, Any]:
+        """Rows of either kind; that they are of one length, a schema cannot say."""
+        rows = {"type": "array", "items": {"type": "string", "pattern": "^[#.]*$"}, "minItems": 1}
+        return {"anyOf": [rows, _nested((None, None), {"enum": [0, 1, True, False]}, 1)]}
+
+
+@dataclass(frozen=True)
+class Optional:
+    """A value, or null."""
+
+    form: Value
+
+    def check(self, name: str, value: object) -> Any:
+        """Check a value unless it is null."""
+        return None if value is None else self.form.check(name, value)
+
+    def schema(self) -> dict[str, Any]:
+        """Either of them."""
+        return {"anyOf": [self.form.schema(), {"type": "null"}]}
+
+
+@dataclass(frozen=True)
+class Either:
+    """A value of one kind where JSON has that type (list or str), else of another."""
+
+    kind: type
+    first: Value
+    second: Value
+
+    def check(self, name: str, value: object) -> Any:
+        """Check it as what its type says."""
+        return (self.first if isinstance(value, self.kind) else self.second).check(name, value)
+
+    def schema(self) -> dict[str, Any]:
+        """Either of them."""
+        return {"anyOf": [self.first.schema(), self.second.schema()]}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A list whose every row is of one form."""
+
+    form: Value
+
+    def check(self, name: str, value: object) -> tuple[Any, ...]:
+        """Check each row."""
+        rows = value if isinstance(value, tuple) else typed(name, value, list)
+        return tuple(self.form.check(f"{name}[{i}]", row) for i, row in enumerate(rows))
+
+    def schema(self) -> dict[str, Any]:
+        """An array."""
+        return {"type": "array", "items": self.form.schema()}
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """An object with names of one's own, whose every value is of one form."""
+
+    form: Value
+
+    def check(self, name: str, value: object) -> dict[str, Any]:
+        """Check each value."""
+        return {key: self.form.check(f"{name}.{key}", entry) for key, entry in typed(name, value, dict).items()}
+
+    def schema(self) -> dict[str, Any]:
+        """An object."""
+        return {"type": "object", "additionalProperties": self.form.schema()}
+
+
+@dataclass(frozen=True)
+class Keys:
+    """An object with known keys, some of them needed."""
+
+    forms: Mapping[str, Value]
+    needed: tuple[str, ...] = ()
+
+    def check(self, name: str, value: object) -> dict[str, Any]:
+        """Check that no key is unknown, that none is missing, and each value; errors begin with the key."""
+        data = typed(name, value, dict)
+        for key in data:
+            choice("key", key, self.forms)
+        for key in self.needed:
+            if key not in data:
+                raise InputError(f"{key}: expected {_told(self.forms[key])}, got nothing")
+        return {key: self.forms[key].check(key, entry) for key, entry in data.items()}
+
+    def schema(self) -> dict[str, Any]:
+        """An object and no further keys."""
+        shown: dict[str, Any] = {
+            "type": "object",
+            "properties": {key: form.schema() for key, form in self.forms.items()},
+            "additionalProperties": False,
+        }
+        return {**shown, "required": list(self.needed)} if self.needed else shown
+
+
+@dataclass(frozen=True)
+class Within:
+    """A form whose errors tell where it lies, too."""
+
+    form: Value
+
+    def check(self, name: str, value: object) -> Any:
+        """Check it; errors begin with its name."""
+        with within(name):
+            return self.form.check(name, value)
+
+    def schema(self) -> dict[str, Any]:
+        """The form's own."""
+        return self.form.schema()
+
+
+@dataclass(frozen=True)
+class Ref:
+    """A form that the schema tells under a name of its definitions; here any JSON, checked by who reads it."""
+
+    definition: str
+
+    def check(self, name: str, value: object) -> Any:
+        """Pass it on."""
+        return value
+
+    def schema(self) -> dict[str, Any]:
+        """A reference."""
+        return {"$ref": f"#/$defs/{self.definition}"}
+
+
+def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
+    """Check that JSON is an object, or a list."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {value!r:.60}")
+    return value
+
+
+def _told(form: Value) -> str:
+    """What a missing value should have been."""
+    if isinstance(form, Numbers) and form.shape == (2,):
+        return "two numbers"
+    return repr(form.value) if isinstance(form, Const) else "a value"
+
+
+def _limits(low: float, high: float) -> dict[str, Any]:
+    told = {"minimum": low, "maximum": high}
+    return {key: limit for key, limit in told.items() if math.isfinite(limit)}
+
+
+def _nested(shape: Shape, item: dict[str, Any], least: int) -> dict[str, Any]:
+    for n in reversed(shape):
+        item = {"type": "array", "items": item}
+        if n is not None:
+            item |= {"minItems": n, "maxItems": n}
+    return item | {"minItems": least} if least else item
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
