@@ -1,13 +1,14 @@
-"""The bundled scene is what its script draws."""
+"""Each bundled scene is what its script draws, and what its name says."""
 
 from __future__ import annotations
 
-import shutil
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from planes import Role, load_scene
 from planes.image import read_png
@@ -15,17 +16,30 @@ from weapons import arsenal_of
 from weapons.arsenal import KINDS
 from weapons.orders import fire_order, orders_of
 
-GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+ROOT = Path(__file__).parents[1]
+FIXTURES = ROOT / "fixtures"
+GALLERY = FIXTURES / "gallery"
+SCENES = sorted(path.parent.name for path in FIXTURES.glob("*/scene.json"))
 
 
-def test_script_draws_the_gallery(tmp_path: Path) -> None:
-    shutil.copy(GALLERY / "draw.py", tmp_path)
-    subprocess.run([sys.executable, "-W", "error", str(tmp_path / "draw.py")], check=True, cwd=GALLERY.parents[1])
-    names = {path.name for path in GALLERY.iterdir()} - {"__pycache__"}
-    assert {path.name for path in tmp_path.iterdir()} == names
-    assert (tmp_path / "scene.json").read_text() == (GALLERY / "scene.json").read_text()
-    for name in sorted(n for n in names if n.endswith(".png")):
-        assert np.array_equal(read_png(tmp_path / name), read_png(GALLERY / name)), name
+def files_of(folder: Path) -> set[str]:
+    """Names of what a script draws: all but scripts."""
+    return {path.name for path in folder.iterdir() if path.suffix != ".py" and path.name != "__pycache__"}
+
+
+def test_every_scene_has_a_script() -> None:
+    assert [path.parent.name for path in sorted(FIXTURES.glob("*/draw.py"))] == SCENES
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_script_draws_what_is_in_the_folder(name: str, tmp_path: Path) -> None:
+    folder = FIXTURES / name
+    words = [sys.executable, "-W", "error", str(folder / "draw.py"), str(tmp_path)]
+    subprocess.run(words, check=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert files_of(tmp_path) == files_of(folder)
+    assert (tmp_path / "scene.json").read_bytes() == (folder / "scene.json").read_bytes()
+    for file in sorted(file for file in files_of(folder) if file.endswith(".png")):
+        assert np.array_equal(read_png(tmp_path / file), read_png(folder / file)), file
 
 
 def test_gallery_has_what_a_first_scene_should_show() -> None:
