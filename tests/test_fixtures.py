@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from planes import Role, load_scene
+from planes import Role, Scene, load_scene
 from planes.image import read_png
-from weapons import arsenal_of
+from planes.sampling import Verdict
+from weapons import Hits, arsenal_of
 from weapons.arsenal import KINDS
 from weapons.orders import fire_order, orders_of
 
@@ -27,8 +31,58 @@ def files_of(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir() if path.suffix != ".py" and path.name != "__pycache__"}
 
 
+def fired_at(scene: Scene) -> list[Hits]:
+    """What the shots of a scene's file hit, shot by shot."""
+    return [fire_order(scene, order) for order in orders_of(scene, arsenal_of(scene))]
+
+
+def names_hit(hits: Hits, scene: Scene) -> list[str]:
+    """Names of the objects hit, each once, in the order of the rows."""
+    return list(dict.fromkeys(scene.name_of(row.object) for row in hits))
+
+
+def mask_points(scene: Scene, item: int) -> np.ndarray[Any, Any]:
+    """Pixels (n, 2) of an object's mask, x and y."""
+    mask, corner = scene.mask(item)
+    return np.argwhere(mask)[:, ::-1] + np.array(corner, np.int64)
+
+
+def numbers_at(data: object, key: str) -> Iterator[float]:
+    """Numbers of all lists that JSON has under a key."""
+    if isinstance(data, dict):
+        for name, value in data.items():
+            yield from value if name == key else numbers_at(value, key)
+    elif isinstance(data, list):
+        for value in data:
+            yield from numbers_at(value, key)
+
+
+# --- every scene ----------------------------------------------------------------------------------------------------
+
+
 def test_every_scene_has_a_script() -> None:
+    assert {"crowd", "edges", "empty", "far", "gallery", "targets"} <= set(SCENES)
     assert [path.parent.name for path in sorted(FIXTURES.glob("*/draw.py"))] == SCENES
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_is_small_and_lies_on_the_grid(name: str) -> None:
+    assert sum((FIXTURES / name / file).stat().st_size for file in files_of(FIXTURES / name)) < 150_000
+    data = json.loads((FIXTURES / name / "scene.json").read_text(encoding="utf-8"))
+    assert 3 <= len(data["shots"]) <= 7
+    assert set(data["weapons"]) >= {shot["weapon"] for shot in data["shots"]}
+    places = [*numbers_at(data, "position_xy"), *numbers_at(data, "at"), *numbers_at(data, "toward")]
+    assert places and all(float(256 * value).is_integer() for value in places)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_saved_and_loaded_it_is_the_same(name: str, tmp_path: Path) -> None:
+    scene = load_scene(FIXTURES / name)
+    scene.save(tmp_path)
+    again = load_scene(tmp_path)
+    assert again.content_hash() == scene.content_hash()
+    assert (again.name, again.weapons, again.shots) == (scene.name, scene.weapons, scene.shots)
+    assert fired_at(again) == fired_at(scene)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -40,6 +94,87 @@ def test_script_draws_what_is_in_the_folder(name: str, tmp_path: Path) -> None:
     assert (tmp_path / "scene.json").read_bytes() == (folder / "scene.json").read_bytes()
     for file in sorted(file for file in files_of(folder) if file.endswith(".png")):
         assert np.array_equal(read_png(tmp_path / file), read_png(folder / file)), file
+
+
+OUTCOMES: dict[str, list[tuple[str, str, list[str], list[str]]]] = {
+    "targets": [
+        ("needler", "hit", ["bull", "inner ring", "outer ring", "board"], []),
+        ("pistol", "filtered", [], []),
+        ("shotgun", "empty hit", ["gear"], []),
+        ("pistol", "hit", ["coin"], []),
+        ("laser", "empty hit", ["invader", "arrow"], []),
+        ("blast", "empty hit filtered", ["star", "invader", "arrow"], []),
+        ("burst", "empty hit", ["fish", "comb"], []),
+    ],
+    "empty": [
+        ("pistol", "empty", [], []),
+        ("blast", "empty", [], []),
+        ("star", "empty", [], []),
+        ("laser", "empty outside", [], []),
+        ("shotgun", "empty outside", [], []),
+        ("burst", "empty outside", [], []),
+        ("pistol", "outside", [], []),
+    ],
+    "crowd": [
+        ("pistol", "hit", ["thing of visitor 144"], []),
+        ("pistol", "hit", ["visitor 71"], []),
+        ("lance", "hit", ["steward 240", *(f"visitor {n}" for n in (212, 211, 184, 183, 155))], []),
+        ("paint", "empty hit occluded", [f"visitor {n}" for n in (234, 206, 235, 236)], ["barrier 2"]),
+        ("flash", "hit", ["visitor 195", "thing of visitor 194",
+                          *(f"visitor {n}" for n in (166, 167, 194, 222, 223, 196, 165, 138))], []),
+        ("hose", "hit occluded filtered", ["steward 136"], ["right pole", "rail"]),
+        ("confetti", "empty hit occluded", [f"visitor {n}" for n in (244, 245, 246, 217)], ["barrier 4"]),
+    ],
+    "edges": [
+        ("blast", "empty hit occluded outside", ["octopus"], ["rock 1"]),
+        ("harpoon", "empty hit occluded outside", ["right fish"], ["right kelp"]),
+        ("eel", "empty hit occluded outside", ["left fish", "right fish"], ["right kelp", "left kelp"]),
+        ("net", "hit occluded filtered outside", ["pearl"], ["coral"]),
+        ("shot", "hit occluded outside", ["chest"], ["right kelp", "rock 4"]),
+        ("burst", "empty hit outside", ["turtle"], []),
+        ("sonar", "outside", [], []),
+    ],
+    "far": [
+        ("pistol", "hit", ["probe"], []),
+        ("pistol", "empty", [], []),
+        ("laser", "empty hit", ["rocket", "planet"], []),
+        ("plasma", "empty hit", ["satellite"], []),
+        ("nova", "empty hit occluded", ["rocket"], ["asteroid", "station"]),
+        ("scan", "empty occluded filtered", [], ["station"]),
+        ("burst", "empty hit", ["saucer"], []),
+    ],
+}  # fmt: skip
+"""For each shot its weapon, the verdicts that occur, the objects hit, and the occluders that stopped a part of it."""
+
+
+@pytest.mark.parametrize("name", OUTCOMES)
+def test_shots_end_as_they_promise(name: str) -> None:
+    scene = load_scene(FIXTURES / name)
+    found = []
+    for shot, hits in zip(scene.shots, fired_at(scene), strict=True):
+        verdicts = " ".join(verdict for verdict, count in hits.verdict_counts().items() if count)
+        blockers = [scene.name_of(blocked.occluder) for blocked in hits.blockers()]
+        found.append((shot["weapon"], verdicts, names_hit(hits, scene), blockers))
+    assert found == OUTCOMES[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "shot", "reason", "refused"),
+    [
+        ("targets", 1, "excluded", {"board", "outer ring", "inner ring", "bull"}),
+        ("targets", 5, "category", {"owl"}),
+        ("crowd", 1, "excluded", {"visitor 127", "thing of visitor 127"}),
+        ("edges", 3, "category", {"clam", "starfish"}),
+        ("far", 5, "category", {"astronaut"}),
+    ],
+)
+def test_filters_refuse_whom_they_should(name: str, shot: int, reason: str, refused: set[str]) -> None:
+    scene = load_scene(FIXTURES / name)
+    told = fired_at(scene)[shot].why_not()
+    assert {scene.name_of(entry.object) for entry in told if entry.reason == reason} == refused
+
+
+# --- one by one -----------------------------------------------------------------------------------------------------
 
 
 def test_gallery_has_what_a_first_scene_should_show() -> None:
@@ -55,10 +190,94 @@ def test_gallery_has_what_a_first_scene_should_show() -> None:
 
 def test_gallery_shots_show_every_outcome() -> None:
     scene = load_scene(GALLERY)
-    found = [fire_order(scene, order) for order in orders_of(scene, arsenal_of(scene))]
+    found = fired_at(scene)
     counts = sum(hits.verdicts for hits in found).sum(axis=0)
     assert (counts[:4] > 0).all()
     names = [[scene.name_of(row.object) for row in hits] for hits in found]
     assert names[1] == ["coin", "hoop"], "pellets through the ring's hole"
     assert names[3] == ["duck 1", "duck 2", "duck 3"], "a beam that pierces"
     assert found[6].why_not(0)[0].reason == "category"
+
+
+def test_targets_are_all_there_is() -> None:
+    scene = load_scene(FIXTURES / "targets")
+    assert scene.bounds is not None
+    assert len(scene) == len(scene.ids(Role.HITTABLE)) > 10
+    first, last = np.array(scene.bounds[:2]), np.array(scene.bounds[2:])
+    for item in scene.ids().tolist():
+        points = mask_points(scene, item)
+        assert (points >= first).all() and (points <= last).all(), scene.name_of(item)
+    text = (FIXTURES / "targets" / "scene.json").read_text(encoding="utf-8")
+    assert all(f'"{source}"' in text for source in ("image", "polygon", "holes", "circle", "box_wh", "mask"))
+
+
+def test_empty_has_bounds_and_no_object() -> None:
+    scene = load_scene(FIXTURES / "empty")
+    assert len(scene) == 0 and scene.bounds is not None
+    assert {"point", "disc", "polygon", "beam", "spread", "rounds"} == {w.kind for w in arsenal_of(scene).values()}
+
+
+def test_crowd_is_three_hundred_who_overlap() -> None:
+    scene = load_scene(FIXTURES / "crowd")
+    ids = scene.ids(Role.HITTABLE).tolist()
+    assert len(ids) == 300 and len(scene.ids(Role.OCCLUDER)) > 0
+    points = [mask_points(scene, item) for item in ids]
+    keys = [p[:, 1] * 10_000 + p[:, 0] for p in points]
+    pixels, count = np.unique(np.concatenate(keys), return_counts=True)
+    shared = set(pixels[count > 1].tolist())
+    assert sum(not shared.isdisjoint(key.tolist()) for key in keys) > 270
+    assert count.max() >= 6, "deep, not only wide"
+
+
+def test_crowd_differs_in_every_part_of_a_pose() -> None:
+    scene = load_scene(FIXTURES / "crowd")
+    data = json.loads((FIXTURES / "crowd" / "scene.json").read_text(encoding="utf-8"))["objects"]["hittable"]
+    assert {entry["flip"] for entry in data if "flip" in entry} == {"none", "x"}
+    for key, least in (("frame", 30), ("scale", 20), ("angle", 20), ("layer", 9)):
+        assert len({str(entry[key]) for entry in data}) >= least, key
+    owner = scene.items.owner
+    held = [item for item in scene.ids(Role.HITTABLE).tolist() if owner[item] != item]
+    assert len(held) == 48
+    assert all(scene.name_of(item) == f"thing of {scene.name_of(int(owner[item]))}" for item in held)
+
+
+@pytest.mark.parametrize("role", [Role.HITTABLE, Role.OCCLUDER, Role.MOVER, Role.HUD])
+def test_something_hangs_over_each_edge_and_corner(role: Role) -> None:
+    scene = load_scene(FIXTURES / "edges")
+    assert scene.bounds is not None
+    first, last = np.array(scene.bounds[:2]), np.array(scene.bounds[2:])
+    if role is Role.HUD:
+        first, last = first - first, last - first
+    crossed = set()
+    for item in scene.ids(role).tolist():
+        points = mask_points(scene, item)
+        low, high = (points < first).any(axis=0), (points > last).any(axis=0)
+        if ((points >= first) & (points <= last)).all(axis=1).any():
+            crossed.add("".join(edge for edge, over in zip("LTRB", (*low, *high), strict=True) if over))
+    assert crossed >= {"L", "T", "R", "B", "LT", "TR", "LB", "RB"}
+
+
+def test_edges_have_a_negative_origin_and_shots_over_them() -> None:
+    scene = load_scene(FIXTURES / "edges")
+    assert scene.bounds is not None and max(scene.bounds[:2]) < 0 < min(scene.bounds[2:])
+    found = fired_at(scene)
+    outside = np.array([hits.verdicts[0, Verdict.OUTSIDE] for hits in found])
+    fired = np.array([hits.fired[0] for hits in found])
+    assert ((outside > 0) & (outside < fired)).sum() == 6 and (outside == fired).sum() == 1
+
+
+def test_far_scene_has_no_bounds_and_lies_between_pixels() -> None:
+    scene = load_scene(FIXTURES / "far")
+    assert scene.bounds is None
+    for item in scene.ids().tolist():
+        assert np.abs(mask_points(scene, item)).min() > 9e8, scene.name_of(item)
+    parts = scene.items.position_256[scene.ids()] % 256
+    assert len(np.unique(parts)) >= 8 and {127, 128, 255} <= set(parts.ravel().tolist())
+    assert sum(hits.verdict_counts()["outside"] for hits in fired_at(scene)) == 0
+
+
+def test_far_scene_tells_positions_of_one_step_apart() -> None:
+    scene = load_scene(FIXTURES / "far")
+    (x, y), (x_next, y_next) = scene.shots[0]["at"], scene.shots[1]["at"]
+    assert x_next - x == 1 / 256 and y == y_next
+    assert [bool(hits) for hits in fired_at(scene)[:2]] == [True, False]
