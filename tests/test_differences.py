@@ -1,0 +1,267 @@
+"""What changed between two reports: nothing that decides goes untold, and it is told in the game's words."""
+
+from __future__ import annotations
+
+import copy
+import json
+import random
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planes import Scene, Sprite, load_scene
+from weapons import Disc, Point, Rounds, Spread, Weapon, arsenal_of, fire
+from weapons.differences import decisive, differences
+from weapons.facts import report_of
+from weapons.jsondiff import same
+from weapons.orders import fire_order, orders_of
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+REPORTS = 5
+LEFT_OUT = ("version", "hash", "plan", "times")
+
+Json = Any
+Steps = tuple[str | int, ...]
+
+
+def game(
+    duck: tuple[int, int] = (200, 100), can: tuple[int, int] = (260, 120), *, wall: bool = True, width: int = 320
+) -> Scene:
+    scene = Scene((width, 200))
+    scene.add(Sprite.circle(12), duck, name="duck")
+    scene.add(Sprite.circle(10), (230, 120), name="bandit")
+    scene.add(Sprite.circle(5), can, name="can")
+    if wall:
+        scene.add(Sprite.box(40, 10), (215, 105), role="occluder", layer=1, name="house")
+    return scene
+
+
+def told(scene: Scene, weapon: Weapon | None = None, at: object = (210, 110), **more: Any) -> dict[str, Any]:
+    return report_of(scene, [fire(scene, weapon or Disc(32), at, **more)])
+
+
+@cache
+def reports() -> tuple[dict[str, Any], ...]:
+    """Of every kind: the gallery's shots, rounds, a batch, a scene without bounds, one without shots."""
+    gallery = load_scene(GALLERY)
+    orders = orders_of(gallery, arsenal_of(gallery))[:3]
+    free = Scene()
+    free.add(Sprite.circle(4), (3, 3), name="ball")
+    return (
+        report_of(gallery, [fire_order(gallery, order) for order in orders], [order.name for order in orders]),
+        told(game(), Rounds(Spread(Disc(3), count=6, radius=20), count=3), seed=5, exclude=[1]),
+        told(game(), Disc(3), [(x, 110) for x in range(190, 220)]),
+        told(free, Point(), (9, 3)),
+        report_of(free, []),
+    )
+
+
+def leaves(value: Json, steps: Steps = ()) -> Iterator[Steps]:
+    """Paths of all that decides and holds nothing else."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    some = False
+    for step, part in inner:
+        some = True
+        inside_weapons = steps[:1] == ("weapons",)
+        if step not in LEFT_OUT or inside_weapons:
+            yield from leaves(part, (*steps, step))
+    if not some:
+        yield steps
+
+
+OTHER = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 500),
+    st.floats(allow_nan=False),
+    st.text(max_size=3),
+    st.just([]),
+    st.just({}),
+    st.just([[1, 2, 3]]),
+    st.just([{"object": 1}]),
+)
+
+
+def changed(report: Json, steps: Steps, value: Json) -> Json:
+    """A copy with one value set."""
+    if not steps:
+        return value
+    out = copy.copy(report)
+    out[steps[0]] = changed(report[steps[0]], steps[1:], value)
+    return out
+
+
+def at(report: Json, steps: Steps) -> Json:
+    for step in steps:
+        report = report[step]
+    return report
+
+
+@cache
+def paths() -> tuple[tuple[int, Steps], ...]:
+    return tuple((number, steps) for number, report in enumerate(reports()) for steps in leaves(report))
+
+
+@pytest.mark.parametrize("number", range(REPORTS))
+def test_a_change_of_any_kind_of_leaf_is_told(number: int) -> None:
+    report, seen = reports()[number], set()
+    for steps in leaves(report):
+        kind = tuple("*" if isinstance(step, int) else step for step in steps)
+        if kind in seen:
+            continue
+        seen.add(kind)
+        for other in (None, True, 1, 0, -7.5, "x\ny", [], {}, [[1, 2, 3]], [[1, 2, 3, 4]], [{"object": 1}], [5]):
+            one = changed(report, steps, other)
+            for lines in (differences(report, one), differences(one, report)):
+                assert bool(lines) != same(at(report, steps), other), steps
+                assert all(line and "\n" not in line for line in lines)
+                assert len(lines) < 200
+
+
+@given(st.data(), OTHER)
+@settings(max_examples=150, deadline=None)
+def test_any_change_of_any_leaf_is_told(data: st.DataObject, other: Json) -> None:
+    number, steps = data.draw(st.sampled_from(paths()))
+    report = reports()[number]
+    assert bool(differences(report, changed(report, steps, other))) != same(at(report, steps), other)
+
+
+@pytest.mark.parametrize("number", range(REPORTS))
+def test_a_lost_or_a_repeated_entry_is_told(number: int) -> None:
+    report = reports()[number]
+    lists = {steps[:i] for steps in leaves(report) for i, step in enumerate(steps) if isinstance(step, int)}
+    for steps in random.Random(number).sample(sorted(lists, key=str), min(len(lists), 100)):
+        value = at(report, steps)
+        for other in (value[1:], value[:-1], [*value, value[0]], value[::-1]):
+            if not same(value, other):
+                assert differences(report, changed(report, steps, other)), steps
+
+
+def test_equal_reports_differ_in_nothing() -> None:
+    for report in reports():
+        assert differences(report, json.loads(json.dumps(report))) == []
+
+
+def test_how_a_report_was_made_does_not_count() -> None:
+    report = copy.deepcopy(reports()[0])
+    report["version"], report["scene"]["hash"], report["scene"]["version"] = "9", "0" * 16, 99
+    report["shots"][0]["plan"] = {"ran": [], "left_out": []}
+    assert differences(reports()[0], report) == []
+    assert decisive(reports()[0]) == decisive(report)
+    assert "plan" in reports()[0]["shots"][0], "the report itself is left as it was"
+
+
+def test_a_weapon_may_be_called_like_what_does_not_count() -> None:
+    scene = game()
+    one, other = (report_of(scene, [fire(scene, Disc(r), (210, 110))], ["plan"]) for r in (3, 4))
+    assert differences(one, other)[0] == 'weapon "plan": radius: 4, was 3'
+
+
+def test_a_number_is_no_truth_value() -> None:
+    assert same(1, 1.0) and same((1, 2), [1, 2])
+    assert not same(1, True) and not same(0, False) and not same(0, None) and not same([], {})
+
+
+AT = "shot 0 (disc at 210, 110)"
+
+
+@pytest.mark.parametrize(
+    ("scene", "lines"),
+    [
+        (game(can=(263, 120)), [f'{AT}: object 2 "can": missed by 17.3 px, was 14.3 px']),
+        (
+            game(duck=(201, 100)),
+            [
+                f'{AT}: object 0 "duck": 258 px, was 269; gained at (201, 88), (205, 89) and 12 more; '
+                "lost at (200, 88), (196, 89) and 23 more; first at (205, 111), was (204, 111)",
+                f'{AT}: object 3 "house" before object 0 "duck" 183 samples, was 172',
+                f"{AT}: verdicts: 2186 empty, was 2175; 572 hit, was 583",
+            ],
+        ),
+        (
+            game(wall=False),
+            [
+                "scene: occluders 0, was 1",
+                f'{AT}: object 0 "duck": 441 px, was 269; gained at (195, 100), (196, 100) and 170 more; '
+                "first at (208, 108), was (204, 111)",
+                f'{AT}: object 1 "bandit": 315 px, was 314; gained at (230, 110)',
+                f'{AT}: object 3 "house" no longer blocks',
+                f"{AT}: verdicts: 2453 empty, was 2175; 756 hit, was 583; 0 occluded, was 451",
+            ],
+        ),
+        (game(width=300), ["scene: bounds_xyxy [0, 0, 299, 199], was [0, 0, 319, 199]"]),
+    ],
+)
+def test_words_about_a_scene_that_changed(scene: Scene, lines: list[str]) -> None:
+    got = differences(told(game()), told(scene))
+    for line in lines:
+        assert any(other.startswith(line) for other in got), got
+    if len(lines) > 1:
+        assert got == lines
+
+
+def test_words_about_a_hit_that_came_or_went() -> None:
+    small = {"weapon": Disc(4), "at": (230, 120)}
+    hidden = game()
+    hidden.add(Sprite.box(40, 40), (230, 120), role="occluder", layer=2, name="crate")
+    here = "shot 0 (disc at 230, 120)"
+    went = differences(told(game(), **small), told(hidden, **small))
+    assert f'{here}: object 1 "bandit" is no longer hit: behind crate' in went
+    assert f'{here}: object 4 "crate" newly blocks 49 samples' in went
+    assert not any("is newly near" in line for line in went)
+    came = differences(told(hidden, **small), told(game(), **small))
+    assert f'{here}: object 1 "bandit" is newly hit: 49 px, first at (230, 120); was behind crate' in came
+    away = game()
+    away.move(1, (245, 120))
+    gone = differences(told(game(), **small), told(away, **small))
+    assert f'{here}: object 1 "bandit" is no longer hit: missed by 1.0 px' in gone
+
+
+def test_words_about_what_was_fired() -> None:
+    scene = game()
+    assert differences(told(scene), told(scene, Disc(33)))[0] == 'weapon "disc": radius: 33, was 32'
+    assert f"{AT}: seed: 4, was 0" in differences(told(scene), told(scene, seed=4))
+    moved = differences(told(scene), told(scene, at=(211, 110.5)))
+    assert moved[0] == "shot 0 (disc at 211, 110.5): fired at 211, 110.5, was 210, 110"
+    kind = differences(told(scene), told(scene, Point()))
+    assert kind[:2] == ['weapon "disc" is gone', 'weapon "point" is new']
+
+
+def test_shots_are_paired_by_what_was_fired() -> None:
+    scene = game()
+    at = [(200, 100), (210, 110), (230, 120)]
+    fewer = differences(told(scene, at=at), told(scene, at=[at[0], at[2]]))
+    assert "shot 1 (disc at 210, 110) is missing" in fewer
+    assert [line for line in fewer if "px, was" in line] == []
+    assert "shot 1 (disc at 210, 110) is new" in differences(told(scene, at=[at[0], at[2]]), told(scene, at=at))
+
+
+def test_rounds_are_told_apart() -> None:
+    weapon = Rounds(Disc(4), count=2, recoil_xy=(0, -6))
+    lines = differences(told(game(), weapon, (200, 94)), told(game(duck=(201, 100)), weapon, (200, 94)))
+    assert any('object 0 "duck", round 1: ' in line for line in lines)
+
+
+def test_of_a_batch_the_first_rows_are_told() -> None:
+    at = [(x, 110) for x in range(180, 240)]
+    lines = differences(told(game(), at=at), told(game(duck=(201, 100)), at=at))
+    assert lines[0] == 'batch: shot 0: object 0 "duck": 226 px, was 248; first at (190, 104), was (190, 106)'
+    assert lines[12] == "batch: and 48 more"
+    assert lines[13].startswith("batch: verdicts: ")
+    assert len(lines) == 14
+    assert differences(told(game()), told(game(), at=at)) == ["shots told as a batch, was shots told one by one"]
+
+
+def test_a_change_that_only_samples_show_is_told() -> None:
+    """A wall over nothing: what was empty is now occluded elsewhere, in equal numbers."""
+    wall = [Scene((64, 64)), Scene((64, 64))]
+    for scene, x in zip(wall, (30, 34), strict=True):
+        scene.add(Sprite.box(4, 4), (x, 30), role="occluder", name="post")
+    lines = differences(*(told(scene, Disc(10), (32, 30)) for scene in wall))
+    assert lines[-1].startswith("shot 0 (disc at 32, 30): ")
+    assert any("occluded samples: gained at " in line and "lost at " in line for line in lines)
