@@ -64,6 +64,9 @@ PELLETS_MAX = 65_536
 NEAR_PX = 32
 """How far from the pattern `why_not` looks for objects, px."""
 
+VIEW_MAX = 2048
+"""A longer side of the world is not shown whole: a picture's view is then what the shots reach, px."""
+
 MARGIN_PX = 8
 """How far `margins` shifts a pattern to look for a flip, px."""
 

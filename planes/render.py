@@ -25,23 +25,29 @@ BARE = {
 GROUND = (38, 41, 47)
 
 
-def draw_view(items: Items, view_xyxy: Box) -> Image:
-    """Draw what lies in a view (inclusive box of the world): background, then by layer, then the HUD.
+def draw_view(items: Items, view_xyxy: Box, screen_xy: tuple[int, int] | None = None) -> Image:
+    """Draw what lies in a view: background, then by layer, then the HUD.
+
+    Parameters
+    ----------
+    view_xyxy : inclusive box of the world, px
+    screen_xy : pixel of the world at the player's top left, from which the HUD is placed; by default the view's
 
     Returns
     -------
     (h, w, 3) bytes, RGB
     """
     x, y, x_max, y_max = view_xyxy
+    screen_x, screen_y = (x, y) if screen_xy is None else screen_xy
     picture = np.empty((y_max - y + 1, x_max - x + 1, 3), np.uint8)
     picture[:] = GROUND
     for item in _back_to_front(items):
         role = ROLES[int(items.role[item])]
         image, pivot_x, pivot_y = picture_of(items.sprites[item], items.forms[item], BARE[role])
         left, top = pixel(items.position_256[item] - (pivot_x, pivot_y)).tolist()
-        if role is not Role.HUD:
-            left, top = left - x, top - y
-        blend(picture, image[:, :, :3], image[:, :, 3], left, top)
+        if role is Role.HUD:
+            left, top = left + screen_x, top + screen_y
+        blend(picture, image[:, :, :3], image[:, :, 3], left - x, top - y)
     return picture
 
 

@@ -32,6 +32,7 @@ from planes.schema import (
     Wholes,
     Within,
     Word,
+    json_of,
     typed,
 )
 from planes.sprite import FLIPS, Sprite, rows_of
@@ -231,27 +232,14 @@ def laid_out(value: Any, depth: int = 0) -> str:
     return "[" + ",".join(pad + laid_out(v, depth + 1) for v in value) + end + "]"
 
 
-def _parsed(path: Path) -> dict[str, Any]:
-    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            names = [key for key, _ in pairs]
-            raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
-        return found
-
-    def number(text: str) -> float:
-        raise InputError(f"number: expected a finite number, got {text}")
-
+def _parsed(path: Path) -> object:
     try:
         text = path.read_text(encoding="utf-8")
-        data = json.loads(text, object_pairs_hook=distinct, parse_constant=number)
     except OSError as error:
         raise InputError(f"cannot read it: {error.strerror}") from error
-    except InputError:
-        raise
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(f"expected JSON in UTF-8: {error}") from error
-    return typed("scene", data, dict)  # type: ignore[no-any-return]
+    return json_of(text)
 
 
 def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:

@@ -5,6 +5,7 @@ A scene file, a weapon, a shot and a report each have one table, made of the par
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from planes.arrays import InputError, bools, choice, flag, integer, integers, re
 
 __all__ = [
     "Const", "Either", "Flag", "Keys", "Mapped", "Mask", "Names", "Number", "Numbers", "Optional", "Ref", "Rows",
-    "Text", "Value", "Whole", "Wholes", "Within", "Word", "typed",
+    "Text", "Value", "Whole", "Wholes", "Within", "Word", "json_of", "typed",
 ]  # fmt: skip
 
 TEXT_MAX = 200
@@ -263,12 +264,14 @@ class Mapped:
     form: Value
 
     def check(self, name: str, value: object) -> dict[str, Any]:
-        """Check each value."""
+        """Check each name and each value."""
+        for key in typed(name, value, dict):
+            Text().check(f"{name}: key", key)
         return {key: self.form.check(f"{name}.{key}", entry) for key, entry in typed(name, value, dict).items()}
 
     def schema(self) -> dict[str, Any]:
         """An object."""
-        return {"type": "object", "additionalProperties": self.form.schema()}
+        return {"type": "object", "propertyNames": Text().schema(), "additionalProperties": self.form.schema()}
 
 
 @dataclass(frozen=True)
@@ -327,6 +330,27 @@ class Ref:
     def schema(self) -> dict[str, Any]:
         """A reference."""
         return {"$ref": f"#/$defs/{self.definition}"}
+
+
+def json_of(text: str) -> Any:
+    """Parse JSON in which no key comes twice and every number is finite."""
+
+    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [key for key, _ in pairs]
+            raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
+        return found
+
+    def number(text: str) -> float:
+        raise InputError(f"number: expected a finite number, got {text}")
+
+    try:
+        return json.loads(text, object_pairs_hook=distinct, parse_constant=number)
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON in UTF-8: {error}") from error
 
 
 def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:

@@ -158,7 +158,7 @@ def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:
 
 
 def _fired(shot: Mapping[str, Any]) -> str:
-    parts = [f"at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}"]
+    parts = [f"at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}"]
     if shot["aim"] is not None:
         parts.append(f"aim {shot['aim']:g} deg")
     if shot["seed"]:

@@ -98,7 +98,7 @@ def report(arguments: argparse.Namespace) -> None:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
-        print(f"{shot['weapon']} at {shot['at'][0]:.12g}, {shot['at'][1]:.12g}: {hit}")
+        print(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
 
 
 def _check_outputs(picture: Path, facts: Path | None) -> None:

@@ -22,8 +22,8 @@ from weapons.resolve import Sight, direct
 from weapons.volley import Shots, Volley, volley_of
 
 __all__ = [
-    "Behind", "Blocked", "Detail", "Samples", "Share", "WhyNot", "blockers_of", "detail_of", "hit_spans", "margins_of",
-    "samples_of", "shares_of", "why_not_of",
+    "REASONS", "Behind", "Blocked", "Detail", "Samples", "Share", "WhyNot", "blockers_of", "detail_of", "hit_spans",
+    "margins_of", "samples_of", "shares_of", "why_not_of",
 ]  # fmt: skip
 
 
@@ -63,6 +63,9 @@ class Blocked(NamedTuple):
     occluder: int
     samples: int
     behind: tuple[Behind, ...]
+
+
+REASONS = ("missed", "category", "excluded", "behind", "outside")
 
 
 class WhyNot(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.constants import ALL, SUB
+from planes.constants import ALL, SUB, VIEW_MAX
 from planes.grid256 import pixel
 from planes.items import Role
 from planes.sampling import Verdict
@@ -27,9 +27,6 @@ FORMAT = "hitplanes-report/1"
 
 SHOTS_MAX = 24
 """More shots than these are told as a batch: the page would be longer than one reads."""
-
-VIEW_MAX = 2048
-"""A longer side of the world is not shown whole: the view is then what the shots reach, px."""
 
 SHOTS_AT_A_TIME = 1024
 

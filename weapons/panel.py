@@ -12,7 +12,10 @@ from planes.arrays import Image
 from weapons.marks import HEAT, MARKS, glyph
 from weapons.world import HATCH, OUTLINES
 
-__all__ = ["CARD", "FAINT", "INK", "LINE", "Text", "clipped", "draw_texts", "legend_of", "page_of"]
+__all__ = [
+    "CARD", "EDGE", "FAINT", "GROUND", "INK", "LINE", "TOP", "Entry", "Legend", "Text", "clipped", "draw_texts",
+    "legend_of", "page_of", "verdict_mark",
+]  # fmt: skip
 
 Color = tuple[int, int, int]
 
@@ -113,9 +116,9 @@ class Entry(NamedTuple):
 class Legend:
     """Entries side by side, in as many lines as they take."""
 
-    def __init__(self, entries: Sequence[Entry], width: int) -> None:
-        self.entries = entries
-        self.columns = max(1, (width - 2 * EDGE) // ENTRY)
+    def __init__(self, entries: Sequence[Entry], width: int, entry_width: int = ENTRY) -> None:
+        self.entries, self.entry_width = entries, entry_width
+        self.columns = max(1, (width - 2 * EDGE) // entry_width)
 
     @property
     def height(self) -> int:
@@ -126,7 +129,7 @@ class Legend:
         """Draw the marks and return the words."""
         texts = []
         for i, entry in enumerate(self.entries):
-            left, top = x + i % self.columns * ENTRY, y + i // self.columns * 26
+            left, top = x + i % self.columns * self.entry_width, y + i // self.columns * 26
             page[top : top + 14, left : left + entry.mark.shape[1]] = entry.mark
             texts.append(Text(left + entry.mark.shape[1] + 6, top + 12, entry.word, FAINT))
         return texts

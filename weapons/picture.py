@@ -16,12 +16,12 @@ from weapons.cards import batch_cards, shot_card
 from weapons.marks import MARKS
 from weapons.overlay import Overlay, blocked_objects
 from weapons.panel import Text, draw_texts, page_of
-from weapons.world import factor_of, ground_of, mark_heat, mark_samples, outline
+from weapons.world import factor_of, ground_of, mark_heat, mark_samples, outline, outline_seen
 
 __all__ = ["picture_of_report"]
 
-OTHERS_MAX = 1000
-"""More objects than these are not outlined one by one, unless they were hit."""
+OUTLINES_MAX = 1000
+"""More objects than these are not outlined, unless they were hit."""
 
 
 def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = True) -> Image:
@@ -63,7 +63,8 @@ def _shots(world: Image, report: Mapping[str, Any], scene: Scene, view: Box, fac
     shots = report["shots"]
     hit = {row["object"] for shot in shots for row in shot["rows"]}
     blocked = blocked_objects(shots, scene)
-    _outline_others(world, scene, hit | blocked, view, factor)
+    others = [item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked]
+    outline_seen(world, scene, others[:OUTLINES_MAX], view, factor)
     for verdict in MARKS:
         mark_samples(world, shots, verdict, view, factor)
     for item in sorted(blocked):
@@ -80,17 +81,8 @@ def _shots(world: Image, report: Mapping[str, Any], scene: Scene, view: Box, fac
 
 
 def _heat(world: Image, report: Mapping[str, Any], scene: Scene, view: Box, factor: int) -> list[Text]:
-    """Colour every pixel by the samples that fell on it, and outline the objects that were hit."""
-    batch = report["batch"]
-    hit = {entry["object"] for entry in batch["objects"]}
-    _outline_others(world, scene, hit, view, factor)
+    """Colour every pixel by the samples that fell on it, and outline the objects."""
     for verdict in MARKS:
-        mark_heat(world, batch["heat"], verdict, view, factor)
-    for item in sorted(hit)[:OTHERS_MAX]:
-        outline(world, scene, item, view, factor, "other")
+        mark_heat(world, report["batch"]["heat"], verdict, view, factor)
+    outline_seen(world, scene, scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX], view, factor)
     return []
-
-
-def _outline_others(world: Image, scene: Scene, but: set[int], view: Box, factor: int) -> None:
-    for item in [i for i in scene.ids(Role.HITTABLE).tolist() if i not in but][:OTHERS_MAX]:
-        outline(world, scene, item, view, factor, "other")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -17,7 +17,10 @@ from planes.scene import Scene
 from planes.spans import Box
 from weapons.marks import HEAT, MARKS, TINT, tiled_glyph
 
-__all__ = ["HATCH", "OUTLINES", "factor_of", "ground_of", "mark_heat", "mark_samples", "outline"]
+__all__ = [
+    "HATCH", "OUTLINES", "factor_of", "fill", "ground_of", "heat_boxes", "heat_step", "lay", "mark_heat",
+    "mark_samples", "outline", "outline_seen",
+]  # fmt: skip
 
 WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 """A view is enlarged by the greatest whole factor, up to LARGEST, that stays within these pixels."""
@@ -52,7 +55,7 @@ def ground_of(scene: Scene | None, bounds: Sequence[int] | None, view: Box, fact
     if scene is None:
         dimmed = np.full((view[3] - view[1] + 1, view[2] - view[0] + 1, 3), GROUND, np.uint8)
     else:
-        plain = draw_view(scene.items, view).astype(np.uint32)
+        plain = draw_view(scene.items, view, scene.extent()[:2]).astype(np.uint32)
         grey = (plain * (54, 183, 19)).sum(axis=2, keepdims=True) // 256
         dimmed = ((plain * 3 + grey * 2) // 5 * light // 255).astype(np.uint8)
     if bounds is not None:
@@ -66,14 +69,35 @@ def ground_of(scene: Scene | None, bounds: Sequence[int] | None, view: Box, fact
     return ground
 
 
-def outline(world: Image, scene: Scene, item: int, view: Box, factor: int, kind: str) -> None:
-    """Draw the border of an object's mask, inside of its pixels; thicker where it was hit, dashed where blocked."""
+def outline_seen(world: Image, scene: Scene, items: Sequence[int], view: Box, factor: int) -> None:
+    """Draw the borders of what is seen of objects."""
+    front = label_plane(scene.items.stack(), view)
+    for item in items:
+        outline(world, scene, item, view, factor, "other", front)
+
+
+def outline(
+    world: Image,
+    scene: Scene,
+    item: int,
+    view: Box,
+    factor: int,
+    kind: str,
+    front: npt.NDArray[np.int32] | None = None,
+) -> None:
+    """Draw the border of an object's mask, inside of its pixels; thicker where it was hit, dashed where blocked.
+
+    With `front`, the labels (h, w) of what is seen in the view, only what is seen of it.
+    """
     mask, (x, y) = scene.mask(item)
     left, top = max(x, view[0]), max(y, view[1])
     right, low = min(x + mask.shape[1], view[2] + 1), min(y + mask.shape[0], view[3] + 1)
     if left >= right or top >= low:
         return
-    inside = np.pad(_enlarged(mask[top - y : low - y, left - x : right - x], factor), 2)
+    part = mask[top - y : low - y, left - x : right - x]
+    if front is not None:
+        part = part & (front[top - view[1] : low - view[1], left - view[0] : right - view[0]] == item + 1)
+    inside = np.pad(_enlarged(part, factor), 2)
     core = _core(inside)
     if kind != "other" and factor > 1:
         core = _core(core)  # so that it stands out in grey, too
@@ -91,8 +115,12 @@ def mark_samples(world: Image, shots: Sequence[Mapping[str, Any]], verdict: str,
     at = np.zeros((view[3] - view[1] + 1, view[2] - view[0] + 1), np.bool_)
     for shot in shots:
         for y, x_first, x_last in shot["samples"].get(verdict, ()):
-            if view[1] <= y <= view[3]:
-                at[y - view[1], max(x_first - view[0], 0) : max(x_last - view[0] + 1, 0)] = True
+            fill(at, view, (x_first, y, x_last, y))
+    lay(world, at, verdict, factor)
+
+
+def lay(world: Image, at: Bools, verdict: str, factor: int) -> None:
+    """Mark the set pixels of a plane (h, w) of the view with the shape of a verdict."""
     rows, columns = np.nonzero(at)
     if not len(rows):
         return
@@ -107,17 +135,30 @@ def mark_samples(world: Image, shots: Sequence[Mapping[str, Any]], verdict: str,
 
 def mark_heat(world: Image, heat: Mapping[str, Any], verdict: str, view: Box, factor: int) -> None:
     """Colour each cell by its count of samples of one verdict: from one to the most, in steps of the logarithm."""
-    cell, most = heat["cell"], max((run[3] for run in heat["counts"].get(verdict, ())), default=0)
-    steps = np.zeros(((view[3] - view[1]) // cell + 1, (view[2] - view[0]) // cell + 1), np.int64)
-    for row, first, last, count in heat["counts"].get(verdict, ()):
-        steps[row, first : last + 1] = 1 + heat_step(count, most)
-    large = _enlarged(steps, cell)[: view[3] - view[1] + 1, : view[2] - view[0] + 1]
-    there = _enlarged(large > 0, factor)
+    runs = heat["counts"].get(verdict, ())
+    most = max((count for *_, count in runs), default=0)
+    steps = np.zeros((view[3] - view[1] + 1, view[2] - view[0] + 1), np.uint8)
+    for count, box in heat_boxes(heat, verdict):
+        fill(steps, view, box, 1 + heat_step(count, most))
+    there = _enlarged(steps > 0, factor)
     if verdict != "hit":
         _lay(world, there & tiled_glyph(verdict, factor, there.shape), MARKS[verdict][0], MARKS[verdict][1] // 2)
         return
-    colors = np.array(HEAT, np.uint8)[np.maximum(large - 1, 0)]
+    colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
     blend(world, _enlarged(colors, factor), np.where(there, 235, 0).astype(np.uint8), 0, 0)
+
+
+def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box]]:
+    """Counts of one verdict, and the boxes of the world that they belong to."""
+    cell, (x, y) = heat["cell"], heat["origin_xy"]
+    for row, first, last, count in heat["counts"].get(verdict, ()):
+        yield count, (x + first * cell, y + row * cell, x + (last + 1) * cell - 1, y + (row + 1) * cell - 1)
+
+
+def fill(plane: npt.NDArray[Any], view: Box, box: Box, value: int = 1) -> None:
+    """Set what lies of a box of the world in a plane (h, w) of a view."""
+    x0, y0, x1, y1 = (max(v - low, -1) for v, low in zip(box, (view[0], view[1]) * 2, strict=True))
+    plane[max(y0, 0) : y1 + 1, max(x0, 0) : x1 + 1] = value
 
 
 def heat_step(count: int, most: int) -> int:

@@ -1,0 +1,207 @@
+"""The table of a report, and JSON Schemas of scene files, shots and reports, made from the tables that check them.
+
+`python -m weapons.schemas` writes them beside this module, in `schemas/`, from where they ship.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from planes.arrays import InputError, within
+from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, VIEW_MAX
+from planes.image import write_text
+from planes.sampling import Verdict
+from planes.scenefile import OBJECT, SCENE
+from planes.schema import (
+    Const,
+    Keys,
+    Mapped,
+    Names,
+    Number,
+    Numbers,
+    Optional,
+    Ref,
+    Rows,
+    Text,
+    Value,
+    Whole,
+    Wholes,
+    Within,
+    Word,
+    json_of,
+)
+from weapons.arsenal import KINDS, Plain, Weapon
+from weapons.explain import REASONS
+from weapons.facts import FORMAT
+from weapons.orders import SHOT
+
+__all__ = ["REPORT", "read_report", "schemas", "write_schemas"]
+
+FOLDER = Path(__file__).parent / "schemas"
+
+FARTHEST = POSITION_MAX + 2 * REACH_MAX
+"""No pixel of a pattern is farther from the origin, px."""
+
+COUNT = Whole(0, 2**62)
+PIXEL = Wholes((2,), -FARTHEST, FARTHEST)
+BOX = Wholes((4,), -FARTHEST, FARTHEST)
+RUNS = Wholes((None, 3), -FARTHEST, FARTHEST)
+SHARE = Number(0, 1)
+ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
+VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
+STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
+
+
+def _all(keys: dict[str, Value]) -> Within:
+    """An object that has all of its keys."""
+    return Within(Keys(keys, tuple(keys)))
+
+
+PLAN = _all({"ran": Rows(_all({**STAGE, "bytes": COUNT})), "left_out": Rows(_all(STAGE))})
+ROW = _all(
+    {
+        **ITEM,
+        "round": COUNT,
+        "samples": COUNT,
+        "pixels": COUNT,
+        "weight": COUNT,
+        "pellets": COUNT,
+        "first_xy": PIXEL,
+        "distance2": COUNT,
+        "shares": _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE}),
+        "runs": RUNS,
+    }
+)
+TOLD = _all(
+    {
+        "shot": Whole(0, 2**63 - 1),
+        "weapon": Text(),
+        "at": Numbers((2,), POSITION_MAX),
+        "at_xy": PIXEL,
+        "aim": Optional(Number(-180, 180)),
+        "seed": Whole(0, SEED_MAX),
+        "accept": Optional(Names()),
+        "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
+        "verdicts": _all(dict(VERDICTS)),
+        "rows": Rows(ROW),
+        "why_not": Rows(
+            _all(
+                {
+                    **ITEM,
+                    "reason": Word(REASONS),
+                    "samples": COUNT,
+                    "by": Rows(_all({**ITEM, "samples": COUNT})),
+                    "distance": Number(0),
+                }
+            )
+        ),
+        "blockers": Rows(
+            _all({**ITEM, "samples": COUNT, "blocked": Rows(_all({**ITEM, "samples": COUNT, "at_xy": PIXEL}))})
+        ),
+        "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))),
+        "plan": PLAN,
+    }
+)
+HEAT = _all(
+    {
+        "cell": Whole(1, VIEW_MAX),
+        "origin_xy": PIXEL,
+        "beyond": COUNT,
+        "counts": Within(Keys(dict.fromkeys(VERDICTS, Wholes((None, 4), 0, 2**62)))),
+    }
+)
+BATCH = _all(
+    {
+        "shots": COUNT,
+        "shots_that_hit": COUNT,
+        "verdicts": _all(dict(VERDICTS)),
+        "objects": Rows(_all({**ITEM, "shots": COUNT, "pixels": COUNT, "weight": COUNT})),
+        "columns": Names(),
+        "rows": Wholes((None, 10), -FARTHEST, 2**62),
+        "heat": HEAT,
+        "plan": Rows(PLAN),
+    }
+)
+KEYS: dict[str, Value] = {
+    "format": Const(FORMAT),
+    "version": Text(),
+    "scene": _all(
+        {
+            "name": Text(),
+            "hash": Text(),
+            "version": COUNT,
+            "bounds_xyxy": Optional(BOX),
+            "hittable": COUNT,
+            "occluders": COUNT,
+        }
+    ),
+    "view_xyxy": BOX,
+    "weapons": Mapped(Ref("weapon")),
+    "shots": Rows(TOLD),
+    "batch": Optional(BATCH),
+}
+REPORT = Keys(KEYS, tuple(KEYS))
+"""The table of a report."""
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """Read the JSON of a report.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the row and the field.
+    """
+    with within(str(path)):
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"cannot read it: {error.strerror}") from error
+        except ValueError as error:
+            raise InputError(f"expected JSON in UTF-8: {error}") from error
+        found = json_of(text)
+        REPORT.check("report", found)
+        x, y, x_max, y_max = found["view_xyxy"]
+        if not (0 <= x_max - x <= 2 * VIEW_MAX and 0 <= y_max - y <= 2 * VIEW_MAX):
+            raise InputError(f"view_xyxy: expected a box of at most {2 * VIEW_MAX} px a side, got {found['view_xyxy']}")
+        return dict(found)
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """JSON Schemas by name: of scene.json, of a shot, and of a report."""
+    weapons = {
+        "weapon": {"anyOf": [Ref("single").schema(), _kind("rounds")]},
+        "single": {"anyOf": [Ref("plain").schema(), _kind("spread")]},
+        "plain": {"anyOf": [_kind(name) for name, kind in KINDS.items() if issubclass(kind, Plain)]},
+    }
+    shot, objects = SHOT.schema(), {"anyOf": [keys.schema() for keys in OBJECT.values()]}
+    return {
+        "scene": _document("A scene of hitplanes", SCENE, {"object": objects, "shot": shot, **weapons}),
+        "shot": _document("A shot, a line of a log of shots", SHOT, {}),
+        "report": _document("What shots hit, and why", REPORT, weapons),
+    }
+
+
+def write_schemas(folder: Path = FOLDER) -> None:
+    """Write every schema to a folder."""
+    for name, schema in schemas().items():
+        write_text(folder / f"{name}.json", json.dumps(schema, indent=1) + "\n")
+
+
+def _document(title: str, table: Keys, definitions: dict[str, Any]) -> dict[str, Any]:
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, "title": title, **table.schema(), **({"$defs": definitions} if definitions else {})}
+
+
+def _kind(name: str) -> dict[str, Any]:
+    """Schema of one kind of weapon."""
+    kind: type[Weapon] = KINDS[name]
+    needed = [field.name for field in fields(kind) if field.default is MISSING]
+    return Keys({"kind": Const(name), **kind.table}, ("kind", *needed)).schema()
+
+
+if __name__ == "__main__":
+    write_schemas()

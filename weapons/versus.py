@@ -1,0 +1,167 @@
+"""Two reports side by side, and the pixels hit in only one of them or in both: expected against got."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from planes.arrays import Bools, Image
+from planes.items import Role
+from planes.scene import Scene
+from planes.spans import Box
+from weapons.differences import differences
+from weapons.marks import MARKS
+from weapons.overlay import Overlay
+from weapons.panel import EDGE, FAINT, GROUND, INK, LINE, TOP, Entry, Legend, Text, clipped, draw_texts, verdict_mark
+from weapons.world import factor_of, fill, ground_of, heat_boxes, lay, mark_heat, mark_samples, outline, outline_seen
+
+__all__ = ["compared_pixels", "picture_of_difference"]
+
+WIDTH, HEIGHT, GAP = 640, 720, 12
+"""About the size of each of the three pictures, and the space between them, px."""
+
+LONGEST = 1200
+"""A longer side of what is compared is cut to what lies around the middle of the differences, px."""
+
+AROUND = 24
+"""What is shown around the pixels that differ, px."""
+
+LINES_MAX = 60
+"""Differences told on the page; the command prints them all."""
+
+LOOKS = {"both": "empty", "other verdict": "filtered", "only expected": "occluded", "only got": "hit"}
+"""The verdict whose mark each kind of pixel borrows: shapes that are told apart in grey."""
+
+
+def picture_of_difference(
+    expected: Mapping[str, Any], got: Mapping[str, Any], scene: Scene | None = None, *, text: bool = True
+) -> Image:
+    """Draw two reports and their difference.
+
+    Parameters
+    ----------
+    expected, got : as `report_of` makes them
+    scene : that of one of them or of both, or None: what is known by its hash is drawn, the rest is left empty
+    text : False leaves the text layer out
+
+    Returns
+    -------
+    (h, w, 3) bytes, RGB
+    """
+    whole = _around(tuple(expected["view_xyxy"]), tuple(got["view_xyxy"]))
+    kinds = compared_pixels(expected, got, whole)
+    view = _focus(kinds, whole)
+    x, y = view[0] - whole[0], view[1] - whole[1]
+    kinds = {name: at[y : y + view[3] - view[1] + 1, x : x + view[2] - view[0] + 1] for name, at in kinds.items()}
+    factor = factor_of(view, WIDTH, HEIGHT)
+    sides = [_side(report, scene, view, factor) for report in (expected, got)]
+    sides.append(_difference(got, scene, kinds, view, factor))
+    page, texts = _page(sides, differences(expected, got), kinds)
+    if text:
+        draw_texts(page, texts)
+    return page
+
+
+def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: Box) -> dict[str, Bools]:
+    """Pixels of a view (h, w) that any shot hit in both reports or in one, and those whose other verdict changed."""
+    mine, other = (_verdict_planes(report, view) for report in (expected, got))
+    a, b = mine["hit"], other["hit"]
+    changed = np.zeros_like(a)
+    for verdict in MARKS:
+        changed |= mine[verdict] != other[verdict]
+    return {"both": a & b, "other verdict": changed & ~(a | b), "only expected": a & ~b, "only got": b & ~a}
+
+
+def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
+    """Planes (h, w) of the pixels that have each verdict in any shot."""
+    shape = view[3] - view[1] + 1, view[2] - view[0] + 1
+    planes = {verdict: np.zeros(shape, np.bool_) for verdict in MARKS}
+    for verdict, plane in planes.items():
+        for shot in report["shots"]:
+            for y, first, last in shot["samples"].get(verdict, ()):
+                fill(plane, view, (first, y, last, y))
+        if report["batch"]:
+            for _, box in heat_boxes(report["batch"]["heat"], verdict):
+                fill(plane, view, box)
+    return planes
+
+
+def _focus(kinds: Mapping[str, Bools], whole: Box) -> Box:
+    """Box around what differs, else around what was hit, else all of it."""
+    for names in (("only expected", "only got"), ("other verdict",), ("both",)):
+        rows, columns = np.nonzero(np.logical_or.reduce([kinds[name] for name in names]))
+        if len(rows):
+            low = (int(columns.min()) - AROUND, int(rows.min()) - AROUND)
+            high = (int(columns.max()) + AROUND, int(rows.max()) + AROUND)
+            x, y = (max(v, 0) + origin for v, origin in zip(low, whole[:2], strict=True))
+            x_max, y_max = (min(v + origin, most) for v, origin, most in zip(high, whole[:2], whole[2:], strict=True))
+            return _cut(x, y, x_max, y_max)
+    return _cut(*whole)
+
+
+def _cut(x: int, y: int, x_max: int, y_max: int) -> Box:
+    """Box of at most LONGEST px a side about the same middle."""
+    over_x, over_y = max(0, x_max - x + 1 - LONGEST), max(0, y_max - y + 1 - LONGEST)
+    return x + over_x // 2, y + over_y // 2, x_max - (over_x + 1) // 2, y_max - (over_y + 1) // 2
+
+
+def _around(a: Box, b: Box) -> Box:
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+def _side(report: Mapping[str, Any], scene: Scene | None, view: Box, factor: int) -> tuple[Image, list[Text]]:
+    """One report: its samples over its scene, and its shots numbered."""
+    known = scene if scene is not None and scene.content_hash() == report["scene"]["hash"] else None
+    world = ground_of(known, report["scene"]["bounds_xyxy"], view, factor)
+    for verdict in MARKS:
+        mark_samples(world, report["shots"], verdict, view, factor)
+        if report["batch"]:
+            mark_heat(world, report["batch"]["heat"], verdict, view, factor)
+    hit = {row["object"] for shot in report["shots"] for row in shot["rows"]}
+    for item in sorted(hit) if known else ():
+        outline(world, known, item, view, factor, "hit")  # type: ignore[arg-type]
+    overlay = Overlay(world, view, factor)
+    for number, shot in enumerate(report["shots"], 1):
+        overlay.shot(shot, number)
+    return world, overlay.texts
+
+
+def _difference(
+    got: Mapping[str, Any], scene: Scene | None, kinds: Mapping[str, Bools], view: Box, factor: int
+) -> tuple[Image, list[Text]]:
+    """Pixels hit in both, or in one."""
+    known = scene if scene is not None and scene.content_hash() == got["scene"]["hash"] else None
+    world = ground_of(known, got["scene"]["bounds_xyxy"], view, factor, 60)
+    if known is not None:
+        outline_seen(world, known, known.ids(Role.HITTABLE).tolist(), view, factor)
+    for name, at in kinds.items():
+        lay(world, at, LOOKS[name], factor)
+    return world, []
+
+
+def _page(
+    sides: Sequence[tuple[Image, list[Text]]], words: Sequence[str], kinds: Mapping[str, Bools]
+) -> tuple[Image, list[Text]]:
+    """The three pictures in a row, the legend of the third, and the differences in words."""
+    high, wide = sides[0][0].shape[:2]
+    width = 2 * EDGE + 3 * wide + 2 * GAP
+    counts = {name: int(at.sum()) for name, at in kinds.items()}
+    entries = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
+    legend = Legend(entries, width, 180)
+    below = TOP + high + 14 + legend.height
+    told = list(words[:LINES_MAX]) or ["no difference"]
+    if len(words) > LINES_MAX:
+        told.append(f"and {len(words) - LINES_MAX} more")
+    page = np.empty((below + LINE * len(told) + 12, width, 3), np.uint8)
+    page[:] = GROUND
+    texts = []
+    for i, ((world, labels), title) in enumerate(zip(sides, ("expected", "got", "difference"), strict=True)):
+        left = EDGE + i * (wide + GAP)
+        page[TOP : TOP + high, left : left + wide] = world
+        texts += [label._replace(x=label.x + left, y=label.y + TOP) for label in labels]
+        texts.append(Text(left, 28, title, INK, bold=True))
+    texts += legend.draw(page, EDGE, TOP + high + 14, width)
+    lines = [Text(EDGE, below + 14 + LINE * i, clipped(line, width - 2 * EDGE), FAINT) for i, line in enumerate(told)]
+    return page, [*texts, *lines]
