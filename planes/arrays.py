@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
+import reprlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -13,7 +15,7 @@ import numpy.typing as npt
 
 __all__ = [
     "Bools", "Floats", "Image", "InputError", "Ints", "array_of", "bools", "choice", "each", "flag", "integer",
-    "integers", "real", "reals", "within",
+    "integers", "real", "reals", "shown", "within",
 ]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
@@ -21,6 +23,12 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Image = npt.NDArray[np.uint8]
 Shape = tuple[int | None, ...]
+
+SHOWN = 60
+"""Characters of a value that an error shows."""
+
+NAMES_SHOWN = 20
+"""Names that an error lists; with more of them, the nearest ones say more than all."""
 
 
 class InputError(ValueError):
@@ -37,12 +45,18 @@ def within(place: str) -> Iterator[None]:
 
 
 def array_of(field: str, values: object, shape: Shape | None = None) -> npt.NDArray[Any]:
-    """Take whatever `numpy.asarray` takes; rows of different length and the like are refused by name."""
+    """Take whatever `numpy.asarray` takes; rows of different length and the like are refused by name.
+
+    So is what it would change without a word: masked values, and true and false among numbers.
+    """
     try:
-        return np.asarray(values)
+        array = np.asarray(values)
     except (ValueError, TypeError, OverflowError) as error:
         of_shape = "" if shape is None else f" of shape {_spelled(shape)}"
-        raise InputError(f"{field}: expected an array{of_shape}, got {_shown(values)}") from error
+        raise InputError(f"{field}: expected an array{of_shape}, got {shown(values)}") from error
+    if values is not array and array.dtype.kind in "biuf" and not _plain(values):
+        _refuse_changed(field, values, array.dtype.kind == "b")
+    return array
 
 
 def each(field: str, value: object, n: int) -> npt.NDArray[Any]:
@@ -70,7 +84,7 @@ def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> 
     InputError
         If it is not numeric, not finite, of another shape, or beyond the limit.
     """
-    array = _numeric(field, values, shape, "iuf").astype(np.float64)
+    array = _float64(_numeric(field, values, shape, "iuf"))
     _first_bad(field, array, np.isfinite(array), "a finite number")
     _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
     return array
@@ -81,6 +95,7 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     array = _numeric(field, values, shape, "iuf")
     whole = f"a whole number from {low} to {high}"
     if array.dtype.kind == "f":
+        array = _float64(array)
         _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
     _first_bad(field, array, (array >= low) & (array <= high), whole)
     return array.astype(np.int64)
@@ -98,7 +113,7 @@ def real(field: str, value: object, low: float, high: float) -> float:
     """Check one finite number in [low, high]."""
     number = float(reals(field, value, ()))
     if not low <= number <= high:
-        raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {_shown(value)}")
+        raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {shown(value)}")
     return number
 
 
@@ -106,14 +121,14 @@ def integer(field: str, value: object, low: int, high: int) -> int:
     """Check one whole number in [low, high], of any size."""
     whole = isinstance(value, int | np.integer) or (isinstance(value, float) and value.is_integer())
     if isinstance(value, bool) or not whole or not low <= int(value) <= high:  # type: ignore[call-overload]
-        raise InputError(f"{field}: expected a whole number from {low} to {high}, got {_shown(value)}")
+        raise InputError(f"{field}: expected a whole number from {low} to {high}, got {shown(value)}")
     return int(value)  # type: ignore[call-overload,no-any-return]
 
 
 def flag(field: str, value: object) -> bool:
     """Check one boolean."""
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{field}: expected true or false, got {_shown(value)}")
+        raise InputError(f"{field}: expected true or false, got {shown(value)}")
     return bool(value)
 
 
@@ -124,31 +139,73 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
         return value
     near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InputError(f"{field}: expected one of {', '.join(map(repr, names)) or 'none'}, got {_shown(value)}{hint}")
+    listed = ", ".join(map(repr, names[:NAMES_SHOWN])) or "none"
+    if len(names) > NAMES_SHOWN:
+        listed += f" and {len(names) - NAMES_SHOWN} more"
+    raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")
+
+
+def shown(value: object) -> str:
+    """Any value in a few words, for an error: on one line, however long, deep or large it is."""
+    try:
+        text = " ".join(_brief.repr(value).split())
+    except (ValueError, RecursionError):  # a whole number of too many digits
+        text = f"a {type(value).__name__} that is too long to show"
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
+
+
+_brief = reprlib.Repr()
+_brief.maxlist = _brief.maxtuple = _brief.maxset = _brief.maxdict = _brief.maxarray = SHOWN // 3
+_brief.maxstring = _brief.maxother = _brief.maxlong = 2 * SHOWN
 
 
 def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArray[Any]:
     array = array_of(field, values, shape)
-    if array.size and array.dtype.kind not in kinds:
+    empty = not array.size and array.dtype.kind == "f"  # as numpy makes of an empty list, whatever it might hold
+    if array.dtype.kind not in kinds and not empty:
         kind = "booleans" if kinds.startswith("b") else "numbers"
-        raise InputError(f"{field}: expected {kind}, got {_shown(array.tolist())}")
+        raise InputError(f"{field}: expected {kind}, got {shown(array.tolist() if array.size <= SHOWN else array)}")
     if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
         raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
     return array
 
 
+def _plain(values: object) -> bool:
+    """Whether nested lists hold nothing but Python's own numbers."""
+    level: list[Any] = [values]
+    while (kinds := set(map(type, level))) and kinds <= {list, tuple}:
+        level = list(itertools.chain.from_iterable(level))
+    return kinds <= {int, float}
+
+
+def _refuse_changed(field: str, values: object, booleans: bool) -> None:
+    """Refuse masked values, and booleans unless all are."""
+    if isinstance(values, np.ndarray) and np.ma.is_masked(values):
+        place = _place(np.argwhere(np.ma.getmaskarray(values))[0].tolist())
+        raise InputError(f"{field}{place}: expected a value, got a masked one")
+    for i, value in enumerate(values if isinstance(values, list | tuple) else ()):
+        is_boolean = isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.dtype.kind == "b")
+        if is_boolean and not booleans:
+            raise InputError(f"{field}[{i}]: expected a number like the others, got {shown(value)}")
+        _refuse_changed(f"{field}[{i}]", value, booleans)
+
+
+def _float64(array: npt.NDArray[Any]) -> Floats:
+    """Float64 of an array of any kind of number; long doubles that it cannot hold are infinite, and refused as such."""
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64)
+
+
 def _first_bad(field: str, array: npt.NDArray[Any], good: Bools | np.bool_, expected: str) -> None:
     if np.all(good):
         return
-    row = tuple(int(i) for i in np.argwhere(~np.asarray(good))[0])
-    place = "".join(f"[{i}]" for i in row)
-    raise InputError(f"{field}{place}: expected {expected}, got {array[row]}")
+    row = tuple(np.argwhere(~np.asarray(good))[0].tolist())
+    raise InputError(f"{field}{_place(row)}: expected {expected}, got {array[row]}")
+
+
+def _place(row: Iterable[int]) -> str:
+    return "".join(f"[{i}]" for i in row)
 
 
 def _spelled(shape: Shape) -> str:
     return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
-
-
-def _shown(value: object) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
