@@ -1,45 +1,76 @@
-"""PNG files in and out, as RGBA arrays (h, w, 4) of bytes; the header is read before anything is decoded."""
+"""PNG files in and out, as RGBA arrays (h, w, 4) of bytes; what is damaged is told before anything is decoded."""
 
 from __future__ import annotations
 
-import os
+import secrets
 import struct
+import zlib
+from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
+from dataclasses import dataclass
+from pathlib import Path, PurePath
 
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Image, InputError
+from planes.arrays import Image, InputError, shown, within
 from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX
 
 __all__ = ["check_output", "read_png", "write_png", "write_text"]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-GREY = 0
+START = 33
+"""Bytes of the signature and the header's chunk."""
+
+GREY, RGB, PALETTE, GREY_ALPHA, RGBA = 0, 2, 3, 4, 6
+CHANNELS = {GREY: 1, RGB: 3, PALETTE: 1, GREY_ALPHA: 2, RGBA: 4}
+DEPTHS = {GREY: (1, 2, 4, 8, 16), RGB: (8, 16), PALETTE: (1, 2, 4, 8), GREY_ALPHA: (8, 16), RGBA: (8, 16)}
+FILTERS = 5
+WHOLE = ((0, 0, 1, 1),)
+ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
+"""Passes of an interlaced image: first column and row, and the steps between them."""
+
+FILE_BYTES_MAX = 16 * MASK_AREA_MAX
+"""Twice the bytes of the largest image, 16 bits of RGBA, without compression (1 GiB)."""
 
 
-def read_png(path: Path, field: str = "image") -> Image:
-    """Read a PNG of any kind (grey, palette, 1 to 16 bits, with or without transparency) as RGBA bytes.
+@dataclass(frozen=True)
+class _Header:
+    width: int
+    height: int
+    depth: int
+    kind: int
+    compression: int
+    filtering: int
+    interlace: int
+
+    @property
+    def passes(self) -> Iterator[tuple[int, int]]:
+        """Rows of each pass, and the bytes of one of them, its filter's included."""
+        bits = self.depth * CHANNELS[self.kind]
+        for x, y, dx, dy in ADAM7 if self.interlace else WHOLE:
+            columns, rows = -(-(self.width - x) // dx), -(-(self.height - y) // dy)
+            if columns > 0 and rows > 0:
+                yield rows, 1 + (columns * bits + 7) // 8
+
+
+def read_png(path: str | Path, field: str = "image") -> Image:
+    """Read a PNG of any kind (grey, palette, 1 to 16 bits, interlaced, with or without transparency) as RGBA bytes.
 
     Raises
     ------
     InputError
         If the file is missing, is no PNG, is damaged, or is larger than a mask may be.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{field}: expected a PNG file, got {path.name!r}: {error.strerror}") from error
-    kind = _checked_header(data, f"{field}: {path.name!r}")
-    import cv2  # here, because a scene without image files need not load it
-
-    decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if decoded is None:
-        raise InputError(f"{field}: expected a whole PNG file, got {path.name!r}, which is damaged")
-    raw = np.asarray(decoded)
-    shades = _grey_key(data, raw) if kind == GREY else None
-    return _rgba(raw, shades)
+    if not isinstance(path, str | PurePath):
+        raise InputError(f"{field}: expected a path, got {shown(path)}")
+    path = Path(path)
+    data = _contents(path, field)
+    with within(f"{field}: {path.name!r}"):
+        header = _header(data, len(data))
+        chunks = _chunks(header, data)
+        _check_pixels(header, chunks[b"IDAT"])
+        return _rgba(header, _decoded(header, chunks[b"IDAT"]), chunks)
 
 
 def write_png(path: Path, image: Image) -> None:
@@ -59,15 +90,20 @@ def write_text(path: Path, text: str) -> None:
 
 def check_output(path: Path) -> None:
     """Refuse, before any work is done, a place where no file can be written."""
-    if not path.name or (path.exists() and not path.is_file()):
+    try:
+        is_other = path.exists() and not path.is_file()
+        has_folder = path.parent.is_dir()
+    except OSError as error:
+        raise InputError(f"output: cannot write {path}: {error.strerror}") from error
+    if not path.name or "\0" in path.name or is_other:
         raise InputError(f"output: cannot write {path}: expected the name of a file")
-    if not path.parent.is_dir():
+    if not has_folder:
         raise InputError(f"output: cannot write {path}: no folder {path.parent}")
 
 
 def _replace(path: Path, data: bytes) -> None:
     check_output(path)
-    aside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")  # two that write at once do not share it
     try:
         aside.write_bytes(data)
         aside.replace(path)
@@ -78,39 +114,152 @@ def _replace(path: Path, data: bytes) -> None:
             aside.unlink()
 
 
-def _checked_header(data: bytes, what: str) -> int:
-    """Colour type of a PNG whose size is within the limits."""
-    if data[:8] != SIGNATURE or data[12:16] != b"IHDR" or len(data) < 33:
-        raise InputError(f"{what}: expected a PNG file, got something else ({len(data)} bytes)")
-    width, height = struct.unpack(">II", data[16:24])
+def _contents(path: Path, field: str) -> bytes:
+    """Bytes of a file; no more than the first of them if they are not those of a PNG within the limits."""
+    what = f"{field}: expected a PNG file, got {path.name!r}"
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{what}, which is a folder, a pipe or a device")
+        with path.open("rb") as file:
+            start = file.read(START)
+            size = path.stat().st_size
+            with within(f"{field}: {path.name!r}"):
+                _header(start, size)
+            if size > FILE_BYTES_MAX:
+                raise InputError(f"{what} of {size} bytes, more than any that a mask may come from")
+            return start + file.read()
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # a zero byte in the name is a ValueError
+        raise InputError(f"{what}: {getattr(error, 'strerror', error)}") from error
+
+
+def _header(start: bytes, size: int) -> _Header:
+    """Header of a PNG whose size is within the limits; `size` of the file is for the error."""
+    if start[:16] != SIGNATURE + b"\0\0\0\x0dIHDR" or len(start) < START:
+        raise InputError(f"expected a PNG file, got something else ({size} bytes)")
+    header = _Header(*struct.unpack(">IIBBBBB", start[16:29]))
+    width, height = header.width, header.height
     if not (0 < width <= MASK_SIDE_MAX and 0 < height <= MASK_SIDE_MAX and width * height <= MASK_AREA_MAX):
         limit = f"sides from 1 to {MASK_SIDE_MAX} px and at most {MASK_AREA_MAX} px in all"
-        raise InputError(f"{what}: expected {limit}, got {width} x {height}")
-    return data[25]
+        raise InputError(f"expected {limit}, got {width} x {height}")
+    known = header.depth in DEPTHS.get(header.kind, ())
+    if not known or header.compression or header.filtering or header.interlace > 1:
+        raise _damaged(f"{header.depth} bits of colour type {header.kind}, or a method that no PNG has")
+    return header
 
 
-def _grey_key(data: bytes, decoded: npt.NDArray[np.generic]) -> int | None:
-    """Transparent shade of a grey PNG, in the decoded range: OpenCV loses it."""
-    at = 8
-    while at + 12 <= len(data):
+def _damaged(why: str) -> InputError:
+    return InputError(f"expected a whole PNG file, got one that is damaged: {why}")
+
+
+def _chunks(header: _Header, data: bytes) -> dict[bytes, bytes]:
+    """Palette, transparency and pixels, each joined; what else a PNG may bring says nothing of its pixels."""
+    found: dict[bytes, list[bytes]] = {b"IDAT": [], b"PLTE": [], b"tRNS": []}
+    last = b""
+    for name, body in _each_chunk(data):
+        if name in (b"PLTE", b"tRNS") and (found[name] or found[b"IDAT"]):
+            raise _damaged(f"{name.decode()} again, or after the pixels")
+        if name == b"IDAT" and found[name] and last != name:
+            raise _damaged("its pixels are not in one place")
+        if name not in found and name != b"IEND" and not name[0] & 0x20:
+            raise _damaged(f"a chunk {name!r} that is not known and must be")
+        found.get(name, []).append(body)
+        last = name
+    chunks = {name: b"".join(bodies) for name, bodies in found.items()}
+    palette, key = len(chunks[b"PLTE"]), len(chunks[b"tRNS"])
+    if header.kind == PALETTE and (not palette or palette % 3 or palette > 768):
+        raise _damaged(f"a palette of {palette} bytes")
+    if header.kind in (GREY_ALPHA, RGBA):
+        chunks[b"tRNS"] = b""  # the pixels have an alpha of their own
+    elif found[b"tRNS"] and key != {GREY: 2, RGB: 6, PALETTE: min(key, palette // 3)}[header.kind]:
+        raise _damaged(f"a transparency of {key} bytes")
+    return chunks
+
+
+def _each_chunk(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Names and bodies of the chunks after the header, up to the end."""
+    at, name = 8, b""
+    while name != b"IEND":
+        if at + 12 > len(data):
+            raise _damaged("it ends too early")
         length, name = struct.unpack(">I4s", data[at : at + 8])
-        if name == b"tRNS" and length >= 2:
-            shade = int.from_bytes(data[at + 8 : at + 10], "big")
-            return shade * (255 // (2 ** data[24] - 1)) if decoded.dtype == np.uint8 else shade
-        if name == b"IDAT":
-            break
-        at += 12 + length
-    return None
+        end = at + 12 + length
+        if end > len(data) or not name.isalpha():
+            raise _damaged(f"it ends within a chunk {name!r}")
+        if zlib.crc32(data[at + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
+            raise _damaged(f"the checksum of {name.decode()} is wrong")
+        if at > 8:
+            yield name, data[at + 8 : end - 4]
+        at = end
 
 
-def _rgba(decoded: npt.NDArray[np.generic], transparent: int | None) -> Image:
-    """Grey, BGR or BGRA of 8 or 16 bits to RGBA of 8, each value to the nearest."""
-    pixels = decoded.astype(np.uint32)
-    if pixels.ndim == 2:
-        pixels = np.repeat(pixels[:, :, None], 3, axis=2)
-    top = 255 if decoded.dtype == np.uint8 else 65535
-    alpha = pixels[:, :, 3] if pixels.shape[2] == 4 else np.full(pixels.shape[:2], top, np.uint32)
-    if transparent is not None:
-        alpha = np.where(pixels[:, :, 0] == transparent, 0, top).astype(np.uint32)
-    out = np.dstack([pixels[:, :, 2::-1], alpha])
-    return ((out * 255 + top // 2) // top).astype(np.uint8)
+def _check_pixels(header: _Header, packed: bytes) -> None:
+    """Refuse a stream of pixels that is broken, too short or too long, or has an unknown filter."""
+    size = sum(rows * row_bytes for rows, row_bytes in header.passes)
+    stream = zlib.decompressobj()
+    try:
+        raw = np.frombuffer(stream.decompress(packed, size + 1), np.uint8)
+    except zlib.error as error:
+        raise _damaged(f"its pixels: {error}") from error
+    if len(raw) != size or not stream.eof or stream.unused_data:
+        raise _damaged(f"its pixels: expected {size} bytes, got {'more' if len(raw) > size else len(raw)}")
+    at = 0
+    for rows, row_bytes in header.passes:
+        if raw[at : at + rows * row_bytes : row_bytes].max() >= FILTERS:
+            raise _damaged("its pixels: an unknown filter")
+        at += rows * row_bytes
+
+
+def _decoded(header: _Header, packed: bytes) -> npt.NDArray[np.unsignedinteger]:
+    """Pixels as OpenCV decodes them, from the header and the pixels alone.
+
+    It is given no palette, and no transparency: those it loses or not, by kind and version. Numbers of a palette are
+    packed like shades of grey. A profile or a note cannot make it speak.
+    """
+    import cv2  # here, because a scene without image files need not load it
+
+    kind = GREY if header.kind == PALETTE else header.kind
+    start = struct.pack(">IIBBBBB", header.width, header.height, header.depth, kind, 0, 0, header.interlace)
+    plain = SIGNATURE + b"".join(_chunk(*c) for c in ((b"IHDR", start), (b"IDAT", packed), (b"IEND", b"")))
+    decoded = cv2.imdecode(np.frombuffer(plain, np.uint8), cv2.IMREAD_UNCHANGED)
+    if decoded is None or decoded.shape[:2] != (header.height, header.width):
+        raise _damaged("OpenCV cannot decode it")
+    return np.asarray(decoded)
+
+
+def _chunk(name: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+
+def _rgba(header: _Header, decoded: npt.NDArray[np.unsignedinteger], chunks: dict[bytes, bytes]) -> Image:
+    """Numbers of a palette, grey, BGR or BGRA of 8 or 16 bits to RGBA of 8, each value to the nearest."""
+    key, top = chunks[b"tRNS"], 2**header.depth - 1
+    shade = max(255 // top, 1)  # fewer bits than 8 come spread over 0 .. 255
+    if header.kind == PALETTE:
+        return _colored(decoded // shade, chunks[b"PLTE"], key)
+    out = np.full((*decoded.shape[:2], 4), 255, np.uint8)
+    channels = decoded[:, :, None] if decoded.ndim == 2 else decoded
+    for to, of in enumerate((0, 0, 0) if channels.shape[2] == 1 else (2, 1, 0, 3)[: channels.shape[2]]):
+        out[:, :, to] = _bytes(channels[:, :, of])
+    if key:
+        color = (np.frombuffer(key, ">u2")[::-1].astype(np.int64) & top) * shade
+        out[(channels == color).all(axis=2), 3] = 0
+    return out
+
+
+def _colored(numbers: npt.NDArray[np.unsignedinteger], palette: bytes, alphas: bytes) -> Image:
+    """Colours of a palette; those without an alpha are opaque."""
+    colors = np.full((len(palette) // 3, 4), 255, np.uint8)
+    colors[:, :3] = np.frombuffer(palette, np.uint8).reshape(-1, 3)
+    colors[: len(alphas), 3] = np.frombuffer(alphas, np.uint8)
+    if int(numbers.max()) >= len(colors):
+        raise _damaged(f"a pixel of colour {numbers.max()} of a palette of {len(colors)}")
+    return np.asarray(colors[numbers])
+
+
+def _bytes(values: npt.NDArray[np.unsignedinteger]) -> npt.NDArray[np.uint8]:
+    """8 of 16 bits, to the nearest."""
+    if values.dtype == np.uint8:
+        return np.asarray(values, np.uint8)
+    return ((values.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
