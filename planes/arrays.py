@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 __all__ = [
     "Bools", "Floats", "Image", "InputError", "Ints", "array_of", "bools", "choice", "each", "flag", "integer",
-    "integers", "real", "reals", "shown", "within",
+    "integers", "listed", "real", "reals", "shown", "within",
 ]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
@@ -143,6 +143,13 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
     if len(names) > NAMES_SHOWN:
         listed += f" and {len(names) - NAMES_SHOWN} more"
     raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")
+
+
+def listed(field: str, values: object, expected: str) -> list[Any]:
+    """Take whatever can be gone through as a list; a text is refused."""
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
+        raise InputError(f"{field}: expected {expected}, got {shown(values)}")
+    return list(values)
 
 
 def shown(value: object) -> str:

@@ -28,6 +28,9 @@ MASK_SIDE_MAX = 2**15
 MASK_AREA_MAX = 2**26
 """Largest area of a mask or an image, px (64 Mpx: a 256 MB picture)."""
 
+FRAMES_MAX = 2**16
+"""Frames of one sprite: beyond it a sheet was cut by the wrong size, and each frame takes about 1 KB."""
+
 PLANE_SIDE_MAX = 65_535
 """Longest side of a plane, px."""
 

@@ -16,8 +16,9 @@ ONE = 1 << SCALE_BITS
 
 def points(field: str, values: object, n: int) -> Floats:
     """Positions (n, 2), or one (2,) for all, px."""
-    array = array_of(field, values)
-    return reals(field, np.broadcast_to(array, (n, 2)) if array.shape == (2,) else array, (n, 2), POSITION_MAX)
+    if array_of(field, values).shape == (2,):
+        return np.broadcast_to(reals(field, values, (2,), POSITION_MAX), (n, 2))
+    return reals(field, values, (n, 2), POSITION_MAX)
 
 
 def scale_pair(scale: object) -> tuple[float, float]:

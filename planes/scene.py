@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, reals, within
+from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
@@ -19,13 +19,16 @@ from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
 from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, write_scene
-from planes.schema import Text
+from planes.schema import Text, typed
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
 __all__ = ["Planes", "Scene", "load_scene"]
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
+FIELDS = ("background", "hittable", "movers", "occluders", "hud")
+"""What the planes of each role are called, in the order of ROLES."""
+
 DEFAULT_CATEGORY = "default"
 """Name of the first category bit: the one that objects have unless told otherwise."""
 
@@ -62,9 +65,11 @@ class Scene:
         name: str = "scene",
     ) -> None:
         self.name = Text().check("name", name)
-        if isinstance(categories, str) or not isinstance(categories, Iterable):
-            raise InputError(f"categories: expected a list of names, got {categories!r}")
-        self.categories = (DEFAULT_CATEGORY, *(Text().check("categories", category) for category in categories))
+        names = listed("categories", categories, "a list of names")
+        self.categories = (
+            DEFAULT_CATEGORY,
+            *(Text().check(f"categories[{i}]", other) for i, other in enumerate(names)),
+        )
         if len(self.categories) > CATEGORY_BITS:
             raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
         if len(set(self.categories)) < len(self.categories):
@@ -99,16 +104,17 @@ class Scene:
             named by its label; (n, h, w) booleans: one object each; (h, w, 3 or 4) bytes: an image.
         origin_xy : pixel of the world at [0, 0]
         """
-        given = {"background": background, "hittable": hittable, "mover": movers, "occluder": occluders, "hud": hud}
-        arrays = {role: array_of(role, plane) for role, plane in given.items() if plane is not None}
-        sizes = {plane_size(role, array) for role, array in arrays.items()}
+        given = dict(zip(FIELDS, (background, hittable, movers, occluders, hud), strict=True))
+        arrays = {field: array_of(field, plane) for field, plane in given.items() if plane is not None}
+        sizes = {plane_size(field, array) for field, array in arrays.items()}
         if len(sizes) != 1:
             raise InputError(f"planes: expected one or more, all of one size, got {sorted(sizes)}")
         scene = cls(next(iter(sizes)), origin_xy)
         x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
-        for role, array in arrays.items():
-            in_picture = role == "hud"
-            for name, sprite, left, top in plane_objects(role, array):
+        for field, array in arrays.items():
+            role = ROLES[FIELDS.index(field)]
+            in_picture = role is Role.HUD
+            for name, sprite, left, top in plane_objects(field, role.value, array):
                 scene.add(sprite, (left, top) if in_picture else (x + left, y + top), role=role, name=name)
         return scene
 
@@ -284,8 +290,7 @@ class Scene:
         box = self.extent()
         x, y, x_max, y_max = box
         out: dict[str, npt.NDArray[np.int32]] = {}
-        fields = ("background", "hittable", "movers", "occluders", "hud")
-        for field, role in zip(fields, ROLES, strict=True):
+        for field, role in zip(FIELDS, ROLES, strict=True):
             at = (0, 0, x_max - x, y_max - y) if role is Role.HUD else box
             out[field] = label_plane(self.items.stack_of(role), at)
             out[field].flags.writeable = False
@@ -309,6 +314,9 @@ class Scene:
 
     def save(self, folder: str | Path) -> None:
         """Write the scene as a folder of scene.json and PNGs; `load_scene` gives the same verdicts."""
+        Text().check("name", self.name)
+        typed("weapons", self.weapons, dict)
+        typed("shots", self.shots, list)
         objects = [self._file_object(item) for item in self.ids().tolist()]
         x, y, x_max, y_max = self.bounds or (0, 0, 0, 0)
         size = None if self.bounds is None else (x_max - x + 1, y_max - y + 1)
@@ -353,13 +361,14 @@ class Scene:
     def _existing(self, ids: object) -> Ints:
         """Ids that are in the scene, each once."""
         given = np.atleast_1d(array_of("ids", ids))
-        rows = integers("ids", given if given.size else np.zeros(0, np.int64), (None,), 0, self.items.count - 1)
+        rows = integers("ids", given, (None,), 0, self.items.count - 1)
         gone = rows[self.items.alive[rows] == 0]
         if len(gone):
             row = int(np.flatnonzero(rows == gone[0])[0])
             raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
-        if len(np.unique(rows)) < len(rows):
-            raise InputError(f"ids: expected each object once, got {rows.tolist()!r:.60}")
+        again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
+        if len(again):
+            raise InputError(f"ids[{again[0]}]: expected each object once, got {rows[again[0]]} again")
         return rows
 
     def _bits(self, categories: object, default: int) -> int:
@@ -367,9 +376,7 @@ class Scene:
             return default
         if isinstance(categories, int | np.integer):
             return integer("categories", categories, 0, ALL)
-        if isinstance(categories, str) or not isinstance(categories, Iterable):
-            raise InputError(f"categories: expected bits or a list of names, got {categories!r}")
-        return self.category_bits(*categories)
+        return self.category_bits(*listed("categories", categories, "bits or a list of names"))
 
     def _bits_per_row(self, categories: object, n: int) -> Ints:
         values = array_of("categories", categories)

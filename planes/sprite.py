@@ -17,9 +17,24 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Image, InputError, Ints, array_of, bools, choice, integer, integers, real, reals
+from planes.arrays import (
+    Bools,
+    Image,
+    InputError,
+    Ints,
+    array_of,
+    bools,
+    choice,
+    integer,
+    integers,
+    listed,
+    real,
+    reals,
+    shown,
+)
 from planes.constants import (
     ALPHA_THRESHOLD,
+    FRAMES_MAX,
     HALF,
     MASK_AREA_MAX,
     MASK_SIDE_MAX,
@@ -129,6 +144,8 @@ class Sprite:
         InputError
             Naming the field: not bytes, not an image, frames that leave it, a sheet that the grid does not divide.
         """
+        if source is not None and not isinstance(source, dict):
+            raise InputError(f"source: expected an object, got {shown(source)}")
         rgba = _as_rgba(image)
         threshold = integer("alpha_threshold", alpha_threshold, 0, 255)
         mask = rgba[:, :, 3] > threshold
@@ -152,16 +169,17 @@ class Sprite:
         source: dict[str, Any] | None = None,
     ) -> Sprite:
         """Take a boolean array (h, w) as the mask of one frame."""
-        checked = bools("mask", mask, (None, None))
-        _check_size("mask", checked.shape[1], checked.shape[0])
+        given = array_of("mask", mask)
+        if given.ndim == 2:
+            _check_size("mask", given.shape[1], given.shape[0])
+        checked = bools("mask", given, (None, None))
         return cls((Frame(_frozen(checked)),), _pivot(pivot_xy), color=_color(color), source=source)
 
     @classmethod
     def polygon(cls, points_xy: object, holes: Sequence[object] = (), *, color: Sequence[int] | None = None) -> Sprite:
         """Shape of points (n, 2) in px about the position; holes by the even-odd rule; edges belong to it."""
-        if isinstance(holes, str) or not isinstance(holes, Sequence | np.ndarray):
-            raise InputError(f"holes: expected a list of rings, got {holes!r:.60}")
-        given = [("polygon", points_xy), *((f"holes[{i}]", hole) for i, hole in enumerate(holes))]
+        others = enumerate(listed("holes", holes, "a list of rings"))
+        given = [("polygon", points_xy), *((f"holes[{i}]", hole) for i, hole in others)]
         rings = []
         for name, points in given:
             checked = reals(name, points, (None, 2), MASK_SIDE_MAX)
@@ -195,6 +213,8 @@ class Sprite:
 def as_sprite(value: object) -> Sprite:
     """Take a Sprite, a boolean array (h, w) or an image (h, w, 3 or 4): whatever `numpy.asarray` takes."""
     if isinstance(value, Sprite):
+        if not value.outline and not value.frames:
+            raise InputError("sprite: expected one that a class method made, got one without a mask")
         return value
     array = array_of("sprite", value)
     if array.ndim == 2:
@@ -374,8 +394,8 @@ def _frame_rects(
         raise InputError("frames: expected grid_wh or rects_xywh, got both")
     if rects_xywh is not None:
         rects = integers("rects_xywh", rects_xywh, (None, 4), 0, MASK_SIDE_MAX)
-        if not len(rects):
-            raise InputError("rects_xywh: expected at least one rectangle, got none")
+        if not 1 <= len(rects) <= FRAMES_MAX:
+            raise InputError(f"rects_xywh: expected 1 to {FRAMES_MAX} rectangles, got {len(rects) or 'none'}")
         for i, (x, y, w, h) in enumerate(rects.tolist()):
             if w < 1 or h < 1 or x + w > width or y + h > height:
                 got = [x, y, w, h]
@@ -386,6 +406,8 @@ def _frame_rects(
     w, h = integers("grid_wh", grid_wh, (2,), 1, MASK_SIDE_MAX).tolist()
     if width % w or height % h:
         raise InputError(f"grid_wh: expected to divide the image of {width} x {height}, got {[w, h]}")
+    if (width // w) * (height // h) > FRAMES_MAX:
+        raise InputError(f"grid_wh: expected at most {FRAMES_MAX} frames, got {[w, h]} in {width} x {height}")
     return [[x, y, w, h] for y in range(0, height, h) for x in range(0, width, w)]
 
 

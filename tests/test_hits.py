@@ -577,7 +577,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"aim": 0, "toward": (5, 5)}, r"aim: expected aim or toward, got both"),
     ({"toward": [(5, 5), (1, 1)]}, r"toward\[1\]: expected a point other than the shot's own"),
     ({"toward": [(5, 5)] * 3}, r"toward: expected shape \(2, 2\)"),
-    ({"toward": (NAN, 0)}, r"toward\[0\]\[0\]: expected a finite number"),
+    ({"toward": (NAN, 0)}, r"toward\[0\]: expected a finite number"),
     ({"accept": [1, -1]}, r"accept\[1\]: expected a whole number from 0 to 4294967295, got -1"),
     ({"accept": 2**32}, r"accept\[0\]: expected"),
     ({"accept": 0.5}, r"accept\[0\]: expected a whole number"),

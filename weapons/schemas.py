@@ -33,7 +33,7 @@ from planes.schema import (
     Word,
     json_of,
 )
-from weapons.arsenal import KINDS, Plain, Weapon
+from weapons.arsenal import KINDS, Plain, Weapon, weapon_from_json
 from weapons.explain import REASONS
 from weapons.facts import FORMAT
 from weapons.orders import SHOT
@@ -53,6 +53,15 @@ SHARE = Number(0, 1)
 ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
 VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
 STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
+
+
+class WeaponJson(Ref):
+    """A weapon, checked by its own table."""
+
+    def check(self, name: str, value: object) -> object:
+        """Check that a weapon can be made of it."""
+        weapon_from_json(value, name)
+        return value
 
 
 def _all(keys: dict[str, Value]) -> Within:
@@ -139,7 +148,7 @@ KEYS: dict[str, Value] = {
         }
     ),
     "view_xyxy": BOX,
-    "weapons": Mapped(Ref("weapon")),
+    "weapons": Mapped(WeaponJson("weapon")),
     "shots": Rows(TOLD),
     "batch": Optional(BATCH),
 }

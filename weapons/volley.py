@@ -99,9 +99,8 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    given = array_of("at", at)
-    single = given.shape == (2,)
-    at_256 = snap(reals("at", given.reshape(1, 2) if single else given, (None, 2), POSITION_MAX))
+    single = array_of("at", at).shape == (2,)
+    at_256 = snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2)
     n = len(at_256)
     numbers = np.arange(n) if shot is None else shot
     return Shots(
