@@ -44,13 +44,15 @@ def within(place: str) -> Iterator[None]:
         raise InputError(f"{place}: {error}") from error
 
 
-def array_of(field: str, values: object, shape: Shape | None = None) -> npt.NDArray[Any]:
+def array_of(
+    field: str, values: object, shape: Shape | None = None, dtype: npt.DTypeLike | None = None
+) -> npt.NDArray[Any]:
     """Take whatever `numpy.asarray` takes; rows of different length and the like are refused by name.
 
     So is what it would change without a word: masked values, and true and false among numbers.
     """
     try:
-        array = np.asarray(values)
+        array = np.asarray(values, dtype)
     except (ValueError, TypeError, OverflowError) as error:
         of_shape = "" if shape is None else f" of shape {_spelled(shape)}"
         raise InputError(f"{field}: expected an array{of_shape}, got {shown(values)}") from error

@@ -28,7 +28,7 @@ numbers = st.one_of(st.integers(0, 9), st.integers(0, 2**40))
 counters = st.tuples(numbers, numbers, numbers)  # shot, round, pellet
 
 
-def offsets(radius_256: int, seed: int, shot, round_, pellet) -> np.ndarray:
+def offsets(radius_256: int, seed, shot, round_, pellet) -> np.ndarray:
     """Draw with the three counters broadcast to one length."""
     rows = np.broadcast_arrays(np.asarray(shot, np.int64), np.asarray(round_, np.int64), np.asarray(pellet, np.int64))
     return draws.disc_offsets(radius_256, seed, *(np.atleast_1d(column).copy() for column in rows))
@@ -125,6 +125,13 @@ def test_a_row_depends_on_itself_alone(radius_256: int, seed: int, rows: list[tu
     assert np.array_equal(shuffled, whole[list(order)])
     for i in order[:3]:
         assert np.array_equal(offsets(radius_256, seed, *rows[i])[0], whole[i])
+
+
+@FEW
+@given(st.integers(0, 40 * 256), st.lists(st.tuples(seeds, counters), min_size=1, max_size=30))
+def test_rows_with_seeds_of_their_own(radius_256: int, rows: list[tuple[int, tuple[int, int, int]]]) -> None:
+    whole = offsets(radius_256, np.array([s for s, _ in rows], np.uint64), *np.array([c for _, c in rows]).T)
+    assert np.array_equal(whole, np.concatenate([offsets(radius_256, seed, *numbers) for seed, numbers in rows]))
 
 
 def test_a_big_batch_can_be_fired_again_one_by_one() -> None:

@@ -14,6 +14,8 @@ import numpy as np
 import oracle_raster
 import oracle_stack
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planes import ALL, InputError, Scene, Sprite
 from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire
@@ -410,6 +412,55 @@ def test_the_order_of_a_batch_changes_no_shot(seed: int) -> None:
         which = len(volley.shots) - 1 - i % len(volley.shots)
         assert [row[1:] for row in twice.of(i)] == [row[1:] for row in forward.of(which)]
         assert twice.verdict_counts(i) == forward.verdict_counts(which)
+
+
+SEEDS = st.sampled_from([0, 1, 2**53 + 1, 2**63 - 1, 2**63, 2**64 - 2, 2**64 - 1])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(SEEDS, st.integers(0, 9)), min_size=1, max_size=12), st.booleans())
+def test_shots_with_seeds_of_their_own_are_the_shots_fired_one_by_one(
+    shots: list[tuple[int, int]], as_array: bool
+) -> None:
+    scene = Scene((60, 60))
+    scene.add(square(9), (25, 25))
+    weapon = Spread(Point(), count=5, radius=20)
+    seeds, numbers = (list(column) for column in zip(*shots, strict=True))
+    given_seeds = np.array(seeds, np.uint64) if as_array else seeds
+    hits = fire(scene, weapon, [(30, 30)] * len(shots), seed=given_seeds, shot=numbers)
+    assert hits.shots.seed.tolist() == seeds
+    for i, (seed, number) in enumerate(shots):
+        alone = fire(scene, weapon, (30, 30), seed=seed, shot=[number])
+        assert [row[1:] for row in hits.of(i)] == [row[1:] for row in alone]
+        assert hits.verdict_counts(i) == alone.verdict_counts()
+        assert np.array_equal(hits.samples_at(i).xy, alone.samples_at().xy)
+
+
+def test_seeds_stay_with_their_shots_in_the_parts_of_a_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene((60, 60))
+    scene.add(square(9), (25, 25))
+    weapon, seeds = Spread(Point(), count=5, radius=20), np.arange(40, dtype=np.uint64)
+    whole = fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3)
+    monkeypatch.setattr("weapons.firing.CHUNK_SAMPLES", 35)
+    assert whole and fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3) == whole
+
+
+@pytest.mark.parametrize(
+    ("seeds", "told"),
+    [
+        ([1, 2**64], r"seed\[1\]: expected a whole number from 0 to 18446744073709551615, got 18446744073709551616"),
+        ([-1, 2**64 - 1], r"seed\[0\]: expected a whole number .*, got -1"),
+        ([1.5, 2], r"seed\[0\]: expected a whole number .*, got 1.5"),
+        (np.array([3, -7]), r"seed\[1\]: expected a whole number .*, got -7"),
+        ([True, 2], r"seed\[0\]: expected a whole number .*, got True"),
+        ([1, 2, 3], r"seed: expected one, or one for each of 2 shots, got shape \(3,\)"),
+        ("12", r"seed: expected a whole number .*, got '12'"),
+        (None, r"seed: expected a whole number .*, got None"),
+    ],
+)
+def test_bad_seeds_are_named(seeds: object, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        fire(Scene(), Point(), [(0, 0), (1, 1)], seed=seeds)
 
 
 # Small pictures: what is on the screen, front-most letter on top, and what a shot does to it

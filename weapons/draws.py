@@ -11,7 +11,7 @@ import numpy.typing as npt
 from planes.arrays import Ints
 from planes.constants import SUB
 
-__all__ = ["disc_offsets", "mix64"]
+__all__ = ["Words", "disc_offsets", "mix64"]
 
 Words = npt.NDArray[np.uint64]
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -28,17 +28,17 @@ def mix64(words: Words) -> Words:
     return z
 
 
-def disc_offsets(radius_256: int, seed: int, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
+def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
     """Whole-pixel offsets (n, 2), uniform over the centres of a disc, by rejection on integers.
 
     Parameters
     ----------
     radius_256 : radius in 1/256 px
-    seed : 0 .. 2**64 - 1
-    shot, round_, pellet : (n,) int64; a row depends on its own three numbers only
+    seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
+    shot, round_, pellet : (n,) int64; a row depends on its seed and its own three numbers only
     """
     rows = np.broadcast_arrays(shot, round_, pellet)
-    key = mix64(np.full(rows[0].shape, seed, np.uint64))
+    key = mix64(np.broadcast_to(np.asarray(seed, np.uint64), rows[0].shape))
     for word in rows:
         key = mix64((key ^ word.astype(np.uint64)) + GOLDEN)
     reach = radius_256 // SUB

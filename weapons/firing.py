@@ -30,7 +30,7 @@ def fire(
     toward: object = None,
     accept: object = ALL,
     exclude: object = None,
-    seed: int = 0,
+    seed: object = 0,
     shot: object = None,
     prefilter: str = "auto",
     strategy: str = "auto",
@@ -52,7 +52,7 @@ def fire(
     prefilter : "auto", "none", "box": what goes before the pixels; it changes no row
     strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row
 
-    Each of aim, toward, accept, exclude and shot is one for all shots or one for each.
+    Each of aim, toward, accept, exclude, seed and shot is one for all shots or one for each.
 
     Raises
     ------

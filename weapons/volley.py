@@ -11,7 +11,7 @@ from planes.constants import ALL, POSITION_MAX, SEED_MAX
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
 from planes.poses import points
 from weapons.arsenal import Weapon, parts_of, pattern_of
-from weapons.draws import disc_offsets
+from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 
 __all__ = ["Shots", "Volley", "checked_shots", "volley_of"]
@@ -30,7 +30,7 @@ class Shots:
     accept : (N,) category bits
     exclude : (N, K) owners, -1 for none
     number : (N,) shot numbers, for the draws
-    seed : of the draws
+    seed : (N,) uint64, of the draws
     """
 
     at_256: Ints
@@ -38,7 +38,7 @@ class Shots:
     accept: Ints
     exclude: Ints
     number: Ints
-    seed: int
+    seed: Words
 
     def __len__(self) -> int:
         return len(self.number)
@@ -53,6 +53,7 @@ class Shots:
             accept=self.accept[part],
             exclude=self.exclude[part],
             number=self.number[part],
+            seed=self.seed[part],
         )
 
 
@@ -109,7 +110,7 @@ def checked_shots(
         integers("accept", each("accept", accept, n), (n,), 0, ALL),
         _owners(exclude, n, single),
         integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
-        integer("seed", seed, 0, SEED_MAX),
+        _seeds(seed, n),
     )
 
 
@@ -128,7 +129,8 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     origin_xy = pixel(origin)
     xy = origin_xy
     if spread:
-        xy = origin_xy + disc_offsets(int(snap(spread.radius)), shots.seed, shots.number[shot], round_, pellet)
+        seed, number = shots.seed[shot], shots.number[shot]
+        xy = origin_xy + disc_offsets(int(snap(spread.radius)), seed, number, round_, pellet)
     if not plain.directed:
         table = PatternTable([pattern_of(plain, ONE, 0)])
         return Volley(table, np.zeros(len(shot), np.int64), xy, origin_xy, shot, round_, pellet)
@@ -157,6 +159,19 @@ def _recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
         return direction
     c, s = unit(degrees * np.arange(int(round_.max(initial=0)) + 1))
     return turned(direction, c[round_], s[round_])
+
+
+def _seeds(seed: object, n: int) -> Words:
+    """Seeds (n,): one for all, or one for each."""
+    # As objects: numpy would make float64 of a list with numbers on both sides of 2**63, and lose their last bits.
+    given = seed if isinstance(seed, np.ndarray) else array_of("seed", seed, dtype=object)
+    if given.ndim == 0:
+        return np.full(n, integer("seed", given.item(), 0, SEED_MAX), np.uint64)
+    if given.shape != (n,):
+        raise InputError(f"seed: expected one, or one for each of {n} shots, got shape {given.shape}")
+    if given.dtype.kind != "u":
+        given = np.array([integer(f"seed[{i}]", v, 0, SEED_MAX) for i, v in enumerate(given.tolist())], np.uint64)
+    return given.astype(np.uint64)
 
 
 def _owners(exclude: object, n: int, single: bool) -> Ints:
