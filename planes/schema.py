@@ -15,7 +15,7 @@ from planes.arrays import InputError, bools, choice, flag, integer, integers, re
 
 __all__ = [
     "Const", "Either", "Flag", "Keys", "Mapped", "Mask", "Names", "Number", "Numbers", "Optional", "Ref", "Rows",
-    "Text", "Value", "Whole", "Wholes", "Within", "Word", "json_of", "typed",
+    "Text", "Value", "Whole", "Wholes", "Within", "Word", "distinct_keys", "json_of", "typed",
 ]  # fmt: skip
 
 TEXT_MAX = 200
@@ -335,22 +335,24 @@ class Ref:
 def json_of(text: str) -> Any:
     """Parse JSON in which no key comes twice and every number is finite."""
 
-    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            names = [key for key, _ in pairs]
-            raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
-        return found
-
     def number(text: str) -> float:
         raise InputError(f"number: expected a finite number, got {text}")
 
     try:
-        return json.loads(text, object_pairs_hook=distinct, parse_constant=number)
+        return json.loads(text, object_pairs_hook=distinct_keys, parse_constant=number)
     except InputError:
         raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON in UTF-8: {error}") from error
+
+
+def distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """JSON object of its pairs, as `object_pairs_hook`: a key that comes twice is refused."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [key for key, _ in pairs]
+        raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
+    return found
 
 
 def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from planes.arrays import choice, integer, within
+from planes.arrays import InputError, choice, integer, within
 from planes.constants import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
 from planes.scene import Scene
 from planes.schema import Either, Keys, Names, Number, Numbers, Optional, Rows, Text, Whole
@@ -13,7 +13,7 @@ from weapons.arsenal import Weapon
 from weapons.firing import fire
 from weapons.hits import Hits
 
-__all__ = ["Order", "fire_order", "order_from_json", "orders_of"]
+__all__ = ["AIM_MAX", "SHOT", "Order", "fire_order", "order_from_json", "orders_of"]
 
 AIM_MAX = 10**9
 """Largest aim, degrees, either way: beyond it a float has lost the angle."""
@@ -74,6 +74,8 @@ def order_from_json(
     with within(place):
         shot = SHOT.check("shot", data)
         name = choice("weapon", shot["weapon"], arsenal)
+        if shot.get("aim") is not None and shot.get("toward") is not None:
+            raise InputError("aim: expected aim or toward, got both")
         accept = shot.get("accept")
         return Order(
             name,
