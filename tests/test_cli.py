@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -98,9 +99,60 @@ def test_an_interrupt_is_one_line_and_leaves_the_old_report(
     assert png.read_bytes() == before and list(tmp_path.iterdir()) == [png]
 
 
-def test_help_shows_examples_and_bad_words_exit_2() -> None:
-    run = [sys.executable, "-W", "error", "-m", "weapons"]
-    shown = subprocess.run([*run, "report", "--help"], capture_output=True, text=True, check=True).stdout
-    assert "hitplanes report fixtures/gallery --weapon shotgun --at 138,91" in shown
-    assert subprocess.run([*run, "rapport"], capture_output=True, check=False).returncode == 2
-    assert subprocess.run(run, capture_output=True, check=False).returncode == 2
+RUN = [sys.executable, "-W", "error", "-m", "weapons"]
+
+
+@pytest.mark.parametrize("word", ["report", "fire"])
+def test_help_shows_examples(word: str) -> None:
+    shown = subprocess.run([*RUN, word, "--help"], capture_output=True, text=True, check=True).stdout
+    examples = shown.split("examples:\n")[1].splitlines()
+    assert any(line.startswith(f"  hitplanes {word} ") for line in examples)
+    assert all(len(line) <= 120 for line in shown.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["rapport"], "argument COMMAND: invalid choice: 'rapport' (choose from "),
+        ([], "the following arguments are required: COMMAND (see hitplanes --help)"),
+        (["report"], "the following arguments are required: SCENE (see hitplanes report --help)"),
+        (["report", "x", "--aim", "left"], "argument --aim: invalid float value: 'left'"),
+        (["fire", "x"], "the following arguments are required: SHOTS.jsonl"),
+        (["report", "a", "b\nc"], "unrecognized arguments: b c"),
+    ],
+)
+def test_bad_words_are_one_line_and_exit_2(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert error.startswith("hitplanes: ") and told in error and error.count("\n") == 1
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0 and re.fullmatch(r"hitplanes \d+\.\d+\.\d+\n", capsys.readouterr().out)
+
+
+def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
+    png = tmp_path / "r.png"
+    read, write = os.pipe()
+    os.close(read)
+    env = {**os.environ, "PYTHONUNBUFFERED": ""}
+    done = subprocess.run(
+        [*RUN, "report", str(GALLERY), "-o", str(png)], check=False, stdout=write, stderr=subprocess.PIPE, env=env
+    )
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"") and png.exists()
+
+
+def test_the_plan_of_each_shot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["report", str(GALLERY), "--weapon", "blast", "--at", "390,110", "-o", str(tmp_path / "r.png")]
+    assert main(words) == 0
+    without = capsys.readouterr().out
+    assert main([*words, "--plan"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(without) and without.count("\n") == 1
+    assert re.search(r"^  ran      walk, [\d,]+ bytes: samples through the stack, front to back$", shown, re.M)
+    assert "  left out hud: drawn only for a picture\n" in shown

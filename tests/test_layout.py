@@ -18,7 +18,8 @@ ORDER = {
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",
         "orders", "heat", "facts", "schemas", "marks", "world", "panel", "overlay", "inset", "cards", "picture",
-        "jsondiff", "differences", "versus", "cli", "__main__",
+        "jsondiff", "differences", "versus", "shotlog", "part", "progress", "stream",
+        "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

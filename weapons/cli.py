@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from planes.arrays import InputError
 from planes.image import check_output, write_png, write_text
@@ -16,6 +18,9 @@ from weapons.arsenal import arsenal_of
 from weapons.facts import report_of
 from weapons.orders import fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
+from weapons.plan import plan_lines
+from weapons.progress import Progress
+from weapons.stream import fire_log
 
 __all__ = ["main"]
 
@@ -29,12 +34,32 @@ Fire shots at a scene folder and write a picture, and the facts as JSON, that sa
 Without --weapon the shots of scene.json are fired.
 """
 
-EXAMPLES = """\
+REPORT_EXAMPLES = """\
 examples:
   hitplanes report fixtures/gallery
   hitplanes report fixtures/gallery -o report.png --json report.json
   hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
   hitplanes report fixtures/gallery --weapon laser --at 100,167 --aim -4.5
+"""
+
+FIRE_HELP = """\
+Resolve a log of shots, of any length, in little memory: a line in, a line out, in the same order.
+
+A line of SHOTS.jsonl is a shot as in scene.json: {"weapon": "pistol", "at": [62, 86]}, and aim or toward, accept,
+exclude, seed. Shots are numbered by their line, from 0, unless they have "shot". Empty lines are refused.
+
+The first line of HITS.jsonl names the scene, the weapons, the columns of a row and the objects by id; then comes
+{"shot": 0, "of": checksum of the line (CRC-32), "rows": [[object, ...], ...], "verdicts": [empty, hit, ...]}.
+
+Answers are written to HITS.jsonl.part, which is renamed when it is complete. After an interrupt, a full disk or a bad
+line, mended, the same command goes on where it was.
+"""
+
+FIRE_EXAMPLES = """\
+examples:
+  hitplanes fire fixtures/gallery shots.jsonl -o hits.jsonl
+  zcat shots.jsonl.gz | hitplanes fire fixtures/gallery /dev/stdin -o hits.jsonl
+  hitplanes fire fixtures/gallery shots.jsonl --plan
 """
 
 
@@ -43,27 +68,39 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     try:
         arguments.run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read what is printed has seen enough; the files are written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except InputError as error:
         print(f"hitplanes: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("hitplanes: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(": ".join(["hitplanes: interrupted", *map(str, interrupt.args)]), file=sys.stderr)
         return 130
     return 0
 
 
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as all errors of the command are."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong with the words, and exit with 2."""
+        self.exit(2, f"hitplanes: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+
 def parser() -> argparse.ArgumentParser:
     """Words, options and help of the command."""
-    top = argparse.ArgumentParser(prog="hitplanes", description=DESCRIPTION)
+    top = OneLineParser(prog="hitplanes", description=DESCRIPTION)
+    top.add_argument("--version", action="version", version=f"hitplanes {version('hitplanes')}")
     words = top.add_subparsers(required=True, metavar="COMMAND")
-    raw = argparse.RawDescriptionHelpFormatter
-    one = words.add_parser(
-        "report",
-        help="fire at a scene and draw what was hit",
-        description=REPORT_HELP,
-        epilog=EXAMPLES,
-        formatter_class=raw,
-    )
+
+    def word(run: Callable[[argparse.Namespace], None], told: str, text: str, examples: str) -> argparse.ArgumentParser:
+        raw = argparse.RawDescriptionHelpFormatter
+        one = words.add_parser(run.__name__, help=told, description=text, epilog=examples, formatter_class=raw)
+        one.set_defaults(run=run)
+        return one
+
+    one = word(report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
     one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
     one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
@@ -71,7 +108,14 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
     one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
     one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
-    one.set_defaults(run=report)
+    one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
+    one = word(fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
+    one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
+    one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
+    one.add_argument(
+        "-o", "--output", type=Path, default=Path("hits.jsonl"), metavar="HITS.jsonl", help="default: hits.jsonl"
+    )
+    one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
     return top
 
 
@@ -99,6 +143,22 @@ def report(arguments: argparse.Namespace) -> None:
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
         print(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
+        if arguments.plan:
+            _print_plan(shot["plan"])
+
+
+def fire(arguments: argparse.Namespace) -> None:
+    """Write the answers to a log of shots."""
+    check_output(arguments.output)
+    done = fire_log(load_scene(arguments.scene), arguments.shots, arguments.output, Progress(sys.stderr))
+    print(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
+    if arguments.plan:
+        _print_plan(done.plan.to_dict(), done.plan.calls)
+
+
+def _print_plan(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> None:
+    for line in plan_lines(plan, calls):
+        print(f"  {line}")
 
 
 def _check_outputs(picture: Path, facts: Path | None) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from planes.arrays import InputError, choice
 from planes.compose import area
@@ -10,7 +12,7 @@ from planes.items import Role, Stack
 from planes.scene import Scene
 from weapons.pattern import PatternTable
 
-__all__ = ["STRATEGIES", "Plan", "Stage", "chosen_strategy", "leave_out_unused"]
+__all__ = ["STRATEGIES", "Plan", "PlanSum", "Stage", "chosen_strategy", "leave_out_unused", "plan_lines"]
 
 STRATEGIES = ("auto", "direct", "composed")
 
@@ -58,6 +60,39 @@ class Plan:
             "ran": [{"stage": s.name, "why": s.why, "bytes": s.bytes_made} for s in self.ran],
             "left_out": [{"stage": s.name, "why": s.why} for s in self.left_out],
         }
+
+
+class PlanSum:
+    """What many calls did, added up: how often each stage ran or was left out, its bytes, and why it first was so."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+        self._sums: dict[bool, dict[str, dict[str, Any]]] = {True: {}, False: {}}
+
+    def add(self, plan: Plan) -> None:
+        """Count the plan of one call."""
+        self.calls += 1
+        for ran, stages in ((True, plan.ran), (False, plan.left_out)):
+            for stage in stages:
+                new = {"stage": stage.name, "why": stage.why, "bytes": 0, "calls": 0}
+                told = self._sums[ran].setdefault(stage.name, new)
+                told["bytes"] += stage.bytes_made
+                told["calls"] += 1
+
+    def to_dict(self) -> dict[str, list[dict[str, Any]]]:
+        """As `Plan.to_dict`, and with each stage in how many `calls` it was so."""
+        return {"ran": list(self._sums[True].values()), "left_out": list(self._sums[False].values())}
+
+
+def plan_lines(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> list[str]:
+    """Lines that tell a plan, given as JSON, to a reader: what ran, what was left out, and why."""
+    lines = []
+    for key, verb in (("ran", "ran"), ("left_out", "left out")):
+        for stage in plan[key]:
+            often = "" if calls == 1 else f", {stage['calls']} of {calls} calls"
+            made = f", {stage['bytes']:,} bytes" if stage.get("bytes") else ""
+            lines.append(f"{verb:8} {stage['stage']}{often}{made}: {stage['why']}")
+    return lines
 
 
 def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTable, placements: int) -> tuple[str, str]:
