@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ from pathlib import Path
 import cv2
 import pytest
 
+from planes import load_scene
+from weapons import starter
 from weapons.cli import main
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
@@ -102,7 +105,7 @@ def test_an_interrupt_is_one_line_and_leaves_the_old_report(
 RUN = [sys.executable, "-W", "error", "-m", "weapons"]
 
 
-@pytest.mark.parametrize("word", ["report", "fire"])
+@pytest.mark.parametrize("word", ["report", "fire", "new"])
 def test_help_shows_examples(word: str) -> None:
     shown = subprocess.run([*RUN, word, "--help"], capture_output=True, text=True, check=True).stdout
     examples = shown.split("examples:\n")[1].splitlines()
@@ -118,7 +121,7 @@ def test_help_shows_examples(word: str) -> None:
         (["report"], "the following arguments are required: SCENE (see hitplanes report --help)"),
         (["report", "x", "--aim", "left"], "argument --aim: invalid float value: 'left'"),
         (["fire", "x"], "the following arguments are required: SHOTS.jsonl"),
-        (["report", "a", "b\nc"], "unrecognized arguments: b c"),
+        (["new", "a", "b\nc"], "unrecognized arguments: b c"),
     ],
 )
 def test_bad_words_are_one_line_and_exit_2(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -156,3 +159,78 @@ def test_the_plan_of_each_shot(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert shown.startswith(without) and without.count("\n") == 1
     assert re.search(r"^  ran      walk, [\d,]+ bytes: samples through the stack, front to back$", shown, re.M)
     assert "  left out hud: drawn only for a picture\n" in shown
+
+
+# new
+
+
+def test_new_makes_a_scene_that_reports_hits_occluded_and_missed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "my range"]) == 0
+    told = capsys.readouterr().out
+    assert told == "a scene is in my range; now try: hitplanes report 'my range'\n"
+    assert main([*shlex.split(told.split(": hitplanes ")[1]), "--json", "r.json"]) == 0
+    shotgun, blast, pistol = json.loads(Path("r.json").read_text())["shots"]
+    assert [row["name"] for row in shotgun["rows"]] == ["bullseye"] and shotgun["verdicts"]["occluded"] > 20
+    assert [row["name"] for row in blast["rows"]] == ["balloon"]
+    assert not pistol["rows"] and pistol["why_not"][0]["reason"] == "missed"
+    files = {path.name: path.stat().st_size for path in Path("my range").iterdir()}
+    assert len(files) == 7 and sum(files.values()) < 40_000
+    assert cv2.imread("report.png").std() > 20
+    Path("shots.jsonl").write_text('{"weapon": "pistol", "at": [88, 60]}\n')
+    assert main(["fire", "my range", "shots.jsonl"]) == 0
+    assert capsys.readouterr().out.endswith("1 shots, 1 hit something, in hits.jsonl\n")
+
+
+def test_new_writes_into_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "."]) == 0
+    assert len(load_scene(tmp_path)) == 6
+
+
+def test_new_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    full, file, closed = tmp_path / "full", tmp_path / "file", tmp_path / "no" / "such"
+    full.mkdir()
+    (full / "mine.txt").write_text("mine")
+    file.write_text("mine")
+    for place, told in (
+        (full, "expected a new or empty folder, got"),
+        (file, "expected a new folder, got the file"),
+        (closed, "folder: cannot make"),
+    ):
+        assert main(["new", str(place)]) == 2
+        error = capsys.readouterr().err
+        assert told in error and error.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "full", "mine.txt"]
+
+
+@pytest.mark.parametrize("there", [True, False])
+@pytest.mark.parametrize("where", ["write_png", "write_text"])
+def test_an_interrupted_new_leaves_nothing(
+    there: bool, where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "range"
+    if there:
+        folder.mkdir()
+    write = getattr(starter, where)
+
+    def interrupted(path: Path, data: object) -> None:
+        write(path, data)
+        if path.name in ("crate.png", "scene.json"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(starter, where, interrupted)
+    assert main(["new", str(folder)]) == 130
+    assert capsys.readouterr().err == "hitplanes: interrupted\n"
+    assert list(tmp_path.rglob("*")) == ([folder] if there else [])
+
+
+def test_the_scene_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed at any time, it leaves nothing that loads, or all."""
+    written = []
+    for name in ("write_png", "write_text"):
+        monkeypatch.setattr(starter, name, lambda path, data: written.append(path.name))
+    starter.write_starter(tmp_path / "range")
+    assert written[-1] == "scene.json" and len(written) == 7

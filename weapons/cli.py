@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
@@ -20,6 +21,7 @@ from weapons.orders import fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
 from weapons.plan import plan_lines
 from weapons.progress import Progress
+from weapons.starter import write_starter
 from weapons.stream import fire_log
 
 __all__ = ["main"]
@@ -60,6 +62,16 @@ examples:
   hitplanes fire fixtures/gallery shots.jsonl -o hits.jsonl
   zcat shots.jsonl.gz | hitplanes fire fixtures/gallery /dev/stdin -o hits.jsonl
   hitplanes fire fixtures/gallery shots.jsonl --plan
+"""
+
+NEW_HELP = """\
+Write a small scene to start from: scene.json, and the images that it names. FOLDER must be new, or empty.
+"""
+
+NEW_EXAMPLES = """\
+examples:
+  hitplanes new range
+  hitplanes report range
 """
 
 
@@ -116,6 +128,8 @@ def parser() -> argparse.ArgumentParser:
         "-o", "--output", type=Path, default=Path("hits.jsonl"), metavar="HITS.jsonl", help="default: hits.jsonl"
     )
     one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
+    one = word(new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
+    one.add_argument("folder", type=Path, metavar="FOLDER", help="where to; its parent must be there")
     return top
 
 
@@ -154,6 +168,12 @@ def fire(arguments: argparse.Namespace) -> None:
     print(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.to_dict(), done.plan.calls)
+
+
+def new(arguments: argparse.Namespace) -> None:
+    """Write a scene to start from, and say what to do next."""
+    write_starter(arguments.folder)
+    print(f"a scene is in {arguments.folder}; now try: hitplanes report {shlex.quote(str(arguments.folder))}")
 
 
 def _print_plan(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> None:
