@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import jsonschema
 import pytest
 
 from planes import load_scene
@@ -177,7 +178,9 @@ def test_new_makes_a_scene_that_reports_hits_occluded_and_missed(
     assert [row["name"] for row in blast["rows"]] == ["balloon"]
     assert not pistol["rows"] and pistol["why_not"][0]["reason"] == "missed"
     files = {path.name: path.stat().st_size for path in Path("my range").iterdir()}
-    assert len(files) == 7 and sum(files.values()) < 40_000
+    assert len(files) == 8 and sum(files.values()) < 70_000
+    schema = json.loads((Path("my range") / "scene.schema.json").read_text())
+    jsonschema.validate(json.loads((Path("my range") / "scene.json").read_text()), schema)
     assert cv2.imread("report.png").std() > 20
     Path("shots.jsonl").write_text('{"weapon": "pistol", "at": [88, 60]}\n')
     assert main(["fire", "my range", "shots.jsonl"]) == 0
@@ -233,4 +236,4 @@ def test_the_scene_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     for name in ("write_png", "write_text"):
         monkeypatch.setattr(starter, name, lambda path, data: written.append(path.name))
     starter.write_starter(tmp_path / "range")
-    assert written[-1] == "scene.json" and len(written) == 7
+    assert written[-1] == "scene.json" and len(written) == 8

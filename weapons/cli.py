@@ -16,13 +16,16 @@ from planes.arrays import InputError
 from planes.image import check_output, write_png, write_text
 from planes.scene import load_scene
 from weapons.arsenal import arsenal_of
+from weapons.differences import differences
 from weapons.facts import report_of
 from weapons.orders import fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
 from weapons.plan import plan_lines
 from weapons.progress import Progress
+from weapons.schemas import read_report
 from weapons.starter import write_starter
 from weapons.stream import fire_log
+from weapons.versus import picture_of_difference
 
 __all__ = ["main"]
 
@@ -75,11 +78,25 @@ examples:
 """
 
 
+COMPARE_HELP = """\
+Say what differs between two reports, in words, and draw them side by side: what was hit in only one of them, in both.
+Exit code: 0 the same, 1 they differ, 2 bad input. Versions and plans are not compared.
+"""
+
+COMPARE_EXAMPLES = """\
+examples:
+  hitplanes report fixtures/gallery --json before.json
+  hitplanes compare before.json after.json
+  hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
+"""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; exit codes: 0 done, 2 bad input, 130 interrupted."""
+    """Run the command; exit codes: 0 done or the same, 1 reports differ, 2 bad input, 130 interrupted."""
     arguments = parser().parse_args(argv)
+    code = 0
     try:
-        arguments.run(arguments)
+        code = arguments.run(arguments) or 0
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read what is printed has seen enough; the files are written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -89,7 +106,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as interrupt:
         print(": ".join(["hitplanes: interrupted", *map(str, interrupt.args)]), file=sys.stderr)
         return 130
-    return 0
+    return code
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -106,7 +123,9 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"hitplanes {version('hitplanes')}")
     words = top.add_subparsers(required=True, metavar="COMMAND")
 
-    def word(run: Callable[[argparse.Namespace], None], told: str, text: str, examples: str) -> argparse.ArgumentParser:
+    def word(
+        run: Callable[[argparse.Namespace], int | None], told: str, text: str, examples: str
+    ) -> argparse.ArgumentParser:
         raw = argparse.RawDescriptionHelpFormatter
         one = words.add_parser(run.__name__, help=told, description=text, epilog=examples, formatter_class=raw)
         one.set_defaults(run=run)
@@ -130,6 +149,11 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
     one = word(new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
     one.add_argument("folder", type=Path, metavar="FOLDER", help="where to; its parent must be there")
+    one = word(compare, "say and draw what differs between two reports", COMPARE_HELP, COMPARE_EXAMPLES)
+    one.add_argument("expected", type=Path, metavar="A.json", help="a report, as report --json writes it")
+    one.add_argument("got", type=Path, metavar="B.json", help="another")
+    one.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw them, too")
+    one.add_argument("--scene", type=Path, metavar="SCENE", help="scene of one of them or of both, to draw them on")
     return top
 
 
@@ -152,6 +176,8 @@ def report(arguments: argparse.Namespace) -> None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
     if not orders:
         print(f"{scene.name}: no shots in its scene.json; name one with --weapon and --at")
+    if facts["batch"]:
+        print(f"{facts['batch']['shots']} shots, {facts['batch']['shots_that_hit']} hit something")
     for shot in facts["shots"]:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
@@ -201,3 +227,16 @@ def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
         raise InputError(f"--at: expected two numbers X,Y, got {arguments.at!r}") from error
     shot: dict[str, Any] = {"weapon": arguments.weapon, "at": at}
     return shot | {name: getattr(arguments, name) for name in ("aim", "seed") if getattr(arguments, name) is not None}
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    """Print the differences of two reports, draw them if asked to, and tell by the exit code whether there are any."""
+    if arguments.output is not None:
+        _check_outputs(arguments.output, None)
+    expected, got = read_report(arguments.expected), read_report(arguments.got)
+    scene = None if arguments.scene is None else load_scene(arguments.scene)
+    if arguments.output is not None:
+        write_png(arguments.output, picture_of_difference(expected, got, scene))
+    lines = differences(expected, got)
+    print("\n".join(lines) or "no difference")
+    return 1 if lines else 0

@@ -10,9 +10,12 @@ import numpy as np
 
 from planes.arrays import Bools, Floats, Image, InputError
 from planes.image import write_png, write_text
-from planes.scenefile import FILE_NAME, laid_out, mask_of_rows
+from planes.scenefile import FILE_NAME, laid_out
+from planes.schema import Mask
 
 __all__ = ["write_starter"]
+
+SCHEMAS = Path(__file__).parent / "schemas"
 
 WIDTH, HEIGHT = 320, 180
 Color = tuple[int, int, int]
@@ -23,7 +26,11 @@ WOOD: Color = (188, 132, 76)
 GRASS: Color = (92, 158, 76)
 SKY_HIGH, SKY_LOW = (104, 170, 220), (220, 238, 240)
 
+SCHEMA_NAME = "scene.schema.json"
+"""An editor that knows JSON Schema completes keys and marks mistakes by it."""
+
 SCENE: dict[str, Any] = {
+    "$schema": SCHEMA_NAME,
     "format": "hitplanes-scene/1",
     "name": "A range to start from",
     "bounds": {"origin_xy": [0, 0], "size_wh": [WIDTH, HEIGHT]},
@@ -84,10 +91,11 @@ def write_starter(folder: Path) -> None:
     try:
         for name, image in images.items():
             write_png(folder / name, image)
+        write_text(folder / SCHEMA_NAME, (SCHEMAS / "scene.json").read_text(encoding="utf-8"))
         write_text(folder / FILE_NAME, laid_out(SCENE) + "\n")
     except BaseException:
         with suppress(OSError):
-            for name in (FILE_NAME, *images):
+            for name in (FILE_NAME, SCHEMA_NAME, *images):
                 (folder / name).unlink(missing_ok=True)
             if made:
                 folder.rmdir()
@@ -206,7 +214,7 @@ def _ground() -> Image:
 
 def _score() -> Image:
     """A dark plate with the score on it."""
-    text = mask_of_rows("score", SCORE).astype(np.uint8)
+    text = Mask().check("score", SCORE).astype(np.uint8)
     height, width = text.shape
     image = np.full((height + 8, width + 12, 4), (*INK, 255), np.uint8)
     _paint(image[4:-4, 6:-6], text == 1, (250, 214, 110))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Bools, Image
+from planes.constants import VIEW_MAX
 from planes.items import Role
 from planes.scene import Scene
 from planes.spans import Box
@@ -108,7 +109,9 @@ def _cut(x: int, y: int, x_max: int, y_max: int) -> Box:
 
 
 def _around(a: Box, b: Box) -> Box:
-    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+    """Box around both; the first alone where they lie far apart."""
+    x, y, x_max, y_max = min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+    return (x, y, x_max, y_max) if max(x_max - x, y_max - y) <= 2 * VIEW_MAX else a
 
 
 def _side(report: Mapping[str, Any], scene: Scene | None, view: Box, factor: int) -> tuple[Image, list[Text]]:
