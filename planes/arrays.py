@@ -6,7 +6,7 @@ import difflib
 import itertools
 import math
 import reprlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -148,8 +148,8 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
 
 
 def listed(field: str, values: object, expected: str) -> list[Any]:
-    """Take whatever can be gone through as a list; a text is refused."""
-    if isinstance(values, str | bytes) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
+    """Take whatever can be gone through as a list; a text or a dict is refused."""
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{field}: expected {expected}, got {shown(values)}")
     return list(values)
 

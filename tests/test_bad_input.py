@@ -1,0 +1,583 @@
+"""Bad input, row by row: each names its field and what came, nothing crashes, hangs, changes or is half written."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planes import InputError, Scene, Sprite, load_scene, read_png
+from weapons import Beam, Box, Cone, Disc, Polygon, Ring, Rounds, Spread, Stencil, arsenal_of, fire, weapon_from_json
+from weapons.orders import orders_of
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+TRIANGLE = [(0, 0), (9, 0), (0, 9)]
+DIGITS = 10**5000
+DEEP: list[Any] = []
+for _ in range(10**5):
+    DEEP = [DEEP]
+
+pytestmark = pytest.mark.usefixtures("bounded")
+
+
+def later(reason: str, *values: Any, id: str) -> Any:  # noqa: A002
+    return pytest.param(*values, marks=pytest.mark.xfail(strict=True, reason=reason), id=id)
+
+
+def world() -> Scene:
+    """A duck (0), a wall in front of its lower half (1), and what was removed (2)."""
+    scene = Scene((64, 40), categories=["target", "friend"])
+    scene.add(Sprite.circle(8), (32, 20), name="duck", categories=["target"])
+    scene.add(Sprite.box(20, 6), (32, 26), role="occluder", name="wall")
+    scene.remove(scene.add(np.ones((3, 3), bool), (5, 5), name="gone"))
+    return scene
+
+
+def shot(**given: Any) -> Any:
+    return fire(world(), given.pop("weapon", Disc(3)), given.pop("at", (32, 20)), **given)
+
+
+def sheet(width: int = 4, height: int = 3) -> np.ndarray:
+    return np.full((height, width, 4), 200, np.uint8)
+
+
+def huge(value: Any, *shape: int) -> np.ndarray:
+    """Large, and not in memory."""
+    return np.broadcast_to(np.asarray(value), shape)
+
+
+class Thing:
+    """What is no number."""
+
+
+masked = np.ma.array([[1.0, 2.0], [3.0, 4.0]], mask=[[0, 0], [0, 1]])
+
+ARRAYS: dict[str, tuple[Any, str]] = {
+    "None": (None, "at: expected numbers, got None"),
+    "text": ("12", "at: expected numbers, got '12'"),
+    "bytes": (b"12", "at: expected numbers, got b'12'"),
+    "object": (Thing(), "at: expected numbers, got <"),
+    "dict": ({"x": 1, "y": 2}, r"at: expected numbers, got \{'x': 1, 'y': 2\}"),
+    "set": ({1, 2}, r"at: expected numbers, got \{1, 2\}"),
+    "generator": ((v for v in (1, 2)), "at: expected numbers, got <generator"),
+    "decimals": ([Decimal(1), Decimal(2)], "at: expected numbers, got .*Decimal"),
+    "one number": (5, r"at: expected shape \(any, 2\), got \(\)"),
+    "empty list": ([], r"at: expected shape \(any, 2\), got \(0,\)"),
+    "three numbers": ((1, 2, 3), r"at: expected shape \(any, 2\), got \(3,\)"),
+    "columns for rows": (np.zeros((2, 5)), r"at: expected shape \(any, 2\), got \(2, 5\)"),
+    "three dimensions": (np.zeros((1, 1, 2)), r"at: expected shape \(any, 2\), got \(1, 1, 2\)"),
+    "ragged": ([(1, 2), (3,)], r"at: expected an array, got \[\(1, 2\), \(3,\)\]"),
+    "ragged deep": ([1, [2]], r"at: expected an array, got \[1, \[2\]\]"),
+    "in itself": ((loop := [1], loop.append(loop), loop)[2], r"at: expected an array, got \[1, \[1, \["),
+    "10^5 deep": (DEEP, r"at: expected an array, got \[\[\["),
+    "5000 digits": ((1, DIGITS), r"at: expected numbers, got a list that is too long to show"),
+    "400 digits": ((1, 10**400), r"at: expected numbers, got \[1, 1000"),
+    "NaN": ((1, math.nan), r"at\[1\]: expected a finite number, got nan"),
+    "NaN in a batch": ([(1, 2), (math.nan, 4)], r"at\[1\]\[0\]: expected a finite number, got nan"),
+    "infinite": ((math.inf, 1), r"at\[0\]: expected a finite number, got inf"),
+    "true": (True, "at: expected numbers, got True"),
+    "two booleans": ((True, False), r"at: expected numbers, got \[True, False\]"),
+    "true beside a number": ([True, 2], r"at\[0\]: expected a number like the others, got True"),
+    "false beside a float": ([(1.5, 2.5), (3.5, False)], r"at\[1\]\[1\]: expected a number like the others, got False"),
+    "numpy's true beside a number": ([np.True_, 2], r"at\[0\]: expected a number like the others"),
+    "booleans in an array in a list": ([np.array([True, True]), (1, 2)], r"at\[0\]: expected a number like the others"),
+    "boolean array": (np.ones((1, 2), bool), r"at: expected numbers, got \[\[True, True\]\]"),
+    "object array": (np.array([1, 2], object), r"at: expected numbers, got \[1, 2\]"),
+    "text array": (np.array(["1", "2"]), r"at: expected numbers, got \['1', '2'\]"),
+    "array of new texts": (np.array(["1", "2"], np.dtypes.StringDType()), "at: expected numbers, got"),
+    "bytes array": (np.array([b"1", b"2"]), "at: expected numbers, got"),
+    "complex": (np.array([1, 2j]), r"at: expected numbers, got \[\(1\+0j\), 2j\]"),
+    "empty complex": (np.zeros((0, 2), complex), "at: expected numbers"),
+    "dates": (np.array(["2020-01-01", "NaT"], "M8[D]"), "at: expected numbers"),
+    "no dates": (np.zeros((0, 2), "M8[s]"), "at: expected numbers"),
+    "times": (np.array([1, 2], "m8[s]"), "at: expected numbers"),
+    "records": (np.zeros(2, "i4,f8"), r"at: expected numbers, got \[\(0, 0.0\)"),
+    "no records": (np.zeros((0, 2), "i4,f8"), "at: expected numbers"),
+    "no texts": (np.zeros((0, 2), "U1"), "at: expected numbers"),
+    "masked": (masked, r"at\[1\]\[1\]: expected a value, got a masked one"),
+    "masked in a list": ([masked[0], masked[1]], r"at\[1\]\[1\]: expected a value, got a masked one"),
+    "masked number": (np.ma.masked, "at: expected a value, got a masked one"),
+    "float16 infinity": (np.array([1, np.inf], np.float16), r"at\[1\]: expected a finite number, got inf"),
+    "too long a double": (np.array([1, np.longdouble("1e4000")]), r"at\[1\]: expected a (finite )?number"),
+    "uint64": (np.array([2**64 - 1, 1], np.uint64), r"at\[0\]: expected a number within ±1099511627776"),
+}  # fmt: skip
+
+CALLS: dict[str, tuple[Callable[[], object], str]] = {
+    # the scene
+    "size of zero": (lambda: Scene((0, 5)), r"size_wh\[0\]: expected a whole number from 1 .*, got 0"),
+    "size of half a pixel": (lambda: Scene((5, 0.5)), r"size_wh\[1\]: expected a whole number from 1 .*, got 0.5"),
+    "size of true": (lambda: Scene((True, 5)), r"size_wh\[0\]: expected a number like the others, got True"),
+    "size of one number": (lambda: Scene(5), r"size_wh: expected shape \(2,\), got \(\)"),
+    "planes of a world too large": (lambda: Scene((10**9, 10**9)).planes(), "bounds: expected a plane of sides up to"),
+    "scene's name": (lambda: Scene(name=5), "name: expected a text of 1 to 200 characters, got 5"),
+    "scene's name, surrogate": (lambda: Scene(name="\ud800"), r"name: expected a text .*got '\\ud800'"),
+    "categories, one text": (lambda: Scene(categories="target"), "categories: expected a list of names, got 'target'"),
+    "categories, number": (lambda: Scene(categories=3), "categories: expected a list of names, got 3"),
+    "categories, array of no dimension": (
+        lambda: Scene(categories=np.array(3)), "categories: expected a list of names"),
+    "category, number": (lambda: Scene(categories=["a", 5]), r"categories\[1\]: expected a text .*got 5"),
+    "categories, too many": (lambda: Scene(categories=map(str, range(32))), "categories: expected at most 31 .*got 32"),
+    "categories, twice": (lambda: Scene(categories=["a", "a"]), "categories: expected distinct names"),
+    # add
+    "sprite, None": (lambda: world().add(None), "sprite: expected a Sprite, a mask .*got NoneType"),
+    "sprite, number": (lambda: world().add(7), "sprite: expected a Sprite, a mask .*got int"),
+    "sprite, four dimensions": (lambda: world().add(np.zeros((1, 1, 1, 1))), r"sprite: .*got \(1, 1, 1, 1\)"),
+    "sprite, 10^5 deep": (lambda: world().add(DEEP), r"sprite: expected an array, got \[\[\["),
+    "sprite made by hand": (lambda: world().add(Sprite(())), "sprite: expected one that a class method made"),
+    "sprite of float pixels": (lambda: world().add(sheet() / 255), "image: expected bytes .*float64"),
+    "sprite of booleans in three planes": (
+        lambda: world().add(np.ones((2, 2, 3), bool)), "image: expected bytes .*bool"),
+    "position with a masked value": (lambda: world().add(Sprite.circle(1), masked[1]), r"position_xy\[1\]: .*masked"),
+    "role": (lambda: world().add(Sprite.circle(1), role="ocluder"), "role: .*got 'ocluder' .did you mean 'occluder'"),
+    "role, number": (lambda: world().add(Sprite.circle(1), role=3), "role: expected one of .*got 3"),
+    "angle, text": (lambda: world().add(Sprite.circle(1), angle="90"), "angle: expected numbers, got '90'"),
+    "scale, three": (
+        lambda: world().add(Sprite.circle(1), scale=(1, 2, 3)), r"scale: expected shape \(2,\), got \(3,\)"),
+    "scale, zero": (lambda: world().add(Sprite.circle(1), scale=0), r"scale\[0\]: expected a number from 0.00390625"),
+    "scale of a mask that gets too large": (
+        lambda: world().add(np.ones((2000, 2000), bool), scale=256), "scale: expected a mask of sides up to 32768"),
+    "flip": (lambda: world().add(Sprite.circle(1), flip="left"), "flip: expected one of .*got 'left'"),
+    "flip, deep": (lambda: world().add(Sprite.circle(1), flip=DEEP), "flip: expected one of"),
+    "frame": (lambda: world().add(Sprite.circle(1), frame=1), "frame: expected a whole number from 0 to 0, got 1"),
+    "layer": (lambda: world().add(Sprite.circle(1), layer=1.5), "layer: expected a whole number .*got 1.5"),
+    "layer, true": (lambda: world().add(Sprite.circle(1), layer=True), "layer: expected a whole number .*got True"),
+    "layer, 5000 digits": (lambda: world().add(Sprite.circle(1), layer=DIGITS), "layer: .*got a int that is too long"),
+    "category, unknown": (
+        lambda: world().add(Sprite.circle(1), categories=["targte"]),
+        "category: .*got 'targte' .did you mean 'target'"),
+    "categories, negative bits": (lambda: world().add(Sprite.circle(1), categories=-1), "categories: .*got -1"),
+    "categories, true": (lambda: world().add(Sprite.circle(1), categories=True), "categories: .*got True"),
+    "categories, bits of no dimension": (
+        lambda: world().add(Sprite.circle(1), categories=np.array(3)), "categories: expected bits or a list"),
+    "owner to come": (
+        lambda: world().add(Sprite.circle(1), owner=9), "owner: expected a whole number from 0 to 3, got 9"),
+    "name, too long": (lambda: world().add(Sprite.circle(1), name="x" * 201), "name: expected a text of 1 to 200"),
+    # change, remove, ask
+    "ids, negative": (lambda: world().move(-1, (0, 0)), r"ids\[0\]: expected a whole number from 0 to 2, got -1"),
+    "ids, removed": (lambda: world().remove([0, 2]), r"ids\[1\]: expected an object in the scene, got 2, which was re"),
+    "ids, twice": (lambda: world().remove([0, 1, 0]), r"ids\[2\]: expected each object once, got 0 again"),
+    "ids, booleans": (lambda: world().remove([True, False]), r"ids: expected numbers, got \[True, False\]"),
+    "ids, a name": (lambda: world().remove("duck"), r"ids: expected numbers, got \['duck'\]"),
+    "ids, masked": (lambda: world().remove(np.ma.array([0, 1], mask=[0, 1])), r"ids\[1\]: expected a value, got a m"),
+    "ids, two dimensions": (lambda: world().remove([[0, 1]]), r"ids: expected shape \(any,\), got \(1, 2\)"),
+    "ids, float16 NaN": (lambda: world().remove(np.array([0, np.nan], np.float16)), r"ids\[1\]: expected a whole"),
+    "positions, too few": (
+        lambda: world().move([0, 1], [(1, 2)]), r"position_xy: expected shape \(2, 2\), got \(1, 2\)"),
+    "position, masked": (
+        lambda: world().move([0, 1], masked), r"position_xy\[1\]\[1\]: expected a value, got a masked"),
+    "position of one for all": (lambda: world().move([0, 1], (3, math.inf)), r"position_xy\[1\]: expected a finite"),
+    "layer of a row": (
+        lambda: world().set([0, 1], layer=[1, 2**31]), r"layer\[1\]: expected a whole number .*2147483648"),
+    "layers in float16": (lambda: world().set([0, 1], layer=np.array([1, 0.5], np.float16)), r"layer\[1\]: .*got 0.5"),
+    "flip of a row": (lambda: world().set([0, 1], flip=["x", "z"]), "row 1: flip: expected one of .*got 'z'"),
+    "flips, too many": (lambda: world().set([0, 1], flip=["x"] * 3), "flip: expected one for all or 2, got 3"),
+    "frame of a row": (lambda: world().set([0, 1], frame=[0, 1]), "row 1: frame: .*got 1"),
+    "scale of a row": (lambda: world().set([0, 1], scale=[1, 300]), r"row 1: scale\[0\]: .*got 300"),
+    "role of a set": (lambda: world().set(0, role="hud "), "role: expected one of .*did you mean 'hud'"),
+    "categories of a set, no dimension": (
+        lambda: world().set(0, categories=np.array(1.5)), "categories: expected bits"),
+    "owner of a set": (lambda: world().set(0, owner=3), "owner.*: expected a whole number from 0 to 2, got 3"),
+    "find": (lambda: world().find("dukc"), "name: expected one of 'duck', 'wall', got 'dukc' .did you mean 'duck'"),
+    "find, removed": (lambda: world().find("gone"), "name: expected one of 'duck', 'wall', got 'gone'"),
+    "find, None": (lambda: world().find(None), "name: expected one of .*got None"),  # type: ignore[arg-type]
+    "find, a book": (lambda: world().find("duc" * 10**6), r"name: expected one of .*got 'ducduc.*\.\.\."),
+    "mask of what was removed": (lambda: world().mask(2), "expected an object in the scene, got 2, which was removed"),
+    "mask of true": (lambda: world().mask(True), "id: expected a whole number from 0 to 2, got True"),
+    "name of nothing": (lambda: world().name_of(3), "id: expected a whole number from 0 to 2, got 3"),
+    "bits of a category": (lambda: world().category_bits("freind"), "category: .*did you mean 'friend'"),
+    "bits of a number": (
+        lambda: world().category_bits(1), "category: expected one of .*got 1"),  # type: ignore[arg-type]
+    "ids of a role": (lambda: world().ids("ducks"), "role: expected one of .*got 'ducks'"),
+    # whole planes
+    "planes, none": (Scene.from_planes, "planes: expected one or more"),
+    "planes, two sizes": (
+        lambda: Scene.from_planes(hittable=np.zeros((3, 4)), hud=np.zeros((3, 5))),
+        "planes: expected .*all of one size"),
+    "labels, negative": (
+        lambda: Scene.from_planes(hittable=[[0, -1]]), r"hittable\[0\]\[1\]: expected a whole .*got -1"),
+    "labels, broken": (lambda: Scene.from_planes(movers=[[0, 1.5]]), r"movers\[0\]\[1\]: expected a whole .*got 1.5"),
+    "labels, NaN": (lambda: Scene.from_planes(movers=[[0, math.nan]]), r"movers\[0\]\[1\]: expected a whole .*got nan"),
+    "labels, too large": (
+        lambda: Scene.from_planes(hittable=[[2**31]]), r"hittable\[0\]\[0\]: expected a whole number"),
+    "labels with true": (lambda: Scene.from_planes(hittable=[[True, 2]]), r"hittable\[0\]\[0\]: .*got True"),
+    "labels, masked": (
+        lambda: Scene.from_planes(hittable=np.ma.array([[1]], mask=[[1]])), r"hittable\[0\]\[0\]: .*masked"),
+    "labels of text": (lambda: Scene.from_planes(occluders=[["a"]]), "occluders: expected numbers, got"),
+    "plane, empty": (
+        lambda: Scene.from_planes(occluders=np.zeros((0, 5))), r"occluders: expected a plane .*got \(0, 5\)"),
+    "plane of one row": (lambda: Scene.from_planes(hud=[1, 2]), r"hud: expected a plane .*got \(2,\)"),
+    "plane of 10^5 a side": (
+        lambda: Scene.from_planes(hittable=huge(1, 10**5, 10**5)), "hittable: expected a plane of si"),
+    "mask of 40,000 columns": (
+        lambda: Scene.from_planes(occluders=np.ones((1, 40_000), bool)), "occluders: mask: expected .*got 40000 x 1"),
+    "masks, a billion": (
+        lambda: Scene.from_planes(movers=huge(True, 10**9, 2, 2)), "movers: expected at most 4194304 "),
+    "masks of twos": (
+        lambda: Scene.from_planes(movers=np.full((2, 3, 5), 2)), r"movers\[0\]\[0\]\[0\]: expected 0 or 1"),
+    # sprites
+    "mask of floats": (lambda: Sprite.from_mask([[0.0, 1.0]]), r"mask: expected booleans, got \[\[0.0, 1.0\]\]"),
+    "mask of twos": (lambda: Sprite.from_mask([[0, 2]]), r"mask\[0\]\[1\]: expected 0 or 1, got 2"),
+    "mask of no rows": (lambda: Sprite.from_mask(np.zeros((0, 4), bool)), "mask: expected .*not empty, got 4 x 0"),
+    "mask of 10^10": (lambda: Sprite.from_mask(huge(True, 10**5, 10**5)), "mask: expected .*got 100000 x 100000"),
+    "mask, masked": (lambda: Sprite.from_mask(np.ma.array([[1, 0]], mask=[[0, 1]])), r"mask\[0\]\[1\]: .*a masked one"),
+    "mask of true and numbers": (lambda: Sprite.from_mask([[True, 0]]), r"mask\[0\]\[0\]: expected a number like the"),
+    "mask of records": (lambda: Sprite.from_mask(np.zeros((2, 2), "i4,i4")), "mask: expected booleans"),
+    "pivot far away": (lambda: Sprite.from_mask([[1]], pivot_xy=(0, 1e6)), r"pivot_xy\[1\]: expected a number within"),
+    "color": (
+        lambda: Sprite.circle(1, color=(0, 0, 256)), r"color\[2\]: expected a whole number from 0 to 255, got 256"),
+    "color, a word": (
+        lambda: Sprite.circle(1, color="red"), "color: expected numbers, got 'red'"),  # type: ignore[arg-type]
+    "image of 16 bits": (lambda: Sprite.from_image(sheet().astype(np.uint16)), "image: expected bytes .*uint16"),
+    "image of two channels": (lambda: Sprite.from_image(sheet()[:, :, :2]), r"image: expected bytes .*\(3, 4, 2\)"),
+    "image of 10^10": (lambda: Sprite.from_image(huge(np.uint8(1), 10**5, 10**5, 4)), "image: .*got 100000 x 100000"),
+    "image, masked": (
+        lambda: Sprite.from_image(np.ma.array(sheet(), mask=True)), r"image\[0\]\[0\]\[0\]: .*a masked one"),
+    "alpha threshold": (lambda: Sprite.from_image(sheet(), alpha_threshold=256), "alpha_threshold: .*got 256"),
+    "color key of two": (lambda: Sprite.from_image(sheet(), color_key=(1, 2)), r"color_key: expected shape \(3,\)"),
+    "source": (lambda: Sprite.from_image(sheet(), source=5), "source: expected an object"),  # type: ignore[arg-type]
+    "grid that does not divide": (lambda: Sprite.from_image(sheet(), grid_wh=(3, 3)), "grid_wh: expected to divide"),
+    "grid of zero": (lambda: Sprite.from_image(sheet(), grid_wh=(0, 3)), r"grid_wh\[0\]: expected a whole .*got 0"),
+    "grid of a million frames": (
+        lambda: Sprite.from_image(np.zeros((1000, 1000, 4), np.uint8), grid_wh=(1, 1)),
+        "grid_wh: expected at most 65536"),
+    "rectangles, none": (lambda: Sprite.from_image(sheet(), rects_xywh=[]), "rects_xywh: expected"),
+    "rectangles, too many": (
+        lambda: Sprite.from_image(sheet(), rects_xywh=np.ones((65_537, 4))), "rects_xywh: expected 1 to 65536"),
+    "rectangle that leaves": (
+        lambda: Sprite.from_image(sheet(), rects_xywh=[[0, 0, 5, 1]]), r"rects_xywh\[0\]: .*4 x 3"),
+    "polygon of two": (lambda: Sprite.polygon([(0, 0), (1, 1)]), "polygon: expected 3 points or more, got 2"),
+    "polygon, far point": (
+        lambda: Sprite.polygon([*TRIANGLE, (0, 1e6)]), r"polygon\[3\]\[1\]: expected a number within"),
+    "holes, a number": (
+        lambda: Sprite.polygon(TRIANGLE, 3), "holes: expected a list of rings, got 3"),  # type: ignore[arg-type]
+    "holes, no dimension": (
+        lambda: Sprite.polygon(TRIANGLE, np.array(3)), "holes: expected a list of rings"),  # type: ignore[arg-type]
+    "hole": (lambda: Sprite.polygon(TRIANGLE, [TRIANGLE, [(0, 0)]]), r"holes\[1\]: expected 3 points or more, got 1"),
+    "circle": (lambda: Sprite.circle(-1), "circle: expected a number from 0 to 32768, got -1"),
+    "box": (lambda: Sprite.box(5, -1), r"box_wh\[1\]: expected a number from 0 to 32768, got -1"),
+    # weapons
+    "ring inside out": (lambda: Ring(5, 3), "inner_radius: expected at most 3.0, got 5.0"),
+    "box weapon of half a pixel": (
+        lambda: Box(2.5, 3), "width: expected a whole number from 1 .*got 2.5"),  # type: ignore[arg-type]
+    "radius, text": (lambda: Disc("3"), "radius: expected numbers, got '3'"),  # type: ignore[arg-type]
+    "radius, list": (lambda: Disc([3]), r"radius: expected shape \(\), got \(1,\)"),  # type: ignore[arg-type]
+    "radius, true": (lambda: Disc(True), "radius: expected numbers, got True"),
+    "radius, masked": (
+        lambda: Disc(np.ma.masked), "radius: expected a value, got a masked one"),  # type: ignore[arg-type]
+    "polygon weapon with true": (lambda: Polygon([*TRIANGLE, (True, 2)]), r"points\[3\]\[0\]: .*got True"),
+    "pierce": (lambda: Disc(1, pierce=1), "pierce: expected true or false, got 1"),  # type: ignore[arg-type]
+    "falloff": (lambda: Disc(1, falloff="liner"), "falloff: .*got 'liner' .did you mean 'linear'"),
+    "stencil, empty": (lambda: Stencil([]), r"mask: expected shape \(any, any\), got \(0,\)"),
+    "stencil, uneven": (lambda: Stencil(["##", "#"]), r"mask\[1\]: expected 2 of '#' and '.', got '#'"),
+    "pellet, a name": (
+        lambda: Spread("disc", 3, 1), "pellet: expected a weapon of one pattern, got 'disc'"),  # type: ignore[arg-type]
+    "pellets, none": (lambda: Spread(Disc(1), 0, 1), "count: expected a whole number from 1 to 65536, got 0"),
+    "rounds of rounds": (
+        lambda: Rounds(Rounds(Disc(1), 2), 2), "weapon: expected a weapon other than rounds"),  # type: ignore[arg-type]
+    "too many pellets in all": (
+        lambda: Rounds(Spread(Disc(1), 65_536, 1), 2), "count: expected a whole number from 1 to 1"),
+    "weapon, None": (lambda: weapon_from_json(None), "weapon: expected an object with a kind, got None"),
+    "weapon of no kind": (lambda: weapon_from_json({}), "weapon: kind: expected one of .*got None"),
+    "kind": (lambda: weapon_from_json({"kind": "dics"}), "weapon: kind: .*got 'dics' .did you mean 'disc'"),
+    "kind, list": (lambda: weapon_from_json({"kind": ["disc"]}), r"weapon: kind: .*got \['disc'\]"),
+    "key of a weapon": (
+        lambda: weapon_from_json({"kind": "disc", "radus": 1}), "weapon: key: .*got 'radus' .did you mean 'radius'"),
+    "key of a weapon, number": (lambda: weapon_from_json({"kind": "point", 5: 1}), "weapon: key: .*got 5"),
+    "field missing": (
+        lambda: weapon_from_json({"kind": "ring", "inner_radius": 1}), "weapon: outer_radius: expected a va"),
+    "pellet missing": (lambda: weapon_from_json({"kind": "spread"}), "weapon: pellet: expected a value, got nothing"),
+    "pellet, wrong field": (
+        lambda: weapon_from_json({"kind": "spread", "pellet": {"kind": "disc", "radius": -1}, "count": 1, "radius": 1}),
+        "weapon: pellet: radius: expected a number from 0 .*got -1"),
+    # fire
+    "fire at no scene": (
+        lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene, got NoneType"),  # type: ignore[arg-type]
+    "fire no weapon": (lambda: shot(weapon="disc"), "weapon: expected a weapon, got str"),
+    "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got type"),
+    "aim, NaN": (lambda: shot(aim=math.nan), "aim.*: expected a finite number, got nan"),
+    "aim of a row": (
+        lambda: shot(at=[(1, 2), (3, 4)], aim=[0, math.inf]), r"aim\[1\]: expected a finite number, got inf"),
+    "aims, too many": (lambda: shot(aim=[1, 2]), r"aim: expected shape \(1,\), got \(2,\)"),
+    "aim and toward": (lambda: shot(aim=1, toward=(3, 4)), "aim: expected aim or toward, got both"),
+    "toward itself": (lambda: shot(toward=(32, 20)), r"toward\[0\]: expected a point other than the shot's own"),
+    "toward, NaN": (lambda: shot(toward=(math.nan, 0)), r"toward\[0\]: expected a finite number, got nan"),
+    "toward, masked": (
+        lambda: shot(at=[(1, 2), (3, 4)], toward=masked), r"toward\[1\]\[1\]: expected a value, got a mas"),
+    "accept, negative": (lambda: shot(accept=-1), "accept.*: expected a whole number from 0 .*got -1"),
+    "accept, None": (lambda: shot(accept=None), "accept: expected numbers, got .*None"),
+    "accept, a name": (lambda: shot(accept="target"), "accept: expected numbers, got .*'target'"),
+    "accept, unknown name": (lambda: shot(accept=["taget"]), "category: .*got 'taget' .did you mean 'target'"),
+    "exclude, -2": (lambda: shot(exclude=[0, -2]), r"exclude\[0\]\[1\]: expected a whole number from -1 .*got -2"),
+    "exclude, a name": (lambda: shot(exclude=["duck"]), r"exclude: expected numbers, got \[\['duck'\]\]"),
+    "exclude, true": (lambda: shot(exclude=True), r"exclude: expected numbers, got .*True"),
+    "exclude, three dimensions": (lambda: shot(exclude=np.zeros((1, 1, 1))), r"exclude: expected shape \(1, any\)"),
+    "seed, text": (lambda: shot(seed="7"), "seed: expected a whole number .*got '7'"),
+    "seed, 5000 digits": (lambda: shot(seed=DIGITS), "seed: expected .*got a int that is too long to show"),
+    "seed, array": (lambda: shot(seed=np.array([1])), r"seed: expected a whole number .*got array\(\[1\]\)"),
+    "shot numbers, too few": (lambda: shot(at=[(1, 2), (3, 4)], shot=[1]), r"shot: expected shape \(2,\), got \(1,\)"),
+    "prefilter": (lambda: shot(prefilter="boxes"), "prefilter: .*got 'boxes' .did you mean 'box'"),
+    "strategy": (lambda: shot(strategy="composd"), "strategy: .*got 'composd' .did you mean 'composed'"),
+    # what may be asked of hits
+    "rows of shot 1 of 1": (lambda: shot().of(1), "shot: expected a whole number from 0 to 0, got 1"),
+    "rows of shot -1": (lambda: shot().of(-1), "shot: expected a whole number from 0 to 0, got -1"),
+    "why not, true": (lambda: shot().why_not(True), "shot: expected a whole number .*got True"),
+    "why not, half": (lambda: shot().why_not(0.5), "shot: expected a whole number .*got 0.5"),  # type: ignore[arg-type]
+    "blockers, a name": (
+        lambda: shot().blockers("duck"), "shot: expected a whole number .*got 'duck'"),  # type: ignore[arg-type]
+    "margins, None": (
+        lambda: shot().margins(None), "shot: expected a whole number .*got None"),  # type: ignore[arg-type]
+    "samples, 5000 digits": (lambda: shot().samples_at(DIGITS), "shot: .*got a int that is too long to show"),
+    "verdicts, deep": (
+        lambda: shot().verdict_counts(DEEP), r"shot: expected a whole number .*got \[\[\["),  # type: ignore[arg-type]
+    "rows of no shot": (lambda: shot(at=np.zeros((0, 2))).of(0), "shot: expected a whole number from 0 to -1, got 0"),
+    # paths
+    "load, None": (lambda: load_scene(None), "folder: expected a path, got None"),  # type: ignore[arg-type]
+    "load, bytes": (lambda: load_scene(b"x"), "folder: expected a path, got b'x'"),  # type: ignore[arg-type]
+    "load, missing": (lambda: load_scene("/no/such"), "/no/such/scene.json: cannot read it: No such file"),
+    "load, a zero byte": (lambda: load_scene("a\0b"), "scene.json: .*null"),
+    "load, 300 characters": (lambda: load_scene("x" * 300), "scene.json: cannot read it: File name too long"),
+    "save, None": (lambda: world().save(None), "folder: expected a path, got None"),  # type: ignore[arg-type]
+    "save below a file": (lambda: world().save(GALLERY / "duck.png" / "x"), "folder: cannot make .*: Not a directory"),
+    "PNG, None": (lambda: read_png(None), "image: expected a path, got None"),  # type: ignore[arg-type]
+    "PNG, its bytes": (lambda: read_png(b"\x89PNG"), "image: expected a path, got b"),  # type: ignore[arg-type]
+    "PNG, missing": (lambda: read_png("no.png"), "image: expected a PNG file, got 'no.png': No such file or directory"),
+    "PNG, a zero byte": (lambda: read_png("a\0.png"), "image: expected a PNG file, got .*null byte"),
+    "PNG, 300 characters": (lambda: read_png("x" * 300), "image: expected a PNG file, got 'xxx.*: File name too long"),
+    "PNG, a folder": (lambda: read_png(GALLERY), "image: expected a PNG file, got 'gallery', which is a folder"),
+}  # fmt: skip
+
+NOT_YET = [
+    later("Spread shows it whole", lambda: Spread(DEEP, 1, 1), "pellet: ", id="pellet, 10^5 deep"),  # type: ignore[arg-type]
+    later("Rounds shows it whole", lambda: Rounds(DIGITS, 1), "weapon: ", id="weapon of rounds, 5000 digits"),  # type: ignore[arg-type]
+    later("Polygon shows it whole", lambda: Polygon(TRIANGLE, DIGITS), "holes: ", id="holes, 5000 digits"),  # type: ignore[arg-type]
+    later(
+        "told when fired",
+        lambda: Stencil(np.ones((1, 40_000), bool)),
+        "mask: .*40000 x 1",
+        id="stencil of 40,000 columns",
+    ),
+    later("weapon_from_json shows it whole", lambda: weapon_from_json(DIGITS), "weapon: ", id="weapon, 5000 digits"),
+    later("weapon_from_json shows it whole", lambda: weapon_from_json(DEEP), "weapon: ", id="weapon, 10^5 deep"),
+    later("goes down first", lambda: weapon_from_json(deep_rounds(10**4)), "weapon: ", id="rounds 10^4 deep"),
+    later("not checked", lambda: arsenal_of(5), "scene: expected a Scene, got", id="arsenal of a number"),
+    later("text_of shows it whole", lambda: Scene(name=DIGITS), "name: ", id="name, 5000 digits"),  # type: ignore[arg-type]
+    later("text_of shows it whole", lambda: world().add(Sprite.circle(1), name=DEEP), "name: ", id="name, 10^5 deep"),  # type: ignore[arg-type]
+    later("folder_of shows it whole", lambda: load_scene(DEEP), "folder: ", id="folder, 10^5 deep"),  # type: ignore[arg-type]
+    later("mkdir's ValueError", lambda: world().save("a\0b"), "folder: cannot make", id="save, a zero byte"),
+]
+
+
+def deep_rounds(depth: int) -> dict[str, Any]:
+    weapon: dict[str, Any] = {"kind": "point"}
+    for _ in range(depth):
+        weapon = {"kind": "rounds", "weapon": weapon, "count": 1}
+    return weapon
+
+
+def check(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    message = str(caught.value)
+    assert re.search(told, message)
+    assert "\n" not in message and len(message) < 1000
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_what_is_no_array_of_numbers(name: str) -> None:
+    given, told = ARRAYS[name]
+    check(lambda: fire(world(), Disc(3), given), f"^{told}")
+
+
+@pytest.mark.parametrize(("call", "told"), [*(pytest.param(*row, id=name) for name, row in CALLS.items()), *NOT_YET])
+def test_a_bad_call_is_named(call: Callable[[], object], told: str, capfd: pytest.CaptureFixture[str]) -> None:
+    check(call, told)
+    assert capfd.readouterr() == ("", "")
+
+
+# Every number of every call
+
+NUMBERS = (math.nan, math.inf, -math.inf, DIGITS, -DIGITS, 10**400, np.longdouble("1e4000"), np.float16(np.inf))
+BEYOND = (1e300, -1e300)
+OTHERS = ("1", True, np.True_, 1j, [1, [2]], {}, Thing(), np.datetime64("2020-01-01"), DEEP)
+FAR = 2**40 + 1
+
+
+def placed(**pose: Any) -> object:
+    return world().add(np.ones((2, 3), bool), **pose)
+
+
+def in_file(**entry: Any) -> object:
+    from planes.scenefile import READERS
+
+    (kind,) = entry
+    return READERS[kind]({kind: entry[kind]}, Path())
+
+
+def ordered(**given: Any) -> object:
+    scene = world()
+    scene.shots = [{"weapon": "gun", "at": [1, 2], **given}]
+    return orders_of(scene, {"gun": Disc(3)})
+
+
+FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
+    "at": (lambda v: shot(at=(1, v)), "at", (FAR, -FAR)),
+    "at of a batch": (lambda v: shot(at=[(1, 2), (v, 3)]), "at", (FAR, -FAR)),
+    "aim": (lambda v: shot(aim=v), "aim", ()),
+    "toward": (lambda v: shot(toward=(v, 2)), "toward", (FAR, -FAR)),
+    "accept": (lambda v: shot(accept=v), "accept", (-1, 2**32, 0.5, 2**64)),
+    "exclude": (lambda v: shot(exclude=v), "exclude", (-2, 0.5, 2**31 + 1, 2**63)),
+    "seed": (lambda v: shot(seed=v), "seed", (-1, 0.5, 2**64)),
+    "shot": (lambda v: shot(shot=v), "shot", (-1, 0.5, 2**63)),
+    "bounds' width": (lambda v: Scene((v, 5)), "size_wh", (0, -1, 0.5, FAR)),
+    "bounds' place": (lambda v: Scene((5, 5), (0, v)), "origin_xy", (0.5, FAR, -FAR)),
+    "planes' place": (lambda v: Scene.from_planes(hittable=[[1]], origin_xy=(v, 0)), "origin_xy", (0.5, FAR)),
+    "add position_xy": (lambda v: placed(position_xy=(1, v)), "position_xy", (FAR, -FAR)),
+    "add angle": (lambda v: placed(angle=v), "angle", ()),
+    "add scale": (lambda v: placed(scale=v), "scale", (0, -1, 1 / 257, 257)),
+    "add scales": (lambda v: placed(scale=(1, v)), "scale", (0, -1, 1 / 257, 257)),
+    "add frame": (lambda v: placed(frame=v), "frame", (-1, 1, 0.5, 2**64)),
+    "add layer": (lambda v: placed(layer=v), "layer", (2**31, -(2**31), 0.5, 2**64)),
+    "add categories": (lambda v: placed(categories=v), "categor", (-1, 2**32, 0.5)),
+    "add owner": (lambda v: placed(owner=v), "owner", (-1, 4, 0.5, 2**64)),
+    "ids": (lambda v: world().remove(v), "ids", (-1, 3, 0.5, 2**64)),
+    "set position_xy": (lambda v: world().set([0, 1], position_xy=[(1, 2), (3, v)]), "position_xy", (FAR, -FAR)),
+    "set angle": (lambda v: world().set([0, 1], angle=[1, v]), "angle", ()),
+    "set scale": (lambda v: world().set([0, 1], scale=[1, v]), "scale", (0, -1, 257)),
+    "set frame": (lambda v: world().set([0, 1], frame=[0, v]), "frame", (-1, 1, 0.5)),
+    "set layer": (lambda v: world().set([0, 1], layer=[0, v]), "layer", (2**31, 0.5)),
+    "set categories": (lambda v: world().set([0, 1], categories=[1, v]), "categor", (-1, 2**32)),
+    "set owner": (lambda v: world().set([0, 1], owner=[1, v]), "owner", (-1, 3, 0.5)),
+    "mask's id": (lambda v: world().mask(v), "id", (-1, 3, 0.5)),
+    "name's id": (lambda v: world().name_of(v), "id", (-1, 3, 0.5)),
+    "hits.of": (lambda v: shot().of(v), "shot", (-1, 1, 0.5)),
+    "hits.why_not": (lambda v: shot().why_not(v), "shot", (-1, 1, 0.5)),
+    "hits.blockers": (lambda v: shot().blockers(v), "shot", (-1, 1, 0.5)),
+    "hits.margins": (lambda v: shot().margins(v), "shot", (-1, 1, 0.5)),
+    "hits.samples_at": (lambda v: shot().samples_at(v), "shot", (-1, 1, 0.5)),
+    "circle": (Sprite.circle, "circle", (-1, 32_769)),
+    "box's width": (lambda v: Sprite.box(v, 1), "box_wh", (-1, 32_769)),
+    "polygon": (lambda v: Sprite.polygon([*TRIANGLE, (1, v)]), "polygon", (32_769,)),
+    "hole": (lambda v: Sprite.polygon(TRIANGLE, [[*TRIANGLE, (1, v)]]), r"holes\[0\]", (32_769,)),
+    "pivot_xy": (lambda v: Sprite.from_mask([[1]], pivot_xy=(v, 0)), "pivot_xy", (32_769,)),
+    "color": (lambda v: Sprite.circle(1, color=(0, v, 0)), "color", (-1, 256, 0.5)),
+    "alpha_threshold": (lambda v: Sprite.from_image(sheet(), alpha_threshold=v), "alpha_threshold", (-1, 256, 0.5)),
+    "color_key": (lambda v: Sprite.from_image(sheet(), color_key=(0, v, 0)), "color_key", (-1, 256, 0.5)),
+    "grid_wh": (lambda v: Sprite.from_image(sheet(), grid_wh=(v, 3)), "grid_wh", (-1, 0, 3, 5, 0.5, 10**9)),
+    "rects_xywh": (
+        lambda v: Sprite.from_image(sheet(), rects_xywh=[(0, 0, 1, v)]), "rects_xywh", (-1, 0, 4, 0.5, 10**9)),
+    "disc radius": (Disc, "radius", (-1, 2**20 + 1, 10**9)),
+    "ring inner_radius": (lambda v: Ring(v, 2**20), "inner_radius", (-1, 2**20 + 1)),
+    "ring outer_radius": (lambda v: Ring(0, v), "outer_radius", (-1, 2**20 + 1)),
+    "box weapon's width": (lambda v: Box(v, 1), "width", (0, -1, 0.5, 2**20 + 1, 10**9)),
+    "box weapon's height": (lambda v: Box(1, v), "height", (0, -1, 0.5, 2**20 + 1, 10**9)),
+    "polygon points": (lambda v: Polygon([*TRIANGLE, (1, v)]), "points", (2**19 + 1,)),
+    "polygon holes": (lambda v: Polygon(TRIANGLE, [[*TRIANGLE, (1, v)]]), r"holes\[0\]", (2**19 + 1,)),
+    "cone reach": (lambda v: Cone(v, 30), "reach", (-1, 2**20 + 1)),
+    "cone angle": (lambda v: Cone(30, v), "angle", (-1, 361)),
+    "beam length": (lambda v: Beam(v, 1), "length", (-1, 2**20 + 1)),
+    "beam width": (lambda v: Beam(1, v), "width", (-1, 2**20 + 1)),
+    "stencil pivot_xy": (lambda v: Stencil(["#"], (v, 0)), "pivot_xy", (32_769,)),
+    "spread count": (lambda v: Spread(Disc(1), v, 1), "count", (0, -1, 0.5, 65_537, 10**9)),
+    "spread radius": (lambda v: Spread(Disc(1), 1, v), "radius", (-1, 2**20 + 1)),
+    "rounds count": (lambda v: Rounds(Disc(1), v), "count", (0, -1, 0.5, 65_537, 10**9)),
+    "rounds recoil_xy": (lambda v: Rounds(Disc(1), 2, (0, v)), "recoil_xy", (2**20 + 1,)),
+    "rounds recoil_deg": (lambda v: Rounds(Disc(1), 2, (0, 0), v), "recoil_deg", (-361, 361)),
+    "file's circle": (lambda v: in_file(circle=v), "circle", (-1, 32_769)),
+    "file's box_wh": (lambda v: in_file(box_wh=[1, v]), "box_wh", (-1, 32_769)),
+    "file's polygon": (lambda v: in_file(polygon=[*TRIANGLE, [1, v]]), "polygon", (32_769,)),
+    "file's mask": (lambda v: in_file(mask=[[1, v]]), "mask", (-1, 2)),
+    "order's at": (lambda v: ordered(at=[1, v]), r"shots\[0\]: at", (FAR,)),
+    "order's aim": (lambda v: ordered(aim=v), r"shots\[0\]: aim", (10**9 + 1,)),
+    "order's toward": (lambda v: ordered(toward=[v, 1]), r"shots\[0\]: toward", (FAR,)),
+    "order's seed": (lambda v: ordered(seed=v), r"shots\[0\]: seed", (-1, 0.5, 2**64)),
+    "order's shot": (lambda v: ordered(shot=v), r"shots\[0\]: shot", (-1, 0.5, 2**63)),
+}  # fmt: skip
+
+MAY_BE_NONE = {
+    "aim", "exclude", "shot", "order's aim", "order's toward", "add categories", "add owner",
+}  # fmt: skip
+NO_LIMIT = {"aim", "add angle", "set angle"}
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_number_is_checked(name: str) -> None:
+    call, field, beyond = FIELDS[name]
+    values = [
+        *NUMBERS,
+        *(() if name in NO_LIMIT else BEYOND),
+        *(() if name in MAY_BE_NONE else (None,)),
+        *OTHERS,
+        *beyond,
+    ]
+    for value in values:
+        with pytest.raises(InputError) as caught:
+            call(value)
+        assert re.match(rf"(row \d+: )?{field}.*: expected .+, got ", str(caught.value)), (value, str(caught.value))
+        assert len(str(caught.value)) < 500
+
+
+# What is right in any form
+
+
+NUMBERS_OF: dict[str, Callable[[np.ndarray], object]] = {
+    "list": lambda v: v.tolist(),
+    "tuples": lambda v: tuple(map(tuple, v.tolist())),
+    "list of arrays": list,
+    "list of numpy's numbers": lambda v: [list(row) for row in v],
+    "int8": lambda v: v.astype(np.int8),
+    "uint64": lambda v: v.astype(np.uint64),
+    "big-endian int16": lambda v: v.astype(">i2"),
+    "float16": lambda v: v.astype(np.float16),
+    "big-endian float64": lambda v: v.astype(">f8"),
+    "long double": lambda v: v.astype(np.longdouble),
+    "columns first": np.asfortranarray,
+    "backwards in memory": lambda v: v[::-1].copy()[::-1],
+    "every other": lambda v: np.repeat(np.repeat(v, 2, axis=0), 3, axis=1)[::2, ::3],
+    "not aligned": lambda v: np.frombuffer(b"x" + v.tobytes(), np.uint8)[1:].view(v.dtype).reshape(v.shape),
+    "a view of one": lambda v: v.view(type("View", (np.ndarray,), {})),
+    "masked nowhere": lambda v: np.ma.array(v, mask=False),
+    "its buffer": lambda v: memoryview(np.ascontiguousarray(v)),
+}
+
+
+def frozen(given: object) -> object:
+    if isinstance(given, np.ndarray):
+        given.flags.writeable = False
+    return given
+
+
+@pytest.mark.parametrize("form", NUMBERS_OF)
+def test_numbers_in_any_form_are_taken_and_left_as_they_were(form: str) -> None:
+    at = np.array([[32, 20], [30, 24], [3, 4]])
+    given = frozen(NUMBERS_OF[form](at.copy()))
+    expected = fire(world(), Disc(3), at, toward=at + 5, exclude=[-1, -1, 0])
+    assert expected and fire(world(), Disc(3), given, toward=at + 5, exclude=[-1, -1, 0]) == expected
+    moved, told = world(), world()
+    moved.set([0, 1], position_xy=given[:2] if isinstance(given, tuple | list | np.ndarray) else at[:2])  # type: ignore[index]
+    told.move([0, 1], at[:2])
+    assert moved.content_hash() == told.content_hash()
+    labels = Scene.from_planes(hittable=given)
+    assert labels.content_hash() == Scene.from_planes(hittable=at).content_hash()
+    assert np.array_equal(np.asarray(given), at)
+
+
+@pytest.mark.parametrize("form", [f for f in NUMBERS_OF if f not in ("float16", "big-endian float64", "long double")])
+def test_masks_and_images_in_any_form_are_taken_and_left_as_they_were(form: str) -> None:
+    mask = np.array([[1, 0, 1], [0, 1, 1]])
+    given = frozen(NUMBERS_OF[form](mask.copy()))
+    assert np.array_equal(Sprite.from_mask(given).frames[0].mask, mask == 1)
+    true = frozen(np.asarray(given) == 1)
+    assert np.array_equal(Sprite.from_mask(true).frames[0].mask, mask == 1)
+    image = np.random.default_rng(1).integers(0, 256, (4, 3, 4)).astype(np.uint8)
+    seen = image.copy()
+    views = [image[::-1].copy()[::-1], np.asfortranarray(image), np.repeat(image, 2, axis=1)[:, ::2]]
+    for view in views:
+        frame = Sprite.from_image(frozen(view)).frames[0]
+        assert frame.image is not None and np.array_equal(frame.image, image)
+    assert np.array_equal(np.asarray(given), mask) and all(np.array_equal(view, seen) for view in views)
