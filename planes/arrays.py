@@ -27,6 +27,9 @@ Shape = tuple[int | None, ...]
 SHOWN = 60
 """Characters of a value that an error shows."""
 
+FLOAT_BITS = 1023
+"""Whole numbers of so many bits are floats, too."""
+
 NAMES_SHOWN = 20
 """Names that an error lists; with more of them, the nearest ones say more than all."""
 
@@ -113,7 +116,8 @@ def bools(field: str, values: object, shape: Shape) -> Bools:
 
 def real(field: str, value: object, low: float, high: float) -> float:
     """Check one finite number in [low, high]."""
-    number = float(reals(field, value, ()))
+    given = float(value) if type(value) is int and value.bit_length() < FLOAT_BITS else value
+    number = float(reals(field, given, ()))
     if not low <= number <= high:
         raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {shown(value)}")
     return number

@@ -31,6 +31,9 @@ MASK_AREA_MAX = 2**26
 FRAMES_MAX = 2**16
 """Frames of one sprite: beyond it a sheet was cut by the wrong size, and each frame takes about 1 KB."""
 
+TEXT_BYTES_MAX = 2**28
+"""Longest JSON file, bytes: it takes some ten times as much in memory."""
+
 PLANE_SIDE_MAX = 65_535
 """Longest side of a plane, px."""
 

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Image, InputError, shown, within
-from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX
+from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX, TEXT_BYTES_MAX
 
-__all__ = ["check_output", "read_png", "write_png", "write_text"]
+__all__ = ["check_output", "read_png", "read_text", "write_png", "write_text"]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 START = 33
@@ -73,6 +73,28 @@ def read_png(path: str | Path, field: str = "image") -> Image:
         return _rgba(header, _decoded(header, chunks[b"IDAT"]), chunks)
 
 
+def read_text(path: Path) -> str:
+    """Read a text file in UTF-8.
+
+    Raises
+    ------
+    InputError
+        If it is missing, too large, not UTF-8, or no file that has an end: a pipe is not waited for.
+    """
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError("cannot read it: it is a pipe or a device")
+        if path.stat().st_size > TEXT_BYTES_MAX:
+            raise InputError(f"cannot read it: expected at most {TEXT_BYTES_MAX} bytes, got {path.stat().st_size}")
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"expected JSON in UTF-8: {error}") from error
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # a zero byte in the name is a ValueError
+        raise InputError(f"cannot read it: {getattr(error, 'strerror', error)}") from error
+
+
 def write_png(path: Path, image: Image) -> None:
     """Write an image (h, w, 3 or 4), RGB order, beside its place and rename it: never half a file."""
     import cv2
@@ -91,7 +113,7 @@ def write_text(path: Path, text: str) -> None:
 def check_output(path: Path) -> None:
     """Refuse, before any work is done, a place where no file can be written."""
     try:
-        is_other = path.exists() and not path.is_file()
+        is_other = not path.is_file() and (path.exists() or path.is_symlink())
         has_folder = path.parent.is_dir()
     except OSError as error:
         raise InputError(f"output: cannot write {path}: {error.strerror}") from error

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Image, InputError, within
+from planes.arrays import Image, InputError, shown, within
 from planes.constants import ITEMS_MAX, LAYER_MAX, MASK_AREA_MAX, MASK_SIDE_MAX, POSITION_MAX, SCALE_MAX, SCALE_MIN, SUB
-from planes.image import read_png, write_png, write_text
+from planes.image import read_png, read_text, write_png, write_text
 from planes.items import Role
 from planes.schema import (
     Const,
@@ -158,7 +158,7 @@ def read_scene(folder: Path) -> SceneFile:
     """
     path = folder / FILE_NAME
     with within(str(path)):
-        data = SCENE.check("scene", _parsed(path))
+        data = SCENE.check("scene", json_of(read_text(path)))
         bounds = data.get("bounds") or {}
         scene = SceneFile(
             name=data.get("name") or Text().check("name", folder.resolve().name),
@@ -182,8 +182,8 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
     """Write a scene folder; images first, scene.json last, so that an interrupt leaves the old scene whole."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
+    except (OSError, ValueError) as error:  # a zero byte is a ValueError
+        raise InputError(f"folder: cannot make {folder}: {getattr(error, 'strerror', error)}") from error
     saved: dict[int, dict[str, Any]] = {}
     sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
     for entry in scene.objects:
@@ -204,8 +204,9 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
         "shots": scene.shots,
     }
     try:
+        SCENE.forms["weapons"].check("weapons", scene.weapons)
         text = laid_out(data)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
             f"scene: expected weapons and shots of plain JSON, got a value that is not: {error}"
         ) from error
@@ -215,7 +216,7 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
 def folder_of(folder: object) -> Path:
     """Take a folder's path as a text or a path."""
     if not isinstance(folder, str | PurePath):
-        raise InputError(f"folder: expected a path, got {folder!r:.60}")
+        raise InputError(f"folder: expected a path, got {shown(folder)}")
     return Path(folder)
 
 
@@ -230,16 +231,6 @@ def laid_out(value: Any, depth: int = 0) -> str:
             "{" + ",".join(f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1)}" for key, v in value.items()) + end + "}"
         )
     return "[" + ",".join(pad + laid_out(v, depth + 1) for v in value) + end + "]"
-
-
-def _parsed(path: Path) -> object:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot read it: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"expected JSON in UTF-8: {error}") from error
-    return json_of(text)
 
 
 def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from planes.arrays import InputError, bools, choice, flag, integer, integers, real, reals, within
+from planes.arrays import InputError, bools, choice, flag, integer, integers, real, reals, shown, within
+from planes.constants import MASK_SIDE_MAX
 
 __all__ = [
     "Const", "Either", "Flag", "Keys", "Mapped", "Mask", "Names", "Number", "Numbers", "Optional", "Ref", "Rows",
@@ -121,7 +122,7 @@ class Text:
             or not 0 < len(value) <= TEXT_MAX
             or any(0xD800 <= ord(c) < 0xE000 for c in value)
         ):
-            raise InputError(f"{name}: expected a text of 1 to {TEXT_MAX} characters, got {value!r:.60}")
+            raise InputError(f"{name}: expected a text of 1 to {TEXT_MAX} characters, got {shown(value)}")
         return value
 
     def schema(self) -> dict[str, Any]:
@@ -137,7 +138,7 @@ class Names:
         """Check a list of texts."""
         names = [Text().check(f"{name}[{i}]", v) for i, v in enumerate(typed(name, value, list))]
         if len(set(names)) < len(names):
-            raise InputError(f"{name}: expected distinct names, got {names}")
+            raise InputError(f"{name}: expected distinct names, got {shown(names)}")
         return names
 
     def schema(self) -> dict[str, Any]:
@@ -169,7 +170,7 @@ class Const:
     def check(self, name: str, value: object) -> str:
         """Check that it is the one."""
         if value != self.value:
-            raise InputError(f"{name}: expected {self.value!r}, got {value!r:.60}")
+            raise InputError(f"{name}: expected {self.value!r}, got {shown(value)}")
         return self.value
 
     def schema(self) -> dict[str, Any]:
@@ -197,11 +198,15 @@ class Mask:
     def check(self, name: str, value: object) -> Any:
         """Check a mask and return it (h, w) as booleans."""
         if not (isinstance(value, list | tuple) and value and isinstance(value[0], str)):
-            return bools(name, value, (None, None))
+            mask = bools(name, value, (None, None))
+            if max(mask.shape) > MASK_SIDE_MAX:
+                got = f"{mask.shape[1]} x {mask.shape[0]}"
+                raise InputError(f"{name}: expected a mask of sides up to {MASK_SIDE_MAX} px, got {got}")
+            return mask
         for i, row in enumerate(value):
             if not isinstance(row, str) or len(row) != len(value[0]) or set(row) - set("#."):
-                raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {row!r:.60}")
-        return bools(name, [[v == "#" for v in row] for row in value], (len(value), len(value[0])))
+                raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {shown(row)}")
+        return self.check(name, [[v == "#" for v in row] for row in value])
 
     def schema(self) -> dict[str, Any]:
         """Rows of either kind; that they are of one length, a schema cannot say."""
@@ -351,14 +356,14 @@ def distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
         names = [key for key, _ in pairs]
-        raise InputError(f"key: expected each key once, got {max(names, key=names.count)!r} again")
+        raise InputError(f"key: expected each key once, got {shown(max(names, key=names.count))} again")
     return found
 
 
 def typed(name: str, value: object, kind: type[dict[str, Any]] | type[list[Any]]) -> Any:
     """Check that JSON is an object, or a list."""
     if not isinstance(value, kind):
-        raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {value!r:.60}")
+        raise InputError(f"{name}: expected {'an object' if kind is dict else 'a list'}, got {shown(value)}")
     return value
 
 

@@ -11,11 +11,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planes.arrays import InputError, Ints, choice, integer, within
+from planes.arrays import InputError, Ints, choice, integer, shown, within
 from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from planes.grid256 import pixel, snap, turned, unit
 from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
+from planes.scene import Scene
 from planes.schema import Flag, Mask, Number, Numbers, Optional, Ref, Rows, Value, Whole, Word
 from planes.spans import Spans
 from planes.sprite import Form, Sprite, rows_of, variant_of
@@ -41,7 +42,7 @@ class Part(Ref):
     def check(self, name: str, value: object) -> object:
         """Check that it is of a kind that may be a part."""
         if not isinstance(value, self.kinds):
-            raise InputError(f"{name}: expected {self.told}, got {value!r:.60}")
+            raise InputError(f"{name}: expected {self.told}, got {shown(value)}")
         return value
 
 
@@ -373,8 +374,14 @@ def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
     return _kept.get((weapon, c, s), lambda: make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256))
 
 
-def weapon_from_json(data: object, name: str = "weapon") -> Weapon:
+def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:
     """Make a weapon of its JSON.
+
+    Parameters
+    ----------
+    data : an object with a kind and the fields of that kind
+    name : in front of errors
+    kinds : those that it may be of; a burst is not a part of a burst
 
     Raises
     ------
@@ -383,8 +390,9 @@ def weapon_from_json(data: object, name: str = "weapon") -> Weapon:
     """
     with within(name):
         if not isinstance(data, Mapping):
-            raise InputError(f"expected an object with a kind, got {data!r:.60}")
-        kind = KINDS[choice("kind", data.get("kind"), KINDS)]
+            raise InputError(f"expected an object with a kind, got {shown(data)}")
+        known_kinds = [kind for kind, made in KINDS.items() if issubclass(made, kinds)]
+        kind = KINDS[choice("kind", data.get("kind"), known_kinds)]
         known = {f.name: f for f in fields(kind)}
         for key in data:
             choice("key", key, ("kind", *known))
@@ -392,14 +400,16 @@ def weapon_from_json(data: object, name: str = "weapon") -> Weapon:
         if missing:
             raise InputError(f"{missing[0]}: expected a value, got nothing")
         values = {key: value for key, value in data.items() if key != "kind"}
-        for key in ("pellet", "weapon"):
-            if key in known:
-                values[key] = weapon_from_json(values[key], key)
+        for key, part in kind.table.items():
+            if isinstance(part, Part):
+                values[key] = weapon_from_json(values[key], key, part.kinds)
         return kind(**values)
 
 
-def arsenal_of(scene: Any) -> dict[str, Weapon]:
+def arsenal_of(scene: Scene) -> dict[str, Weapon]:
     """Weapons of a scene's file, by name."""
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
     return {name: weapon_from_json(data, f"weapons.{name}") for name, data in scene.weapons.items()}
 
 

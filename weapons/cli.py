@@ -34,6 +34,9 @@ DESCRIPTION = "What does a shot hit in a 2-D scene? Decided by pixels, exactly, 
 NAMED = 8
 """Objects that a line of output names."""
 
+USAGE_MAX = 300
+"""Letters of a word that the command line does not take."""
+
 REPORT_HELP = """\
 Fire shots at a scene folder and write a picture, and the facts as JSON, that say what was hit and why.
 Without --weapon the shots of scene.json are fired.
@@ -99,9 +102,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = arguments.run(arguments) or 0
         sys.stdout.flush()
     except BrokenPipeError:  # whoever read what is printed has seen enough; the files are written
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _hush()
     except InputError as error:
-        print(f"hitplanes: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"hitplanes: {_plain(' '.join(str(error).split()))}", file=sys.stderr)
+        return 2
+    except OSError as error:  # files have errors of their own; this is what is printed
+        _hush()
+        print(f"hitplanes: output: cannot write what is printed: {error.strerror}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as interrupt:
         print(": ".join(["hitplanes: interrupted", *map(str, interrupt.args)]), file=sys.stderr)
@@ -109,12 +116,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
+def _hush() -> None:
+    """Send what is left to be printed nowhere, or Python would try it again on its way out."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _say(line: str) -> None:
+    """Print a line; what the terminal cannot show, or might obey, is spelled out."""
+    encoding = sys.stdout.encoding or "utf-8"
+    print(_plain(line).encode(encoding, "backslashreplace").decode(encoding))
+
+
+def _plain(text: str) -> str:
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class OneLineParser(argparse.ArgumentParser):
     """A parser whose errors are one line, as all errors of the command are."""
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong with the words, and exit with 2."""
-        self.exit(2, f"hitplanes: {' '.join(message.split())} (see {self.prog} --help)\n")
+        told = _plain(" ".join(message.split()))
+        told = told if len(told) <= USAGE_MAX else told[:USAGE_MAX] + "..."
+        self.exit(2, f"hitplanes: {told} (see {self.prog} --help)\n")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -175,14 +199,14 @@ def report(arguments: argparse.Namespace) -> None:
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
     if not orders:
-        print(f"{scene.name}: no shots in its scene.json; name one with --weapon and --at")
+        _say(f"{scene.name}: no shots in its scene.json; name one with --weapon and --at")
     if facts["batch"]:
-        print(f"{facts['batch']['shots']} shots, {facts['batch']['shots_that_hit']} hit something")
+        _say(f"{facts['batch']['shots']} shots, {facts['batch']['shots_that_hit']} hit something")
     for shot in facts["shots"]:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
-        print(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
+        _say(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
         if arguments.plan:
             _print_plan(shot["plan"])
 
@@ -191,7 +215,7 @@ def fire(arguments: argparse.Namespace) -> None:
     """Write the answers to a log of shots."""
     check_output(arguments.output)
     done = fire_log(load_scene(arguments.scene), arguments.shots, arguments.output, Progress(sys.stderr))
-    print(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
+    _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.to_dict(), done.plan.calls)
 
@@ -199,12 +223,12 @@ def fire(arguments: argparse.Namespace) -> None:
 def new(arguments: argparse.Namespace) -> None:
     """Write a scene to start from, and say what to do next."""
     write_starter(arguments.folder)
-    print(f"a scene is in {arguments.folder}; now try: hitplanes report {shlex.quote(str(arguments.folder))}")
+    _say(f"a scene is in {arguments.folder}; now try: hitplanes report {shlex.quote(str(arguments.folder))}")
 
 
 def _print_plan(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> None:
     for line in plan_lines(plan, calls):
-        print(f"  {line}")
+        _say(f"  {line}")
 
 
 def _check_outputs(picture: Path, facts: Path | None) -> None:
@@ -213,7 +237,7 @@ def _check_outputs(picture: Path, facts: Path | None) -> None:
         raise InputError(f"--output: expected a name that ends in .png, got {picture.name!r}")
     if facts is not None:
         check_output(facts)
-        if facts.resolve() == picture.resolve():
+        if os.path.realpath(facts) == os.path.realpath(picture):  # unlike resolve(), it takes a link to itself
             raise InputError(f"--json: expected another file than --output, got {str(facts)!r} for both")
 
 
@@ -238,5 +262,6 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.output is not None:
         write_png(arguments.output, picture_of_difference(expected, got, scene))
     lines = differences(expected, got)
-    print("\n".join(lines) or "no difference")
+    for line in lines or ["no difference"]:
+        _say(line)
     return 1 if lines else 0

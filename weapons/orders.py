@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from planes.arrays import InputError, choice, integer, within
 from planes.constants import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
+from planes.grid256 import snap
 from planes.scene import Scene
 from planes.schema import Either, Keys, Names, Number, Numbers, Optional, Rows, Text, Whole
 from weapons.arsenal import Weapon
@@ -76,6 +77,8 @@ def order_from_json(
         name = choice("weapon", shot["weapon"], arsenal)
         if shot.get("aim") is not None and shot.get("toward") is not None:
             raise InputError("aim: expected aim or toward, got both")
+        if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
+            raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
         accept = shot.get("accept")
         return Order(
             name,

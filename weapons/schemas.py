@@ -12,7 +12,7 @@ from typing import Any
 
 from planes.arrays import InputError, within
 from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, VIEW_MAX
-from planes.image import write_text
+from planes.image import read_text, write_text
 from planes.sampling import Verdict
 from planes.scenefile import OBJECT, SCENE
 from planes.schema import (
@@ -165,13 +165,7 @@ def read_report(path: Path) -> dict[str, Any]:
         Naming the file, the row and the field.
     """
     with within(str(path)):
-        try:
-            text = path.read_text(encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"cannot read it: {error.strerror}") from error
-        except ValueError as error:
-            raise InputError(f"expected JSON in UTF-8: {error}") from error
-        found = json_of(text)
+        found = json_of(read_text(path))
         REPORT.check("report", found)
         x, y, x_max, y_max = found["view_xyxy"]
         if not (0 <= x_max - x <= 2 * VIEW_MAX and 0 <= y_max - y <= 2 * VIEW_MAX):
