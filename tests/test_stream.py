@@ -156,6 +156,19 @@ def test_the_first_line_tells_what_was_fired_at_and_names_objects(tmp_path: Path
     assert names_in(tmp_path) == ["hits.jsonl", "shots.jsonl"]
 
 
+def test_chunks_follow_the_time_that_they_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr("weapons.stream.time.monotonic", lambda: now[0])
+    taken = []
+    for chunk in stream._chunks(io.BytesIO(GOOD * 100_000)):
+        taken.append(len(chunk))
+        now[0] += len(chunk) * (1e-6 if len(taken) < 8 else 1e-3)
+        if len(taken) > 16:
+            break
+    assert taken[:8] == [16, 64, 256, 1024, 4096, 16384, 16384, 16384]
+    assert taken[8:15] == [8192, 4096, 2048, 1024, 512, 256, 256]
+
+
 def test_no_shots_at_all(tmp_path: Path) -> None:
     assert answers_of(b"", tmp_path) == []
 
@@ -266,7 +279,7 @@ def begun(tmp_path: Path) -> Iterator[tuple[Path, Path, Path]]:
 def test_half_a_line_is_cut_off(begun: tuple[Path, Path, Path]) -> None:
     _, log, output = begun
     done = run(log, output)
-    assert (done.shots, done.resumed, done.plan.calls) == (30, 12, 1)
+    assert (done.shots, done.resumed, done.plan.calls) == (30, 12, 2)
     again = output.with_name("again.jsonl")
     assert run(log, again).resumed == 0
     assert again.read_bytes() == output.read_bytes()
@@ -492,7 +505,7 @@ def test_a_run_cut_short_goes_on_to_the_same_bytes(
     assert whole.startswith(kept) and len(kept) < len(whole)
     done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True)
     answered = kept.count(b"\n") - 1
-    assert done.stderr == f"hitplanes: {part} answers {answered} shots: going on after them\n" and answered >= 1024
+    assert done.stderr == f"hitplanes: {part} answers {answered} shots: going on after them\n" and answered > 100
     assert output.read_bytes() == whole
     hit = sum(b'"rows":[]' not in line for line in whole.splitlines()[1:])
     assert done.stdout == f"24000 shots, {hit} hit something, in {output}\n"

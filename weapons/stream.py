@@ -40,11 +40,13 @@ FORMAT = "hitplanes-hits/1"
 COLUMNS = ("object", "round", "samples", "pixels", "weight", "pellets", "x", "y", "distance2")
 """Of a row: as in `Hits`, with first_xy as x and y."""
 
-LINES_FIRST, LINES_MAX = 1024, 16384
-"""Lines of the first chunk, and of the largest: larger ones make nothing faster."""
+LINES_FIRST, LINES_MAX = 16, 16384
+"""Lines of the first chunk, for shots that may hit thousands of objects each, and of the largest: larger ones make
+nothing faster."""
 
 SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
-"""A chunk that took less, or more, is followed by one twice, or half, as large: so an interrupt loses little."""
+"""A chunk that took less is followed by one four times as large, one that took more by one half as large: so memory
+follows what the shots hit, and an interrupt loses little."""
 
 SUFFIX = ".jsonl"
 NOTHING = b'"rows":[],'
@@ -170,7 +172,7 @@ def _chunks(lines: BinaryIO) -> Iterator[list[bytes]]:
         yield chunk
         now = time.monotonic()
         if now - begin < SECONDS_SHORT:
-            count = min(2 * count, LINES_MAX)
+            count = min(4 * count, LINES_MAX)
         elif now - begin > SECONDS_LONG:
             count = max(count // 2, 1)
         begin = now
