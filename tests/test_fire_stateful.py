@@ -19,7 +19,7 @@ from test_fire import Volley, expected, some_battle, some_sprite, some_volley, s
 import planes.items
 import weapons.firing
 import weapons.resolve
-from planes import InputError, Role, Scene, Sprite, load_scene
+from planes import ALL, InputError, Role, Scene, Sprite, load_scene
 from planes.compose import CodePlane
 from weapons import Disc, Hits, Point, fire
 
@@ -79,6 +79,11 @@ def stale_calls(hits: Hits) -> list[Any]:
     return [hits.shares, hits.why_not, hits.blockers, hits.margins, hits.samples_at, hits.by_owner]
 
 
+def default_bits(role: str) -> int:
+    """Categories that a role gives to what is given none."""
+    return ALL if role == "occluder" else 1
+
+
 class ChangingScene(RuleBasedStateMachine):
     """Add, remove, move, set, save and load, and fire in between."""
 
@@ -130,7 +135,10 @@ class ChangingScene(RuleBasedStateMachine):
             rows = [data.draw(poses[name])] * len(ids) if one_for_all else [data.draw(poses[name]) for _ in ids]
             values[name] = rows[0] if one_for_all else rows
             for number, value in zip(ids, rows, strict=True):
-                self.models[number].pose[name] = value
+                pose = self.models[number].pose
+                if name == "role" and "categories" not in names and pose["categories"] == default_bits(pose["role"]):
+                    pose["categories"] = default_bits(value)
+                pose[name] = value
         self.scene.set(ids, **values)
 
     @precondition(lambda self: self.models)
