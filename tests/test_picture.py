@@ -17,7 +17,7 @@ from weapons.facts import report_of
 from weapons.marks import MARKS, TINT, glyph
 from weapons.orders import fire_order, orders_of
 from weapons.picture import picture_of_report
-from weapons.world import mark_samples
+from weapons.world import mark_samples, outline, outline_seen
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 
@@ -159,3 +159,30 @@ def test_blend_rounds_to_the_nearest_and_clips() -> None:
     picture = np.full((2, 2, 3), 100, np.uint8)
     blend(picture, (200, 200, 200), np.full((3, 3), 128, np.uint8), -1, -1)
     assert picture.tolist() == [[[150] * 3] * 2] * 2
+
+
+def test_the_hud_stays_where_the_player_has_it() -> None:
+    """Placed from the corner of the player's screen, also where the view begins elsewhere."""
+    scene = Scene((4, 1))
+    scene.add(Sprite.from_mask(np.ones((1, 1), np.bool_), color=(40, 0, 0)), (1, 0), role="hud")
+    assert (draw_view(scene.items, (0, 0, 3, 0))[0, :, 0] == 40).tolist() == [False, True, False, False]
+    assert (draw_view(scene.items, (-2, 0, 3, 0), (0, 0))[0, :, 0] == 40).tolist() == [False] * 3 + [True] + [False] * 2
+    assert (draw_view(scene.items, (5, 0, 6, 0), (0, 0))[0, :, 0] == 40).tolist() == [False, False]
+
+
+def test_outlines_differ_by_what_became_of_the_object() -> None:
+    """A plain line, a thicker one, a dashed one; and only what is seen, where it is told what is."""
+    scene = Scene((12, 12))
+    item = scene.add(np.ones((6, 6), np.bool_), (5, 5))
+    scene.add(np.ones((12, 3), np.bool_), (2, 5), role="occluder", layer=1)
+    drawn = {}
+    for kind in ("other", "blocked", "hit"):
+        world = np.zeros((96, 96, 3), np.uint8)
+        outline(world, scene, item, (0, 0, 11, 11), 8, kind)
+        drawn[kind] = world.any(axis=2)
+    assert drawn["other"].sum() == 4 * 47 and drawn["hit"].sum() == 4 * 47 + 4 * 45
+    assert (drawn["blocked"] <= drawn["hit"]).all() and 0.3 < drawn["blocked"].sum() / drawn["hit"].sum() < 0.7
+    world = np.zeros((96, 96, 3), np.uint8)
+    outline_seen(world, scene, [item], (0, 0, 11, 11), 8)
+    columns = np.flatnonzero(world.any(axis=2).any(axis=0))
+    assert (columns.min() // 8, columns.max() // 8) == (4, 8), "three of its columns are hidden"

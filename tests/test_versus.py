@@ -97,6 +97,11 @@ def test_scenes_are_drawn_where_they_are_known() -> None:
     a, b = shot_at(before), shot_at(after)
     pictures = [picture_of_difference(a, b, scene, text=False) for scene in (None, before, after)]
     assert len({p.tobytes() for p in pictures}) == 3 and len({p.shape for p in pictures}) == 1
+    wide = (pictures[0].shape[1] - 2 * 16 - 2 * 12) // 3
+    sides = [[p[44:500, 16 + i * (wide + 12) :][:, :wide].tobytes() for i in range(3)] for p in pictures]
+    nothing, old, new = sides
+    assert old[0] != nothing[0] and old[1] == nothing[1] and old[2] == nothing[2]
+    assert new[0] == nothing[0] and new[1] != nothing[1] and new[2] != nothing[2]
 
 
 @pytest.mark.parametrize("far", [0, 10**9])
