@@ -166,6 +166,7 @@ def test_the_hud_stays_where_the_player_has_it() -> None:
     scene = Scene((4, 1))
     scene.add(Sprite.from_mask(np.ones((1, 1), np.bool_), color=(40, 0, 0)), (1, 0), role="hud")
     assert (draw_view(scene.items, (0, 0, 3, 0))[0, :, 0] == 40).tolist() == [False, True, False, False]
+    assert (draw_view(scene.items, (5, 7, 8, 7))[0, :, 0] == 40).tolist() == [False, True, False, False]
     assert (draw_view(scene.items, (-2, 0, 3, 0), (0, 0))[0, :, 0] == 40).tolist() == [False] * 3 + [True] + [False] * 2
     assert (draw_view(scene.items, (5, 0, 6, 0), (0, 0))[0, :, 0] == 40).tolist() == [False, False]
 
