@@ -62,9 +62,7 @@ def read_png(path: str | Path, field: str = "image") -> Image:
     InputError
         If the file is missing, is no PNG, is damaged, or is larger than a mask may be.
     """
-    if not isinstance(path, str | PurePath):
-        raise InputError(f"{field}: expected a path, got {shown(path)}")
-    path = Path(path)
+    path = _path(path, field)
     data = _contents(path, field)
     with within(f"{field}: {path.name!r}"):
         header = _header(data, len(data))
@@ -95,8 +93,20 @@ def read_text(path: Path) -> str:
         raise InputError(f"cannot read it: {getattr(error, 'strerror', error)}") from error
 
 
-def write_png(path: Path, image: Image) -> None:
-    """Write an image (h, w, 3 or 4), RGB order, beside its place and rename it: never half a file."""
+def write_png(path: str | Path, image: Image) -> None:
+    """Write an image (h, w, 3 or 4) of bytes, RGB order, beside its place and rename it: never half a file.
+
+    Raises
+    ------
+    InputError
+        If it is no image, or the file cannot be written.
+    """
+    path = _path(path, "output")
+    if not (
+        isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.size and image.shape[2:] in ((3,), (4,))
+    ):
+        got = f"{image.dtype} {image.shape}" if isinstance(image, np.ndarray) else shown(image)
+        raise InputError(f"image: expected bytes (h, w, 3 or 4), got {got}")
     import cv2
 
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
@@ -121,6 +131,12 @@ def check_output(path: Path) -> None:
         raise InputError(f"output: cannot write {path}: expected the name of a file")
     if not has_folder:
         raise InputError(f"output: cannot write {path}: no folder {path.parent}")
+
+
+def _path(path: object, field: str) -> Path:
+    if not isinstance(path, str | PurePath):
+        raise InputError(f"{field}: expected a path, got {shown(path)}")
+    return Path(path)
 
 
 def _replace(path: Path, data: bytes) -> None:

@@ -4,6 +4,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -270,3 +271,27 @@ def test_a_place_that_cannot_be_written_is_an_error(tmp_path: Path, write: Calla
     with pytest.raises(InputError, match="output: cannot write"):
         write(tmp_path / name)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file.txt", "folder"]
+
+
+@pytest.mark.parametrize(
+    ("path", "image", "told"),
+    [
+        (5, np.zeros((2, 2, 3), np.uint8), "output: expected a path, got 5"),
+        ("a.png", np.zeros((2, 2), np.uint8), r"image: expected bytes \(h, w, 3 or 4\), got uint8 \(2, 2\)"),
+        ("a.png", np.zeros((2, 2, 3)), r"image: expected bytes .*got float64 \(2, 2, 3\)"),
+        ("a.png", [[1]], r"image: expected bytes .*got \[\[1\]\]"),
+        ("a.png", np.zeros((0, 2, 3), np.uint8), r"image: expected bytes .*got uint8 \(0, 2, 3\)"),
+    ],
+)
+def test_what_is_no_image_is_not_written(
+    path: Any, image: Any, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=told):
+        write_png(path, image)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_path_may_be_a_text(tmp_path: Path) -> None:
+    write_png(str(tmp_path / "a.png"), np.full((1, 2, 3), 7, np.uint8))
+    assert read_png(tmp_path / "a.png")[:, :, :3].tolist() == [[[7] * 3] * 2]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -12,8 +13,10 @@ from pathlib import Path
 import pytest
 
 from planes import load_scene
+from planes.image import read_png
 from weapons import arsenal_of
 from weapons.arsenal import KINDS
+from weapons.cli import main
 from weapons.orders import fire_order, orders_of
 
 ROOT = Path(__file__).parents[1]
@@ -44,6 +47,31 @@ def test_ten_lines_print_what_is_shown() -> None:
 
 def test_batch_example_runs() -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", blocks("python")[1]], cwd=ROOT, check=True)
+
+
+def test_report_example_writes_a_picture(tmp_path: Path) -> None:
+    code = blocks("python")[2].replace("fixtures/", f"{ROOT}/fixtures/")
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=tmp_path, env=env, check=True)
+    assert read_png(tmp_path / "flame.png").shape[0] > 500
+
+
+def test_log_example_answers_what_is_shown(tmp_path: Path) -> None:
+    shot, answer = (block for block in blocks("text") if block.startswith('{"'))
+    (tmp_path / "shots.jsonl").write_text(shot)
+    assert (
+        main(
+            ["fire", str(ROOT / "fixtures" / "gallery"), str(tmp_path / "shots.jsonl"), "-o", str(tmp_path / "h.jsonl")]
+        )
+        == 0
+    )
+    assert (tmp_path / "h.jsonl").read_text().splitlines(keepends=True)[1] == answer
+
+
+def test_every_fixture_is_named() -> None:
+    told = section("Where things are")
+    for path in (ROOT / "fixtures").glob("*/scene.json"):
+        assert f"`{path.parent.name}`" in told
 
 
 def test_scene_example_loads_and_hits(tmp_path: Path) -> None:
