@@ -119,5 +119,6 @@ def rgba(data: bytes) -> np.ndarray:
     out = np.full((*values.shape[:2], 4), 255, np.int64)
     out[:, :, : wide.shape[2]] = (wide * 510 + top) // (2 * top)
     if key and kind in (GREY, RGB):
-        out[(values == np.frombuffer(key, ">u2").astype(np.int64)).all(axis=2), 3] = 0
+        color = np.frombuffer(key, ">u2").astype(np.int64) & top  # the low bits count
+        out[(values == color).all(axis=2), 3] = 0
     return out.astype(np.uint8)

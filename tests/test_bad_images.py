@@ -135,6 +135,7 @@ RIGHT = {
     "an empty chunk of pixels": START + chunk(b"IDAT", b"") + PIXELS + chunk(b"IDAT", b"") + END,
     "not compressed": START + chunk(b"IDAT", zlib.compress(RAW, 0)) + END,
     "a small window": START + chunk(b"IDAT", (c := zlib.compressobj(wbits=9)).compress(RAW) + c.flush()) + END,
+    "a transparency beside an alpha": png(np.full((4, 6, 4), 5), 8, RGBA, chunk(b"tRNS", b"\0\5")),
     "garbage behind the end": GOOD + b"\0garbage" * 99,
     "another image behind the end": GOOD + GOOD,
     "more colours than numbers": png(values(2, PALETTE, 5, 4), 2, PALETTE, palette(8)),

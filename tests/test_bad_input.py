@@ -35,6 +35,13 @@ def world() -> Scene:
     return scene
 
 
+def crowd() -> Scene:
+    scene = Scene()
+    for number in range(30):
+        scene.add(Sprite.circle(1), name=str(number))
+    return scene
+
+
 def shot(**given: Any) -> Any:
     return fire(world(), given.pop("weapon", Disc(3)), given.pop("at", (32, 20)), **given)
 
@@ -183,6 +190,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "find, removed": (lambda: world().find("gone"), "name: expected one of 'duck', 'wall', got 'gone'"),
     "find, None": (lambda: world().find(None), "name: expected one of .*got None"),  # type: ignore[arg-type]
     "find, a book": (lambda: world().find("duc" * 10**6), r"name: expected one of .*got 'ducduc.*\.\.\."),
+    "find among many": (lambda: crowd().find("30"), "name: expected one of '0', '1', .*'19' and 10 more, got '30'"),
     "mask of what was removed": (lambda: world().mask(2), "expected an object in the scene, got 2, which was removed"),
     "mask of true": (lambda: world().mask(True), "id: expected a whole number from 0 to 2, got True"),
     "name of nothing": (lambda: world().name_of(3), "id: expected a whole number from 0 to 2, got 3"),
@@ -393,6 +401,13 @@ def test_what_is_no_array_of_numbers(name: str) -> None:
 def test_a_bad_call_is_named(call: Callable[[], object], told: str, capfd: pytest.CaptureFixture[str]) -> None:
     check(call, told)
     assert capfd.readouterr() == ("", "")
+
+
+def test_labels_are_counted_before_they_are_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.labels.ITEMS_MAX", 3)
+    assert len(Scene.from_planes(hittable=[[1, 2, 3, 0]])) == 3
+    with pytest.raises(InputError, match="hittable: expected at most 3 objects, got 4"):
+        Scene.from_planes(hittable=[[1, 2, 3, 9]])
 
 
 # Every number of every call
