@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath, PurePosixPath
@@ -112,6 +113,8 @@ SCENE = Keys(
     ("format",),
 )
 """The tables of a scene file. Objects, weapons and shots are checked one by one, by who reads them."""
+
+DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)\s*(\..*)?", re.IGNORECASE)
 
 SHEET_WIDTH = 4096
 """Frames of a saved sprite are laid in rows of about this width, px."""
@@ -291,7 +294,8 @@ def _inside(folder: Path, text: str) -> Path:
     """Path of a file of the scene's folder; one that leads out of it is refused."""
     parts = PurePosixPath(text).parts
     path = folder.joinpath(*parts)
-    if "\\" in text or ":" in text or text.startswith("/") or ".." in parts:
+    devices = [part for part in parts if DEVICE.fullmatch(part)]  # what Windows opens under such a name is no file
+    if "\\" in text or ":" in text or text.startswith("/") or ".." in parts or devices:
         raise InputError(f"image: expected a path inside the scene's folder, got {text!r}")
     try:
         inside = path.resolve().is_relative_to(folder.resolve())

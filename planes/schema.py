@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from planes.arrays import InputError, bools, choice, flag, integer, integers, real, reals, shown, within
+from planes.arrays import InputError, array_of, bools, choice, flag, integer, integers, real, reals, shown, within
 from planes.constants import MASK_SIDE_MAX
 
 __all__ = [
@@ -198,11 +198,11 @@ class Mask:
     def check(self, name: str, value: object) -> Any:
         """Check a mask and return it (h, w) as booleans."""
         if not (isinstance(value, list | tuple) and value and isinstance(value[0], str)):
-            mask = bools(name, value, (None, None))
-            if max(mask.shape) > MASK_SIDE_MAX:
-                got = f"{mask.shape[1]} x {mask.shape[0]}"
+            array = array_of(name, value)
+            if array.ndim == 2 and max(array.shape) > MASK_SIDE_MAX:
+                got = f"{array.shape[1]} x {array.shape[0]}"
                 raise InputError(f"{name}: expected a mask of sides up to {MASK_SIDE_MAX} px, got {got}")
-            return mask
+            return bools(name, value, (None, None))
         for i, row in enumerate(value):
             if not isinstance(row, str) or len(row) != len(value[0]) or set(row) - set("#."):
                 raise InputError(f"{name}[{i}]: expected {len(value[0])} of '#' and '.', got {shown(row)}")
