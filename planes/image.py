@@ -16,7 +16,7 @@ import numpy.typing as npt
 from planes.arrays import Image, InputError, shown, within
 from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX, TEXT_BYTES_MAX
 
-__all__ = ["check_output", "read_png", "read_text", "write_png", "write_text"]
+__all__ = ["check_output", "read_png", "read_text", "write_bytes", "write_png", "write_text"]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 START = 33
@@ -112,12 +112,12 @@ def write_png(path: str | Path, image: Image) -> None:
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
     flat = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_DEFAULT, cv2.IMWRITE_PNG_COMPRESSION, 6]
     _, data = cv2.imencode(".png", cv2.cvtColor(image, order), flat)  # a third of the size of OpenCV's default
-    _replace(path, data.tobytes())
+    write_bytes(path, data.tobytes())
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file beside its place and rename it."""
-    _replace(path, text.encode("utf-8"))
+    write_bytes(path, text.encode("utf-8"))
 
 
 def check_output(path: Path) -> None:
@@ -139,7 +139,8 @@ def _path(path: object, field: str) -> Path:
     return Path(path)
 
 
-def _replace(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file beside its place and rename it."""
     check_output(path)
     aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")  # two that write at once do not share it
     try:

@@ -223,17 +223,20 @@ def folder_of(folder: object) -> Path:
     return Path(folder)
 
 
-def laid_out(value: Any, depth: int = 0) -> str:
-    """JSON with one object of the scene, one weapon or one shot to a line."""
+def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:
+    """JSON over lines that a comparison of texts can tell apart.
+
+    What is short takes one line. `whole` is the depth from which on everything does; by default it is every object
+    from the third level on: one object of the scene, one weapon or one shot to a line.
+    """
     flat, pad, end = json.dumps(value, allow_nan=False), "\n" + "  " * (depth + 1), "\n" + "  " * depth
-    entry = depth > 1 and isinstance(value, dict)
+    entry = depth > 1 and isinstance(value, dict) if whole is None else depth >= whole
     if (depth > 0 and len(flat) <= 100) or entry or not isinstance(value, dict | list):
         return flat
     if isinstance(value, dict):
-        return (
-            "{" + ",".join(f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1)}" for key, v in value.items()) + end + "}"
-        )
-    return "[" + ",".join(pad + laid_out(v, depth + 1) for v in value) + end + "]"
+        rows = [f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1, whole=whole)}" for key, v in value.items()]
+        return "{" + ",".join(rows) + end + "}"
+    return "[" + ",".join(pad + laid_out(v, depth + 1, whole=whole) for v in value) + end + "]"
 
 
 def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:

@@ -179,7 +179,7 @@ AT = "shot 0 (disc at 210, 110)"
             [
                 f'{AT}: object 0 "duck": 258 px, was 269; gained at (201, 88), (205, 89) and 12 more; '
                 "lost at (200, 88), (196, 89) and 23 more; first at (205, 111), was (204, 111)",
-                f'{AT}: object 3 "house" before object 0 "duck" 183 samples, was 172',
+                f'{AT}: object 3 "house" in front of object 0 "duck": 183 samples, was 172',
                 f"{AT}: verdicts: 2186 empty, was 2175; 572 hit, was 583",
             ],
         ),

@@ -18,7 +18,8 @@ ORDER = {
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",
         "orders", "heat", "facts", "schemas", "marks", "world", "panel", "overlay", "inset", "cards", "picture",
-        "jsondiff", "differences", "versus", "shotlog", "part", "progress", "stream", "starter",
+        "jsondiff", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
+        "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
         "cli", "__main__",
     ),
 }  # fmt: skip

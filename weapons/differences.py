@@ -208,7 +208,7 @@ def _blocker(was: Entry, now: Entry) -> list[str]:
         counts = [0 if side is None else side.get("samples") for side in (before, after)]
         if not same(*counts):
             name = _name(after or before or {})
-            parts.append(f"before {name} {_count(counts[1], 'sample')}, was {shown(counts[0])}")
+            parts.append(f"in front of {name}: {_count(counts[1], 'sample')}, was {shown(counts[0])}")
     return parts or [f"as a blocker: {line}" for line in first_of(by_path("", was, now))]
 
 
@@ -336,6 +336,8 @@ def _fields(was: Entry, now: Entry, keys: Iterable[str]) -> list[str]:
         before, after = was.get(key, ABSENT), now.get(key, ABSENT)
         if not same(before, after) and key == "first_xy":
             told.append(f"first at ({_place(after)}), was ({_place(before)})")
+        elif isinstance(before, dict) and isinstance(after, dict):
+            told += by_path(key, before, after)
         elif not same(before, after):
             told.append(f"{key} {shown(after)}, was {shown(before)}")
     return told
