@@ -170,7 +170,7 @@ def test_what_fails_is_drawn(golden: Callable[..., Outcome], tmp_path: Path) -> 
     folder = tmp_path / FOLDER / failure["folder"]
     drawn = {file for row in failure["rows"] for _, file in row} | set(failure["texts"])
     assert drawn == {p.name for p in folder.iterdir()} == {
-        "expected.json", "got.json", "expected.png", "got.png", "difference.png", "crop.png",
+        "expected.json", "got.json", "hits.png", "expected.png", "got.png", "difference.png", "crop.png",
         "plane-0-difference.png", "plane-0-crop.png",
     }  # fmt: skip
     red = (read_png(folder / "plane-0-difference.png")[:, :, :3] == RED).all(axis=2)
@@ -201,6 +201,7 @@ def test_one_pixel_of_the_picture_is_red(golden: Callable[..., Outcome], tmp_pat
     difference, crop = (read_png(folder / name)[:, :, :3] for name in ("difference.png", "crop.png"))
     assert np.argwhere((difference == RED).all(axis=2)).tolist() == [[400, 300]]
     assert (crop == RED).all(axis=2).sum() == 4**2, "enlarged"
+    assert not (folder / "hits.png").exists(), "the hits are the same"
     assert golden(update=True).kind == "updated" and golden().kind == "same"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import fields
@@ -66,6 +67,32 @@ def test_log_example_answers_what_is_shown(tmp_path: Path) -> None:
         == 0
     )
     assert (tmp_path / "h.jsonl").read_text().splitlines(keepends=True)[1] == answer
+
+
+def test_golden_example_is_written_accepted_and_says_what_changed(tmp_path: Path) -> None:
+    """A user's golden test, in a folder of its own."""
+    (code,) = (block for block in blocks("python") if "hits_golden" in block)
+    (told,) = re.findall(r"```text\n(.*?)```", section("A golden test of your own game"), flags=re.DOTALL)
+    (tmp_path / "test_blast.py").write_text(code)
+    shutil.copytree(ROOT / "fixtures" / "gallery", tmp_path / "level1")
+
+    def pytest_run(*words: str) -> tuple[int, str]:
+        run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words]
+        env = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+        done = subprocess.run(run, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout
+
+    assert pytest_run()[0] == 1 and not (tmp_path / "goldens").exists()
+    assert (tmp_path / "hits-failures" / "index.html").is_file()
+    assert pytest_run("--hits-update")[0] == 0 and pytest_run()[0] == 0
+    scene = tmp_path / "level1" / "scene.json"
+    scene.write_text(scene.read_text().replace("[405.5, 212.5]", "[402.5, 212.5]"))
+    code_, printed = pytest_run()
+    assert code_ == 1 and told in printed
+    (tmp_path / "test_blast.py").write_text(code.replace("test_blast_behind", "test_boom_behind"))
+    assert pytest_run("--hits-update")[0] == 0
+    code_, printed = pytest_run("--hits-stale")
+    assert code_ == 1 and "test_blast_behind_the_counter.json" in printed
 
 
 def test_every_fixture_is_named() -> None:

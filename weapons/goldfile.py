@@ -83,7 +83,7 @@ class Golden:
     origin_xy : pixel of the world at [0, 0] of the scene's planes
     left_out : why the scene's planes are not kept, or None
     picture : (h, w, 3 or 4) bytes, without text
-    names : of objects by id, for words; not kept
+    scene : what was fired on, for words and pictures; not kept
     """
 
     test: str
@@ -93,7 +93,7 @@ class Golden:
     origin_xy: tuple[int, int]
     left_out: str | None
     picture: Image
-    names: Mapping[int, str] = field(default_factory=dict)
+    scene: Scene | None = None
 
     def text(self) -> str:
         """The JSON, laid out for a comparison of texts."""
@@ -155,7 +155,7 @@ def golden_of(hits: object, planes: object, test: str, name: str | None) -> Gold
         origin_xy,
         left_out,
         picture_of_report(report, scene, text=False),
-        {item: scene.name_of(item) for item in scene.ids().tolist()},
+        scene,
     )
 
 
@@ -220,21 +220,22 @@ def _plane_lines(name: str, was: Plane | None, got: Golden) -> list[str]:
     differ = pixels_unlike(was, now)
     if differ.any():
         y, x = np.argwhere(differ)[0].tolist()
-        after, before = ((_called(name, side[y, x], got.names)) for side in (now, was))
+        after, before = ((_called(name, side[y, x], got.scene)) for side in (now, was))
         if name in SCENE_PLANES:
             x, y = x + got.origin_xy[0], y + got.origin_xy[1]
         lines.append(f"plane {name!r}: pixels differ: {differ.sum()}, first at ({x}, {y}): {after}, was {before}")
     return lines
 
 
-def _called(plane: str, value: Any, names: Mapping[int, str]) -> str:
+def _called(plane: str, value: Any, scene: Scene | None) -> str:
     """A value of a plane; in the scene's own it is an object."""
     if plane not in SCENE_PLANES:
         return str(value.tolist())
     item = int(value) - 1
     if item < 0:
         return "nothing"
-    return f"object {item}" + (f" {json.dumps(names[item], ensure_ascii=False)}" if item in names else "")
+    known = scene is not None and item < scene.items.count
+    return f"object {item}" + (f" {json.dumps(scene.name_of(item), ensure_ascii=False)}" if known else "")  # type: ignore[union-attr]
 
 
 def _picture_lines(was: Image, now: Image) -> list[str]:

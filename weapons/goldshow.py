@@ -11,6 +11,7 @@ import numpy.typing as npt
 from planes.arrays import Bools, Image
 from planes.image import write_png
 from weapons.goldfile import Golden, Unlike, opaque, pixels_unlike
+from weapons.versus import picture_of_difference
 
 __all__ = ["draw_difference", "picture_of_pixels", "pictures_of"]
 
@@ -32,6 +33,9 @@ GAP = 8
 PLANE = "plane-{}-"
 """Before the files of a plane; its name may be none for a file."""
 
+COMPARED = "hits.png"
+"""Hits expected and got side by side, where they differ."""
+
 HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 """Teschner et al., "Optimized Spatial Hashing" (2003): primes that tell neighbouring labels apart by colour."""
 
@@ -43,7 +47,7 @@ Row = list[tuple[str, str]]
 def pictures_of(changed: Unlike) -> list[str]:
     """Files that `draw_difference` may write."""
     planes = [f"{PLANE.format(i)}{part}.png" for i in range(len(changed.planes)) for part in ("difference", "crop")]
-    return ["expected.png", "got.png", "difference.png", "crop.png", *planes]
+    return [COMPARED, "expected.png", "got.png", "difference.png", "crop.png", *planes]
 
 
 def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed: Unlike) -> list[Row]:
@@ -57,10 +61,14 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
     if expected is None:
         return [[("got", "got.png")]]
     write_png(folder / "expected.png", expected.picture)
-    rows: list[Row] = [[("expected", "expected.png"), ("got", "got.png")]]
+    rows: list[Row] = []
+    if changed.hits:
+        write_png(folder / COMPARED, picture_of_difference(expected.report, _with_hash(got), got.scene))
+        rows += [[("hits: expected, got, difference", COMPARED)]]
+    rows += [[("expected", "expected.png"), ("got", "got.png")]]
     if changed.picture:
         was, now = opaque(expected.picture), opaque(got.picture)
-        rows[0] += [("difference", "difference.png")]
+        rows[-1] += [("difference", "difference.png")]
         rows += [_close(folder, "", was, now, _differ(was, now), PICTURE_CLOSE)]
     for number, name in enumerate(name for name in changed.planes if name in expected.planes and name in got.planes):
         was, now = expected.planes[name], got.planes[name]
@@ -69,6 +77,12 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
             _close(folder, PLANE.format(number), coloured(was), coloured(now), differ, PLANE_CLOSE, f"plane {name}: ")
         ]
     return rows
+
+
+def _with_hash(golden: Golden) -> dict[str, Any]:
+    """The report of a golden, with the hash of its scene where that is known."""
+    known = {} if golden.scene is None else {"hash": golden.scene.content_hash()}
+    return {**golden.report, "scene": {**golden.report["scene"], **known}}
 
 
 def picture_of_pixels(now: Image, differ: Bools) -> Image:

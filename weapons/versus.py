@@ -53,13 +53,14 @@ def picture_of_difference(
     """
     whole = _around(tuple(expected["view_xyxy"]), tuple(got["view_xyxy"]))
     kinds = compared_pixels(expected, got, whole)
+    counts = {name: int(at.sum()) for name, at in kinds.items()}
     view = _focus(kinds, whole)
     x, y = view[0] - whole[0], view[1] - whole[1]
     kinds = {name: at[y : y + view[3] - view[1] + 1, x : x + view[2] - view[0] + 1] for name, at in kinds.items()}
     factor = factor_of(view, WIDTH, HEIGHT)
     sides = [_side(report, scene, view, factor) for report in (expected, got)]
     sides.append(_difference(got, scene, kinds, view, factor))
-    page, texts = _page(sides, differences(expected, got), kinds)
+    page, texts = _page(sides, differences(expected, got), counts)
     if text:
         draw_texts(page, texts)
     return page
@@ -114,9 +115,14 @@ def _around(a: Box, b: Box) -> Box:
     return (x, y, x_max, y_max) if max(x_max - x, y_max - y) <= 2 * VIEW_MAX else a
 
 
+def _known(scene: Scene | None, report: Mapping[str, Any]) -> Scene | None:
+    """The scene, if it is that of a report; a golden's report does not tell which it was."""
+    return scene if scene is not None and scene.content_hash() == report["scene"].get("hash") else None
+
+
 def _side(report: Mapping[str, Any], scene: Scene | None, view: Box, factor: int) -> tuple[Image, list[Text]]:
     """One report: its samples over its scene, and its shots numbered."""
-    known = scene if scene is not None and scene.content_hash() == report["scene"]["hash"] else None
+    known = _known(scene, report)
     world = ground_of(known, report["scene"]["bounds_xyxy"], view, factor)
     for verdict in MARKS:
         mark_samples(world, report["shots"], verdict, view, factor)
@@ -135,7 +141,7 @@ def _difference(
     got: Mapping[str, Any], scene: Scene | None, kinds: Mapping[str, Bools], view: Box, factor: int
 ) -> tuple[Image, list[Text]]:
     """Pixels hit in both, or in one."""
-    known = scene if scene is not None and scene.content_hash() == got["scene"]["hash"] else None
+    known = _known(scene, got)
     world = ground_of(known, got["scene"]["bounds_xyxy"], view, factor, 60)
     if known is not None:
         outline_seen(world, known, known.ids(Role.HITTABLE).tolist(), view, factor)
@@ -145,12 +151,11 @@ def _difference(
 
 
 def _page(
-    sides: Sequence[tuple[Image, list[Text]]], words: Sequence[str], kinds: Mapping[str, Bools]
+    sides: Sequence[tuple[Image, list[Text]]], words: Sequence[str], counts: dict[str, int]
 ) -> tuple[Image, list[Text]]:
     """The three pictures in a row, the legend of the third, and the differences in words."""
     high, wide = sides[0][0].shape[:2]
     width = 2 * EDGE + 3 * wide + 2 * GAP
-    counts = {name: int(at.sum()) for name, at in kinds.items()}
     entries = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
     legend = Legend(entries, width, 180)
     below = TOP + high + 14 + legend.height
