@@ -30,7 +30,7 @@ Row = tuple[int, int, int, int, int, int, int, Pixel, int]
 ONE = 2**30
 FAR = 10**9
 SCENES_IN_PART = 100
-PARTS, LONG_PARTS = 20, 80
+PARTS, LONG_PARTS = 10, 90
 
 
 # The oracle: from a scene and the arguments of `fire` to rows and verdict counts, one sample at a time
