@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Image, InputError, shown, within
-from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX, TEXT_BYTES_MAX
+from planes.constants import MASK_AREA_MAX, MASK_SIDE_MAX, PLANE_SIDE_MAX, TEXT_BYTES_MAX
 
 __all__ = ["check_output", "read_png", "read_text", "write_bytes", "write_png", "write_text"]
 
@@ -107,6 +107,10 @@ def write_png(path: str | Path, image: Image) -> None:
     ):
         got = f"{image.dtype} {image.shape}" if isinstance(image, np.ndarray) else shown(image)
         raise InputError(f"image: expected bytes (h, w, 3 or 4), got {got}")
+    if max(image.shape) > PLANE_SIDE_MAX:
+        raise InputError(
+            f"image: expected sides of at most {PLANE_SIDE_MAX} px, got {image.shape[1]} x {image.shape[0]}"
+        )
     import cv2
 
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA

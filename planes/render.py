@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Image
+from planes.constants import SCALE_BITS, SUB
 from planes.grid256 import pixel
 from planes.items import ROLES, Items, Role
 from planes.spans import Box
@@ -42,6 +43,8 @@ def draw_view(items: Items, view_xyxy: Box, screen_xy: tuple[int, int] | None = 
     picture = np.empty((y_max - y + 1, x_max - x + 1, 3), np.uint8)
     picture[:] = GROUND
     for item in _back_to_front(items):
+        if _beyond(items, item, view_xyxy):
+            continue
         role = ROLES[int(items.role[item])]
         image, pivot_x, pivot_y = picture_of(items.sprites[item], items.forms[item], BARE[role])
         left, top = pixel(items.position_256[item] - (pivot_x, pivot_y)).tolist()
@@ -64,6 +67,18 @@ def blend(
     a = alpha[part].astype(np.uint32)[:, :, None]
     under = picture[y0:y1, x0:x1]
     under[:] = (under * (255 - a) + over * a + 127) // 255
+
+
+def _beyond(items: Items, item: int, view_xyxy: Box) -> bool:
+    """Whether an image surely lies out of view: farther from its pivot than all its sides and its scale allow."""
+    sprite, form = items.sprites[item], items.forms[item]
+    if not sprite.frames or ROLES[int(items.role[item])] is Role.HUD:
+        return False
+    height, width = sprite.frames[form.frame].mask.shape
+    pivot = max(map(abs, sprite.pivot_256 or (0, 0))) // SUB
+    reach = (height + width + 2 * pivot + 2) * (max(form.scale_x, form.scale_y, 1 << SCALE_BITS) >> SCALE_BITS) * 2
+    x, y = pixel(items.position_256[item]).tolist()
+    return not (view_xyxy[0] - reach <= x <= view_xyxy[2] + reach and view_xyxy[1] - reach <= y <= view_xyxy[3] + reach)
 
 
 def _back_to_front(items: Items) -> list[int]:

@@ -156,7 +156,7 @@ SCENES: dict[str, tuple[Any, str]] = {
     "weapon's field, missing": (
         changed(f"{GUN}.radius", MISSING), r"weapons\.gun: radius: expected a value, got nothing"),
     "weapon of too many pixels": (
-        changed(f"{GUN}.radius", 2**20), "samples: expected a shot of at most 67108864 samples"),
+        changed(f"{GUN}.radius", 2**20), "samples: expected a shot of at most 33554432 to tell"),
     "shots, object": (changed("shots", {}), r"shots: expected a list, got \{\}"),
     "shot, number": (changed(SHOT, 5), r"shots\[0\]: shot: expected an object, got 5"),
     "shot of nothing": (changed(SHOT, {}), r"shots\[0\]: weapon: expected a value, got nothing"),

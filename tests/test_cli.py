@@ -18,7 +18,8 @@ from planes import load_scene
 from weapons import starter
 from weapons.cli import main
 
-GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+ROOT = Path(__file__).parents[1]
+GALLERY = ROOT / "fixtures" / "gallery"
 
 
 def test_report_writes_picture_and_facts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -237,3 +238,37 @@ def test_the_scene_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(starter, name, lambda path, data: written.append(path.name))
     starter.write_starter(tmp_path / "range")
     assert written[-1] == "scene.json" and len(written) == 8
+
+
+def test_a_report_is_never_written_over_the_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "range"]) == 0
+    (tmp_path / "link.png").symlink_to(tmp_path / "range" / "crate.png")
+    before = {path: path.read_bytes() for path in (tmp_path / "range").iterdir()}
+    for words in (["--json", "range/scene.json"], ["-o", "range/crate.png"], ["-o", "link.png"]):
+        for scene in ("range", "range/scene.json"):
+            assert main(["report", scene, *words]) == 2
+            assert "output: expected another file than those of the scene" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in (tmp_path / "range").iterdir()} == before
+    assert main(["report", "range", "-o", "range/mine.png"]) == 0
+
+
+def test_an_object_without_a_pixel_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    objects = {"hittable": [{"name": "ghost", "mask": ["..", ".."], "position_xy": [5, 5]}]}
+    (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/1", "objects": objects}))
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
+    assert "note: ghost has no pixel: nothing hits it" in capsys.readouterr().out
+
+
+def test_a_closed_output_is_no_traceback(tmp_path: Path) -> None:
+    run = f"exec {shlex.quote(sys.executable)} -m weapons new {shlex.quote(str(tmp_path / 'range'))} >&-"
+    done = subprocess.run(["sh", "-c", run], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "range" / "scene.json").exists()
+
+
+def test_a_value_that_begins_with_a_minus_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["report", str(GALLERY), "--weapon", "pistol", "--at", "-5,3"])
+    assert "one that begins with a minus is written --at=-5,3" in capsys.readouterr().err

@@ -16,8 +16,9 @@ from weapons import Disc, Weapon, arsenal_of, fire
 from weapons.facts import report_of
 from weapons.marks import MARKS, TINT, glyph
 from weapons.orders import fire_order, orders_of
+from weapons.panel import legend_of
 from weapons.picture import picture_of_report
-from weapons.world import mark_samples, outline, outline_seen
+from weapons.world import World
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 
@@ -29,6 +30,14 @@ def told(scene: Scene, *shots: tuple[Weapon, tuple[float, float]]) -> dict[str, 
 def gallery_report(scene: Scene) -> dict[str, Any]:
     orders = orders_of(scene, arsenal_of(scene))
     return report_of(scene, [fire_order(scene, order) for order in orders], [order.name for order in orders])
+
+
+def blank(scene: Scene | None, view: tuple[int, int, int, int], factor: int) -> World:
+    """A view on which nothing is painted yet."""
+    world = World(scene, None, view, factor)
+    world.image[:] = 0
+    world.painted.clear()
+    return world
 
 
 def small_scene() -> tuple[Scene, int]:
@@ -60,14 +69,14 @@ def test_every_sample_is_marked_with_its_shape() -> None:
     assert set(samples) == {"hit", "occluded", "empty"}
     factor, view = 8, (2, 3, 20, 19)
     for verdict, runs in samples.items():
-        world = np.zeros((17 * factor, 19 * factor, 3), np.uint8)
-        mark_samples(world, report["shots"], verdict, view, factor)
-        wanted = np.zeros(world.shape[:2], np.bool_)
+        world = blank(None, view, factor)
+        world.mark_samples(report["shots"], verdict)
+        wanted = np.zeros(world.image.shape[:2], np.bool_)
         for y, first, last in runs:
             for x in range(max(first, 2), last + 1):
                 if y >= 3:
                     wanted[(y - 3) * factor :, (x - 2) * factor :][:factor, :factor] = glyph(verdict, factor)
-        assert np.array_equal(world.max(axis=2) > TINT, wanted), verdict
+        assert np.array_equal(world.image.max(axis=2) > TINT, wanted), verdict
         assert wanted.any()
 
 
@@ -125,7 +134,7 @@ def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
     assert hashlib.sha256(picture.tobytes()).hexdigest()[:16] == PICTURE_HASHES[kind]
 
 
-PICTURE_HASHES = {"shots": "5833c8605055b3e4", "batch": "09ba7c77266044ee", "out of view": "04ec93f87e3e9d09"}
+PICTURE_HASHES = {"shots": "1a481992b3ee2a35", "batch": "12913b4b582b4710", "out of view": "0ac4cea66953d9b7"}
 """Of pictures without text; look at a picture before changing its hash."""
 
 
@@ -178,12 +187,57 @@ def test_outlines_differ_by_what_became_of_the_object() -> None:
     scene.add(np.ones((12, 3), np.bool_), (2, 5), role="occluder", layer=1)
     drawn = {}
     for kind in ("other", "blocked", "hit"):
-        world = np.zeros((96, 96, 3), np.uint8)
-        outline(world, scene, item, (0, 0, 11, 11), 8, kind)
-        drawn[kind] = world.any(axis=2)
+        world = blank(scene, (0, 0, 11, 11), 8)
+        world.outline(item, kind)
+        drawn[kind] = world.image.any(axis=2)
+        assert world.painted == {f"object {kind}"}
     assert drawn["other"].sum() == 4 * 47 and drawn["hit"].sum() == 4 * 47 + 4 * 45
     assert (drawn["blocked"] <= drawn["hit"]).all() and 0.3 < drawn["blocked"].sum() / drawn["hit"].sum() < 0.7
-    world = np.zeros((96, 96, 3), np.uint8)
-    outline_seen(world, scene, [item], (0, 0, 11, 11), 8)
-    columns = np.flatnonzero(world.any(axis=2).any(axis=0))
+    world = blank(scene, (0, 0, 11, 11), 8)
+    world.outline_seen([item])
+    columns = np.flatnonzero(world.image.any(axis=2).any(axis=0))
     assert (columns.min() // 8, columns.max() // 8) == (4, 8), "three of its columns are hidden"
+
+
+def test_an_object_that_the_view_cuts_has_no_border_there() -> None:
+    scene = Scene()
+    item = scene.add(np.ones((9, 9), np.bool_), (4, 4))
+    for draw in (lambda w: w.outline(item, "hit"), lambda w: w.outline_seen([item])):
+        world = blank(scene, (2, 2, 6, 6), 8)
+        draw(world)
+        assert not world.image.any() and not world.painted, "its border lies out of view"
+        world = blank(scene, (2, 2, 9, 9), 8)
+        draw(world)
+        assert world.image.any() and not world.image[0, 0].any()
+
+
+def test_the_legend_has_what_the_picture_has() -> None:
+    """Not what lies out of view or hidden."""
+    scene, _ = small_scene()
+    scene.add(Sprite.circle(1), (14, 12), name="hidden")
+    report = told(scene, (Disc(6), (10, 10)))
+    world = blank(scene, tuple(report["view_xyxy"]), 8)
+    words = [entry.word for entry in legend_of(report, world.painted, 900).entries]
+    assert words == []
+    world = World(scene, None, tuple(report["view_xyxy"]), 8)
+    for verdict in MARKS:
+        world.mark_samples(report["shots"], verdict)
+    words = [entry.word for entry in legend_of(report, world.painted, 900).entries]
+    assert words == ["hit", "occluded", "empty", "occluder"]
+    far = told(scene, (Disc(1), (-4000, 5)))
+    picture_of_report(far, scene)
+    world = World(scene, None, tuple(far["view_xyxy"]), 8)
+    for verdict in MARKS:
+        world.mark_samples(far["shots"], verdict)
+    assert "outside" not in [entry.word for entry in legend_of(far, world.painted, 900).entries]
+
+
+def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
+    scene, _ = small_scene()
+    report = told(scene, (Disc(6), (10, 10)))
+    painted = {*MARKS, "occluder", "object hit", "object blocked", "object other"}
+    wide, narrow = (legend_of(report, painted, width) for width in (2000, 400))
+    assert wide.height < narrow.height and len(wide.entries) == len(narrow.entries) == 9
+    for legend, width in ((wide, 2000), (narrow, 400)):
+        ends = [x + e.mark.shape[1] + 8 * len(e.word) for (x, _), e in zip(legend.places, legend.entries, strict=True)]
+        assert max(ends) < width

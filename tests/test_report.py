@@ -18,8 +18,9 @@ from weapons.heat import heat_of
 from weapons.inset import CELL, COLUMNS, ROWS, inset_of
 from weapons.marks import HEAT, MARKS
 from weapons.overlay import BADGE, LETTER, ROW, Overlay
+from weapons.panel import plain
 from weapons.picture import picture_of_report
-from weapons.world import heat_step
+from weapons.world import World, heat_step
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 
@@ -170,10 +171,10 @@ def test_weapons_without_names_are_called_by_their_kind() -> None:
 
 
 def overlaid(scene: Scene, report: dict[str, Any], factor: int) -> Overlay:
-    x, y, x_max, y_max = view = tuple(report["view_xyxy"])
-    overlay = Overlay(np.zeros(((y_max - y + 1) * factor, (x_max - x + 1) * factor, 3), np.uint8), view, factor)
+    x, y, *_ = view = tuple(report["view_xyxy"])
+    overlay = Overlay(World(scene, scene.bounds, view, factor))
     overlay.keep_free(report["shots"], scene)
-    before = np.zeros(overlay.world.shape[:2], np.bool_)  # pixels that no label may cover
+    before = np.zeros(overlay.image.shape[:2], np.bool_)  # pixels that no label may cover
     named = {e["object"] for shot in report["shots"] for e in (*shot["rows"], *shot["blockers"])}
     free = {p for shot in report["shots"] for runs in shot["samples"].values() for p in pixels(runs)}
     for item in named:
@@ -182,16 +183,15 @@ def overlaid(scene: Scene, report: dict[str, Any], factor: int) -> Overlay:
     for column, row in free:
         if column >= x and row >= y:
             before[(row - y) * factor :, (column - x) * factor :][:factor, :factor] = True
-    for number, shot in enumerate(report["shots"], 1):
+    for number, shot in enumerate(report["shots"]):
         overlay.shot(shot, number)
-    overlay.links(report["shots"])
     overlay.names(report["shots"], scene)
+    overlay.links(report["shots"], {row["object"] for shot in report["shots"] for row in shot["rows"]})
     for text in overlay.texts:  # what a label takes: its words at their widest
         wide = BADGE if text.bold else (LETTER * len(text.text) + 8) // 2
         tall = BADGE if text.bold else ROW // 2
-        left, top = (
-            (text.x + 4 * len(text.text) - wide, text.y - 4 - tall) if text.bold else (text.x - 4, text.y - 5 - tall)
-        )
+        middle = text.x + 4 * len(text.text) if text.bold else text.x
+        left, top = middle - wide, text.y - 5 - tall + text.bold
         assert not before[top + 1 : top + 2 * tall, left + 1 : left + 2 * wide - 1].any(), text.text
         before[top + 1 : top + 2 * tall, left + 1 : left + 2 * wide - 1] = True
     return overlay
@@ -202,7 +202,7 @@ def test_labels_cover_no_sample_no_target_and_no_label(factor: int) -> None:
     scene = street()
     report = report_of(scene, [fire(scene, Disc(10), (20, 20)), fire(scene, Beam(50, 3), (2, 30), aim=-12)])
     overlay = overlaid(scene, report, factor)
-    assert {text.text for text in overlay.texts} == {"1", "2", "near", "far", "wall blocks near"} - (
+    assert {text.text for text in overlay.texts} == {"0", "1", "near", "far", "wall blocks near"} - (
         {"far"} if all(row["name"] != "far" for shot in report["shots"] for row in shot["rows"]) else set()
     )
 
@@ -213,7 +213,7 @@ def test_labels_of_the_gallery_cover_nothing() -> None:
     fired = [fire(scene, weapons[n], (390, 110)) for n in ("blast", "shotgun")]
     fired.append(fire(scene, weapons["flame"], (356, 232), aim=-24))
     texts = [text.text for text in overlaid(scene, report_of(scene, fired), 3).texts]
-    assert {"bandit", "can 1", "house blocks bandit", "1", "2", "3"} <= set(texts)
+    assert {"bandit", "can 1", "house blocks teddy", "0", "1", "2"} <= set(texts)
 
 
 def test_a_shot_out_of_view_is_pointed_at() -> None:
@@ -260,3 +260,68 @@ def test_a_batch_has_a_heat_picture() -> None:
     for step, spot in ((len(HEAT) - 1, (18, 20)), (0, (12, 20))):
         x, y = (24 * v + 12 for v in spot)
         assert np.abs(world[y, x].astype(int) - HEAT[step]).max() < 30, step
+
+
+def test_what_is_no_list_of_hits_is_refused() -> None:
+    scene = street()
+    hits = fire(scene, Point(), (1, 1))
+    for fired, told in (
+        (hits, "fired: expected a list of Hits, got Hits alone"),
+        (5, "fired: expected a list of Hits, got 5"),
+        ("hits", "fired: expected a list of Hits, got 'hits'"),
+    ):
+        with pytest.raises(InputError, match=told):
+            report_of(scene, fired)  # type: ignore[arg-type]
+    assert len(report_of(scene, (h for h in [hits]))["shots"]) == 1, "whatever can be gone through"  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="scene: expected a Scene, got NoneType"):
+        report_of(None, [])  # type: ignore[arg-type]
+    for name in ("", "x" * 201, "\ud800", 5):
+        with pytest.raises(InputError, match=r"names\[0\]: expected a text of 1 to 200 characters"):
+            report_of(scene, [hits], [name])  # type: ignore[list-item]
+    scene.name = "\ud800"
+    with pytest.raises(InputError, match=r"scene\.name: expected a text"):
+        report_of(scene, [hits])
+
+
+@pytest.mark.parametrize(
+    ("at", "view"),
+    [
+        ((5000, 150), (4736, 0, 5264, 299)),
+        ((2 * 10**5, 50), None),
+        ((-9000, 50), None),
+        ((5000, -5000), None),
+    ],
+)
+def test_a_view_of_a_wide_world_lies_in_it_and_is_no_sliver(at: tuple[int, int], view: tuple[int, ...] | None) -> None:
+    scene = Scene((10**5, 300))
+    found = tuple(report_of(scene, [fire(scene, Disc(8), at)])["view_xyxy"])
+    assert found == view or view is None
+    x, y, x_max, y_max = found
+    assert x >= -48 and x_max <= 10**5 + 48 and y_max - y >= 299 and 256 <= x_max - x <= 2048 + 96
+
+
+def test_the_view_of_a_long_beam_shows_what_it_hit() -> None:
+    scene = Scene((10**5, 300))
+    scene.add(Sprite.circle(9), (50_000, 150), name="far away")
+    x, y, x_max, y_max = report_of(scene, [fire(scene, Beam(90_000, 3), (100, 150))])["view_xyxy"]
+    assert x <= 50_000 <= x_max and y <= 150 <= y_max
+
+
+def test_letters_that_the_font_has_not_are_told_as_well_as_it_can() -> None:
+    assert plain("énte\nñ größe 鴨 \x1b[31m") == "ente n gro?e ?  [31m"
+
+
+def test_equal_plans_of_a_batch_are_told_once() -> None:
+    scene = street()
+    batch = report_of(scene, [fire(scene, Point(), (i, 20)) for i in range(30)])["batch"]
+    assert 1 <= len(batch["plan"]) <= 4 and batch["shots"] == 30
+
+
+def test_a_hit_object_that_was_blocked_is_linked_only_if_no_other_was() -> None:
+    """A ring tells most where nothing else does: an object that no shot hit."""
+    scene = Scene((80, 40))
+    scene.add(Sprite.box(9, 30), (20, 20), name="seen in part")
+    scene.add(Sprite.box(2, 2), (26, 20), name="hidden")
+    scene.add(Sprite.box(12, 30), (26, 20), role="occluder", layer=1, name="wall")
+    report = report_of(scene, [fire(scene, Disc(12), (22, 20))])
+    assert "wall blocks hidden" in [text.text for text in overlaid(scene, report, 8).texts]

@@ -302,6 +302,20 @@ def test_half_a_first_line_is_no_part_yet(length: int, begun: tuple[Path, Path, 
     assert run(log, output).resumed == 0
 
 
+@pytest.mark.parametrize("damage", ["zeros", "short", "letters"])
+def test_a_damaged_answer_and_what_follows_it_are_answered_again(damage: str, begun: tuple[Path, Path, Path]) -> None:
+    """As a loss of power leaves a page of a file."""
+    _, log, output = begun
+    part = output.with_name("hits.jsonl.part")
+    lines = part.read_bytes().splitlines(keepends=True)
+    bad = {"zeros": lines[6][:60] + b"\0" * (len(lines[6]) - 61) + b"\n", "short": lines[6][:45] + b"\n",
+           "letters": lines[6].replace(b'"rows":[', b'"rows":[x')}[damage]  # fmt: skip
+    part.write_bytes(b"".join([*lines[:6], bad, *lines[7:]]))
+    assert run(log, output).resumed == 5
+    again = output.with_name("again.jsonl")
+    assert run(log, again).resumed == 0 and again.read_bytes() == output.read_bytes()
+
+
 def test_a_line_changed_or_taken_out_of_the_log_is_refused(begun: tuple[Path, Path, Path]) -> None:
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
@@ -312,7 +326,7 @@ def test_a_line_changed_or_taken_out_of_the_log_is_refused(begun: tuple[Path, Pa
         (lines[:10], 11),
     ):
         log.write_bytes(b"".join(changed))
-        told = rf"shots.jsonl line {number} is not the one that .*hits.jsonl.part answers: remove it to start anew"
+        told = rf"shots.jsonl line {number} is not the one that .*hits.jsonl.part answers: remove .*.part to start anew"
         with pytest.raises(InputError, match=told):
             run(log, output)
         assert part.read_bytes() == before and not output.exists()

@@ -134,6 +134,7 @@ def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["compare", a, b, "-o", png]) == 2
     assert main(["compare", a, str(tmp_path / "none.json")]) == 2
     assert main(["compare", a, a, "--scene", str(tmp_path)]) == 2
+    assert main(["compare", a, a, "--scene", str(GALLERY.parent / "empty")]) == 2
     assert main(["compare", a, a, "-o", str(tmp_path / "diff.jpg")]) == 2
-    assert capsys.readouterr().err.count("\n") == 4 and Path(png).read_bytes() == before
+    assert capsys.readouterr().err.count("\n") == 5 and Path(png).read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b.json", "diff.png"]

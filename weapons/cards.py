@@ -11,9 +11,9 @@ import cv2
 from planes.arrays import Image
 from planes.scene import Scene
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
-from weapons.marks import MARKS, glyph
+from weapons.marks import MARKS
 from weapons.overlay import short
-from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped
+from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
 
 __all__ = ["Card", "batch_cards", "shot_card"]
 
@@ -81,7 +81,7 @@ class Card:
         if self.inset:
             texts += _inset(page, self.inset, x + 10, top)
             counts_x += _margin(self.inset) + COLUMNS * CELL + 14
-        texts += _counts(page, self.verdicts, counts_x, top)
+        texts += _counts(page, self.verdicts, counts_x, top, x + wide - 10 - counts_x)
         return texts + self._table(x, top + self._facts_height, wide)
 
     def _table(self, x: int, y: int, wide: int) -> list[Text]:
@@ -105,7 +105,7 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
     lines: list[Sequence[str]] = [HEADER] if shot["rows"] else []
     rounds = len({row["round"] for row in shot["rows"]}) > 1
     for row in shot["rows"][:HIT_LINES]:
-        name = f"{row['name']}, round {row['round'] + 1}" if rounds else row["name"]
+        name = f"{row['name']}, round {row['round']}" if rounds else row["name"]
         shares = [percent(share) for share in row["shares"].values()]
         lines.append((name, str(row["pixels"]), *shares, f"{row['distance2'] ** 0.5:.1f} px"))
     lines += _rest(shot["rows"], HIT_LINES, "")
@@ -131,7 +131,7 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
             (entry["name"], str(entry["shots"]), share, str(entry["pixels"]), f"{entry['weight'] / 65535:.6g}")
         )
     lines += _rest(batch["objects"], HIT_LINES, " hit")
-    lines.append([f"{never} of {report['scene']['hittable']} objects never hit"])
+    lines.append([f"{never} of {report['scene']['hittable']} objects never hit" if never else "every object was hit"])
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
     return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
@@ -182,7 +182,7 @@ def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) ->
         begun = done
 
 
-def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int) -> list[Text]:
+def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> list[Text]:
     """Samples of each verdict that occurs, beside its mark."""
     total = sum(verdicts.values())
     if not total:
@@ -190,10 +190,9 @@ def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int) -> list[Te
     texts = []
     for row, verdict in enumerate(v for v in reversed(MARKS) if verdicts[v]):
         top = y + 3 + row * LINE
-        page[top : top + 12, x : x + 12] = (70, 74, 82)
-        page[top : top + 12, x : x + 12][glyph(verdict, 12)] = MARKS[verdict][0]
+        page[top : top + 12, x : x + 12] = verdict_mark(verdict, 12)
         share = percent(verdicts[verdict] / total)
-        texts.append(Text(x + 18, top + 11, f"{verdicts[verdict]} {verdict}, {share}", FAINT))
+        texts.append(Text(x + 18, top + 11, clipped(f"{verdicts[verdict]} {verdict}, {share}", wide - 18), FAINT))
     return texts
 
 

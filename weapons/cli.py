@@ -7,14 +7,17 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
 
 from planes.arrays import InputError
 from planes.image import check_output, write_png, write_text
-from planes.scene import load_scene
+from planes.items import Role
+from planes.scene import Scene, load_scene
+from planes.scenefile import FILE_NAME
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
 from weapons.facts import report_of
@@ -100,20 +103,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     code = 0
     try:
         code = arguments.run(arguments) or 0
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            with _printing():
+                sys.stdout.flush()
     except BrokenPipeError:  # whoever read what is printed has seen enough; the files are written
         _hush()
     except InputError as error:
         print(f"hitplanes: {_plain(' '.join(str(error).split()))}", file=sys.stderr)
         return 2
-    except OSError as error:  # files have errors of their own; this is what is printed
-        _hush()
-        print(f"hitplanes: output: cannot write what is printed: {error.strerror}", file=sys.stderr)
-        return 2
     except KeyboardInterrupt as interrupt:
         print(": ".join(["hitplanes: interrupted", *map(str, interrupt.args)]), file=sys.stderr)
         return 130
     return code
+
+
+@contextmanager
+def _printing() -> Iterator[None]:
+    """Name what goes wrong with what is printed."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _hush()
+        raise InputError(f"output: cannot write what is printed: {error.strerror}") from error
 
 
 def _hush() -> None:
@@ -123,8 +136,11 @@ def _hush() -> None:
 
 def _say(line: str) -> None:
     """Print a line; what the terminal cannot show, or might obey, is spelled out."""
+    if sys.stdout is None:  # closed before we began
+        return
     encoding = sys.stdout.encoding or "utf-8"
-    print(_plain(line).encode(encoding, "backslashreplace").decode(encoding))
+    with _printing():
+        print(_plain(line).encode(encoding, "backslashreplace").decode(encoding))
 
 
 def _plain(text: str) -> str:
@@ -136,6 +152,8 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong with the words, and exit with 2."""
+        if message.endswith("expected one argument"):
+            message += "; one that begins with a minus is written --at=-5,3"
         told = _plain(" ".join(message.split()))
         told = told if len(told) <= USAGE_MAX else told[:USAGE_MAX] + "..."
         self.exit(2, f"hitplanes: {told} (see {self.prog} --help)\n")
@@ -168,7 +186,12 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
     one.add_argument(
-        "-o", "--output", type=Path, default=Path("hits.jsonl"), metavar="HITS.jsonl", help="default: hits.jsonl"
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("hits.jsonl"),
+        metavar="HITS.jsonl",
+        help="a name that ends in .jsonl (default: hits.jsonl)",
     )
     one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
     one = word(new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
@@ -185,6 +208,8 @@ def report(arguments: argparse.Namespace) -> None:
     """Write the picture, and the facts, of the scene's shots or of one shot."""
     _check_outputs(arguments.output, arguments.json)
     scene = load_scene(arguments.scene)
+    _check_not_of_scene(scene, arguments.scene, arguments.output, arguments.json)
+    _note_empty(scene)
     arsenal = arsenal_of(scene)
     if arguments.weapon is None:
         for name in ("at", "aim", "seed"):
@@ -241,6 +266,23 @@ def _check_outputs(picture: Path, facts: Path | None) -> None:
             raise InputError(f"--json: expected another file than --output, got {str(facts)!r} for both")
 
 
+def _check_not_of_scene(scene: Scene, folder: Path, *outputs: Path | None) -> None:
+    """Refuse to write over a file that the scene is made of."""
+    folder = folder.parent if folder.name == FILE_NAME else folder
+    images = {str((sprite.source or {}).get("image", "")) for sprite in scene.items.sprites}
+    own = {os.path.realpath(folder / name) for name in {FILE_NAME, *images}}
+    for output in outputs:
+        if output is not None and os.path.realpath(output) in own:
+            raise InputError(f"output: expected another file than those of the scene, got {output}")
+
+
+def _note_empty(scene: Scene) -> None:
+    """Say which objects nothing can hit, for want of a pixel."""
+    for item in (*scene.ids(Role.HITTABLE).tolist(), *scene.ids(Role.OCCLUDER).tolist()):
+        if not scene.mask(item)[0].any():
+            _say(f"note: {scene.name_of(item)} has no pixel: nothing hits it, it blocks nothing")
+
+
 def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
     """One shot of the command line as a scene file would have it."""
     if arguments.at is None:
@@ -259,6 +301,8 @@ def compare(arguments: argparse.Namespace) -> int:
         _check_outputs(arguments.output, None)
     expected, got = read_report(arguments.expected), read_report(arguments.got)
     scene = None if arguments.scene is None else load_scene(arguments.scene)
+    if scene is not None and scene.content_hash() not in (known := [r["scene"]["hash"] for r in (expected, got)]):
+        raise InputError(f"--scene: expected that of a report, {' or '.join(known)}, got {scene.content_hash()}")
     if arguments.output is not None:
         write_png(arguments.output, picture_of_difference(expected, got, scene))
     lines = differences(expected, got)

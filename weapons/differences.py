@@ -114,11 +114,13 @@ def _weapons(was: Entry, now: Entry) -> list[str] | None:
 
 def _shots(was: Entry, now: Entry) -> list[str] | None:
     groups = []
+    numbers = {id(shot): number for side in (was, now) for number, shot in enumerate(entries(side["shots"]))}
     for before, after in _paired_shots(entries(was["shots"]), entries(now["shots"])):
+        title = _title(after or before or {}, numbers)
         if before is None or after is None:
-            groups.append([f"{_title(after or before or {})} is {'missing' if after is None else 'new'}"])
+            groups.append([f"{title} is {'missing' if after is None else 'new'}"])
         elif not same(before, after):
-            groups.append([f"{_title(after)}: {line}" for line in _shot(before, after)])
+            groups.append([f"{title}: {line}" for line in _shot(before, after)])
     lines = [line for group in groups[:LINES_MAX] for line in group]
     return lines + [f"and {len(groups) - LINES_MAX} more shots"] * (len(groups) > LINES_MAX) or None
 
@@ -263,8 +265,8 @@ def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
         return None
     known = [{text_of_json(row) for row in side} for side in rows]
     before, after = (
-        [_as_row(row, batch) for row in batch["rows"] if text_of_json(row) not in known[1 - side]]
-        for side, batch in enumerate((was, now))
+        [_as_row(row, names) for row in batch["rows"] if text_of_json(row) not in known[1 - side]]
+        for side, (batch, names) in enumerate((batch, _names_of(batch)) for batch in (was, now))
     )
     lines = []
     for old, new in pairs(before, after, "shot", "object", "round"):
@@ -274,11 +276,14 @@ def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
     return first_of(lines) or None
 
 
-def _as_row(row: Any, batch: Entry) -> dict[str, Any]:
+def _names_of(batch: Entry) -> dict[str, Any]:
+    return {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
+
+
+def _as_row(row: Any, names: Mapping[str, Any]) -> dict[str, Any]:
     """A row of a batch as one of a shot."""
     told = dict(zip(BATCH_COLUMNS, row, strict=True))
     first_xy = [told.pop("x"), told.pop("y")]
-    names = {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
     return {**told, "first_xy": first_xy, "name": names.get(text_of_json(told["object"]))}
 
 
@@ -355,8 +360,9 @@ def _told_as(report: Entry) -> str:
     return "shots told one by one"
 
 
-def _title(shot: Entry) -> str:
-    return f"shot {shown(shot.get('shot'))} ({_plain(shot.get('weapon'))} at {_place(shot.get('at'))})"
+def _title(shot: Entry, numbers: Mapping[int, int]) -> str:
+    """A shot by its number in the report, as the picture has it."""
+    return f"shot {numbers.get(id(shot), 0)} ({_plain(shot.get('weapon'))} at {_place(shot.get('at'))})"
 
 
 def _name(entry: Entry) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.constants import CHUNK_SAMPLES, MARGIN_PX, MASK_AREA_MAX, NEAR_PX
+from planes.constants import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, MARGIN_PX, NEAR_PX
 from planes.items import Stack
 from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from planes.scene import Scene
@@ -107,18 +109,20 @@ class Detail:
     rank: Ints
     ended: Ints
 
-    @property
-    def y(self) -> Ints:
-        """Row of each sample."""
-        return np.asarray(self.runs.y[self.run])
+    @cached_property
+    def start(self) -> Ints:
+        """Number of the sample at x = 0 of each run."""
+        return np.asarray(np.cumsum(self.runs.lengths) - self.runs.lengths - self.runs.x_first)
 
     def on(self, rank: int) -> Ints:
         """Samples that lie on an item of the stack."""
         x0, y0, x1, y1 = self.stack.box_xyxy[rank].tolist()
-        y = self.y
-        inside = np.flatnonzero((self.x >= x0) & (self.x <= x1) & (y >= y0) & (y <= y1))
-        covered = self.stack.mask(rank)[y[inside] - y0, self.x[inside] - x0]
-        return np.asarray(inside[covered])
+        runs = self.runs
+        first, last = np.maximum(runs.x_first, x0), np.minimum(runs.x_last, x1)
+        meets = np.flatnonzero((first <= last) & (runs.y >= y0) & (runs.y <= y1))
+        piece, x = each_pixel(first[meets], last[meets])
+        run = meets[piece]
+        return np.asarray((self.start[run] + x)[self.stack.mask(rank)[runs.y[run] - y0, x - x0]])
 
 
 def samples_of(detail: Detail) -> Samples:
@@ -126,7 +130,7 @@ def samples_of(detail: Detail) -> Samples:
     volley = detail.volley
     placement = detail.runs.placement[detail.run]
     ids = np.append(detail.stack.ids, -1)
-    xy = np.stack([detail.x, detail.y], axis=1)
+    xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
     return Samples(xy, volley.round[placement], volley.pellet[placement], detail.verdict, ids[detail.rank])
 
 
@@ -135,8 +139,11 @@ def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
     under = detail.runs.take(detail.hit.run)
     found: dict[tuple[int, int], Spans] = {}
     keys = np.stack([detail.volley.round[under.placement], detail.stack.ids[detail.hit.rank]], axis=1)
-    for round_, item in np.unique(keys, axis=0).tolist():
-        own = (keys == (round_, item)).all(axis=1)
+    order = np.lexsort(keys.T[::-1])
+    begins = np.flatnonzero((np.diff(keys[order], axis=0, prepend=-1) != 0).any(axis=1)).tolist()
+    for first, last in pairwise([*begins, len(order)]):
+        own = order[first:last]
+        round_, item = keys[own[0]].tolist()
         found[round_, item] = Spans.from_runs(under.y[own], detail.hit.x_first[own], detail.hit.x_last[own])
     return found
 
@@ -164,7 +171,7 @@ def blockers_of(detail: Detail) -> list[Blocked]:
 
 
 def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
-    x, y = detail.x[samples], detail.y[samples]
+    x, y = detail.x[samples], detail.runs.y[detail.run[samples]]
     dx, dy = (v - v.min() - int((v - v.min()).sum()) // len(v) for v in (x, y))  # from the pixel of their mean
     nearest = int(np.lexsort((x, y, dx**2 + dy**2))[0])
     return Behind(int(detail.stack.ids[rank]), len(samples), (int(x[nearest]), int(y[nearest])))
@@ -246,8 +253,9 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and keep what decided it."""
     stack, bounds = scene.items.stack(), scene.bounds
     volley = volley_of(weapon, shots)
-    if int(volley.count.sum()) > MASK_AREA_MAX:
-        raise InputError(f"samples: expected a shot of at most {MASK_AREA_MAX} samples, got {int(volley.count.sum())}")
+    if int(volley.count.sum()) > DETAIL_SAMPLES_MAX:
+        got = int(volley.count.sum())
+        raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
     runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
     pairs = pairs_of(volley.boxes, volley.shot, shots, stack, "box")

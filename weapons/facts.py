@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -9,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import InputError, Ints
+from planes.arrays import InputError, Ints, listed
 from planes.constants import ALL, SUB, VIEW_MAX
 from planes.grid256 import pixel
 from planes.items import Role
 from planes.sampling import Verdict
 from planes.scene import Scene
+from planes.schema import Text
 from planes.spans import Box, Spans
 from weapons.arsenal import parts_of
 from weapons.heat import heat_of
@@ -28,7 +30,7 @@ FORMAT = "hitplanes-report/1"
 SHOTS_MAX = 24
 """More shots than these are told as a batch: the page would be longer than one reads."""
 
-SHOTS_AT_A_TIME = 1024
+PLACEMENTS_AT_A_TIME = 2**16
 
 NEAR_OUTSIDE = 48
 """How far beyond the bounds samples are shown, px."""
@@ -51,7 +53,7 @@ def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None =
     InputError
         If hits are of another scene, or of another version of it, or are told under one name with different weapons.
     """
-    _check(scene, fired)
+    fired = _checked(scene, fired)
     called = _weapon_names(fired, names)
     shots = sum(len(hits.shots) for hits in fired)
     each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
@@ -82,34 +84,67 @@ def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
     if not len(reach):
         return x, y, min(x_max, x + VIEW_MAX), min(y_max, y + VIEW_MAX)
     low, high = reach[:, :2].min(axis=0).tolist(), reach[:, 2:].max(axis=0).tolist()
-    if max(x_max - x, y_max - y) >= VIEW_MAX:
-        middle = np.concatenate([pixel(hits.shots.at_256) for hits in fired])
-        low, high = (middle.min(axis=0) - VIEW_MAX // 8).tolist(), (middle.max(axis=0) + VIEW_MAX // 8).tolist()
-        x, y = max(x, low[0]), max(y, low[1])
-        return x, y, max(x, min(x_max, high[0], x + VIEW_MAX)), max(y, min(y_max, high[1], y + VIEW_MAX))
+    middle = np.concatenate([_anchors(hits) for hits in fired])
     over = VIEW_MAX // 4 if scene.bounds is None else NEAR_OUTSIDE
-    x, y = max(min(x, low[0] - 2), x - over), max(min(y, low[1] - 2), y - over)
-    return x, y, min(max(x_max, high[0] + 2), x_max + over), min(max(y_max, high[1] + 2), y_max + over)
+    (x, x_max), (y, y_max) = (
+        _shown(*side, over)
+        for side in (
+            (x, x_max, low[0], high[0], *_ends(middle[:, 0])),
+            (y, y_max, low[1], high[1], *_ends(middle[:, 1])),
+        )
+    )
+    return x, y, x_max, y_max
+
+
+def _anchors(hits: Hits) -> Ints:
+    """Pixel (N, 2) of each shot that should be seen: of its first hit, or its own."""
+    at = pixel(hits.shots.at_256)
+    some = hits.starts[:-1] < hits.starts[1:]
+    at[some] = hits.first_xy[hits.starts[:-1][some]]
+    return at
+
+
+def _ends(values: Ints) -> tuple[int, int]:
+    return int(values.min()), int(values.max())
+
+
+def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int, over: int) -> tuple[int, int]:
+    """What is shown of one side of the world: all and a little more, or what the samples reach, or around the shots."""
+    if last - first < VIEW_MAX:
+        return max(min(first, low - 2), first - over), min(max(last, high + 2), last + over)
+    if high - low >= VIEW_MAX - VIEW_MAX // 4:
+        low, high = at_low, at_high
+    begin = min(max(first, low - VIEW_MAX // 8), last - VIEW_MAX // 4)
+    return begin, min(last, max(high + VIEW_MAX // 8, begin + VIEW_MAX // 4), begin + VIEW_MAX)
 
 
 def _boxes(hits: Hits) -> Ints:
     """Box (n, 4) around the samples of each part of a batch that has any."""
     found = []
-    for first in range(0, len(hits.shots), SHOTS_AT_A_TIME):
-        boxes = volley_of(hits.weapon, hits.shots.take(first, first + SHOTS_AT_A_TIME)).boxes
+    burst, spread, _ = parts_of(hits.weapon)
+    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
+    for first in range(0, len(hits.shots), step):
+        boxes = volley_of(hits.weapon, hits.shots.take(first, first + step)).boxes
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
         if len(boxes):
             found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
     return np.array(found, np.int64).reshape(-1, 4)
 
 
-def _check(scene: Scene, fired: Sequence[Hits]) -> None:
-    for row, hits in enumerate(fired):
+def _checked(scene: Scene, fired: object) -> list[Hits]:
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    Text().check("scene.name", scene.name)
+    if isinstance(fired, Hits):
+        raise InputError("fired: expected a list of Hits, got Hits alone")
+    told: list[Hits] = listed("fired", fired, "a list of Hits")
+    for row, hits in enumerate(told):
         if not isinstance(hits, Hits):
             raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
         if hits.scene is not scene or hits.version != scene.version:
             got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
             raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")
+    return told
 
 
 def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[str]:
@@ -117,6 +152,7 @@ def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[st
     if names is not None:
         if len(names) != len(fired):
             raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(names)}")
+        names = [Text().check(f"names[{i}]", name) for i, name in enumerate(names)]
         known: dict[str, Any] = {}
         for name, hits in zip(names, fired, strict=True):
             if known.setdefault(name, hits.weapon) != hits.weapon:
@@ -212,8 +248,13 @@ def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
         "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
         "rows": rows,
         "heat": heat_of(fired, view),
-        "plan": [hits.plan.to_dict() for hits in fired],
+        "plan": _distinct([hits.plan.to_dict() for hits in fired]),
     }
+
+
+def _distinct(plans: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Plans that differ."""
+    return list({json.dumps(plan): plan for plan in plans}.values())
 
 
 def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:

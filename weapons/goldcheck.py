@@ -113,6 +113,8 @@ def settle(call: Call, hits: object, planes: Mapping[str, object]) -> Outcome:
     failure, look = _show(call, lines, expected, got, changed or Unlike())
     more = [f"and {len(lines) - LINES_MAX} more"] if len(lines) > LINES_MAX else []
     accept = ["accept: run again with --hits-update"] if ours else []
+    if changed is not None and not changed.hits:
+        more.append("the hits are the same")
     message = [*lines[:LINES_MAX], *more, f"golden: {failure['golden']}", f"look: {look}", *accept]
     return Outcome("failed", "\n".join(message), failure)
 

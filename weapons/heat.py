@@ -39,7 +39,8 @@ def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
         column, row = ((xy[seen] - (x, y)) // cell).T
         for kind in np.unique(verdict[seen]).tolist():
             own = verdict[seen] == kind
-            counts[kind] += np.bincount(row[own] * width + column[own], minlength=height * width)
+            cells, samples = np.unique(row[own] * width + column[own], return_counts=True)
+            counts[kind, cells] += samples
         beyond += int((~seen).sum())
     runs = {v.name.lower(): _runs(counts[v].reshape(height, width)) for v in Verdict if counts[v].any()}
     return {"cell": cell, "origin_xy": [x, y], "beyond": beyond, "counts": runs}
@@ -51,7 +52,7 @@ def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
         step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
         for first in range(0, len(hits.shots), step):
             detail = detail_of(hits.scene, hits.weapon, hits.shots.take(first, first + step))
-            yield np.stack([detail.x, detail.y], axis=1), detail.verdict
+            yield np.stack([detail.x, detail.runs.y[detail.run]], axis=1), detail.verdict
 
 
 def _runs(counts: Ints) -> list[list[int]]:

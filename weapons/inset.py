@@ -11,7 +11,7 @@ from planes.arrays import Image
 from planes.scene import Scene
 from planes.spans import Box
 from weapons.marks import MARKS
-from weapons.world import ground_of, mark_samples, outline
+from weapons.world import World
 
 __all__ = ["CELL", "COLUMNS", "ROWS", "Inset", "inset_of"]
 
@@ -38,11 +38,12 @@ def inset_of(shot: Mapping[str, Any], scene: Scene) -> Inset | None:
         return None
     x, y = shot["rows"][0]["first_xy"]
     view = (x - COLUMNS // 2, y - ROWS // 2, x + COLUMNS // 2, y + ROWS // 2)
-    image = ground_of(scene, scene.bounds, view, CELL, LIGHT)
+    world = World(scene, scene.bounds, view, CELL, LIGHT)
     for verdict in MARKS:
-        mark_samples(image, [shot], verdict, view, CELL)
-    for row in shot["rows"]:
-        outline(image, scene, row["object"], view, CELL, "hit")
+        world.mark_samples([shot], verdict)
+    for item in sorted({row["object"] for row in shot["rows"]}):
+        world.outline(item, "hit")
+    image = world.image
     for line in (image[::CELL], image[:, ::CELL]):
         line[:] = (line.astype(np.uint16) * GRID // 255).astype(np.uint8)
     left, top = COLUMNS // 2 * CELL, ROWS // 2 * CELL

@@ -5,20 +5,21 @@ A label goes where it covers no sample, no object that it could be read for, and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
 import cv2
 import numpy as np
 
-from planes.arrays import Bools, Image
+from planes.arrays import Bools, Image, Ints
 from planes.items import Role
 from planes.scene import Scene
 from planes.spans import Box, Spans
 from weapons.marks import MARKS
 from weapons.panel import INK, Text
+from weapons.world import OUTLINES_MAX, World, fill_runs
 
-__all__ = ["Overlay", "blocked_objects", "short"]
+__all__ = ["Overlay", "short"]
 
 LETTER, ROW = 7, 17
 """Width of a letter and height of a label, px; not taken from the font, whose sizes depend on OpenCV's version."""
@@ -35,44 +36,41 @@ NAME_MAX = 24
 BADGE = 11
 """Radius of the disc of a shot's number, px."""
 
-NEAR, FAR = 40, 400
-"""How far a name, and a number or a link, may lie from what it belongs to, px."""
+NEAR, CLOSE, FAR = 40, 110, 400
+"""How far a name may lie from its object, how far a link lies if it can, and how far it and a number may lie, px."""
 
 DARK = (20, 22, 26)
 WHITE = (255, 255, 255)
 
 
 class Overlay:
-    """Marks and labels over an enlarged view; `texts` collects the text layer.
+    """Marks and labels over an enlarged view; `texts` collects the text layer."""
 
-    Parameters
-    ----------
-    world : (h, w, 3) picture that is drawn on
-    view : inclusive box of the world that it shows, px
-    factor : pixels of the picture for one of the world
-    """
-
-    def __init__(self, world: Image, view: Box, factor: int) -> None:
-        self.world, self.view, self.factor = world, view, factor
-        self.taken: Bools = np.zeros(world.shape[:2], np.bool_)
+    def __init__(self, world: World) -> None:
+        self.world, self.image, self.view, self.factor = world, world.image, world.view, world.factor
+        self.taken: Bools = np.zeros(self.image.shape[:2], np.bool_)
+        self.targets: Bools = self.taken.copy()
         self.texts: list[Text] = []
 
     def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Let no label cover a sample, an object that was hit, or an occluder that blocked."""
-        for y, x_first, x_last in (run for shot in shots for of in shot["samples"].values() for run in of):
-            self._take(*self._at(x_first, y), *self._at(x_last + 1, y + 1))
+        runs = [of for shot in shots for of in shot["samples"].values()]
         hit = {row["object"] for shot in shots for row in shot["rows"]}
-        for item in sorted(hit | {by["object"] for shot in shots for by in shot["blockers"]}):
-            mask, (x, y) = scene.mask(item)
-            spans = Spans.from_mask(mask, (x, y))
-            for row, x_first, x_last in zip(
-                spans.y.tolist(), spans.x_first.tolist(), spans.x_last.tolist(), strict=True
-            ):
-                self._take(*self._at(x_first, row), *self._at(x_last + 1, row + 1))
+        blocking = {by["object"] for shot in shots for by in shot["blockers"]}
+        self.taken |= self._plane([*runs, *(_runs(scene, item) for item in sorted(hit | blocking))])
+        self.targets |= self._plane([_runs(scene, item) for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]])
+
+    def _plane(self, runs: Sequence[Any]) -> Bools:
+        """Pixels of the picture that runs of the world cover."""
+        x, y, x_max, y_max = self.view
+        at = np.zeros((y_max - y + 1, x_max - x + 1), np.bool_)
+        for some in runs:
+            fill_runs(at, self.view, some)
+        return np.repeat(np.repeat(at, self.factor, axis=0), self.factor, axis=1)
 
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Number a shot: a cross on its pixel, a disc beside the pattern, a line between; an arrow if it is far off."""
-        height, width = self.world.shape[:2]
+        height, width = self.image.shape[:2]
         x, y = (v + self.factor // 2 for v in self._at(*shot["at_xy"]))
         inside = 0 <= x < width and 0 <= y < height
         if not inside:
@@ -80,12 +78,12 @@ class Overlay:
             x, y = edge
         bx, by = self._free(x, y, BADGE + 1, BADGE + 1)
         if inside:
-            cv2.line(self.world, (x, y), (bx, by), WHITE, 1)
-            _cross(self.world, x, y, max(3, self.factor))
+            cv2.line(self.image, (x, y), (bx, by), WHITE, 1)
+            _cross(self.image, x, y, max(3, self.factor))
         else:
-            cv2.arrowedLine(self.world, (bx, by), (x, y), WHITE, 1, tipLength=0.4)
-        cv2.circle(self.world, (bx, by), BADGE - 1, DARK, -1)
-        cv2.circle(self.world, (bx, by), BADGE - 1, WHITE, 1)
+            cv2.arrowedLine(self.image, (bx, by), (x, y), WHITE, 1, tipLength=0.4)
+        cv2.circle(self.image, (bx, by), BADGE - 1, DARK, -1)
+        cv2.circle(self.image, (bx, by), BADGE - 1, WHITE, 1)
         self._take(bx - BADGE, by - BADGE, bx + BADGE + 1, by + BADGE + 1)
         label = str(number)
         self.texts.append(Text(bx - 4 * len(label), by + 4, label, WHITE, bold=True))
@@ -98,44 +96,66 @@ class Overlay:
         for item in sorted(pixels, key=lambda item: (-pixels[item], item))[:LABELS_MAX]:
             mask, (x, y) = scene.mask(item)
             box = (*self._at(x, y), *self._at(x + mask.shape[1], y + mask.shape[0]))
-            self._label(scene.name_of(item), box, INK, NEAR)
+            self._label(scene.name_of(item), box, INK, NEAR, np.argwhere(mask)[:, ::-1] + (x, y))
 
-    def links(self, shots: Sequence[Mapping[str, Any]]) -> None:
-        """Ring samples that an occluder kept from an object, and say which kept what."""
+    def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
+        """Ring samples that an occluder kept from an object, and say which kept what; objects not hit come first."""
         color = MARKS["occluded"][0]
-        found = [(by["blocked"][0], by) for shot in shots for by in shot["blockers"] if by["blocked"]]
-        for told, by in sorted(found, key=lambda pair: -pair[0]["samples"])[:LINKS_MAX]:
+        pairs: dict[tuple[int, int], tuple[Mapping[str, Any], Mapping[str, Any]]] = {}
+        for shot in shots:
+            for by in shot["blockers"]:
+                for told in by["blocked"]:
+                    key = by["object"], told["object"]
+                    if key not in pairs or told["samples"] > pairs[key][0]["samples"]:
+                        pairs[key] = told, by
+        linked: set[int] = set()
+        for told, by in sorted(pairs.values(), key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
             x, y = (v + self.factor // 2 for v in self._at(*told["at_xy"]))
-            if not (0 <= x < self.world.shape[1] and 0 <= y < self.world.shape[0]):
+            inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
+            if not inside or by["object"] in linked or len(linked) >= LINKS_MAX:
                 continue
-            for shade, thick in ((DARK, 3), (color, 1)):
-                cv2.circle(self.world, (x, y), 6, shade, thick)
             text = f"{short(by['name'])} blocks {short(told['name'])}"
-            self._label(text, (x - 7, y - 7, x + 8, y + 8), color, FAR)
+            if self._label(text, (x - 7, y - 7, x + 8, y + 8), color, FAR):
+                linked.add(by["object"])
+                for shade, thick in ((DARK, 3), (color, 1)):
+                    cv2.circle(self.image, (x, y), 6, shade, thick)
 
-    def _label(self, text: str, box: Box, color: tuple[int, int, int], farthest: int) -> None:
-        """Write a text near a box of the picture, with a line to it where it had to go far; or not at all."""
+    def _label(
+        self, text: str, box: Box, color: tuple[int, int, int], farthest: int, pixels: Ints | None = None
+    ) -> bool:
+        """Write a text near a box of the picture, with a line to it where it had to go far; tells if there was room.
+
+        Where there is none beside the other targets, it may lie on one that no shot has to do with. The line ends at
+        the nearest of the pixels (n, 2) of the world, or at the box.
+        """
         text = short(text, 2 * NAME_MAX)
         half_w, half_h = (LETTER * len(text) + 8) // 2, ROW // 2 + 1
-        for x, y in _around(box, half_w, half_h, farthest):
-            if self._is_free(x - half_w, y - half_h, x + half_w, y + half_h):
+        reaches = [(reach, free) for reach in (min(CLOSE, farthest), farthest) for free in (True, False)]
+        spots = ((spot, free) for reach, free in reaches for spot in _around(box, half_w, half_h, reach))
+        for (x, y), free in spots:
+            place = x - half_w, y - half_h, x + half_w, y + half_h
+            if self._is_free(*place) and not (free and self.targets[place[1] : place[3], place[0] : place[2]].any()):
                 break
         else:
-            return
+            return False
         near = min(max(x, box[0]), box[2] - 1), min(max(y, box[1]), box[3] - 1)
-        if abs(x - near[0]) > half_w + 8 or abs(y - near[1]) > half_h + 8:
-            cv2.line(self.world, (x, y), near, color, 1)
-        part = self.world[y - half_h : y + half_h, x - half_w : x + half_w]
+        if pixels is not None:
+            away = (pixels - self.view[:2]) * self.factor + self.factor // 2 - (x, y)
+            near = tuple((away[(away**2).sum(axis=1).argmin()] + (x, y)).tolist())
+        if not free or abs(x - near[0]) > half_w + 8 or abs(y - near[1]) > half_h + 8:
+            cv2.line(self.image, (x, y), near, color, 1)
+        part = self.image[y - half_h : y + half_h, x - half_w : x + half_w]
         part[:] = (part.astype(np.uint16) * 60 + np.array(DARK, np.uint16) * 195) // 255
         self._take(x - half_w, y - half_h, x + half_w, y + half_h)
-        self.texts.append(Text(x - half_w + 4, y + 5, text, color))
+        self.texts.append(Text(x, y + 5, text, color, middle=True))
+        return True
 
     def _free(self, x: int, y: int, half_w: int, half_h: int) -> tuple[int, int]:
         """Nearest of some spots around a point where a rectangle covers nothing; else one inside the picture."""
         for bx, by in _around((x - 6, y - 6, x + 6, y + 6), half_w, half_h, FAR):
             if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
                 return bx, by
-        height, width = self.world.shape[:2]
+        height, width = self.image.shape[:2]
         return min(max(x, half_w), max(width - half_w, 0)), min(max(y - 22, half_h), max(height - half_h, 0))
 
     def _is_free(self, x0: int, y0: int, x1: int, y1: int) -> bool:
@@ -150,11 +170,10 @@ class Overlay:
         return (x - self.view[0]) * self.factor, (y - self.view[1]) * self.factor
 
 
-def blocked_objects(shots: Sequence[Mapping[str, Any]], scene: Scene) -> set[int]:
-    """Objects that occluders kept samples from, and that no shot hit."""
-    hit = {row["object"] for shot in shots for row in shot["rows"]}
-    blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]}
-    return (blocked - hit) & set(scene.ids(Role.HITTABLE).tolist())
+def _runs(scene: Scene, item: int) -> Ints:
+    """Pixels of an item, as runs [y, x_first, x_last]."""
+    spans = Spans.from_mask(*scene.mask(item))
+    return np.stack([spans.y, spans.x_first, spans.x_last], axis=1)
 
 
 def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple[int, int]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import unicodedata
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, NamedTuple, Protocol
 
 import cv2
@@ -10,7 +11,7 @@ import numpy as np
 
 from planes.arrays import Image
 from weapons.marks import HEAT, MARKS, glyph
-from weapons.world import HATCH, OUTLINES
+from weapons.world import HATCH, OUTLINES, World
 
 __all__ = [
     "CARD", "EDGE", "FAINT", "GROUND", "INK", "LINE", "TOP", "Entry", "Legend", "Text", "clipped", "draw_texts",
@@ -27,15 +28,15 @@ LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12
 
 GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
 
-ENTRY = 124
-"""Width of an entry of the legend, px; not taken from the text, whose width depends on the version of OpenCV."""
+LETTER, ENTRY_GAP = 8, 28
+"""About the width of a letter, and the space around an entry of the legend, px."""
 
 SIZE = 0.42
 """Scale of OpenCV's font, about 8 px a letter."""
 
 
 class Text(NamedTuple):
-    """A line of text: (x, y) is the left end of its base line, or the right end, px."""
+    """A line of text: (x, y) is the left end of its base line, px; its right end, or its middle."""
 
     x: int
     y: int
@@ -43,6 +44,7 @@ class Text(NamedTuple):
     color: Color = INK
     bold: bool = False
     right: bool = False
+    middle: bool = False
 
 
 class Drawn(Protocol):
@@ -57,14 +59,15 @@ class Drawn(Protocol):
 
 
 def page_of(
-    report: Mapping[str, Any], world: Image, texts: Sequence[Text], cards: Sequence[Drawn]
+    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Drawn]
 ) -> tuple[Image, list[Text]]:
     """Lay a page around the enlarged world; texts, with those of the world, are drawn later."""
-    width = max(world.shape[1] + 2 * EDGE, NARROWEST)
+    image = world.image
+    width = max(image.shape[1] + 2 * EDGE, NARROWEST)
     columns = max(1, (width - 2 * EDGE + GAP) // (COLUMN + GAP))
     wide = (width - 2 * EDGE - GAP * (columns - 1)) // columns
-    legend = legend_of(report, width)
-    bottoms = [TOP + world.shape[0] + 14 + legend.height] * columns
+    legend = legend_of(report, world.painted, width)
+    bottoms = [TOP + image.shape[0] + 14 + legend.height] * columns
     places = []
     for card in cards:
         column = bottoms.index(min(bottoms))
@@ -72,28 +75,34 @@ def page_of(
         bottoms[column] += card.height + GAP
     page = np.empty((max(bottoms) + 46, width, 3), np.uint8)
     page[:] = GROUND
-    left = (width - world.shape[1]) // 2
-    page[TOP : TOP + world.shape[0], left : left + world.shape[1]] = world
+    left = (width - image.shape[1]) // 2
+    page[TOP : TOP + image.shape[0], left : left + image.shape[1]] = image
     every = [text._replace(x=text.x + left, y=text.y + TOP) for text in texts]
     every += [Text(EDGE, 28, clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
-    every += legend.draw(page, EDGE, TOP + world.shape[0] + 14, width)
+    every += legend.draw(page, EDGE, TOP + image.shape[0] + 14)
     for card, (x, y) in zip(cards, places, strict=True):
         every += card.draw(page, x, y, wide)
     return page, [*every, *_footer(report, width, page.shape[0])]
 
 
 def draw_texts(page: Image, texts: Sequence[Text]) -> None:
-    """Draw the text layer; what the font has no letter for is shown as a question mark."""
+    """Draw the text layer."""
     for text in texts:
-        shown = text.text.encode("ascii", "replace").decode()
-        x = text.x - text_width(shown) if text.right else text.x
+        shown = plain(text.text)
+        x = text.x - text_width(shown) * (2 * text.right + text.middle) // 2
         font = cv2.FONT_HERSHEY_DUPLEX if text.bold else cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(page, shown, (x, text.y), font, SIZE, text.color, 1, cv2.LINE_AA)
 
 
+def plain(text: str) -> str:
+    """A text in letters that the font has: without accents, on one line, and a question mark for what it has not."""
+    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    return "".join(c if c.isprintable() else " " for c in bare).encode("ascii", "replace").decode()
+
+
 def text_width(text: str) -> int:
     """Width of a text, px."""
-    return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, SIZE, 1)[0][0])
+    return int(cv2.getTextSize(plain(text), cv2.FONT_HERSHEY_SIMPLEX, SIZE, 1)[0][0])
 
 
 def clipped(text: str, width: int) -> str:
@@ -114,67 +123,70 @@ class Entry(NamedTuple):
 
 
 class Legend:
-    """Entries side by side, in as many lines as they take."""
+    """Entries side by side, in as many lines as they take; widths are not taken from the font, which differs."""
 
-    def __init__(self, entries: Sequence[Entry], width: int, entry_width: int = ENTRY) -> None:
-        self.entries, self.entry_width = entries, entry_width
-        self.columns = max(1, (width - 2 * EDGE) // entry_width)
+    def __init__(self, entries: Sequence[Entry], width: int) -> None:
+        self.entries = entries
+        self.places: list[tuple[int, int]] = []
+        x, y = 0, 0
+        for entry in entries:
+            wide = entry.mark.shape[1] + LETTER * len(entry.word) + ENTRY_GAP
+            if x and x + wide > width - 2 * EDGE:
+                x, y = 0, y + 26
+            self.places.append((x, y))
+            x += wide
+        self.height = y + 26 + 8 if entries else 8
 
-    @property
-    def height(self) -> int:
-        """Height with the space below, px."""
-        return 26 * -(-len(self.entries) // self.columns) + 8
-
-    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
+    def draw(self, page: Image, x: int, y: int) -> list[Text]:
         """Draw the marks and return the words."""
         texts = []
-        for i, entry in enumerate(self.entries):
-            left, top = x + i % self.columns * self.entry_width, y + i // self.columns * 26
-            page[top : top + 14, left : left + entry.mark.shape[1]] = entry.mark
-            texts.append(Text(left + entry.mark.shape[1] + 6, top + 12, entry.word, FAINT))
+        for entry, (left, top) in zip(self.entries, self.places, strict=True):
+            wide = entry.mark.shape[1]
+            page[y + top : y + top + 14, x + left : x + left + wide] = entry.mark
+            texts.append(Text(x + left + wide + 6, y + top + 12, entry.word, FAINT))
         return texts
 
 
-def legend_of(report: Mapping[str, Any], width: int) -> Legend:
-    """Only what the picture has: verdicts or their heat, outlines, rings, hatching."""
-    shots, batch = report["shots"], report["batch"]
-    present = {v for shot in shots for v in shot["samples"]} | set(batch["heat"]["counts"] if batch else ())
-    hit = {row["object"] for shot in shots for row in shot["rows"]}
-    blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]}
-    entries = [Entry(v, verdict_mark(v)) for v in reversed(MARKS) if v in present and not (batch and v == "hit")]
-    if batch and "hit" in present:
-        most = max(run[3] for run in batch["heat"]["counts"]["hit"])
+def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legend:
+    """Only what the picture has: verdicts or their heat, outlines, hatching."""
+    heat = report["batch"]["heat"]["counts"].get("hit", ()) if report["batch"] else ()
+    entries = [Entry(v, verdict_mark(v)) for v in reversed(MARKS) if v in painted and not (heat and v == "hit")]
+    if heat and "hit" in painted:
         scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
-        entries.insert(0, Entry(f"1 to {most}", np.repeat(scale, 5, axis=1)))
-    if hit:
-        entries.append(Entry("object hit", _outlined("hit")))
-    if blocked - hit:
-        entries.append(Entry("object blocked", _outlined("blocked")))
-    if report["scene"]["hittable"] > len(hit | blocked):
-        entries.append(Entry("other target" if hit | blocked else "target", _outlined("other")))
-    if report["scene"]["occluders"]:
+        entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{_per(report)}", np.repeat(scale, 5, axis=1)))
+    told = "other target" if painted & {"object hit", "object blocked"} else "target"
+    for kind, word in (("hit", "object hit"), ("blocked", "object blocked"), ("other", told)):
+        if f"object {kind}" in painted:
+            entries.append(Entry(word, _outlined(kind)))
+    if "occluder" in painted:
         rows, columns = np.mgrid[:14, :14]
-        mark = _blank()
+        mark = _blank(14)
         mark[(rows + columns) % 6 < 2] = HATCH
         entries.append(Entry("occluder", mark))
     return Legend(entries, width)
 
 
-def verdict_mark(verdict: str) -> Image:
-    """Mark (14, 14, 3) of a verdict, for a legend."""
-    mark = _blank()
-    mark[glyph(verdict, 14)] = MARKS[verdict][0]
+def _per(report: Mapping[str, Any]) -> str:
+    """What a count of heat belongs to, where that is not one pixel."""
+    cell = report["batch"]["heat"]["cell"]
+    return f" in {cell} x {cell} px" if cell > 1 else ""
+
+
+def verdict_mark(verdict: str, size: int = 14) -> Image:
+    """Mark (size, size, 3) of a verdict, for a legend."""
+    mark = _blank(size)
+    mark[glyph(verdict, size)] = MARKS[verdict][0]
     return mark
 
 
-def _blank() -> Image:
-    mark = np.empty((14, 14, 3), np.uint8)
+def _blank(size: int) -> Image:
+    mark = np.empty((size, size, 3), np.uint8)
     mark[:] = (70, 74, 82)
     return mark
 
 
 def _outlined(kind: str) -> Image:
-    mark, thick = _blank(), 1 if kind == "other" else 2
+    mark, thick = _blank(14), 1 if kind == "other" else 2
     border = np.ones((14, 14), np.bool_)
     border[thick:-thick, thick:-thick] = False
     rows, columns = np.ogrid[:14, :14]

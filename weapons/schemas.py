@@ -167,6 +167,9 @@ def read_report(path: Path) -> dict[str, Any]:
     with within(str(path)):
         found = json_of(read_text(path))
         REPORT.check("report", found)
+        for verdict, runs in (found["batch"] or {"heat": {"counts": {}}})["heat"]["counts"].items():
+            if any(run[3] < 1 for run in runs):
+                raise InputError(f"batch: heat: counts: {verdict}: expected counts from 1, got 0")
         x, y, x_max, y_max = found["view_xyxy"]
         if not (0 <= x_max - x <= 2 * VIEW_MAX and 0 <= y_max - y <= 2 * VIEW_MAX):
             raise InputError(f"view_xyxy: expected a box of at most {2 * VIEW_MAX} px a side, got {found['view_xyxy']}")

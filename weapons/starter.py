@@ -110,7 +110,10 @@ def _empty(folder: Path) -> bool:
     except FileExistsError:
         if not folder.is_dir():
             raise InputError(f"folder: expected a new folder, got the file {folder}") from None
-        held = sorted(path.name for path in folder.iterdir())
+        try:
+            held = sorted(path.name for path in folder.iterdir())
+        except OSError as error:
+            raise InputError(f"folder: cannot read {folder}: {error.strerror}") from error
         if held:
             raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it") from None
         return False

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import time
 import zlib
 from collections.abc import Iterator
@@ -49,6 +50,7 @@ SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 follows what the shots hit, and an interrupt loses little."""
 
 SUFFIX = ".jsonl"
+ANSWER = re.compile(rb'\{"shot":\d+,"of":"[0-9a-f]{8}","rows":\[[-\d,\[\]]*\],"verdicts":\[\d+(,\d+){4}\]\}\n')
 NOTHING = b'"rows":[],'
 """In the answer to a shot that hit nothing."""
 
@@ -153,9 +155,11 @@ def _hash(data: object) -> str:
 def _resume(lines: BinaryIO, reader: ShotReader, part: Part, done: Streamed) -> None:
     """Pass over the lines of the log that an older part answers; each answer names its line by a checksum."""
     for answer in part.lines():
+        if not ANSWER.fullmatch(answer):
+            break  # damaged, as by a loss of power: it and what follows are answered again
         line = b"".join(read_lines(lines, 1))
         if b'"of":"%08x"' % zlib.crc32(body_of(line)) not in answer[:64]:
-            told = f"is not the one that {part.path} answers: remove it to start anew"
+            told = f"is not the one that {part.path} answers: remove {part.path} to start anew"
             raise InputError(f"{reader.place(done.shots)} {told}")
         done.shots += 1
         done.size += len(line)

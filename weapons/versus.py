@@ -16,7 +16,7 @@ from weapons.differences import differences
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import EDGE, FAINT, GROUND, INK, LINE, TOP, Entry, Legend, Text, clipped, draw_texts, verdict_mark
-from weapons.world import factor_of, fill, ground_of, heat_boxes, lay, mark_heat, mark_samples, outline, outline_seen
+from weapons.world import World, factor_of, fill, fill_runs, heat_boxes
 
 __all__ = ["compared_pixels", "picture_of_difference"]
 
@@ -28,6 +28,9 @@ LONGEST = 1200
 
 AROUND = 24
 """What is shown around the pixels that differ, px."""
+
+DARK = 60
+"""How much of the scene's light is left under the difference, of 255."""
 
 LINES_MAX = 60
 """Differences told on the page; the command prints them all."""
@@ -58,9 +61,15 @@ def picture_of_difference(
     x, y = view[0] - whole[0], view[1] - whole[1]
     kinds = {name: at[y : y + view[3] - view[1] + 1, x : x + view[2] - view[0] + 1] for name, at in kinds.items()}
     factor = factor_of(view, WIDTH, HEIGHT)
-    sides = [_side(report, scene, view, factor) for report in (expected, got)]
-    sides.append(_difference(got, scene, kinds, view, factor))
-    page, texts = _page(sides, differences(expected, got), counts)
+    worlds = [World(_known(scene, report), report["scene"]["bounds_xyxy"], view, factor) for report in (expected, got)]
+    sides = [(world.image, _marked(world, report)) for world, report in zip(worlds, (expected, got), strict=True)]
+    sides.append((_difference(got, _known(scene, got), kinds, view, factor), []))
+    painted = worlds[0].painted | worlds[1].painted
+    wide = sides[0][0].shape[1] + 2 * EDGE
+    marks = Legend([Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted], wide)
+    kept = [(name, n) for name, n in reversed(counts.items()) if n]
+    legend = Legend([Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in kept], wide)
+    page, texts = _page(sides, [marks, legend], differences(expected, got))
     if text:
         draw_texts(page, texts)
     return page
@@ -82,8 +91,7 @@ def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
     planes = {verdict: np.zeros(shape, np.bool_) for verdict in MARKS}
     for verdict, plane in planes.items():
         for shot in report["shots"]:
-            for y, first, last in shot["samples"].get(verdict, ()):
-                fill(plane, view, (first, y, last, y))
+            fill_runs(plane, view, shot["samples"].get(verdict, ()))
         if report["batch"]:
             for _, box in heat_boxes(report["batch"]["heat"], verdict):
                 fill(plane, view, box)
@@ -120,45 +128,39 @@ def _known(scene: Scene | None, report: Mapping[str, Any]) -> Scene | None:
     return scene if scene is not None and scene.content_hash() == report["scene"].get("hash") else None
 
 
-def _side(report: Mapping[str, Any], scene: Scene | None, view: Box, factor: int) -> tuple[Image, list[Text]]:
-    """One report: its samples over its scene, and its shots numbered."""
-    known = _known(scene, report)
-    world = ground_of(known, report["scene"]["bounds_xyxy"], view, factor)
+def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
+    """Mark the samples of one report, and number its shots."""
     for verdict in MARKS:
-        mark_samples(world, report["shots"], verdict, view, factor)
+        world.mark_samples(report["shots"], verdict)
         if report["batch"]:
-            mark_heat(world, report["batch"]["heat"], verdict, view, factor)
-    hit = {row["object"] for shot in report["shots"] for row in shot["rows"]}
-    for item in sorted(hit) if known else ():
-        outline(world, known, item, view, factor, "hit")  # type: ignore[arg-type]
-    overlay = Overlay(world, view, factor)
-    for number, shot in enumerate(report["shots"], 1):
+            world.mark_heat(report["batch"]["heat"], verdict)
+    for item in sorted({row["object"] for shot in report["shots"] for row in shot["rows"]}):
+        world.outline(item, "hit")
+    overlay = Overlay(world)
+    for number, shot in enumerate(report["shots"]):
         overlay.shot(shot, number)
-    return world, overlay.texts
+    return overlay.texts
 
 
 def _difference(
     got: Mapping[str, Any], scene: Scene | None, kinds: Mapping[str, Bools], view: Box, factor: int
-) -> tuple[Image, list[Text]]:
+) -> Image:
     """Pixels hit in both, or in one."""
-    known = _known(scene, got)
-    world = ground_of(known, got["scene"]["bounds_xyxy"], view, factor, 60)
-    if known is not None:
-        outline_seen(world, known, known.ids(Role.HITTABLE).tolist(), view, factor)
+    world = World(scene, got["scene"]["bounds_xyxy"], view, factor, DARK)
+    if scene is not None:
+        world.outline_seen(scene.ids(Role.HITTABLE).tolist())
     for name, at in kinds.items():
-        lay(world, at, LOOKS[name], factor)
-    return world, []
+        world.lay(at, LOOKS[name])
+    return world.image
 
 
 def _page(
-    sides: Sequence[tuple[Image, list[Text]]], words: Sequence[str], counts: dict[str, int]
+    sides: Sequence[tuple[Image, list[Text]]], legends: Sequence[Legend], words: Sequence[str]
 ) -> tuple[Image, list[Text]]:
-    """The three pictures in a row, the legend of the third, and the differences in words."""
+    """The three pictures in a row, a legend of the first two and one of the third, and the differences in words."""
     high, wide = sides[0][0].shape[:2]
     width = 2 * EDGE + 3 * wide + 2 * GAP
-    entries = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
-    legend = Legend(entries, width, 180)
-    below = TOP + high + 14 + legend.height
+    below = TOP + high + 14 + max(legend.height for legend in legends)
     told = list(words[:LINES_MAX]) or ["no difference"]
     if len(words) > LINES_MAX:
         told.append(f"and {len(words) - LINES_MAX} more")
@@ -170,6 +172,7 @@ def _page(
         page[TOP : TOP + high, left : left + wide] = world
         texts += [label._replace(x=label.x + left, y=label.y + TOP) for label in labels]
         texts.append(Text(left, 28, title, INK, bold=True))
-    texts += legend.draw(page, EDGE, TOP + high + 14, width)
+    for legend, left in zip(legends, (EDGE, EDGE + 2 * (wide + GAP)), strict=True):
+        texts += legend.draw(page, left, TOP + high + 14)
     lines = [Text(EDGE, below + 14 + LINE * i, clipped(line, width - 2 * EDGE), FAINT) for i, line in enumerate(told)]
     return page, [*texts, *lines]
