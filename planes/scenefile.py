@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Callable
@@ -188,10 +189,11 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
     except (OSError, ValueError) as error:  # a zero byte is a ValueError
         raise InputError(f"folder: cannot make {folder}: {getattr(error, 'strerror', error)}") from error
     saved: dict[int, dict[str, Any]] = {}
+    images: dict[str, str | None] = {}
     sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
     for entry in scene.objects:
         if entry.sprite.uid not in saved:
-            saved[entry.sprite.uid] = _saved_source(entry.sprite, folder)
+            saved[entry.sprite.uid] = _saved_source(entry.sprite, folder, images)
         section = next(name for name, role in SECTIONS.items() if role is entry.role)
         sections[section].append(_object_json(entry, saved[entry.sprite.uid]))
     bounds = None
@@ -319,7 +321,7 @@ def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def _saved_source(sprite: Sprite, folder: Path) -> dict[str, Any]:
+def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
     """Source of a sprite as JSON; its image is written to the folder, and no other file is ever overwritten."""
     if sprite.outline is not None:
         color = {} if sprite.color is None else {"color": list(sprite.color)}
@@ -337,7 +339,7 @@ def _saved_source(sprite: Sprite, folder: Path) -> dict[str, Any]:
     sheet, rects = _sheet(sprite)
     if len(rects) > 1:
         options["frames"] = {"rects_xywh": rects}
-    return {"image": _write_apart(folder, str(known.get("image", "sprite.png")), sheet), **options}
+    return {"image": _write_apart(folder, str(known.get("image", "sprite.png")), sheet, images), **options}
 
 
 def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
@@ -363,14 +365,33 @@ def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
     return sheet, rects
 
 
-def _write_apart(folder: Path, name: str, sheet: Image) -> str:
-    """Write an image under its own name, or under a numbered one where another image has that name already."""
-    stem = PurePosixPath(name).stem
+def _write_apart(folder: Path, name: str, sheet: Image, images: dict[str, str | None]) -> str:
+    """Write an image under its own name, or under a numbered one where another image has that name already.
+
+    `images` keeps the digests of the files that were looked at; None stands for no file.
+    """
+    stem, own = PurePosixPath(name).stem, _digest(sheet)
     for number in range(1, 10**6):
         path = folder / (f"{stem}.png" if number == 1 else f"{stem}-{number}.png")
-        if not path.exists():
+        if path.name not in images:
+            images[path.name] = _digest_of(path)
+        if images[path.name] is None:
             write_png(path, sheet)
-            return path.name
-        if np.array_equal(read_png(path), sheet):
+            images[path.name] = own
+        if images[path.name] == own:
             return path.name
     raise InputError(f"image: expected a free name like {name!r} in {folder}")
+
+
+def _digest_of(path: Path) -> str | None:
+    """Digest of an image; of what is none, one that no image has."""
+    if not path.exists() and not path.is_symlink():
+        return None
+    try:
+        return _digest(read_png(path))
+    except InputError:
+        return ""
+
+
+def _digest(image: Image) -> str:
+    return hashlib.sha256(repr(image.shape).encode() + image.tobytes()).hexdigest()

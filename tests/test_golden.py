@@ -201,7 +201,8 @@ def test_one_pixel_of_the_picture_is_red(golden: Callable[..., Outcome], tmp_pat
     difference, crop = (read_png(folder / name)[:, :, :3] for name in ("difference.png", "crop.png"))
     assert np.argwhere((difference == RED).all(axis=2)).tolist() == [[400, 300]]
     assert (crop == RED).all(axis=2).sum() == 4**2, "enlarged"
-    assert not (folder / "hits.png").exists(), "the hits are the same"
+    assert not (folder / "hits.png").exists()
+    assert "\nthe hits are the same\n" in outcome.message
     assert golden(update=True).kind == "updated" and golden().kind == "same"
 
 

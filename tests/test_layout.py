@@ -17,10 +17,9 @@ ORDER = {
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",
-        "orders", "heat", "facts", "schemas", "marks", "world", "panel", "overlay", "inset", "cards", "picture",
-        "jsondiff", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
-        "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
-        "cli", "__main__",
+        "orders", "heat", "facts", "schemas", "jsondiff", "words", "marks", "world", "panel", "overlay", "inset",
+        "cards", "picture", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale",
+        "golden", "shotlog", "part", "progress", "stream", "starter", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -325,3 +325,18 @@ def test_a_hit_object_that_was_blocked_is_linked_only_if_no_other_was() -> None:
     scene.add(Sprite.box(12, 30), (26, 20), role="occluder", layer=1, name="wall")
     report = report_of(scene, [fire(scene, Disc(12), (22, 20))])
     assert "wall blocks hidden" in [text.text for text in overlaid(scene, report, 8).texts]
+
+
+def test_a_name_lies_on_no_other_target_where_there_is_room() -> None:
+    """Above and below are other targets; beside there is room."""
+    scene = Scene((90, 60))
+    hit = scene.add(Sprite.box(8, 8), (20, 30), name="this one")
+    for y in (16, 44):
+        scene.add(Sprite.box(30, 18), (20, y), name="another")
+    report = report_of(scene, [fire(scene, Point(), (20, 30))])
+    (name,) = (text for text in overlaid(scene, report, 8).texts if text.text == "this one")
+    mask, (x, y) = scene.mask(hit)
+    others = [((5 * 8, 35 * 8), (y * 8, (y + 18) * 8)) for y in (7, 35)]
+    for (left, right), (top, low) in others:
+        assert not (left < name.x < right and top < name.y < low), name
+    assert mask.shape == (9, 9) and x < name.x // 8

@@ -355,11 +355,28 @@ def test_a_file_that_is_no_image_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "sprite.png").write_text("notes")
     scene = Scene()
     scene.add(SHEET)
-    try:
-        scene.save(tmp_path)
-    except InputError:
-        assert not (tmp_path / "scene.json").exists()
+    scene.save(tmp_path)
     assert (tmp_path / "sprite.png").read_text() == "notes"
+    assert load_scene(tmp_path).content_hash() == scene.content_hash() and (tmp_path / "sprite-2.png").is_file()
+
+
+def test_each_image_is_looked_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many want the same name."""
+    scene = Scene()
+    for i in range(40):
+        scene.add(np.full((2, 2, 4), i + 1, np.uint8) | np.uint8(128), (i, 0))
+    scene.save(tmp_path)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    looked: list[str] = []
+
+    def counted(path: Path) -> Any:
+        looked.append(path.name)
+        return read_png(path)
+
+    monkeypatch.setattr(scenefile, "read_png", counted)
+    scene.save(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    assert len(looked) == len(set(looked)) > 20
 
 
 def test_an_interrupted_save_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

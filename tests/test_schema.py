@@ -292,6 +292,11 @@ def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
         path.write_text(json.dumps({**report, key: value}))
         with pytest.raises(InputError, match=message):
             read_report(path)
+    batch = report_of(scene, [fire(scene, arsenal_of(scene)["pistol"], [(62, 86)] * 30)])
+    batch["batch"]["heat"]["counts"]["hit"][0][3] = 0
+    path.write_text(json.dumps(batch))
+    with pytest.raises(InputError, match="batch: heat: counts: hit: expected counts from 1, got 0"):
+        read_report(path)
     path.write_bytes(b"\xff")
     with pytest.raises(InputError, match="expected JSON in UTF-8"):
         read_report(path)

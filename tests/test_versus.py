@@ -13,6 +13,7 @@ import pytest
 from planes import Scene, Sprite, load_scene
 from weapons import Disc, Point, Spread, arsenal_of, fire, report_of
 from weapons.cli import main
+from weapons.differences import differences
 from weapons.marks import MARKS
 from weapons.versus import AROUND, compared_pixels, picture_of_difference
 from weapons.world import factor_of
@@ -138,3 +139,9 @@ def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["compare", a, a, "-o", str(tmp_path / "diff.jpg")]) == 2
     assert capsys.readouterr().err.count("\n") == 5 and Path(png).read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b.json", "diff.png"]
+
+
+def test_shots_are_called_by_the_number_that_the_picture_has() -> None:
+    scene, moved = yard(), yard(22)
+    a, b = (report_of(s, [fire(s, Point(), (58, 38)), fire(s, Disc(8), (24, 20))]) for s in (scene, moved))
+    assert differences(a, b)[0].startswith("shot 1 (disc at 24, 20): object 0")

@@ -12,8 +12,8 @@ from planes.arrays import Image
 from planes.scene import Scene
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
 from weapons.marks import MARKS
-from weapons.overlay import short
 from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
+from weapons.words import NAME_MAX, percent, reason, short
 
 __all__ = ["Card", "batch_cards", "shot_card"]
 
@@ -113,7 +113,7 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
         behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
         lines.append((f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"))
     lines += _rest(shot["blockers"], NOT_LINES, " block")
-    lines += [(f"not {entry['name']}", reason(entry)) for entry in shot["why_not"][:NOT_LINES]]
+    lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in shot["why_not"][:NOT_LINES]]
     lines += _rest(shot["why_not"], NOT_LINES, " near it")
     return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines)
 
@@ -135,22 +135,6 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
     return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
-
-
-def reason(entry: Mapping[str, Any]) -> str:
-    """Why an object was not hit, in words."""
-    if entry["reason"] == "missed":
-        return f"missed by {entry['distance']:.1f} px"
-    if entry["reason"] == "behind":
-        return "behind " + ", ".join(short(by["name"]) for by in entry["by"])
-    return {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}[
-        entry["reason"]
-    ]
-
-
-def percent(share: float) -> str:
-    """A share, short."""
-    return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
 
 
 def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:

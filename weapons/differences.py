@@ -24,6 +24,7 @@ from weapons.jsondiff import (
     shown,
     text_of_json,
 )
+from weapons.words import reason, unquoted
 
 __all__ = ["decisive", "differences"]
 
@@ -41,8 +42,6 @@ SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (
 """What follows from the rest of a shot, of its rows and of a batch: told only if nothing else has changed."""
 
 BATCH_COLUMNS = ("shot", "round", "object", "samples", "pixels", "weight", "pellets", "x", "y", "distance2")
-
-REASONS = {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}
 
 
 def differences(expected: Entry, got: Entry) -> list[str]:
@@ -167,7 +166,7 @@ def _rows(was: Entry, now: Entry) -> list[str] | None:
         row = after or before or {}
         name = _name(row) + (f", round {shown(row.get('round'))}" if rounds else "")
         why = reasons[after is None].get(key_of(row, "object"))
-        lines += _row(name, before, after, "" if why is None else _reason(why))
+        lines += _row(name, before, after, "" if why is None else reason(why))
     return first_of(lines) or None
 
 
@@ -224,14 +223,14 @@ def _why_not(was: Entry, now: Entry) -> list[str] | None:
         if key_of(entry, "object") in told:
             continue
         if before is None or after is None:
-            lines.append(f"{_name(entry)} is {'newly' if before is None else 'no longer'} near: {_reason(entry)}")
+            lines.append(f"{_name(entry)} is {'newly' if before is None else 'no longer'} near: {reason(entry)}")
         elif not same(before, after):
             lines.append(f"{_name(after)}: " + "; ".join(_why_changed(before, after)))
     return first_of(lines) if lines or told else None
 
 
 def _why_changed(was: Entry, now: Entry) -> list[str]:
-    before, after = _reason(was), _reason(now)
+    before, after = reason(was), reason(now)
     if before != after:
         prefix = "missed by "
         return [f"{after}, was {before.removeprefix(prefix) if after.startswith(prefix) else before}"]
@@ -362,22 +361,11 @@ def _told_as(report: Entry) -> str:
 
 def _title(shot: Entry, numbers: Mapping[int, int]) -> str:
     """A shot by its number in the report, as the picture has it."""
-    return f"shot {numbers.get(id(shot), 0)} ({_plain(shot.get('weapon'))} at {_place(shot.get('at'))})"
+    return f"shot {numbers.get(id(shot), 0)} ({unquoted(shot.get('weapon'))} at {_place(shot.get('at'))})"
 
 
 def _name(entry: Entry) -> str:
     return f"object {shown(entry.get('object'))} {shown(entry.get('name'))}"
-
-
-def _reason(entry: Entry) -> str:
-    """Why an object was not hit."""
-    reason = entry.get("reason")
-    if reason == "missed":
-        distance = entry.get("distance")
-        return f"missed by {distance:.1f} px" if _is_number(distance) else f"missed by {shown(distance)}"
-    if reason == "behind":
-        return "behind " + ", ".join(_plain(by.get("name")) for by in entries(entry.get("by")))
-    return REASONS.get(str(reason), shown(reason))
 
 
 def _count(n: Any, what: str = "px") -> str:
@@ -387,12 +375,3 @@ def _count(n: Any, what: str = "px") -> str:
 def _place(at: Any) -> str:
     """A position, or a pixel, without its brackets."""
     return ", ".join(map(shown, at)) if isinstance(at, list | tuple) else shown(at)
-
-
-def _plain(value: Any) -> str:
-    """A name without quotes, on one line."""
-    return shown(value)[1:-1] if isinstance(value, str) else shown(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

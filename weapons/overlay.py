@@ -17,9 +17,10 @@ from planes.scene import Scene
 from planes.spans import Box, Spans
 from weapons.marks import MARKS
 from weapons.panel import INK, Text
+from weapons.words import NAME_MAX, short
 from weapons.world import OUTLINES_MAX, World, fill_runs
 
-__all__ = ["Overlay", "short"]
+__all__ = ["Overlay"]
 
 LETTER, ROW = 7, 17
 """Width of a letter and height of a label, px; not taken from the font, whose sizes depend on OpenCV's version."""
@@ -29,9 +30,6 @@ LABELS_MAX = 16
 
 LINKS_MAX = 8
 """Occluders that are linked to the object they kept most samples from; the cards have them all."""
-
-NAME_MAX = 24
-"""Letters of a name on a label."""
 
 BADGE = 11
 """Radius of the disc of a shot's number, px."""
@@ -191,8 +189,3 @@ def _cross(world: Image, x: int, y: int, size: int) -> None:
     for color, thickness in ((DARK, 3), (WHITE, 1)):
         cv2.line(world, (x - size, y), (x + size, y), color, thickness)
         cv2.line(world, (x, y - size), (x, y + size), color, thickness)
-
-
-def short(name: str, most: int = NAME_MAX) -> str:
-    """A name of at most so many letters."""
-    return name if len(name) <= most else name[: most - 3] + "..."

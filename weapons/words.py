@@ -1,0 +1,43 @@
+"""Words for what a report holds: why an object was not hit, names and shares in short."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from weapons.jsondiff import entries, shown
+
+__all__ = ["percent", "reason", "short", "unquoted"]
+
+REASONS = {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}
+
+NAME_MAX = 24
+"""Letters of a name on a label."""
+
+
+def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
+    """Why an object was not hit, of any JSON; names are cut to a number of letters."""
+    told = entry.get("reason")
+    if told == "missed":
+        distance = entry.get("distance")
+        plain = isinstance(distance, int | float) and not isinstance(distance, bool)
+        return f"missed by {distance:.1f} px" if plain else f"missed by {shown(distance)}"
+    if told == "behind":
+        names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
+        return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
+    return REASONS.get(str(told), shown(told))
+
+
+def short(name: str, most: int = NAME_MAX) -> str:
+    """A name of at most so many letters."""
+    return name if len(name) <= most else name[: most - 3] + "..."
+
+
+def percent(share: float) -> str:
+    """A share, short."""
+    return f"{100 * share:.1f} %" if share == 0 or share >= 0.001 else "< 0.1 %"
+
+
+def unquoted(value: Any) -> str:
+    """A name without quotes, on one line."""
+    return shown(value)[1:-1] if isinstance(value, str) else shown(value)
