@@ -11,7 +11,7 @@ import cv2
 from planes.arrays import Image
 from planes.scene import Scene
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
-from weapons.marks import MARKS
+from weapons.marks import MARKS, tiled_glyph
 from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
 from weapons.words import NAME_MAX, percent, reason, short
 
@@ -25,6 +25,9 @@ NOT_LINES = 5
 
 CELL_WIDTH = 64
 """Width of a column of numbers, px."""
+
+BAR = 9
+"""Height of the bar of verdicts, px."""
 
 LETTER = 8
 """About the width of a digit, px."""
@@ -155,14 +158,15 @@ def _fired(shot: Mapping[str, Any]) -> str:
 
 
 def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> None:
-    """Verdicts of a shot as parts of one bar."""
+    """Verdicts of a shot as parts of one bar, in the texture of their marks."""
     total = sum(verdicts.values())
-    page[y : y + 8, x : x + wide] = (58, 62, 70)
+    page[y : y + BAR, x : x + wide] = (58, 62, 70)
     begun = 0
     for verdict in ("hit", "occluded", "filtered", "outside"):
         done = begun + verdicts[verdict]
         if total:
-            page[y : y + 8, x + begun * wide // total : x + done * wide // total] = MARKS[verdict][0]
+            part = page[y : y + BAR, x + begun * wide // total : x + done * wide // total]
+            part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]
         begun = done
 
 

@@ -26,6 +26,9 @@ HEAT = (
 TINT = 40
 """Opacity of a mark's ground: where samples are too small for a shape each, it shows all of them."""
 
+EYE_MIN = 8
+"""Least size of a block with an eye, px: by it a hit stands out in grey from what it hit."""
+
 SHAPE_MIN = 6
 """Least size of a shape on the page, px; smaller samples share one."""
 
@@ -38,18 +41,19 @@ def tiled_glyph(verdict: str, factor: int, shape: tuple[int, ...]) -> Bools:
 
 
 def glyph(verdict: str, size: int) -> Bools:
-    """Shape (size, size) of a mark: block, cross, bar, frame or dot; a block where it is too small for a shape."""
+    """Shape (size, size) of a mark: block with an eye, cross, bar, frame or dot; a block where it is too small."""
     if size < 3:
         return np.ones((size, size), np.bool_)
     free = int(size > 3)  # larger marks leave a line between neighbours
     last = size - 1 - free
     y, x = np.mgrid[:size, :size]
     thick = max(1, size // 6)
+    dot = (abs(2 * x - last) <= thick) & (abs(2 * y - last) <= thick)
     shapes = {
-        "hit": np.ones((size, size), np.bool_),
+        "hit": ~dot if size >= EYE_MIN else np.ones((size, size), np.bool_),
         "occluded": (abs(x - y) < thick) | (abs(x + y - last) < thick),
         "filtered": abs(2 * y - last) <= thick,
         "outside": (x < thick) | (y < thick) | (x > last - thick) | (y > last - thick),
-        "empty": (abs(2 * x - last) <= thick) & (abs(2 * y - last) <= thick),
+        "empty": dot,
     }
     return np.asarray(shapes[verdict] & (x <= last) & (y <= last), np.bool_)

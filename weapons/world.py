@@ -32,6 +32,9 @@ OUTLINES = {"hit": ((255, 200, 40), 255), "blocked": ((86, 180, 233), 255), "oth
 DASH = 5
 """Dashes of the outline of a blocked object, px."""
 
+SHADOW, SHADOW_ALPHA = (12, 14, 18), 170
+"""What lies under the marks of hits, and its opacity, of 255: gaps between them are dark on any ground."""
+
 HEAT_ALPHA = 235
 """Opacity of the heat of hits, of 255."""
 
@@ -89,6 +92,8 @@ class World:
         shape = tiled_glyph(verdict, self.factor, part.shape)
         color, alpha = MARKS[verdict]
         window = self.image[y0 * self.factor :, x0 * self.factor :]
+        if verdict == "hit":
+            _lay(window, part, SHADOW, SHADOW_ALPHA)
         _lay(window, part, color, TINT)
         _lay(window, part & shape, color, alpha)
 
