@@ -171,10 +171,11 @@ def parser() -> argparse.ArgumentParser:
         raw = argparse.RawDescriptionHelpFormatter
         one = words.add_parser(run.__name__, help=told, description=text, epilog=examples, formatter_class=raw)
         one.set_defaults(run=run)
+        if run in (report, fire):
+            one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
         return one
 
     one = word(report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
-    one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
     one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
     one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
@@ -183,7 +184,6 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
     one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
     one = word(fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
-    one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
     one.add_argument(
         "-o",

@@ -94,20 +94,17 @@ class Overlay:
         for item in sorted(pixels, key=lambda item: (-pixels[item], item))[:LABELS_MAX]:
             mask, (x, y) = scene.mask(item)
             box = (*self._at(x, y), *self._at(x + mask.shape[1], y + mask.shape[0]))
-            self._label(scene.name_of(item), box, INK, NEAR, np.argwhere(mask)[:, ::-1] + (x, y))
+            at = np.argwhere(mask)[:, ::-1] + (x, y)
+            seen = at[(at >= self.view[:2]).all(axis=1) & (at <= self.view[2:]).all(axis=1)]
+            if len(seen):
+                self._label(scene.name_of(item), box, INK, NEAR, seen)
 
     def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
         """Ring samples that an occluder kept from an object, and say which kept what; objects not hit come first."""
         color = MARKS["occluded"][0]
-        pairs: dict[tuple[int, int], tuple[Mapping[str, Any], Mapping[str, Any]]] = {}
-        for shot in shots:
-            for by in shot["blockers"]:
-                for told in by["blocked"]:
-                    key = by["object"], told["object"]
-                    if key not in pairs or told["samples"] > pairs[key][0]["samples"]:
-                        pairs[key] = told, by
+        pairs = [(told, by) for shot in shots for by in shot["blockers"] for told in by["blocked"]]
         linked: set[int] = set()
-        for told, by in sorted(pairs.values(), key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
+        for told, by in sorted(pairs, key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
             x, y = (v + self.factor // 2 for v in self._at(*told["at_xy"]))
             inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
             if not inside or by["object"] in linked or len(linked) >= LINKS_MAX:
