@@ -165,17 +165,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"hitplanes {version('hitplanes')}")
     words = top.add_subparsers(required=True, metavar="COMMAND")
 
-    def word(
-        run: Callable[[argparse.Namespace], int | None], told: str, text: str, examples: str
-    ) -> argparse.ArgumentParser:
-        raw = argparse.RawDescriptionHelpFormatter
-        one = words.add_parser(run.__name__, help=told, description=text, epilog=examples, formatter_class=raw)
-        one.set_defaults(run=run)
-        if run in (report, fire):
-            one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
-        return one
-
-    one = word(report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
+    one = _word(words, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
     one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
     one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
     one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
@@ -183,7 +173,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
     one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
     one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
-    one = word(fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
+    one = _word(words, fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
     one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
     one.add_argument(
         "-o",
@@ -194,14 +184,28 @@ def parser() -> argparse.ArgumentParser:
         help="a name that ends in .jsonl (default: hits.jsonl)",
     )
     one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
-    one = word(new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
+    one = _word(words, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
     one.add_argument("folder", type=Path, metavar="FOLDER", help="where to; its parent must be there")
-    one = word(compare, "say and draw what differs between two reports", COMPARE_HELP, COMPARE_EXAMPLES)
+    one = _word(words, compare, "say and draw what differs between two reports", COMPARE_HELP, COMPARE_EXAMPLES)
     one.add_argument("expected", type=Path, metavar="A.json", help="a report, as report --json writes it")
     one.add_argument("got", type=Path, metavar="B.json", help="another")
     one.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw them, too")
     one.add_argument("--scene", type=Path, metavar="SCENE", help="scene of one of them or of both, to draw them on")
     return top
+
+
+def _word(
+    words: Any, run: Callable[[argparse.Namespace], int | None], told: str, text: str, examples: str
+) -> argparse.ArgumentParser:
+    """Add a word of the command; those that fire take a scene first."""
+    raw = argparse.RawDescriptionHelpFormatter
+    one: argparse.ArgumentParser = words.add_parser(
+        run.__name__, help=told, description=text, epilog=examples, formatter_class=raw
+    )
+    one.set_defaults(run=run)
+    if run in (report, fire):
+        one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
+    return one
 
 
 def report(arguments: argparse.Namespace) -> None:
