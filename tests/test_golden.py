@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -22,7 +23,7 @@ from weapons import Disc, Hits, fire
 from weapons.goldcheck import Call, Outcome, safe_name, settle
 from weapons.goldfile import golden_of, pixels_unlike, unlike
 from weapons.goldpage import FOLDER, PAGE, claimed, note_files, replace_page
-from weapons.goldshow import RED
+from weapons.goldshow import RED, scene_of
 
 ROOT = Path(__file__).parents[1]
 
@@ -449,3 +450,28 @@ def test_the_page_shows_words_then_pictures_and_needs_nothing_else(
     assert page.index("22 px, was 23") < page.index('<img src="')
     linked = re.findall(r'(?:src|href)="([^"#]+)"', page)
     assert len(linked) > 10 and all((tmp_path / FOLDER / path).is_file() for path in linked)
+
+
+def test_all_objects_that_a_plane_has_changed_are_named(golden: Callable[..., Outcome]) -> None:
+    message = golden(shot(duck=without(DUCK, 0, 5), can=without(CAN, 0, 0))).message
+    assert 'plane \'hittable\': changed: object 0 "duck", object 1 "can"\n' in message
+    assert "changed:" not in golden(shot(can=without(CAN, 0, 0))).message, "one is named already"
+
+
+def test_what_was_expected_is_drawn_on_what_was_there(golden: Callable[..., Outcome], tmp_path: Path) -> None:
+    """The scene of a golden is not kept, but its planes are: under the same ids, where they were."""
+    hits = shot()
+    kept = golden_of(hits, {}, "test_a.py::test_x", None)
+    left = scene_of(kept)
+    assert left is not None
+    for name in ("hittable", "occluders"):
+        again = getattr(left.planes(), name)
+        x, y, *_ = left.extent()
+        rows, columns = np.nonzero(kept.planes[name])
+        assert np.array_equal(again[rows - y, columns - x], kept.planes[name][rows, columns])
+        assert (again > 0).sum() == len(rows)
+    assert scene_of(dataclasses.replace(kept, planes={})) is None
+    outcome = golden(shot(duck=without(DUCK, 2, 5)))
+    picture = read_png(tmp_path / FOLDER / outcome.failure["folder"] / "hits.png")
+    wide = (picture.shape[1] - 2 * 16 - 2 * 12) // 3
+    assert len(np.unique(picture[44:400, 16 : 16 + wide].reshape(-1, 4), axis=0)) > 8, "more than an empty ground"

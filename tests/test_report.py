@@ -340,3 +340,20 @@ def test_a_name_lies_on_no_other_target_where_there_is_room() -> None:
     for (left, right), (top, low) in others:
         assert not (left < name.x < right and top < name.y < low), name
     assert mask.shape == (9, 9) and x < name.x // 8
+
+
+def test_a_card_tells_the_weight_where_there_is_falloff() -> None:
+    scene = street()
+    (shot,) = report_of(scene, [fire(scene, Disc(18, falloff="linear"), (8, 20))])["shots"]
+    lines = shot_card(shot, 0, scene).lines
+    assert lines[0][:3] == ("object hit", "pixels", "weight") and len(lines[1]) == len(lines[0]) == 7
+    assert lines[1][2] == f"{shot['rows'][0]['weight'] / 65535:.1f}" and float(lines[1][2]) < shot["rows"][0]["pixels"]
+
+
+def test_numbers_of_many_shots_on_one_pixel_do_not_pile_up() -> None:
+    scene = street()
+    report = report_of(scene, [fire(scene, Point(), [(5, 5)] * SHOTS_MAX)])
+    at = [(text.x + 4 * len(text.text), text.y) for text in overlaid(scene, report, 9).texts if text.text.isdigit()]
+    assert len(at) == SHOTS_MAX
+    apart = [max(abs(a[0] - b[0]), abs(a[1] - b[1])) for i, a in enumerate(at) for b in at[:i]]
+    assert min(apart) >= 2 * BADGE

@@ -96,7 +96,8 @@ def test_the_third_picture_marks_each_pixel() -> None:
 def test_scenes_are_drawn_where_they_are_known() -> None:
     before, after = yard(), yard(22)
     a, b = shot_at(before), shot_at(after)
-    pictures = [picture_of_difference(a, b, scene, text=False) for scene in (None, before, after)]
+    scenes = (None, None), (before, None), (None, after)
+    pictures = [picture_of_difference(a, b, pair, text=False) for pair in scenes]
     assert len({p.tobytes() for p in pictures}) == 3 and len({p.shape for p in pictures}) == 1
     wide = (pictures[0].shape[1] - 2 * 16 - 2 * 12) // 3
     sides = [[p[44:500, 16 + i * (wide + 12) :][:, :wide].tobytes() for i in range(3)] for p in pictures]
@@ -111,7 +112,7 @@ def test_odd_reports_have_a_picture(far: int) -> None:
     scene.add(Sprite.circle(3), (far, far))
     hit, none = report_of(scene, [fire(scene, Point(), (far, far))]), report_of(scene, [])
     for a, b in ((hit, none), (none, hit), (none, none), (hit, hit)):
-        assert picture_of_difference(a, b, scene).shape[2] == 3
+        assert picture_of_difference(a, b, (scene, scene)).shape[2] == 3
     elsewhere = Scene((10, 10))
     assert max(picture_of_difference(hit, shot_at(elsewhere)).shape) < 4200
 
@@ -126,7 +127,12 @@ def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFi
     a, b, png = (str(path) for path in (*paths, tmp_path / "diff.png"))
     assert main(["compare", a, a]) == 0
     assert capsys.readouterr().out == "no difference\n"
+    scene.save(tmp_path / "moved")
+    both = ["--scene", str(GALLERY), "--scene", str(tmp_path / "moved")]
     assert main(["compare", a, b, "-o", png, "--scene", str(GALLERY)]) == 1
+    capsys.readouterr()
+    one = Path(png).read_bytes()
+    assert main(["compare", a, b, "-o", png, *both]) == 1 and Path(png).read_bytes() != one
     told = capsys.readouterr().out
     assert '"bandit"' in told and "px, was" in told
     assert cv2.imread(png).std() > 10
@@ -138,7 +144,7 @@ def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["compare", a, a, "--scene", str(GALLERY.parent / "empty")]) == 2
     assert main(["compare", a, a, "-o", str(tmp_path / "diff.jpg")]) == 2
     assert capsys.readouterr().err.count("\n") == 5 and Path(png).read_bytes() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b.json", "diff.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "b.json", "diff.png", "moved"]
 
 
 def test_shots_are_called_by_the_number_that_the_picture_has() -> None:

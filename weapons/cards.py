@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 
 from planes.arrays import Image
+from planes.constants import WEIGHT_FULL
 from planes.scene import Scene
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
 from weapons.marks import MARKS, tiled_glyph
@@ -23,8 +24,8 @@ HIT_LINES = 24
 NOT_LINES = 5
 """Objects that a card names as blocked or as not hit; the JSON has them all."""
 
-CELL_WIDTH = 64
-"""Width of a column of numbers, px."""
+CELL_WIDTH, NARROW, MANY = 64, 58, 7
+"""Width of a column of numbers, px; and where there are many."""
 
 BAR = 9
 """Height of the bar of verdicts, px."""
@@ -33,6 +34,9 @@ LETTER = 8
 """About the width of a digit, px."""
 
 HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
+WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])
+"""With falloff: weight in samples of full strength."""
+
 BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
 
 
@@ -91,26 +95,29 @@ class Card:
         texts = []
         for row, cells in enumerate(self.lines):
             base = y + 14 + row * LINE
-            color = FAINT if len(cells) == 1 or cells in (HEADER, BATCH_HEADER) else INK
+            color = FAINT if len(cells) == 1 or cells[0] == HEADER[0] else INK
             if len(cells) == 2:  # what, and why
                 texts.append(Text(x + wide - 10, base, clipped(cells[1], wide * 3 // 5), FAINT, right=True))
                 texts.append(Text(x + 10, base, clipped(cells[0], wide * 2 // 5 - 20), FAINT))
                 continue
-            room = wide - 20 - CELL_WIDTH * (len(cells) - 1)
+            cell_width = CELL_WIDTH if len(cells) < MANY else NARROW
+            room = wide - 20 - cell_width * (len(cells) - 1)
             texts.append(Text(x + 10, base, clipped(cells[0], room), color))
             for column, cell in enumerate(reversed(cells[1:])):
-                texts.append(Text(x + wide - 10 - CELL_WIDTH * column, base, cell, color, right=True))
+                texts.append(Text(x + wide - 10 - cell_width * column, base, cell, color, right=True))
         return texts
 
 
 def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
     """Card of one shot."""
-    lines: list[Sequence[str]] = [HEADER] if shot["rows"] else []
+    weighted = any(row["weight"] != WEIGHT_FULL * row["samples"] for row in shot["rows"])
+    lines: list[Sequence[str]] = [WEIGHT_HEADER if weighted else HEADER] if shot["rows"] else []
     rounds = len({row["round"] for row in shot["rows"]}) > 1
     for row in shot["rows"][:HIT_LINES]:
         name = f"{row['name']}, round {row['round']}" if rounds else row["name"]
         shares = [percent(share) for share in row["shares"].values()]
-        lines.append((name, str(row["pixels"]), *shares, f"{row['distance2'] ** 0.5:.1f} px"))
+        weight = [f"{row['weight'] / WEIGHT_FULL:.1f}"] if weighted else []
+        lines.append((name, str(row["pixels"]), *weight, *shares, f"{row['distance2'] ** 0.5:.1f} px"))
     lines += _rest(shot["rows"], HIT_LINES, "")
     for entry in shot["blockers"][:NOT_LINES]:
         behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
@@ -131,7 +138,7 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     for entry in batch["objects"][:HIT_LINES]:
         share = percent(entry["shots"] / shots)
         lines.append(
-            (entry["name"], str(entry["shots"]), share, str(entry["pixels"]), f"{entry['weight'] / 65535:.6g}")
+            (entry["name"], str(entry["shots"]), share, str(entry["pixels"]), f"{entry['weight'] / WEIGHT_FULL:.1f}")
         )
     lines += _rest(batch["objects"], HIT_LINES, " hit")
     lines.append([f"{never} of {report['scene']['hittable']} objects never hit" if never else "every object was hit"])

@@ -94,6 +94,7 @@ examples:
   hitplanes report fixtures/gallery --json before.json
   hitplanes compare before.json after.json
   hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
+  hitplanes compare before.json after.json -o diff.png --scene level/old --scene level/new
 """
 
 
@@ -190,7 +191,8 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("expected", type=Path, metavar="A.json", help="a report, as report --json writes it")
     one.add_argument("got", type=Path, metavar="B.json", help="another")
     one.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw them, too")
-    one.add_argument("--scene", type=Path, metavar="SCENE", help="scene of one of them or of both, to draw them on")
+    told = "scene of one of them or of both, to draw them on; may be given twice"
+    one.add_argument("--scene", type=Path, metavar="SCENE", action="append", help=told)
     return top
 
 
@@ -304,11 +306,14 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.output is not None:
         _check_outputs(arguments.output, None)
     expected, got = read_report(arguments.expected), read_report(arguments.got)
-    scene = None if arguments.scene is None else load_scene(arguments.scene)
-    if scene is not None and scene.content_hash() not in (known := [r["scene"]["hash"] for r in (expected, got)]):
-        raise InputError(f"--scene: expected that of a report, {' or '.join(known)}, got {scene.content_hash()}")
+    hashes = expected["scene"]["hash"], got["scene"]["hash"]
+    scenes = {scene.content_hash(): scene for scene in map(load_scene, arguments.scene or ())}
+    for other in scenes.keys() - set(hashes):
+        raise InputError(f"--scene: expected that of a report, {' or '.join(hashes)}, got {other}")
     if arguments.output is not None:
-        write_png(arguments.output, picture_of_difference(expected, got, scene))
+        write_png(
+            arguments.output, picture_of_difference(expected, got, (scenes.get(hashes[0]), scenes.get(hashes[1])))
+        )
     lines = differences(expected, got)
     for line in lines or ["no difference"]:
         _say(line)

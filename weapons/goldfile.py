@@ -34,6 +34,7 @@ __all__ = [
     "DamagedGoldenError",
     "ForeignGoldenError",
     "Golden",
+    "SCENE_PLANES",
     "Unlike",
     "golden_of",
     "opaque",
@@ -49,6 +50,9 @@ PLANES_AREA_MAX = 4 * 2**20
 
 SCENE_PLANES = ("hittable", "occluders")
 """Planes that decide hits."""
+
+CHANGED_MAX = 8
+"""Objects that a line names as changed."""
 
 LINE_DEPTH = 5
 """From this depth on the JSON is not broken: one row, one blocker or the samples of one verdict to a line."""
@@ -224,6 +228,11 @@ def _plane_lines(name: str, was: Plane | None, got: Golden) -> list[str]:
         if name in SCENE_PLANES:
             x, y = x + got.origin_xy[0], y + got.origin_xy[1]
         lines.append(f"plane {name!r}: pixels differ: {differ.sum()}, first at ({x}, {y}): {after}, was {before}")
+        labels = np.union1d(was[differ], now[differ])
+        told = [_called(name, label, got.scene) for label in labels[labels > 0]] if name in SCENE_PLANES else []
+        if len(told) > 1:
+            more = f" and {len(told) - CHANGED_MAX} more" if len(told) > CHANGED_MAX else ""
+            lines.append(f"plane {name!r}: changed: {', '.join(told[:CHANGED_MAX])}{more}")
     return lines
 
 
@@ -247,7 +256,7 @@ def _picture_lines(was: Image, now: Image) -> list[str]:
         return []
     y, x = np.nonzero(differ)
     box = f"({x.min()}, {y.min()}) to ({x.max()}, {y.max()})"
-    return [f"picture: pixels differ: {len(x)}, in the box {box}; 0 may"]
+    return [f"picture: pixels differ: {len(x)}, in the box {box} of the picture; 0 may"]
 
 
 def opaque(picture: Image) -> Image:

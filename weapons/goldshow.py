@@ -10,10 +10,13 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, Image
 from planes.image import write_png
-from weapons.goldfile import Golden, Unlike, opaque, pixels_unlike
+from planes.items import Role
+from planes.labels import plane_objects
+from planes.scene import Scene
+from weapons.goldfile import SCENE_PLANES, Golden, Unlike, opaque, pixels_unlike
 from weapons.versus import picture_of_difference
 
-__all__ = ["draw_difference", "picture_of_pixels", "pictures_of"]
+__all__ = ["draw_difference", "picture_of_pixels", "pictures_of", "scene_of"]
 
 RED = (255, 40, 40)
 """What differs."""
@@ -63,7 +66,8 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
     write_png(folder / "expected.png", expected.picture)
     rows: list[Row] = []
     if changed.hits:
-        write_png(folder / COMPARED, picture_of_difference(expected.report, _with_hash(got), got.scene))
+        scenes = scene_of(expected), got.scene
+        write_png(folder / COMPARED, picture_of_difference(expected.report, got.report, scenes))
         rows += [[("hits: expected, got, difference", COMPARED)]]
     rows += [[("expected", "expected.png"), ("got", "got.png")]]
     if changed.picture:
@@ -79,10 +83,17 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
     return rows
 
 
-def _with_hash(golden: Golden) -> dict[str, Any]:
-    """The report of a golden, with the hash of its scene where that is known."""
-    known = {} if golden.scene is None else {"hash": golden.scene.content_hash()}
-    return {**golden.report, "scene": {**golden.report["scene"], **known}}
+def scene_of(golden: Golden) -> Scene | None:
+    """What is left of the scene of a golden: what was seen of the objects and occluders, under their ids."""
+    if not set(SCENE_PLANES) <= golden.planes.keys():
+        return None
+    scene = Scene()
+    fields = zip(SCENE_PLANES, (Role.HITTABLE, Role.OCCLUDER), strict=True)
+    found = [(role, *one) for name, role in fields for one in plane_objects(name, role.value, golden.planes[name])]
+    for role, label, sprite, left, top in sorted(found, key=lambda one: int(one[1])):
+        scene.items.skip_to(int(label) - 1)
+        scene.add(sprite, (left + golden.origin_xy[0], top + golden.origin_xy[1]), role=role)
+    return scene
 
 
 def picture_of_pixels(now: Image, differ: Bools) -> Image:

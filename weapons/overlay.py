@@ -146,11 +146,16 @@ class Overlay:
         return True
 
     def _free(self, x: int, y: int, half_w: int, half_h: int) -> tuple[int, int]:
-        """Nearest of some spots around a point where a rectangle covers nothing; else one inside the picture."""
+        """A spot around a point where a rectangle covers nothing; else the nearest anywhere; else one that covers."""
         for bx, by in _around((x - 6, y - 6, x + 6, y + 6), half_w, half_h, FAR):
             if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
                 return bx, by
         height, width = self.image.shape[:2]
+        rows, columns = np.mgrid[half_h : height - half_h : BADGE, half_w : width - half_w : BADGE].reshape(2, -1)
+        for i in np.argsort((columns - x) ** 2 + (rows - y) ** 2, kind="stable").tolist():
+            bx, by = int(columns[i]), int(rows[i])
+            if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
+                return bx, by
         return min(max(x, half_w), max(width - half_w, 0)), min(max(y - 22, half_h), max(height - half_h, 0))
 
     def _is_free(self, x0: int, y0: int, x1: int, y1: int) -> bool:

@@ -40,14 +40,18 @@ LOOKS = {"both": "empty", "other verdict": "filtered", "only expected": "occlude
 
 
 def picture_of_difference(
-    expected: Mapping[str, Any], got: Mapping[str, Any], scene: Scene | None = None, *, text: bool = True
+    expected: Mapping[str, Any],
+    got: Mapping[str, Any],
+    scenes: tuple[Scene | None, Scene | None] = (None, None),
+    *,
+    text: bool = True,
 ) -> Image:
     """Draw two reports and their difference.
 
     Parameters
     ----------
     expected, got : as `report_of` makes them
-    scene : that of one of them or of both, or None: what is known by its hash is drawn, the rest is left empty
+    scenes : that of each, or None, which leaves its ground empty
     text : False leaves the text layer out
 
     Returns
@@ -61,9 +65,12 @@ def picture_of_difference(
     x, y = view[0] - whole[0], view[1] - whole[1]
     kinds = {name: at[y : y + view[3] - view[1] + 1, x : x + view[2] - view[0] + 1] for name, at in kinds.items()}
     factor = factor_of(view, WIDTH, HEIGHT)
-    worlds = [World(_known(scene, report), report["scene"]["bounds_xyxy"], view, factor) for report in (expected, got)]
+    worlds = [
+        World(scene, report["scene"]["bounds_xyxy"], view, factor)
+        for scene, report in zip(scenes, (expected, got), strict=True)
+    ]
     sides = [(world.image, _marked(world, report)) for world, report in zip(worlds, (expected, got), strict=True)]
-    sides.append((_difference(got, _known(scene, got), kinds, view, factor), []))
+    sides.append((_difference(got, scenes[1], kinds, view, factor), []))
     painted = worlds[0].painted | worlds[1].painted
     wide = sides[0][0].shape[1] + 2 * EDGE
     marks = Legend([Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted], wide)
@@ -123,18 +130,14 @@ def _around(a: Box, b: Box) -> Box:
     return (x, y, x_max, y_max) if max(x_max - x, y_max - y) <= 2 * VIEW_MAX else a
 
 
-def _known(scene: Scene | None, report: Mapping[str, Any]) -> Scene | None:
-    """The scene, if it is that of a report; a golden's report does not tell which it was."""
-    return scene if scene is not None and scene.content_hash() == report["scene"].get("hash") else None
-
-
 def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     """Mark the samples of one report, and number its shots."""
     for verdict in MARKS:
         world.mark_samples(report["shots"], verdict)
         if report["batch"]:
             world.mark_heat(report["batch"]["heat"], verdict)
-    for item in sorted({row["object"] for shot in report["shots"] for row in shot["rows"]}):
+    there = set() if world.scene is None else set(world.scene.ids().tolist())
+    for item in sorted(there & {row["object"] for shot in report["shots"] for row in shot["rows"]}):
         world.outline(item, "hit")
     overlay = Overlay(world)
     for number, shot in enumerate(report["shots"]):
