@@ -353,7 +353,7 @@ def test_a_card_tells_the_weight_where_there_is_falloff() -> None:
 def test_numbers_of_many_shots_on_one_pixel_do_not_pile_up() -> None:
     scene = street()
     report = report_of(scene, [fire(scene, Point(), [(5, 5)] * SHOTS_MAX)])
-    at = [(text.x + 4 * len(text.text), text.y) for text in overlaid(scene, report, 9).texts if text.text.isdigit()]
+    at = [(text.x + 4 * len(text.text), text.y) for text in overlaid(scene, report, 4).texts if text.text.isdigit()]
     assert len(at) == SHOTS_MAX
     apart = [max(abs(a[0] - b[0]), abs(a[1] - b[1])) for i, a in enumerate(at) for b in at[:i]]
     assert min(apart) >= 2 * BADGE

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from planes import Scene, Sprite, load_scene
+from planes import Scene, Sprite, load_scene, read_png
 from weapons import Disc, Point, Spread, arsenal_of, fire, report_of
 from weapons.cli import main
 from weapons.differences import differences
 from weapons.marks import MARKS
+from weapons.schemas import read_report
 from weapons.versus import AROUND, compared_pixels, picture_of_difference
 from weapons.world import factor_of
 
@@ -129,10 +130,10 @@ def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().out == "no difference\n"
     scene.save(tmp_path / "moved")
     both = ["--scene", str(GALLERY), "--scene", str(tmp_path / "moved")]
-    assert main(["compare", a, b, "-o", png, "--scene", str(GALLERY)]) == 1
-    capsys.readouterr()
-    one = Path(png).read_bytes()
-    assert main(["compare", a, b, "-o", png, *both]) == 1 and Path(png).read_bytes() != one
+    reports = [read_report(path) for path in paths]
+    for words, scenes in ((both[:2], (load_scene(GALLERY), None)), (both, (load_scene(GALLERY), scene))):
+        assert main(["compare", a, b, "-o", png, *words]) == 1
+        assert np.array_equal(read_png(png)[:, :, :3], picture_of_difference(*reports, scenes))
     told = capsys.readouterr().out
     assert '"bandit"' in told and "px, was" in told
     assert cv2.imread(png).std() > 10
