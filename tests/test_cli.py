@@ -272,3 +272,28 @@ def test_a_value_that_begins_with_a_minus_is_explained(capsys: pytest.CaptureFix
     with pytest.raises(SystemExit):
         main(["report", str(GALLERY), "--weapon", "pistol", "--at", "-5,3"])
     assert "one that begins with a minus is written --at=-5,3" in capsys.readouterr().err
+
+
+def test_weapons_and_shots_of_a_file_are_named_with_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = {"format": "hitplanes-scene/1", "weapons": {"gun": {"kind": "disc", "radius": -1}}, "shots": []}
+    (tmp_path / "scene.json").write_text(json.dumps(data))
+    for scene in (tmp_path, tmp_path / "scene.json"):
+        assert main(["report", str(scene), "-o", str(tmp_path / "r.png")]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"hitplanes: {tmp_path / 'scene.json'}: weapons.gun: radius: expected a number from 0")
+    data |= {"weapons": {"gun": {"kind": "point"}}, "shots": [{"weapon": "gun", "at": [1]}]}
+    (tmp_path / "scene.json").write_text(json.dumps(data))
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 2
+    assert f"{tmp_path / 'scene.json'}: shots[0]: at: expected shape (2,)" in capsys.readouterr().err
+
+
+def test_many_shots_of_a_file_are_told_as_a_batch(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", str(tmp_path / "range")]) == 0
+    path = tmp_path / "range" / "scene.json"
+    data = json.loads(path.read_text())
+    data["shots"] = [{"weapon": "pistol", "at": [70 + i, 60]} for i in range(30)]
+    path.write_text(json.dumps(data))
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "range"), "-o", str(tmp_path / "r.png"), "--plan"]) == 0
+    told = capsys.readouterr().out
+    assert re.match(r"30 shots, \d+ hit something\n", told) and "left out weights: the weapon has no falloff" in told

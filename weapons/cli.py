@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from planes.arrays import InputError
+from planes.arrays import InputError, within
 from planes.image import check_output, write_png, write_text
 from planes.items import Role
 from planes.scene import Scene, load_scene
@@ -21,7 +21,7 @@ from planes.scenefile import FILE_NAME
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
 from weapons.facts import report_of
-from weapons.orders import fire_order, order_from_json, orders_of
+from weapons.orders import Order, fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
 from weapons.plan import plan_lines
 from weapons.progress import Progress
@@ -216,30 +216,43 @@ def report(arguments: argparse.Namespace) -> None:
     scene = load_scene(arguments.scene)
     _check_not_of_scene(scene, arguments.scene, arguments.output, arguments.json)
     _note_empty(scene)
-    arsenal = arsenal_of(scene)
-    if arguments.weapon is None:
-        for name in ("at", "aim", "seed"):
-            if getattr(arguments, name) is not None:
-                raise InputError(f"--{name}: expected only together with --weapon, got no weapon")
-        orders = orders_of(scene, arsenal)
-    else:
-        orders = [order_from_json(_shot(arguments), scene, arsenal, "command line")]
-    fired = [fire_order(scene, order) for order in orders]
-    facts = report_of(scene, fired, [order.name for order in orders])
+    orders = _orders(arguments, scene)
+    facts = report_of(scene, [fire_order(scene, order) for order in orders], [order.name for order in orders])
     write_png(arguments.output, picture_of_report(facts, scene))
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
-    if not orders:
-        _say(f"{scene.name}: no shots in its scene.json; name one with --weapon and --at")
-    if facts["batch"]:
-        _say(f"{facts['batch']['shots']} shots, {facts['batch']['shots_that_hit']} hit something")
+    _tell(facts, arguments.plan)
+
+
+def _orders(arguments: argparse.Namespace, scene: Scene) -> list[Order]:
+    """Shots of the scene's file, or the one of the command line."""
+    folder = arguments.scene.parent if arguments.scene.name == FILE_NAME else arguments.scene
+    with within(str(folder / FILE_NAME)):
+        arsenal = arsenal_of(scene)
+        if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "seed")):
+            return orders_of(scene, arsenal)
+    if arguments.weapon is None:
+        given = next(name for name in ("at", "aim", "seed") if getattr(arguments, name) is not None)
+        raise InputError(f"--{given}: expected only together with --weapon, got no weapon")
+    return [order_from_json(_shot(arguments), scene, arsenal, "command line")]
+
+
+def _tell(facts: Mapping[str, Any], plan: bool) -> None:
+    """Print what each shot hit, or how many did; and what ran."""
+    batch = facts["batch"]
+    if batch:
+        _say(f"{batch['shots']} shots, {batch['shots_that_hit']} hit something")
+    elif not facts["shots"]:
+        _say(f"{facts['scene']['name']}: no shots in its scene.json; name one with --weapon and --at")
     for shot in facts["shots"]:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
         _say(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
-        if arguments.plan:
+        if plan:
             _print_plan(shot["plan"])
+    for ran in batch["plan"] if batch and plan else ():
+        _print_plan(ran)
 
 
 def fire(arguments: argparse.Namespace) -> None:
