@@ -18,7 +18,7 @@ from planes.grid256 import snap
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
-from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, write_scene
+from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, scene_folder, write_scene
 from planes.schema import Text, typed
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
@@ -395,9 +395,7 @@ def load_scene(folder: str | Path) -> Scene:
     InputError
         Naming the file, the section, the row and the field.
     """
-    path = folder_of(folder)
-    if path.name == FILE_NAME:
-        path = path.parent
+    path = scene_folder(folder_of(folder))
     file = read_scene(path)
     with within(str(path / FILE_NAME)):
         x, y = file.origin_xy

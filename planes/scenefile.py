@@ -40,11 +40,13 @@ from planes.schema import (
 from planes.sprite import FLIPS, Sprite, rows_of
 
 __all__ = [
+    "DEVICE",
     "FileObject",
     "SceneFile",
     "folder_of",
     "laid_out",
     "read_scene",
+    "scene_folder",
     "write_scene",
 ]
 
@@ -116,6 +118,7 @@ SCENE = Keys(
 """The tables of a scene file. Objects, weapons and shots are checked one by one, by who reads them."""
 
 DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)\s*(\..*)?", re.IGNORECASE)
+"""Names that Windows keeps for devices, with any ending."""
 
 SHEET_WIDTH = 4096
 """Frames of a saved sprite are laid in rows of about this width, px."""
@@ -223,6 +226,11 @@ def folder_of(folder: object) -> Path:
     if not isinstance(folder, str | PurePath):
         raise InputError(f"folder: expected a path, got {shown(folder)}")
     return Path(folder)
+
+
+def scene_folder(path: Path) -> Path:
+    """Take the path of scene.json for that of its folder."""
+    return path.parent if path.name == FILE_NAME else path
 
 
 def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:

@@ -123,6 +123,10 @@ class Spans:
         edges[self.y - y, self.x_last - x + 1] = -1  # runs are maximal: the pixel behind a run begins no other
         return np.cumsum(edges, axis=1, dtype=np.int8)[:, :-1].astype(np.bool_), (x, y)
 
+    def runs(self) -> Ints:
+        """Runs (n, 3) as rows [y, x_first, x_last]."""
+        return np.stack([self.y, self.x_first, self.x_last], axis=1)
+
     def pixels(self) -> Ints:
         """Pixels as rows (x, y), ordered by (y, x)."""
         run, x = each_pixel(self.x_first, self.x_last)

@@ -17,7 +17,7 @@ from planes.arrays import InputError, within
 from planes.image import check_output, write_png, write_text
 from planes.items import Role
 from planes.scene import Scene, load_scene
-from planes.scenefile import FILE_NAME
+from planes.scenefile import FILE_NAME, scene_folder
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
 from weapons.facts import report_of
@@ -226,8 +226,7 @@ def report(arguments: argparse.Namespace) -> None:
 
 def _orders(arguments: argparse.Namespace, scene: Scene) -> list[Order]:
     """Shots of the scene's file, or the one of the command line."""
-    folder = arguments.scene.parent if arguments.scene.name == FILE_NAME else arguments.scene
-    with within(str(folder / FILE_NAME)):
+    with within(str(scene_folder(arguments.scene) / FILE_NAME)):
         arsenal = arsenal_of(scene)
         if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "seed")):
             return orders_of(scene, arsenal)
@@ -287,7 +286,7 @@ def _check_outputs(picture: Path, facts: Path | None) -> None:
 
 def _check_not_of_scene(scene: Scene, folder: Path, *outputs: Path | None) -> None:
     """Refuse to write over a file that the scene is made of."""
-    folder = folder.parent if folder.name == FILE_NAME else folder
+    folder = scene_folder(folder)
     images = {str((sprite.source or {}).get("image", "")) for sprite in scene.items.sprites}
     own = {os.path.realpath(folder / name) for name in {FILE_NAME, *images}}
     for output in outputs:

@@ -175,7 +175,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "at": (shots.at_256[row] / SUB).tolist(),
         "at_xy": pixel(shots.at_256[row]).tolist(),
         "aim": _degrees(hits, row),
-        "seed": int(np.broadcast_to(np.asarray(shots.seed, np.uint64), len(shots))[row]),
+        "seed": int(shots.seed[row]),
         "accept": None if accept == ALL else scene.category_names(accept),
         "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
         "verdicts": hits.verdict_counts(row),
@@ -218,7 +218,7 @@ def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
             "shares": {name: round(value, 6) for name, value in share._asdict().items()},
-            "runs": _runs(pixels[row.round, row.object]),
+            "runs": pixels[row.round, row.object].runs().tolist(),
         }
         for row, share in zip(hits.of(shot), hits.shares(shot), strict=True)
     ]
@@ -231,7 +231,7 @@ def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
     for verdict in Verdict:
         xy = samples.xy[samples.verdict == verdict]
         if len(xy):
-            runs[verdict.name.lower()] = _runs(Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]))
+            runs[verdict.name.lower()] = Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]).runs().tolist()
     return runs
 
 
@@ -292,8 +292,3 @@ def _degrees(hits: Hits, row: int) -> float | None:
         return None
     c, s = hits.shots.direction[row].tolist()
     return round(math.degrees(math.atan2(s, c)), 6) + 0.0
-
-
-def _runs(spans: Spans) -> list[list[int]]:
-    rows: list[list[int]] = np.stack([spans.y, spans.x_first, spans.x_last], axis=1).tolist()
-    return rows

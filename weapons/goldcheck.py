@@ -11,6 +11,7 @@ from typing import Any
 
 from planes.arrays import InputError
 from planes.image import write_text
+from planes.scenefile import DEVICE
 from weapons.goldfile import (
     DamagedGoldenError,
     ForeignGoldenError,
@@ -31,7 +32,6 @@ LINES_MAX, PAGE_LINES_MAX = 20, 500
 NAME_LETTERS, HASH_DIGITS = 80, 10
 
 PLAIN = re.compile(r"[a-z0-9_]+(\[[a-z0-9_.,=+-]*\])?"), re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
-RESERVED = re.compile(r"con|prn|aux|nul|com\d|lpt\d")
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def safe_name(test: str, name: str | None = None) -> str:
     whole = test if name is None else f"{test}-{name}"
     plain = PLAIN[0].fullmatch(test) and PLAIN[1].fullmatch("_" if name is None else name)
     like_hashed = re.fullmatch(rf".*-[0-9a-f]{{{HASH_DIGITS}}}", whole)
-    if plain and len(whole) <= NAME_LETTERS and not RESERVED.fullmatch(whole) and not like_hashed:
+    if plain and len(whole) <= NAME_LETTERS and not DEVICE.fullmatch(whole) and not like_hashed:
         return whole
     digest = hashlib.sha256(repr((test, name)).encode()).hexdigest()[:HASH_DIGITS]
     letters = re.sub(r"[^A-Za-z0-9_]+", "-", whole).strip("-")[:NAME_LETTERS]

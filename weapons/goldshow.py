@@ -15,6 +15,7 @@ from planes.labels import plane_objects
 from planes.scene import Scene
 from weapons.goldfile import SCENE_PLANES, Golden, Unlike, opaque, pixels_unlike
 from weapons.versus import picture_of_difference
+from weapons.world import enlarged
 
 __all__ = ["draw_difference", "picture_of_pixels", "pictures_of", "scene_of"]
 
@@ -147,12 +148,8 @@ def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, sid
         view = np.full((height, width, 3), NOWHERE, np.uint8)
         part = picture[top : top + height, left : left + width, :3]
         view[: part.shape[0], : part.shape[1]] = part
-        views.append(np.pad(_enlarged(view, factor), ((0, 0), (0, GAP), (0, 0))))
+        views.append(np.pad(enlarged(view, factor), ((0, 0), (0, GAP), (0, 0))))
     write_png(folder / f"{prefix}crop.png", np.concatenate(views, axis=1)[:, :-GAP])
     around = f"{caption}around ({x}, {y}), {factor} times: expected, got, difference"
     whole = [(f"{caption}difference", f"{prefix}difference.png")] if caption else []
     return [*whole, (around, f"{prefix}crop.png")]
-
-
-def _enlarged(picture: Image, factor: int) -> Image:
-    return np.repeat(np.repeat(picture, factor, axis=0), factor, axis=1)

@@ -18,7 +18,7 @@ from planes.spans import Box, Spans
 from weapons.marks import MARKS
 from weapons.panel import INK, Text
 from weapons.words import NAME_MAX, short
-from weapons.world import OUTLINES_MAX, World, fill_runs
+from weapons.world import OUTLINES_MAX, World, enlarged, fill_runs
 
 __all__ = ["Overlay"]
 
@@ -55,8 +55,12 @@ class Overlay:
         runs = [of for shot in shots for of in shot["samples"].values()]
         hit = {row["object"] for shot in shots for row in shot["rows"]}
         blocking = {by["object"] for shot in shots for by in shot["blockers"]}
-        self.taken |= self._plane([*runs, *(_runs(scene, item) for item in sorted(hit | blocking))])
-        self.targets |= self._plane([_runs(scene, item) for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]])
+        self.taken |= self._plane(
+            [*runs, *(Spans.from_mask(*scene.mask(item)).runs() for item in sorted(hit | blocking))]
+        )
+        self.targets |= self._plane(
+            [Spans.from_mask(*scene.mask(item)).runs() for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]]
+        )
 
     def _plane(self, runs: Sequence[Any]) -> Bools:
         """Pixels of the picture that runs of the world cover."""
@@ -64,7 +68,7 @@ class Overlay:
         at = np.zeros((y_max - y + 1, x_max - x + 1), np.bool_)
         for some in runs:
             fill_runs(at, self.view, some)
-        return np.repeat(np.repeat(at, self.factor, axis=0), self.factor, axis=1)
+        return enlarged(at, self.factor)
 
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Number a shot: a cross on its pixel, a disc beside the pattern, a line between; an arrow if it is far off."""
@@ -168,12 +172,6 @@ class Overlay:
     def _at(self, x: int, y: int) -> tuple[int, int]:
         """Top left of a pixel of the world in the picture."""
         return (x - self.view[0]) * self.factor, (y - self.view[1]) * self.factor
-
-
-def _runs(scene: Scene, item: int) -> Ints:
-    """Pixels of an item, as runs [y, x_first, x_last]."""
-    spans = Spans.from_mask(*scene.mask(item))
-    return np.stack([spans.y, spans.x_first, spans.x_last], axis=1)
 
 
 def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple[int, int]]:

@@ -213,8 +213,7 @@ def _fired(salvo: Salvo, bodies: list[bytes], reader: ShotReader, plan: PlanSum)
 
 def _answers(hits: Hits) -> Iterator[bytes]:
     """Rows and verdicts of each shot, as the end of its line."""
-    names = ("object", "round", "samples", "pixels", "weight", "pellets")
-    columns = [*(getattr(hits, name) for name in names), *hits.first_xy.T, hits.distance2]
+    columns = [*(getattr(hits, name) for name in COLUMNS[:-3]), *hits.first_xy.T, hits.distance2]
     rows = np.stack(columns, axis=1).tolist()
     starts = hits.starts.tolist()
     for first, last, verdicts in zip(starts, starts[1:], hits.verdicts.tolist(), strict=False):

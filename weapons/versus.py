@@ -29,7 +29,7 @@ LONGEST = 1200
 AROUND = 24
 """What is shown around the pixels that differ, px."""
 
-DARK = 60
+LIGHT = 60
 """How much of the scene's light is left under the difference, of 255."""
 
 LINES_MAX = 60
@@ -149,7 +149,7 @@ def _difference(
     got: Mapping[str, Any], scene: Scene | None, kinds: Mapping[str, Bools], view: Box, factor: int
 ) -> Image:
     """Pixels hit in both, or in one."""
-    world = World(scene, got["scene"]["bounds_xyxy"], view, factor, DARK)
+    world = World(scene, got["scene"]["bounds_xyxy"], view, factor, LIGHT)
     if scene is not None:
         world.outline_seen(scene.ids(Role.HITTABLE).tolist())
     for name, at in kinds.items():

@@ -17,7 +17,7 @@ from planes.scene import Scene
 from planes.spans import Box, each_pixel
 from weapons.marks import HEAT, MARKS, TINT, tiled_glyph
 
-__all__ = ["HATCH", "OUTLINES", "World", "factor_of", "fill", "fill_runs", "heat_boxes", "heat_step"]
+__all__ = ["HATCH", "OUTLINES", "World", "enlarged", "factor_of", "fill", "fill_runs", "heat_boxes", "heat_step"]
 
 WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 """A view is enlarged by the greatest whole factor, up to LARGEST, that stays within these pixels."""
@@ -68,7 +68,7 @@ class World:
         ground = np.full((*shape, 3), GROUND, np.uint8) if scene is None else _dimmed(scene, view, light)
         if bounds is not None:
             _shade_outside(ground, view, bounds)
-        self.image: Image = _enlarged(ground, factor)
+        self.image: Image = enlarged(ground, factor)
         if bounds is not None and view != tuple(bounds):
             _frame(self.image, view, bounds, factor)
         if scene is not None and len(scene.ids(Role.OCCLUDER)):
@@ -88,7 +88,7 @@ class World:
             return
         self.painted.add(verdict)
         y0, x0 = int(rows.min()), int(columns.min())
-        part = _enlarged(at[y0 : rows.max() + 1, x0 : columns.max() + 1], self.factor)
+        part = enlarged(at[y0 : rows.max() + 1, x0 : columns.max() + 1], self.factor)
         shape = tiled_glyph(verdict, self.factor, part.shape)
         color, alpha = MARKS[verdict]
         window = self.image[y0 * self.factor :, x0 * self.factor :]
@@ -106,13 +106,13 @@ class World:
         if not steps.any():
             return
         self.painted.add(verdict)
-        there = _enlarged(steps > 0, self.factor)
+        there = enlarged(steps > 0, self.factor)
         if verdict != "hit":
             color, alpha = MARKS[verdict]
             _lay(self.image, there & tiled_glyph(verdict, self.factor, there.shape), color, alpha // 2)
             return
         colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
-        blend(self.image, _enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
+        blend(self.image, enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
 
     def outline(self, item: int, kind: str) -> None:
         """Draw the border of an object's mask, inside of its pixels; thicker where it was hit, dashed where blocked."""
@@ -144,7 +144,7 @@ class World:
         )
         if left >= right or top >= low:
             return
-        inside = _enlarged(np.pad(mask, 1)[top - y : low - y + 2, left - x : right - x + 2], factor)
+        inside = enlarged(np.pad(mask, 1)[top - y : low - y + 2, left - x : right - x + 2], factor)
         core = _core(inside)
         if kind != "other" and factor > 1:
             core = _core(core)  # so that it stands out in grey, too
@@ -164,7 +164,7 @@ class World:
             return
         self.painted.add("occluder")
         y, x = np.ogrid[: self.image.shape[0], : self.image.shape[1]]
-        _lay(self.image, _enlarged(occluding, self.factor) & ((x + y) % 12 < 2), HATCH, 80)
+        _lay(self.image, enlarged(occluding, self.factor) & ((x + y) % 12 < 2), HATCH, 80)
 
 
 def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box]]:
@@ -221,7 +221,8 @@ def _core(inside: Bools) -> Bools:
     return np.asarray(inside & up & down & np.roll(inside, 1, axis=1) & np.roll(inside, -1, axis=1))
 
 
-def _enlarged(plane: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
+def enlarged(plane: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
+    """Each pixel of a plane (h, w) or a picture (h, w, 3) as a square of so many pixels a side."""
     return np.repeat(np.repeat(plane, factor, axis=0), factor, axis=1)
 
 
