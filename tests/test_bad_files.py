@@ -483,7 +483,8 @@ def test_a_full_disk_leaves_the_old_report(tmp_path: Path) -> None:
     """The kernel lets no file of the process grow beyond 20 kB."""
     for name in ("r.png", "r.json"):
         (tmp_path / name).write_bytes(OLD)
-    limited = f"import resource; resource.setrlimit({resource.RLIMIT_FSIZE}, (20_000, 20_000)); " + REPORT
+    limit = f"import resource; resource.setrlimit({resource.RLIMIT_FSIZE}, (20_000, 20_000)); "
+    limited = "import sys; sys.dont_write_bytecode = True; " + limit + REPORT  # one cut short would spoil later runs
     words = ["report", str(GALLERY), "-o", str(tmp_path / "r.png"), "--json", str(tmp_path / "r.json")]
     run = in_process(limited, *words)
     assert run.returncode == 2 and re.fullmatch(r"hitplanes: output: cannot write .*: File too large\n", run.stderr)

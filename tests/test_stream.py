@@ -441,7 +441,10 @@ def test_a_full_disk_is_one_line_and_the_part_goes_on_later(tmp_path: Path) -> N
     def small() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_001, 100_001))
 
-    full = subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=False, preexec_fn=small)
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # cut short, a .pyc would spoil the runs after this
+    full = subprocess.run(
+        words, capture_output=True, text=True, cwd=ROOT, check=False, preexec_fn=small, env=environment
+    )
     assert full.returncode == 2
     assert full.stderr == f"hitplanes: output: cannot write {output}.part: File too large\n"
     assert (tmp_path / "hits.jsonl.part").stat().st_size == 100_001 and not output.exists()
