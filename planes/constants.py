@@ -100,3 +100,18 @@ CHUNK_PAIRS = 2**21
 
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""
+
+ROUNDING = 2.0**-53
+"""Largest relative error of one float64 operation."""
+
+FLOAT_TINY = 1e-290
+"""Below it a value of a float filter may have lost digits to underflow, far above the least float."""
+
+FLOAT_HUGE = 1e300
+"""Beyond it a value of a float filter may have overflowed on the way."""
+
+LENGTH_TINY = 1e-140
+"""A length whose square underflows is shorter than this."""
+
+CHUNK_ROWS = 8192
+"""Rows of a float filter worked on at a time: 64 KB for each of its arrays."""

@@ -1,0 +1,364 @@
+"""Exact signs of float64 inputs: a float filter by chunk and by row, then whole numbers where it cannot tell.
+
+Each predicate is one polynomial, or its float stand-in, with a bound on the error. The chunk's largest magnitudes give
+one bound for all of its rows; a row that this does not settle gets a bound of its own; one that is still in doubt is
+computed in Python's integers. A comparison with NaN is false, so "certain" is asked for and NaN is in doubt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Floats, InputError
+from planes.constants import CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
+
+__all__ = ["Signs", "circles_sign", "orient2d", "orient3d", "point_segment_sign", "segment_segment_sign"]
+
+Signs = npt.NDArray[np.int8]
+Numbers = npt.NDArray[Any]
+
+WORK_ROWS = 16
+"""Arrays of a chunk that a predicate may work in."""
+
+ORIENT2D_ERROR = 3.3307e-16
+ORIENT3D_ERROR = 7.7716e-16
+"""Relative error of the determinants, of the sum of their terms' magnitudes: Shewchuk (1997), table 1."""
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """One sign: by floats with a bound, and by whole numbers.
+
+    `value(columns, work)` gives the determinant, in a row of work, and magnitudes (n,) or (k, n); `bound` turns the
+    largest of each magnitude into a bound on the error; `exact(columns)` takes columns of Python integers. All
+    columns are lengths in one unit, and the sign does not depend on the unit.
+    """
+
+    value: Callable[[list[Floats], Floats], tuple[Floats, tuple[Floats, ...]]]
+    bound: Callable[..., Any]
+    exact: Callable[[list[Numbers]], Numbers]
+
+
+def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative: bool = False) -> Signs:
+    """Tell on which side of the line through a and b the point c lies.
+
+    Parameters
+    ----------
+    a, b, c : (..., 2) float, finite; leading axes broadcast
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: 1 when turning from +x towards +y, which is clockwise on the screen; 0 on the line; -1
+
+    Raises
+    ------
+    InputError
+        If a point does not have two coordinates.
+
+    References
+    ----------
+    Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (1997).
+    """
+    return _signs(_ORIENT2D, [*_columns("a", a, 2), *_columns("b", b, 2), *_columns("c", c, 2)], conservative)
+
+
+def orient3d(
+    a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, d: npt.ArrayLike, conservative: bool = False
+) -> Signs:
+    """Tell on which side of the plane through a, b and c the point d lies: sign of det(a - d, b - d, c - d).
+
+    Parameters
+    ----------
+    a, b, c, d : (..., 3) float, finite; leading axes broadcast
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: 1 where a, b, c turn from +x towards +y when seen from +z and d lies below them; 0 in the plane; -1
+
+    Raises
+    ------
+    InputError
+        If a point does not have three coordinates.
+    """
+    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 3)]
+    return _signs(_ORIENT3D, columns, conservative)
+
+
+def circles_sign(
+    c1: npt.ArrayLike, r1: npt.ArrayLike, c2: npt.ArrayLike, r2: npt.ArrayLike, conservative: bool = False
+) -> Signs:
+    """Compare the distance of two centres with the sum of two radii.
+
+    Parameters
+    ----------
+    c1, c2 : (..., 2) or (..., 3) float, finite; leading axes broadcast
+    r1, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 where the circles share more than a point, 0 where they touch, 1 where they are apart
+
+    Raises
+    ------
+    InputError
+        If a point does not have two or three coordinates, or the centres differ in it.
+    """
+    d = np.shape(c1)[-1] if np.ndim(c1) else 0
+    if d not in (2, 3):
+        raise InputError(f"c1: expected 2 or 3 coordinates on the last axis, got {np.shape(c1)}")
+    columns = [*_columns("c1", c1, d), *_columns("c2", c2, d), _column(r1), _column(r2)]
+    return _signs(_CIRCLES, columns, conservative)
+
+
+def point_segment_sign(
+    p: npt.ArrayLike,
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    r: npt.ArrayLike,
+    r2: npt.ArrayLike = 0.0,
+    conservative: bool = False,
+) -> Signs:
+    """Compare the distance from p to the segment ab with r + r2.
+
+    Parameters
+    ----------
+    p, a, b : (..., 2) float, finite; leading axes broadcast; a may equal b
+    r, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 nearer, 0 at that distance, 1 farther
+
+    Raises
+    ------
+    InputError
+        If a point does not have two coordinates.
+
+    References
+    ----------
+    Ericson, *Real-Time Collision Detection* (2005), 5.1.2.
+    """
+    columns = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2), _column(r), _column(r2)]
+    return _signs(_POINT_SEGMENT, columns, conservative)
+
+
+def segment_segment_sign(
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    c: npt.ArrayLike,
+    d: npt.ArrayLike,
+    r: npt.ArrayLike,
+    r2: npt.ArrayLike = 0.0,
+    conservative: bool = False,
+) -> Signs:
+    """Compare the distance between the segments ab and cd with r + r2.
+
+    Parameters
+    ----------
+    a, b, c, d : (..., 2) float, finite; leading axes broadcast; segments may be single points
+    r, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 nearer, 0 at that distance (with radii 0: they meet), 1 farther
+
+    Raises
+    ------
+    InputError
+        If a point does not have two coordinates.
+    """
+    points = [np.asarray(v, np.float64) for v in (a, b, c, d)]
+    a, b, c, d = points
+    sign = point_segment_sign(a, c, d, r, r2, conservative)
+    for p, q, s in ((b, c, d), (c, a, b), (d, a, b)):
+        sign = np.minimum(sign, point_segment_sign(p, q, s, r, r2, conservative))
+    grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
+    crossing = _cross(a, b, c, d, conservative)
+    return np.asarray(np.where(crossing, np.minimum(sign, -grown.astype(np.int8)), sign), np.int8)
+
+
+def _cross(a: Floats, b: Floats, c: Floats, d: Floats, conservative: bool) -> Bools:
+    """Where two segments pass through each other; conservative, also where they might."""
+    met = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
+    boxes = met[..., 0] & met[..., 1]
+    crossing = np.zeros(boxes.shape, np.bool_)
+    if not boxes.any():
+        return crossing
+    a, b, c, d = (np.broadcast_to(v, met.shape)[boxes] for v in (a, b, c, d))
+    sides = orient2d(a, b, c, conservative) * orient2d(a, b, d, conservative)
+    others = orient2d(c, d, a, conservative) * orient2d(c, d, b, conservative)
+    least = 0 if conservative else -1
+    crossing[boxes] = (sides <= least) & (others <= least)
+    return crossing
+
+
+def _column(values: npt.ArrayLike) -> Floats:
+    return np.asarray(values, np.float64)
+
+
+def _columns(field: str, points: npt.ArrayLike, d: int) -> list[Floats]:
+    array = np.asarray(points, np.float64)
+    if not array.ndim or array.shape[-1] != d:
+        raise InputError(f"{field}: expected {d} coordinates on the last axis, got {array.shape}")
+    return [array[..., k] for k in range(d)]
+
+
+def _signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> Signs:
+    """Run over the rows of all columns, broadcast, a chunk at a time in the same memory."""
+    work = np.empty((WORK_ROWS, CHUNK_ROWS))
+    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
+    modes: Any = [["readonly"]] * len(columns) + [["writeonly", "allocate"]]
+    types: Any = [np.float64] * len(columns) + [np.int8]
+    chunks = np.nditer([*columns, None], flags, modes, types, buffersize=CHUNK_ROWS)
+    with chunks, np.errstate(all="ignore"):
+        for *rows, signs in chunks:
+            if len(signs):
+                _chunk(predicate, rows, work[:, : len(signs)], signs, conservative)
+        return np.asarray(chunks.operands[-1])
+
+
+def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs, conservative: bool) -> None:
+    """Fill the signs of one chunk; rows in doubt by a bound of their own, then by integers."""
+    value, magnitudes = predicate.value(columns, work)
+    np.subtract((value > 0).view(np.int8), (value < 0).view(np.int8), out=signs)
+    bound = predicate.bound(*(max(m.max(), -m.min()) for m in magnitudes))
+    size = np.abs(value, out=value)
+    if size.min() > bound and size.max() < FLOAT_HUGE:
+        return
+    doubt = np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
+    rows = [column[doubt] for column in columns]
+    value, magnitudes = predicate.value(rows, work[:, : len(doubt)])
+    bounds = predicate.bound(*(np.abs(m).reshape(-1, len(doubt)).max(axis=0) for m in magnitudes))
+    size = np.abs(value)
+    signs[doubt] = np.sign(value)
+    left = np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
+    if not len(left):
+        return
+    signs[doubt[left]] = 0 if conservative else _exact(predicate, [row[left] for row in rows])
+
+
+def _exact(predicate: Predicate, columns: list[Floats]) -> Signs:
+    """Signs by whole numbers: each row's lengths in units of its smallest power of two."""
+    mantissas, exponents = np.frexp(np.stack(columns))
+    exponents = np.where(mantissas == 0, np.iinfo(np.int32).max, exponents)
+    shifts = np.where(mantissas == 0, 0, exponents - exponents.min(axis=0))
+    numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
+    value = predicate.exact(list(numbers))
+    return np.asarray((value > 0).astype(np.int8) - (value < 0).astype(np.int8))
+
+
+def _orient2d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    ax, ay, bx, by, cx, cy = columns
+    left, right, other = work[0], work[1], work[2]
+    np.multiply(np.subtract(ax, cx, out=left), np.subtract(by, cy, out=other), out=left)
+    np.multiply(np.subtract(ay, cy, out=right), np.subtract(bx, cx, out=other), out=right)
+    return np.subtract(left, right, out=other), (left, right)
+
+
+def _orient2d_bound(left: Any, right: Any) -> Any:
+    return ORIENT2D_ERROR * (left + right) + FLOAT_TINY
+
+
+def _orient2d_exact(columns: list[Numbers]) -> Numbers:
+    ax, ay, bx, by, cx, cy = columns
+    return np.asarray((ax - cx) * (by - cy) - (ay - cy) * (bx - cx))
+
+
+def _orient3d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    a, b, c = work[0:3], work[3:6], work[6:9]
+    for i in range(9):
+        np.subtract(columns[i], columns[9 + i % 3], out=work[i])
+    total, term, other = work[9], work[10], work[11]
+    total.fill(0)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.subtract(np.multiply(b[i], c[j], out=term), np.multiply(b[j], c[i], out=other), out=term)
+        np.add(total, np.multiply(a[k], term, out=term), out=total)
+    return total, (a, b, c)
+
+
+def _orient3d_bound(a: Any, b: Any, c: Any) -> Any:
+    """Six terms, each at most a * b * c; a product that underflows before it meets a counts, too."""
+    return 6 * ORIENT3D_ERROR * a * (b * c + FLOAT_TINY) + FLOAT_TINY
+
+
+def _orient3d_exact(columns: list[Numbers]) -> Numbers:
+    d = columns[9:]
+    a, b, c = ([columns[3 * i + k] - d[k] for k in range(3)] for i in range(3))
+    terms = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    return np.asarray(sum(a[k] * (b[i] * c[j] - b[j] * c[i]) for i, j, k in terms))
+
+
+def _circles_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    *coordinates, r1, r2 = columns
+    d = len(coordinates) // 2
+    total, other, radius = work[0], work[1], work[2]
+    np.square(np.subtract(coordinates[0], coordinates[d], out=total), out=total)
+    for k in range(1, d):
+        np.square(np.subtract(coordinates[k], coordinates[d + k], out=other), out=other)
+        np.add(total, other, out=total)
+    np.square(np.add(r1, r2, out=radius), out=other)
+    return np.subtract(total, other, out=total), (radius,)
+
+
+def _circles_bound(radius: Any) -> Any:
+    """Where it matters, both squares are about the same: 5 roundings in one, 3 in the other, one in the difference."""
+    return 10 * ROUNDING * radius * radius + FLOAT_TINY
+
+
+def _circles_exact(columns: list[Numbers]) -> Numbers:
+    *coordinates, r1, r2 = columns
+    d = len(coordinates) // 2
+    return np.asarray(sum((coordinates[k] - coordinates[d + k]) ** 2 for k in range(d)) - (r1 + r2) ** 2)
+
+
+def _point_segment_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    px, py, ax, ay, bx, by, r1, r2 = columns
+    f, (dx, dy, share, length2, other, radius, value) = work[0:2], work[2:9]
+    fx, fy = np.subtract(px, ax, out=f[0]), np.subtract(py, ay, out=f[1])
+    np.subtract(bx, ax, out=dx)
+    np.subtract(by, ay, out=dy)
+    np.add(np.multiply(fx, dx, out=share), np.multiply(fy, dy, out=other), out=share)
+    np.add(np.square(dx, out=length2), np.square(dy, out=other), out=length2)
+    np.divide(share, np.maximum(length2, FLOAT_TINY, out=other), out=share)
+    np.minimum(np.maximum(share, 0, out=share), 1, out=share)
+    np.square(np.subtract(fx, np.multiply(share, dx, out=dx), out=dx), out=dx)
+    np.square(np.subtract(fy, np.multiply(share, dy, out=dy), out=dy), out=dy)
+    np.square(np.add(r1, r2, out=radius), out=other)
+    np.subtract(np.add(dx, dy, out=value), other, out=value)
+    return value, (f, radius, length2)
+
+
+def _point_segment_bound(f: Any, radius: Any, length2: Any) -> Any:
+    """The distance is off by at most e: 14 roundings of |f|, which is at least the part of it along the segment.
+
+    A length whose square underflows is itself shorter than LENGTH_TINY; one whose square is huge is left to integers.
+    """
+    e = 32 * ROUNDING * f + LENGTH_TINY
+    bound = e * (2 * radius + e) + 10 * ROUNDING * radius * radius
+    return np.where(length2 < FLOAT_HUGE, bound, np.inf)
+
+
+def _point_segment_exact(columns: list[Numbers]) -> Numbers:
+    px, py, ax, ay, bx, by, r1, r2 = columns
+    fx, fy, dx, dy = px - ax, py - ay, bx - ax, by - ay
+    share, length2, radius2 = fx * dx + fy * dy, dx * dx + dy * dy, (r1 + r2) ** 2
+    at_a = fx * fx + fy * fy - radius2
+    at_b = (px - bx) ** 2 + (py - by) ** 2 - radius2
+    between = (fx * dy - fy * dx) ** 2 - radius2 * length2
+    return np.asarray(np.where(share <= 0, at_a, np.where(share >= length2, at_b, between)))
+
+
+_ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact)
+_ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact)
+_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact)
+_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact)
