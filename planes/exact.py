@@ -240,7 +240,6 @@ def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Sig
     value, magnitudes = predicate.value(rows, work[:, : len(doubt)])
     bounds = predicate.bound(*(np.abs(m).reshape(-1, len(doubt)).max(axis=0) for m in magnitudes))
     size = np.abs(value)
-    signs[doubt] = np.sign(value)
     left = np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
     if not len(left):
         return
@@ -250,8 +249,7 @@ def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Sig
 def _exact(predicate: Predicate, columns: list[Floats]) -> Signs:
     """Signs by whole numbers: each row's lengths in units of its smallest power of two."""
     mantissas, exponents = np.frexp(np.stack(columns))
-    exponents = np.where(mantissas == 0, np.iinfo(np.int32).max, exponents)
-    shifts = np.where(mantissas == 0, 0, exponents - exponents.min(axis=0))
+    shifts = exponents - exponents.min(axis=0)
     numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
     value = predicate.exact(list(numbers))
     return np.asarray((value > 0).astype(np.int8) - (value < 0).astype(np.int8))

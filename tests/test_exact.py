@@ -170,6 +170,15 @@ def test_any_floats_at_all(predicate: Callable[..., Any]) -> None:
         assert wrong(predicate, [np.abs(v) if v.ndim == 1 else v for v in arrays]) == []
 
 
+def test_products_that_underflow_before_they_count() -> None:
+    """Coordinates of one column are tiny, of another huge: a product of two is lost, of three it is not."""
+    rng = np.random.default_rng(6)
+    for powers in ((-540, -534, 500), (-540, 500, -534), (500, -540, -534)):
+        arrays = [np.ldexp(rng.integers(-999, 1000, (300, 3)).astype(float), powers) for _ in range(4)]
+        assert wrong(orient3d, arrays) == []
+        assert (orient3d(*arrays) != 0).any()
+
+
 def test_spheres() -> None:
     rng = np.random.default_rng(8)
     c1, r1 = rng.integers(-20, 20, (500, 3)) + 1e9, rng.integers(0, 3, 500) / 3

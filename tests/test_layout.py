@@ -12,8 +12,9 @@ ROOT = Path(__file__).parent.parent
 
 ORDER = {
     "planes": (
-        "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "image", "kept", "sprite", "items",
-        "compose", "labels", "poses", "scenefile", "scene", "render", "sampling",
+        "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "hulls", "volumes",
+        "overlap", "image", "kept", "sprite", "items", "compose", "labels", "poses", "scenefile", "scene",
+        "render", "sampling",
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",

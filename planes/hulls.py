@@ -1,0 +1,186 @@
+"""Rows of points to convex outlines, exactly: hulls, tests of convexity, and simple polygons cut into triangles.
+
+Orientation as in the frame: an outline turns from +x towards +y.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, InputError, Ints
+from planes.exact import orient2d
+
+__all__ = ["convex_rows", "hull", "outlines", "rows_of", "triangles"]
+
+Point = tuple[float, float]
+Whole = tuple[int, int]
+
+
+def rows_of(starts: Ints, total: int) -> tuple[Ints, Ints]:
+    """Counts of ragged rows (N,), and the row of each point (total,)."""
+    counts = np.diff(np.append(starts, total))
+    return counts, np.repeat(np.arange(len(starts)), counts)
+
+
+def convex_rows(points: Floats, starts: Ints) -> Ints:
+    """Turning sense of convex outlines of three points or more: 1, -1; 0 where a row is not convex or has no area.
+
+    All turns have one sense, and going round the edges change only once from rightward to leftward: a star that winds
+    twice changes twice. Points on an edge pass; equal neighbours must have been removed.
+    """
+    if not len(starts):
+        return np.zeros(0, np.int64)
+    counts, row = rows_of(starts, len(points))
+    place = np.arange(len(points)) - starts[row]
+    after = starts[row] + (place + 1) % counts[row]
+    turns = orient2d(points, points[after], points[after[after]]).astype(np.int64)
+    step_x, step_y = points[after, 0] - points[:, 0], points[after, 1] - points[:, 1]
+    rightward = (step_x > 0) | ((step_x == 0) & (step_y > 0))
+    changes = np.add.reduceat((rightward != rightward[after]).astype(np.int64), starts)
+    low, high = np.minimum.reduceat(turns, starts), np.maximum.reduceat(turns, starts)
+    return np.where((changes == 2) & (counts > 2) & (low * high >= 0), low + high, 0).clip(-1, 1)
+
+
+def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
+    """Hulls of ragged rows: rows that are convex already are only brought to one turning sense.
+
+    Returns
+    -------
+    points, starts : the outlines; rows that have no area have one or two points
+    """
+    if not len(starts):
+        return points, starts
+    sense = _checked_sense(points, starts)
+    counts, row = rows_of(starts, len(points))
+    place = np.arange(len(points)) - starts[row]
+    points = points[np.where(sense[row] < 0, starts[row] + counts[row] - 1 - place, np.arange(len(points)))]
+    if sense.all():
+        return points, starts
+    parts = np.split(points, starts[1:])
+    for i in np.flatnonzero(sense == 0).tolist():
+        parts[i] = np.array(hull([(x, y) for x, y in parts[i].tolist()]))
+    lengths = np.array([len(part) for part in parts])
+    return np.concatenate(parts), np.cumsum(lengths) - lengths
+
+
+def _checked_sense(points: Floats, starts: Ints) -> Ints:
+    """Sense of convex rows; 0 also for rows with equal neighbours, whose turns would not be seen."""
+    counts, row = rows_of(starts, len(points))
+    after = starts[row] + (np.arange(len(points)) - starts[row] + 1) % counts[row]
+    same: Bools = (points == points[after]).all(axis=1)
+    return np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
+
+
+def hull(points: list[Point]) -> list[Point]:
+    """Convex hull, without points on its edges: one point or two where it has no area.
+
+    References
+    ----------
+    Andrew, *Another efficient algorithm for convex hulls in two dimensions* (1979).
+    """
+    distinct = sorted(set(points))
+    if len(distinct) < 3:
+        return distinct
+    whole = dict(zip(distinct, _whole(distinct), strict=True))
+    found: list[Point] = []
+    for run in (distinct, distinct[::-1]):
+        chain: list[Point] = []
+        for p in run:
+            while len(chain) > 1 and _turn(whole[chain[-2]], whole[chain[-1]], whole[p]) <= 0:
+                chain.pop()
+            chain.append(p)
+        found += chain[:-1]
+    return found
+
+
+def triangles(points: list[Point]) -> list[tuple[int, int, int]]:
+    """Cut a simple polygon into triangles on its own points, as indices; points on edges are welcome.
+
+    Raises
+    ------
+    InputError
+        If it crosses or touches itself, or has no area.
+
+    References
+    ----------
+    Meisters, *Polygons have ears* (1975).
+    """
+    whole = _whole(points)
+    _refuse_crossing(whole)
+    n = len(points)
+    twice_area = sum(whole[i - 1][0] * whole[i][1] - whole[i][0] * whole[i - 1][1] for i in range(n))
+    left = list(range(n)) if twice_area > 0 else list(range(n))[::-1]
+    found = []
+    while left := _without_straight(left, whole):
+        if len(left) < 3:
+            break
+        k = next(k for k in range(len(left)) if _is_ear(left, k, whole))
+        found.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
+        if len(left) == 3:
+            break
+        del left[k]
+    return found
+
+
+def _without_straight(left: list[int], whole: list[Whole]) -> list[int]:
+    kept = list(left)
+    k = 0
+    while k < len(kept) and len(kept) > 2:
+        if _turn(whole[kept[k - 1]], whole[kept[k]], whole[kept[(k + 1) % len(kept)]]) == 0:
+            del kept[k]
+            k = max(k - 1, 0)
+        else:
+            k += 1
+    return kept
+
+
+def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
+    """Whether a corner turns inward and no other point lies in its closed triangle."""
+    corner = (left[k - 1], left[k], left[(k + 1) % len(left)])
+    a, b, c = (whole[i] for i in corner)
+    if _turn(a, b, c) <= 0:
+        return False
+    others = (whole[i] for i in left if i not in corner)
+    return not any(_turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0 for p in others)
+
+
+def _refuse_crossing(whole: list[Whole]) -> None:
+    """Edges that are no neighbours do not meet; neighbours share one point."""
+    n = len(whole)
+    if n < 3:
+        raise InputError(f"points: expected three or more, got {n}")
+    edges = [(whole[i], whole[(i + 1) % n]) for i in range(n)]
+    for i in range(n):
+        for j in range(i + 1, n):
+            (a, b), (c, d) = edges[i], edges[j]
+            if j == i + 1 or (i == 0 and j == n - 1):
+                p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
+                bad = q in (p, s) or (_turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p)))
+            else:
+                bad = _meet(a, b, c, d)
+            if bad:
+                raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
+
+
+def _meet(a: Whole, b: Whole, c: Whole, d: Whole) -> bool:
+    turns = _turn(a, b, c), _turn(a, b, d), _turn(c, d, a), _turn(c, d, b)
+    if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
+        return True
+    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+    return any(turn == 0 and _within(*end) for turn, end in zip(turns, ends, strict=True))
+
+
+def _within(a: Whole, b: Whole, p: Whole) -> bool:
+    """Whether a point of the line through a and b lies between them."""
+    return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in range(2))
+
+
+def _turn(a: Whole, b: Whole, c: Whole) -> int:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _whole(points: list[Point]) -> list[Whole]:
+    """Points as integers in units of their smallest power of two."""
+    ratios = [(x.as_integer_ratio(), y.as_integer_ratio()) for x, y in points]
+    unit = max((max(x[1], y[1]) for x, y in ratios), default=1)
+    return [(x[0] * (unit // x[1]), y[0] * (unit // y[1])) for x, y in ratios]

@@ -1,0 +1,401 @@
+"""Volumes as rows of float64 columns: circles, boxes, turned boxes, convex polygons, capsules, and sets of parts.
+
+All are closed sets. Each is the hull of a few points, grown by a radius (`core`). A moved volume keeps the one it was
+made of (`original`): turning from there again and again adds no rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
+from planes.constants import TRIG_BITS
+from planes.grid256 import unit
+from planes.hulls import convex_rows, outlines, rows_of, triangles
+
+__all__ = ["Aabbs", "BoxSets", "Capsules", "Circles", "ConcavePolygons", "Core", "Obbs", "Parts", "Polygons", "Volumes"]
+
+Numbers = npt.NDArray[Any]
+Move = Callable[[Floats, Ints], Floats]
+"""Points (n, d) and the row that each belongs to, to points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Core:
+    """Points (M, d) in ragged rows, each row in order round its hull, and a radius (N,)."""
+
+    points: Floats
+    starts: Ints
+    counts: Ints
+    radius: Floats
+
+    def point(self, rows: Ints, k: int) -> Floats:
+        """Point k of rows; numbers go round."""
+        return np.asarray(self.points[self.starts[rows] + k % self.counts[rows]])
+
+
+class Volumes:
+    """What all kinds have: length, bounds, a choice of rows, and moves that keep the original."""
+
+    _original: Volumes | None = None
+    d = 2
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    def core(self) -> Core:
+        """Points and a radius."""
+        raise NotImplementedError
+
+    def take(self, rows: object) -> Self:
+        """Some rows, by number."""
+        chosen = integers("rows", rows, (None,), 0, len(self) - 1)
+        return self._chosen(chosen)._of(None if self._original is None else self._original.take(chosen))
+
+    @property
+    def original(self) -> Volumes:
+        """What this was before the first move."""
+        return self if self._original is None else self._original
+
+    def bounds(self) -> Aabbs:
+        """Boxes that contain the volumes: rounded outward."""
+        core = self.core()
+        if not len(self):
+            return Aabbs(np.zeros((0, self.d)), np.zeros((0, self.d)))
+        low, high = np.minimum.reduceat(core.points, core.starts), np.maximum.reduceat(core.points, core.starts)
+        radius = core.radius[:, None]
+        return Aabbs._made(_sum_outward(low, -radius, -np.inf), _sum_outward(high, radius, np.inf))
+
+    def translated(self, xy: object) -> Self:
+        """Move by a vector (d,), or one for each row (N, d)."""
+        by = _vectors("xy", xy, len(self), self.d)
+        return self._moved(lambda p, row: np.asarray(p + by[row]), np.ones(len(self)))._of(self.original)
+
+    def scaled(self, s: object, about_xy: object = 0.0) -> Self:
+        """Scale by a factor above 0, or one for each row (N,), about a point."""
+        factor = reals("s", each("s", s, len(self)), (len(self),))
+        if not (factor > 0).all():
+            raise InputError(f"s: expected a number above 0, got {factor.min()}")
+        about = _vectors("about_xy", about_xy, len(self), self.d)
+        moved = self._moved(lambda p, row: np.asarray(about[row] + (p - about[row]) * factor[row, None]), factor)
+        return moved._of(self.original)
+
+    def rotated(self, degrees: object, about_xy: object = 0.0) -> Volumes:
+        """Turn by degrees, or by one angle for each row (N,), about a point; quarter turns are exact."""
+        if self.d != 2:
+            raise InputError("rotated: expected volumes in 2-D, got 3-D")
+        c, s = (v / 2.0**TRIG_BITS for v in unit(reals("degrees", each("degrees", degrees, len(self)), (len(self),))))
+        about = _vectors("about_xy", about_xy, len(self), 2)
+
+        def turn(p: Floats, row: Ints) -> Floats:
+            x, y = (p - about[row]).T
+            return np.asarray(about[row] + np.stack([c[row] * x - s[row] * y, s[row] * x + c[row] * y], axis=1))
+
+        return self._turned(turn)._of(self.original)
+
+    def _turned(self, move: Move) -> Volumes:
+        return self._moved(move, np.ones(len(self)))
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        raise NotImplementedError
+
+    def _chosen(self, rows: Ints) -> Self:
+        raise NotImplementedError
+
+    def _of(self, original: Volumes | None) -> Self:
+        self._original = original
+        return self
+
+
+class Circles(Volumes):
+    """Circles, or spheres: center (N, d) with d 2 or 3, radius (N,) of 0 or more."""
+
+    def __init__(self, center: object, radius: object) -> None:
+        self.center = _points("center", center)
+        self.d = self.center.shape[1]
+        self.radius = _radii(radius, len(self.center))
+
+    def __len__(self) -> int:
+        return len(self.center)
+
+    def core(self) -> Core:
+        """One point."""
+        return Core(self.center, *_even(len(self), 1), self.radius)
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        return type(self)(move(self.center, np.arange(len(self))), self.radius * factor)
+
+    def _chosen(self, rows: Ints) -> Self:
+        return type(self)(self.center[rows], self.radius[rows])
+
+
+class Aabbs(Volumes):
+    """Boxes along the axes: min and max (N, d) with d 2 or 3, min <= max; flat ones and single points are boxes."""
+
+    def __init__(self, min: object, max: object) -> None:  # noqa: A002
+        self.min = _points("min", min)
+        self.d = self.min.shape[1]
+        self.max = reals("max", max, (len(self.min), self.d))
+        bad = np.argwhere(self.min > self.max)
+        if len(bad):
+            i, k = bad[0].tolist()
+            raise InputError(f"max[{i}][{k}]: expected {self.min[i, k]} or more, got {self.max[i, k]}")
+
+    @classmethod
+    def _made(cls, low: Floats, high: Floats) -> Self:
+        """Bounds, which may reach beyond the floats."""
+        made = cls.__new__(cls)
+        made.min, made.max, made.d = low, high, low.shape[1]
+        return made
+
+    def __len__(self) -> int:
+        return len(self.min)
+
+    def corners(self) -> Floats:
+        """Corners (N, 4, 2) of boxes in 2-D, in order."""
+        (x0, y0), (x1, y1) = self.min.T, self.max.T
+        return np.stack([np.stack(p, axis=1) for p in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=1)
+
+    def core(self) -> Core:
+        """Four corners in 2-D; in 3-D min and max."""
+        points = self.corners() if self.d == 2 else np.stack([self.min, self.max], axis=1)
+        return Core(points.reshape(-1, self.d), *_even(len(self), points.shape[1]), np.zeros(len(self)))
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        rows = np.arange(len(self))
+        return type(self)(move(self.min, rows), move(self.max, rows))
+
+    def _turned(self, move: Move) -> Volumes:
+        return Obbs.from_corners(
+            move(self.corners().reshape(-1, 2), np.repeat(np.arange(len(self)), 4)).reshape(-1, 4, 2)
+        )
+
+    def _chosen(self, rows: Ints) -> Self:
+        return type(self)(self.min[rows], self.max[rows])
+
+
+class _Hulls(Volumes):
+    """Hulls of ragged rows of points."""
+
+    points: Floats
+    starts: Ints
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def core(self) -> Core:
+        """Points of the hulls."""
+        return Core(self.points, self.starts, rows_of(self.starts, len(self.points))[0], np.zeros(len(self)))
+
+    @classmethod
+    def _around(cls, points: Floats, starts: Ints) -> Self:
+        made = cls.__new__(cls)
+        made.points, made.starts = outlines(reals("points", points, (None, 2)), starts)
+        return made
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        return self._around(move(self.points, rows_of(self.starts, len(self.points))[1]), self.starts)
+
+    def _chosen(self, rows: Ints) -> Self:
+        made = type(self).__new__(type(self))
+        made.points, made.starts = _ragged(self.points, self.starts, rows)
+        return made
+
+
+class Obbs(_Hulls):
+    """Turned boxes: each is the hull of its four stored corners, whatever rounding made of them."""
+
+    @classmethod
+    def from_corners(cls, corners: object) -> Self:
+        """From corners (N, 4, 2), in any order."""
+        array = reals("corners", corners, (None, 4, 2))
+        return cls._around(array.reshape(-1, 2), _even(len(array), 4)[0])
+
+    @classmethod
+    def from_center(cls, center: object, half_wh: object, angle_deg: object) -> Self:
+        """From centres (N, 2), half sizes (N, 2) of 0 or more, and angles in degrees (N,) or one."""
+        middle = reals("center", center, (None, 2))
+        n = len(middle)
+        half = reals("half_wh", half_wh, (n, 2))
+        if not (half >= 0).all():
+            raise InputError(f"half_wh: expected numbers of 0 or more, got {half.min()}")
+        c, s = (v[:, None] / 2.0**TRIG_BITS for v in unit(reals("angle_deg", each("angle_deg", angle_deg, n), (n,))))
+        x, y = (half[:, k, None] * np.array(signs) for k, signs in enumerate(((-1, 1, 1, -1), (-1, -1, 1, 1))))
+        return cls.from_corners(middle[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=2))
+
+
+class Polygons(_Hulls):
+    """Convex polygons: points (M, 2), and the first point of each row (N,); either turning sense."""
+
+    def __init__(self, points: object, starts: object) -> None:
+        given, first = _ragged_points(points, starts)
+        counts, row = rows_of(first, len(given))
+        after = first[row] + (np.arange(len(given)) - first[row] + 1) % counts[row]
+        kept = (given != given[after]).any(axis=1)
+        counts = np.bincount(row[kept], minlength=len(first))
+        for i in np.flatnonzero(counts < 3).tolist():
+            raise InputError(f"points: expected three distinct points or more in row {i}, got {counts[i]}")
+        given, first = given[kept], np.cumsum(counts) - counts
+        for i in np.flatnonzero(convex_rows(given, first) == 0).tolist():
+            raise InputError(
+                f"points: expected a convex polygon with an area in row {i}, got {shown(_row(given, first, i))}"
+            )
+        self.points, self.starts = outlines(given, first)
+
+
+class Capsules(Volumes):
+    """Segments from a_xy to b_xy (N, 2), grown by a radius (N,) of 0 or more; a segment may be one point."""
+
+    def __init__(self, a_xy: object, b_xy: object, radius: object) -> None:
+        self.a_xy = reals("a_xy", a_xy, (None, 2))
+        self.b_xy = reals("b_xy", b_xy, (len(self.a_xy), 2))
+        self.radius = _radii(radius, len(self.a_xy))
+
+    def __len__(self) -> int:
+        return len(self.a_xy)
+
+    def core(self) -> Core:
+        """Two points."""
+        return Core(np.stack([self.a_xy, self.b_xy], axis=1).reshape(-1, 2), *_even(len(self), 2), self.radius)
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        rows = np.arange(len(self))
+        return type(self)(move(self.a_xy, rows), move(self.b_xy, rows), self.radius * factor)
+
+    def _chosen(self, rows: Ints) -> Self:
+        return type(self)(self.a_xy[rows], self.b_xy[rows], self.radius[rows])
+
+
+class Parts(Volumes):
+    """Rows of several parts: volumes of one kind (M), and the first part of each row (N,); a row has one or more."""
+
+    def __init__(self, parts: Volumes, starts: object) -> None:
+        self.parts, self.d = parts, parts.d
+        self.starts = _starts(starts, len(parts))
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def core(self) -> Core:
+        """A row of parts has no hull of its own."""
+        raise InputError("core: expected a volume of one part, got a set of parts")
+
+    def bounds(self) -> Aabbs:
+        """Boxes around all parts of each row."""
+        inner = self.parts.bounds()
+        if not len(self):
+            return inner
+        return Aabbs._made(np.minimum.reduceat(inner.min, self.starts), np.maximum.reduceat(inner.max, self.starts))
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        row = rows_of(self.starts, len(self.parts))[1]
+        return self._same(self.parts._moved(lambda p, part: move(p, row[part]), factor[row]), self.starts)
+
+    def _turned(self, move: Move) -> Volumes:
+        row = rows_of(self.starts, len(self.parts))[1]
+        return Parts(self.parts._turned(lambda p, part: move(p, row[part])), self.starts)
+
+    def _chosen(self, rows: Ints) -> Self:
+        chosen, starts = _ragged(np.arange(len(self.parts)), self.starts, rows)
+        return self._same(self.parts._chosen(chosen), starts)
+
+    def _same(self, parts: Volumes, starts: Ints) -> Self:
+        made = type(self).__new__(type(self))
+        made.parts, made.starts, made.d = parts, starts, parts.d
+        return made
+
+
+class BoxSets(Parts):
+    """Sets of boxes: min and max (M, d), and the first box of each row (N,)."""
+
+    def __init__(self, min: object, max: object, starts: object) -> None:  # noqa: A002
+        super().__init__(Aabbs(min, max), starts)
+
+
+class ConcavePolygons(Parts):
+    """Simple polygons, cut into triangles; points on edges are welcome."""
+
+    @classmethod
+    def from_concave(cls, points: object, starts: object) -> Self:
+        """From points (M, 2) and the first point of each row (N,), in either turning sense.
+
+        Raises
+        ------
+        InputError
+            If a row crosses or touches itself, or has fewer than three points or no area.
+        """
+        given, first = _ragged_points(points, starts)
+        corners: list[Floats] = []
+        lengths = []
+        for i, row in enumerate(np.split(given, first[1:]) if len(first) else []):
+            with within(f"row {i}"):
+                cut = triangles([(x, y) for x, y in row.tolist()])
+            corners += [row[list(indices)] for indices in cut]
+            lengths.append(len(cut))
+        joined = np.concatenate(corners) if corners else np.zeros((0, 2))
+        ends = np.cumsum(np.array(lengths, np.int64))
+        made = cls.__new__(cls)
+        Parts.__init__(made, Polygons(joined, np.arange(len(corners)) * 3), ends - np.array(lengths, np.int64))
+        return made
+
+
+def _points(field: str, values: object) -> Floats:
+    shape = array_of(field, values).shape
+    return reals(field, values, (None, 3 if len(shape) == 2 and shape[1] == 3 else 2))
+
+
+def _radii(radius: object, n: int) -> Floats:
+    radii = reals("radius", each("radius", radius, n), (n,))
+    for i in np.flatnonzero(radii < 0).tolist():
+        raise InputError(f"radius[{i}]: expected 0 or more, got {radii[i]}")
+    return radii
+
+
+def _vectors(field: str, values: object, n: int, d: int) -> Floats:
+    array = array_of(field, values)
+    if array.ndim < 2:
+        return np.broadcast_to(reals(field, np.broadcast_to(array, (d,)) if not array.ndim else array, (d,)), (n, d))
+    return reals(field, array, (n, d))
+
+
+def _starts(starts: object, total: int) -> Ints:
+    first = integers("starts", starts, (None,), 0, max(total - 1, 0))
+    if (len(first) and first[0] != 0) or (np.diff(first) < 1).any() or (total and not len(first)):
+        raise InputError(f"starts: expected 0 and then numbers that grow, got {first[:9].tolist()}")
+    return first
+
+
+def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
+    given = reals("points", points, (None, 2))
+    return given, _starts(starts, len(given))
+
+
+def _even(n: int, count: int) -> tuple[Ints, Ints]:
+    return np.arange(n) * count, np.full(n, count)
+
+
+def _row(points: Floats, starts: Ints, i: int) -> list[list[float]]:
+    rows: list[list[float]] = np.split(points, starts[1:])[i].tolist()
+    return rows
+
+
+def _ragged(values: Numbers, starts: Ints, rows: Ints) -> tuple[Numbers, Ints]:
+    """Some ragged rows of values, and their starts."""
+    counts = rows_of(starts, len(values))[0][rows]
+    first = np.cumsum(counts) - counts
+    return values[np.repeat(starts[rows] - first, counts) + np.arange(counts.sum())], first
+
+
+def _sum_outward(a: Floats, b: Floats, toward: float) -> Floats:
+    """Sum of a and b, the next float outward where rounding went inward (Knuth's two-sum)."""
+    with np.errstate(all="ignore"):
+        total = a + b
+        part = total - a
+        rest = (a - (total - part)) + (b - part)
+        inside = rest <= 0 if toward > 0 else rest >= 0
+        return np.where(inside, total, np.nextafter(total, toward))
