@@ -34,7 +34,7 @@ class Core:
     counts: Ints
     radius: Floats
 
-    def point(self, rows: Ints, k: int) -> Floats:
+    def point(self, rows: Ints, k: int | Ints) -> Floats:
         """Point k of rows; numbers go round."""
         return np.asarray(self.points[self.starts[rows] + k % self.counts[rows]])
 

@@ -1,0 +1,223 @@
+"""Laws over the whole table of pairs, rows by hand, and closed forms against points and a radius."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planes.overlap
+from planes import InputError
+from planes.exact import orient2d
+from planes.overlap import TABLE, contains_point, overlap, separating_axis
+from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Polygons, Volumes
+
+L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]
+CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+def ordinary(kind: str, n: int, rng: np.random.Generator) -> Any:
+    """Rows on a coarse lattice: many touch, some are degenerate."""
+    p, q = (rng.integers(-6, 7, (n, 2)).astype(float) for _ in range(2))
+    r = rng.integers(0, 4, n).astype(float)
+    if kind == "circles":
+        return Circles(p, r)
+    if kind == "aabbs":
+        return Aabbs(np.minimum(p, q), np.maximum(p, q))
+    if kind == "obbs":
+        along, across = rng.integers(-3, 4, (n, 2)), rng.integers(0, 3, (n, 1))
+        other = np.stack([-along[:, 1], along[:, 0]], axis=1) * across
+        corners = [p, p + along, p + along + other, p + other]
+        return Obbs.from_corners(np.stack(corners, axis=1))
+    if kind == "polygons":
+        shapes = np.array([[[0, 0], [3, 1], [1, 4]], [[0, 0], [0, 5], [1, 0]], [[0, 0], [-2, 2], [0, 1]]])
+        return Polygons((p[:, None] + shapes[rng.integers(0, 3, n)]).reshape(-1, 2), np.arange(n) * 3)
+    if kind == "capsules":
+        return Capsules(p, q, r)
+    if kind == "box sets":
+        low = np.stack([np.minimum(p, q), p], axis=1).reshape(-1, 2)
+        high = np.stack([np.maximum(p, q), p + 1], axis=1).reshape(-1, 2)
+        return BoxSets(low, high, np.arange(n) * 2)
+    return ConcavePolygons.from_concave((p[:, None] + L_SHAPE).reshape(-1, 2), np.arange(n) * 6)
+
+
+SINGLE = ["circles", "aabbs", "obbs", "polygons", "capsules"]
+KINDS = [*SINGLE, "box sets", "concave"]
+PAIRS = pytest.mark.parametrize(("one", "two"), list(product(KINDS, KINDS)))
+
+
+def test_the_table_has_fifteen_pairs_both_ways_round() -> None:
+    assert len(TABLE) == 25 and len({frozenset(pair) for pair in TABLE}) == 15
+
+
+@PAIRS
+def test_symmetric_whole_moves_broadcasting_and_conservative(one: str, two: str) -> None:
+    rng = np.random.default_rng(7)
+    a, b = ordinary(one, 300, rng), ordinary(two, 300, rng)
+    found = overlap(a, b)
+    assert found.dtype == np.bool_ and found.shape == (300,) and 0 < found.sum() < 300
+    assert (overlap(b, a) == found).all()
+    assert (overlap(a.translated([2**40, -7]), b.translated([2**40, -7])) == found).all()
+    assert (overlap(a.scaled(2.0**-60), b.scaled(2.0**-60)) == found).all()
+    assert (overlap(a.rotated(90), b.rotated(90)) == found).all()
+    assert overlap(a, b, conservative=True)[found].all()
+    assert (overlap(a.take([5]), b) == overlap(a.take([5] * 300), b)).all()
+    assert (overlap(a, b.take([5])) == overlap(a, b.take([5] * 300))).all()
+    assert overlap(a.take([]), b.take([])).shape == (0,) == overlap(a.take([]), b.take([5])).shape
+    assert overlap(a, a).all()
+
+
+@PAIRS
+def test_what_shares_a_point_overlaps(one: str, two: str) -> None:
+    """A lattice point in both proves that they overlap."""
+    rng = np.random.default_rng(9)
+    a, b = ordinary(one, 40, rng), ordinary(two, 40, rng)
+    lattice = np.array(list(product(range(-9, 10), repeat=2)), float)
+    rows, points = np.repeat(np.arange(40), len(lattice)), np.tile(lattice, (40, 1))
+    both = contains_point(a.take(rows), points) & contains_point(b.take(rows), points)
+    shared = both.reshape(40, -1).any(axis=1)
+    assert overlap(a, b)[shared].all() and shared.any()
+
+
+def wholly(a: Any, b: Any) -> Any:
+    """Where the box around a lies in a box b."""
+    box = a.bounds()
+    return ((b.min <= box.min) & (box.max <= b.max)).all(axis=1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_containment_implies_overlap(kind: str) -> None:
+    rng = np.random.default_rng(4)
+    a, big = ordinary(kind, 200, rng), Aabbs(np.full((200, 2), -8.0), np.full((200, 2), 8.0))
+    inside = wholly(a, big)
+    assert inside.sum() > 20
+    around = [big, Obbs.from_corners(big.corners()), Polygons(big.corners().reshape(-1, 2), np.arange(200) * 4),
+              Circles(np.zeros((200, 2)), 12.0), Capsules(np.zeros((200, 2)), np.ones((200, 2)), 12.0)]  # fmt: skip
+    for volume in around:
+        assert overlap(a, volume)[inside].all() and overlap(volume, a)[inside].all()
+
+
+@pytest.mark.parametrize(("one", "two"), list(product(SINGLE, SINGLE)))
+def test_closed_forms_agree_with_points_and_a_radius(one: str, two: str) -> None:
+    """By distances of edges alone, with a look for a point of one inside the other."""
+    rng = np.random.default_rng(11)
+    a, b = ordinary(one, 2000, rng), ordinary(two, 2000, rng)
+    rows = np.arange(2000)
+    first, second = a.core(), b.core()
+    general = planes.overlap._near(first, second, rows, False)
+    for hull, other in ((first, second), (second, first)):
+        if (hull.counts > 2).any():
+            general |= planes.overlap._holds(hull, other, rows, False)
+    assert (overlap(a, b) == general).all()
+
+
+def ulp(value: float, steps: int) -> float:
+    for _ in range(abs(steps)):
+        value = float(np.nextafter(value, np.inf if steps > 0 else -np.inf))
+    return value
+
+
+def point_like(x: float, y: float) -> list[Volumes]:
+    p: Any = [[x, y]]
+    return [Circles(p, 0), Aabbs(p, p), Obbs.from_center(p, [[0, 0]], 0), Capsules(p, p, 0)]
+
+
+@pytest.mark.parametrize("other", range(4))
+def test_touching_counts_to_the_ulp(other: int) -> None:
+    """Single points of each kind against an edge at x = 3: an ulp farther they are apart."""
+    shapes = [
+        Circles([[0, 0]], 3),
+        Aabbs([[0, -1]], [[3, 1]]),
+        Obbs.from_center([[2, 0]], [[1, 1]], 90),
+        Polygons([[0, 0], [3, -3], [3, 3]], [0]),
+        Capsules([[-5, 0]], [[1, 0]], 2),
+        BoxSets([[-9, -9], [0, -1]], [[-8, -8], [3, 1]], [0]),
+        ConcavePolygons.from_concave([[0, 0], [3, -3], [3, 3], [2, 0]], [0]),
+    ]
+    for shape in shapes[:6]:
+        for steps in (-2, -1, 0, 1, 2):
+            assert overlap(shape, point_like(ulp(3.0, steps), 0)[other]).tolist() == [steps <= 0]
+    for x, y, inside in ((2.0, 1.0, False), (2.0, 0.0, True), (2.9, 2.5, True)):
+        assert overlap(point_like(x, y)[other], shapes[6]).tolist() == [inside]
+
+
+def test_degenerate_rows() -> None:
+    """Flat boxes and zero-length capsules on one line: they meet, touch, or are apart."""
+
+    def kinds(x0: float, x1: float) -> list[Volumes]:
+        low: Any = [[x0, x0]]
+        high: Any = [[x1, x1]]
+        turned = Obbs.from_corners([[*low, *high, *high, *low]])
+        return [turned, Capsules(low, high, 0)]
+
+    for (x0, x1), meets in (((4, 6), True), ((3, 6), True), ((5, 5), False), ((4, 4), True), ((7, 9), False)):
+        for a, b in product(kinds(0, 4), kinds(x0, x1)):
+            assert overlap(a, b).tolist() == [meets] == overlap(b, a).tolist()
+    flat = Aabbs([[0, 1]], [[9, 1]])
+    for wall in (Aabbs([[5, 0]], [[5, 2]]), Capsules([[5, 0]], [[5, 1]], 0), Obbs.from_center([[5, 0]], [[1, 0]], 90)):
+        assert overlap(flat, wall).all() and not overlap(flat.translated([0, 1.5]), wall).any()
+
+
+def test_parallel_slivers() -> None:
+    """Two thin triangles whose long sides are an ulp apart far from the origin."""
+    base = np.array([[0, 0], [1e12, 1], [0, 1]])
+    a = Polygons(base, [0])
+    for steps, meets in ((0, True), (1, False)):
+        b = Polygons([[0, ulp(-0.0, -steps)], [1e12, ulp(1.0, -steps)], [1e12, -5]], [0])
+        assert overlap(a, b).tolist() == [meets]
+
+
+def test_spheres_and_cubes() -> None:
+    balls, cubes = Circles([[0, 0, 0], [5, 2, 3]], [1, 3]), Aabbs([[1, 0, 0], [0, 0, 0]], [[2, 2, 2], [2, 1, 1]])
+    assert overlap(balls, cubes).tolist() == [True, False]
+    assert overlap(cubes, balls).tolist() == [True, False]
+    assert overlap(cubes, cubes.take([1, 0])).tolist() == [True, True]
+    assert contains_point(balls, [1, 0, 0]).tolist() == [True, False]
+
+
+def test_separating_axis_is_a_witness() -> None:
+    rng = np.random.default_rng(2)
+    for one, two in product(("aabbs", "polygons"), ("obbs", "polygons")):
+        a, b = ordinary(one, 300, rng), ordinary(two, 300, rng)
+        line = separating_axis(a, b)
+        apart = ~np.isnan(line[:, 0])
+        assert not overlap(a, b)[apart].any() and 0 < apart.sum() < 300
+        if "polygons" in (one, two):
+            assert (apart == ~overlap(a, b)).all()
+        for i in np.flatnonzero(apart).tolist():
+            sides = [orient2d(line[i, :2], line[i, 2:], v.take([i]).core().points) for v in (a, b)]
+            ends = [(s.min(), s.max()) for s in sides]
+            assert (ends[0][0] >= 0 and ends[1][1] < 0) or (ends[1][0] >= 0 and ends[0][1] < 0)
+
+
+def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = 0
+
+    def counted(*points: Any) -> Any:
+        nonlocal rows
+        rows += len(points[0])
+        return orient2d(*points)
+
+    monkeypatch.setattr(planes.overlap, "orient2d", counted)
+    a = Obbs.from_corners(np.tile(CORNERS * 1.0, (1000, 1, 1)))
+    slanted = np.array([[0, -3], [3, 0], [0, 3], [-3, 0]]) + 3.5
+    b = Obbs.from_corners(np.tile(slanted, (1000, 1, 1)))
+    assert not overlap(b, a).any()
+    assert rows <= 1000 * 16
+
+
+BAD: list[tuple[Callable[[], Any], str]] = [
+    (lambda: overlap(Circles([[0, 0]] * 2, 1), Circles([[0, 0]] * 3, 1)), "b: expected 2 rows or 1, got 3"),
+    (lambda: overlap(Circles([[0, 0]], 1), Circles([[0, 0, 0]], 1)), "b: expected volumes in 2-D, got 3-D"),
+    (lambda: overlap([1, 2], Circles([[0, 0]], 1)), "a: expected volumes, got list"),  # type: ignore[arg-type]
+    (lambda: separating_axis(Circles([[0, 0]], 1), Circles([[0, 0]], 1)), "separating_axis: expected boxes"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), BAD)
+def test_bad_input_is_named(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call()
