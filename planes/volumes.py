@@ -67,7 +67,10 @@ class Volumes:
         core = self.core()
         if not len(self):
             return Aabbs(np.zeros((0, self.d)), np.zeros((0, self.d)))
-        low, high = np.minimum.reduceat(core.points, core.starts), np.maximum.reduceat(core.points, core.starts)
+        low = high = core.point(rows := np.arange(len(self)), 0)
+        for k in range(1, int(core.counts.max())):
+            corner = core.point(rows, np.minimum(k, core.counts - 1))
+            low, high = np.minimum(low, corner), np.maximum(high, corner)
         radius = core.radius[:, None]
         return Aabbs._made(_sum_outward(low, -radius, -np.inf), _sum_outward(high, radius, np.inf))
 

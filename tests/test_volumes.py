@@ -92,6 +92,18 @@ def test_rows_are_taken_and_moved(kind: str) -> None:
 
 
 @KINDS
+def test_each_row_has_its_own_factor_and_angle(kind: str) -> None:
+    v = samples()[kind]
+    factor, about = [2.0, 0.5, 4.0], [[1, 2], [3, 4], [5, 6]]
+    for moved, one in (
+        (v.scaled(factor, about), lambda row, i: row.scaled(factor[i], about[i])),
+        (v.rotated([10, 20, 30], about), lambda row, i: row.rotated([10, 20, 30][i], about[i])),
+    ):
+        for i in range(3):
+            assert cores(moved.take([i])) == cores(one(v.take([i]), i))
+
+
+@KINDS
 def test_the_original_is_kept(kind: str) -> None:
     v = samples()[kind]
     assert v.original is v
