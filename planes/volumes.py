@@ -38,6 +38,19 @@ class Core:
         """Point k of rows; numbers go round."""
         return np.asarray(self.points[self.starts[rows] + k % self.counts[rows]])
 
+    def extent(self) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates (N, d) of the points of each row."""
+        most = int(self.counts.max())
+        if len(self.points) == most * len(self.counts):  # as many points in each row: no gathering
+            corners = list(self.points.reshape(len(self.counts), most, -1).transpose(1, 0, 2))
+        else:
+            rows = np.arange(len(self.counts))
+            corners = [self.point(rows, np.minimum(k, self.counts - 1)) for k in range(most)]
+        low = high = corners[0]
+        for corner in corners[1:]:
+            low, high = np.minimum(low, corner), np.maximum(high, corner)
+        return low, high
+
 
 class Volumes:
     """What all kinds have: length, bounds, a choice of rows, and moves that keep the original."""
@@ -67,10 +80,9 @@ class Volumes:
         core = self.core()
         if not len(self):
             return Aabbs(np.zeros((0, self.d)), np.zeros((0, self.d)))
-        low = high = core.point(rows := np.arange(len(self)), 0)
-        for k in range(1, int(core.counts.max())):
-            corner = core.point(rows, np.minimum(k, core.counts - 1))
-            low, high = np.minimum(low, corner), np.maximum(high, corner)
+        low, high = core.extent()
+        if not core.radius.any():
+            return Aabbs._made(low, high)
         radius = core.radius[:, None]
         return Aabbs._made(_sum_outward(low, -radius, -np.inf), _sum_outward(high, radius, np.inf))
 
