@@ -38,7 +38,7 @@ def convex_rows(points: Floats, starts: Ints) -> Ints:
     rightward = (step_x > 0) | ((step_x == 0) & (step_y > 0))
     changes = np.add.reduceat((rightward != rightward[after]).astype(np.int64), starts)
     low, high = np.minimum.reduceat(turns, starts), np.maximum.reduceat(turns, starts)
-    return np.where((changes == 2) & (counts > 2) & (low * high >= 0), low + high, 0).clip(-1, 1)
+    return np.where(changes == 2, low + high, 0).clip(-1, 1)
 
 
 def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:

@@ -143,20 +143,17 @@ def _capsules_capsules(a: Capsules, b: Capsules, conservative: bool) -> Bools:
 
 
 def _hulls_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
-    """Separating axes, where one has an area; two segments or points meet at distance 0.
+    """Separating axes; a row that found its axis leaves the batch.
 
-    A row that found its axis leaves the batch.
+    Bounds come first. They also part what no edge does: segments on one line, and single points.
     """
     one, two = a.core(), b.core()
     left = np.flatnonzero(_aabbs_aabbs(a.bounds(), b.bounds(), conservative))
-    flat = _flat(one, left) & _flat(two, left)
-    segments, left = left[flat], left[~flat]
     for first, second in ((one, two), (two, one)):
         for k in range(int(first.counts[left].max(initial=0))):
             left = left[~_edge_parts(first, second, left, k, conservative)]
     found = np.zeros(len(a), np.bool_)
     found[left] = True
-    found[segments] = _near(one, two, segments, conservative)
     return found
 
 

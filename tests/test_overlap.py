@@ -161,6 +161,11 @@ def test_degenerate_rows() -> None:
         assert overlap(flat, wall).all() and not overlap(flat.translated([0, 1.5]), wall).any()
 
 
+def test_a_turned_box_with_a_double_corner_has_an_area() -> None:
+    box = Obbs.from_corners([[[0, 0], [0, 0], [4, 0], [0, 4]]])
+    assert contains_point(box, [1, 1]).all() and overlap(box, Capsules([[1, 1]], [[1.5, 1]], 0.1)).all()
+
+
 def test_parallel_slivers() -> None:
     """Two thin triangles whose long sides are an ulp apart far from the origin."""
     base = np.array([[0, 0], [1e12, 1], [0, 1]])

@@ -145,6 +145,8 @@ def test_turned_boxes_are_the_hull_of_their_corners() -> None:
     bow = Obbs.from_corners([[[0, 0], [2, 2], [2, 0], [0, 2]], [[0, 0], [4, 0], [1, 1], [0, 4]]])
     first, second = (p for p, _, _ in cores(bow))
     assert sorted(first) == [(0, 0), (0, 2), (2, 0), (2, 2)] and sorted(second) == [(0, 0), (0, 4), (4, 0)]
+    lined = Obbs.from_corners([[[0, 0], [2, 2], [1, 1], [0, 5]]])
+    assert sorted(cores(lined)[0][0]) == [(0, 0), (0, 5), (2, 2)]
     far = Obbs.from_center(np.full((50, 2), 1e12), np.full((50, 2), 1e-4), np.arange(50) * 7.0)
     check_bounds(far)
 
