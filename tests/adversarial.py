@@ -127,11 +127,11 @@ def touching(
 def nudged(rng: Rng, *bodies: Body) -> tuple[Body, ...]:
     """Every number moved by up to 3 ulp: its own, or in half of the cases that of the greatest number."""
     greatest = max(np.abs(b.points).max() + b.radius for b in bodies)
-    coarse = rng.random() < 0.5
+    coarse, most = rng.random() < 0.5, int(rng.integers(ULPS + 1))
 
     def moved(values: Array) -> Array:
         ulp = np.spacing(np.full_like(values, greatest) if coarse else np.abs(values))
-        return values + rng.integers(-ULPS, ULPS + 1, values.shape) * ulp
+        return values + rng.integers(-most, most + 1, values.shape) * ulp
 
     return tuple(
         replace(b, points=moved(b.points), radius=abs(float(moved(np.array(b.radius)))) if b.radius else 0.0)
@@ -139,9 +139,14 @@ def nudged(rng: Rng, *bodies: Body) -> tuple[Body, ...]:
     )
 
 
+def exact_hull(points: Array) -> list[Shape]:
+    """The hull of float64 points, its corners as they came."""
+    return [tuple(map(float, corner)) for corner in exact.hull(exact.fractions(*points.tolist()))]
+
+
 def as_polygon(rng: Rng, points: Array) -> Shape | None:
     """The exact hull of points as a convex polygon: any start, either sense, at times a point on a side."""
-    ring = exact.hull(tuple(row) for row in points.tolist())
+    ring = exact_hull(points)
     if len(ring) < 3:
         return None
     (x0, y0), (x1, y1) = ring[0], ring[1]
@@ -191,7 +196,10 @@ def near_touching(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...
 
 
 def far_away(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
-    """Both moved by 10^0 to 10^12."""
+    """Both moved by 10^0 to 10^12: whole numbers by whole numbers, so that ties stay ties, or any."""
+    if rng.random() < 0.4:
+        whole = np.rint(unit(rng, dim) * 10 ** rng.uniform(0, 12))
+        return tuple(b.moved(whole) for b in lattice(rng, kinds, dim))
     by = unit(rng, dim) * 10 ** rng.uniform(0, 12)
     return nudged(rng, *(b.moved(by) for b in contact(rng, kinds, dim)))
 
@@ -209,7 +217,7 @@ def needles(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
 
 def parallel(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
     """Sides that are parallel but for rounding, side by side or one after the other on a line."""
-    along = np.array([1.0, 0.0]) if "aabb" in kinds else unit(rng, 2)
+    along = np.array([1.0, 0.0]) if "aabb" in kinds or rng.random() < 0.3 else unit(rng, 2)
     a, b = (body(rng, kind, dim, thin=10 ** rng.uniform(-3, 0), along=along) for kind in kinds)
     normal = np.eye(dim)[int(rng.integers(dim))] if dim == 3 else (along, across(along))[int(rng.integers(2))]
     return nudged(rng, *touching(rng, a, b, normal * rng.choice([-1, 1])))
@@ -237,7 +245,7 @@ def shared(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
 
 def on_a_side(rng: Rng, a: Body, kind: str) -> Array:
     """Points of a shape that has a side of another, and lies on the side's far side."""
-    ring = np.array(exact.hull(map(tuple, a.corners().tolist())))
+    ring = np.array(exact_hull(a.corners()))
     row = int(rng.integers(len(ring)))
     first, last = ring[row], ring[(row + 1) % len(ring)]
     out = -across(last - first) * rng.uniform(0.1, 1)
@@ -248,22 +256,32 @@ def on_a_side(rng: Rng, a: Body, kind: str) -> Array:
     return np.array([last, first, first + out + (last - first) * rng.uniform(-1, 2)])
 
 
+def lattice_pair(rng: Rng, kinds: tuple[str, str], dim: int, flat: bool = False) -> tuple[Body, Body]:
+    """Two shapes of whole numbers, or of halves, that touch exactly in the origin."""
+    *vector, length = LATTICE_NORMALS[dim][int(rng.integers(6))]
+    normal = [int(v) for v in np.array(vector) * rng.choice([-1, 1], dim)]
+    a, b = (lattice_body(rng, kind, [*normal, length], flat) for kind in kinds)
+    there = np.array(normal, float)
+    a, b = a.moved(-outermost(rng, a, there, length, True)), b.moved(-outermost(rng, b, -there, length, True))
+    return a, b.moved(np.sign(normal)) if rng.random() < 0.3 else b
+
+
 def lattice(rng: Rng, kinds: tuple[str, str], dim: int, flat: bool = False) -> tuple[Body, ...]:
     """Whole numbers: they touch exactly, or are a step away, or lie anywhere near."""
-    *vector, length = LATTICE_NORMALS[dim][int(rng.integers(6))]
-    signed = [*(int(v) for v in np.array(vector) * rng.choice([-1, 1], dim)), length]
-    a, b = (lattice_body(rng, kind, signed, flat) for kind in kinds)
-    if rng.random() < 0.7:
-        a, b = touching(rng, a, b, np.array(signed[:-1]), length, halfway=True)
-        step = np.sign(signed[:-1]) * (rng.random() < 0.6) if rng.random() < 0.5 else rng.integers(-1, 2, dim)
-        return a, b.moved(step * 1.0)
-    reach = 3 if flat else 8
-    return a, b.moved(rng.integers(-reach, reach + 1, dim) * 1.0)
+    a, b = lattice_pair(rng, kinds, dim, flat)
+    reach = int(rng.choice([0, 0, 1, 3 if flat else 6]))
+    steps = rng.integers(-reach, reach + 1, (2, dim))
+    return a.moved(steps[0]), b.moved(steps[1] if reach > 1 else steps[0] + rng.integers(-reach, reach + 1, dim))
 
 
 def flat(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
     """Whole numbers and nothing in them: radius 0, boxes and capsules that are a line or a point."""
     return lattice(rng, kinds, dim, flat=True)
+
+
+def mixed(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
+    """They touch in the origin, where scaling by powers of two keeps ties; one may be 10^600 times the other."""
+    return tuple(b.scaled(2.0 ** int(rng.integers(-1060, 1000))) for b in lattice_pair(rng, kinds, dim))
 
 
 def at_scale(rng: Rng, kinds: tuple[str, str], dim: int, powers: tuple[int, int]) -> tuple[Body, ...]:
@@ -289,8 +307,8 @@ def greatest(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
 
 FAMILIES: dict[str, Callable[[Rng, tuple[str, str], int], tuple[Body, ...]]] = {
     "near_touching": near_touching, "far_away": far_away, "size_ratio": size_ratio, "needles": needles,
-    "parallel": parallel, "shared": shared, "lattice": lattice, "flat": flat, "subnormal": subnormal, "huge": huge,
-    "greatest": greatest,
+    "parallel": parallel, "shared": shared, "lattice": lattice, "flat": flat, "mixed": mixed,
+    "subnormal": subnormal, "huge": huge, "greatest": greatest,
 }  # fmt: skip
 
 
@@ -359,9 +377,10 @@ def near_coplanar(rng: Rng) -> tuple[Array, Array]:
         return flat_a @ frame, flat_b @ frame
     frame = np.array([unit(rng, 3), unit(rng, 3)])
     along = unit(rng, 2)
-    a, b = (body(rng, "obb", 2, thin=rng.uniform(0.1, 1), along=along) for _ in range(2))
-    a, b = touching(rng, a, b, across(along))
-    return nudged3(rng, rng.permutation(a.points)[:3] @ frame, rng.permutation(b.points)[:3] @ frame)
+    corners = rng.permutation(np.array([-along, along, across(along) * rng.uniform(0.1, 1)]))
+    a, b = Body("polygon", corners), Body("polygon", -corners * rng.uniform(0.1, 1))
+    a, b = touching(rng, a, b, across(along) if rng.random() < 0.5 else unit(rng, 2))
+    return nudged3(rng, rng.permutation(a.points) @ frame, rng.permutation(b.points) @ frame)
 
 
 def shared3(rng: Rng) -> tuple[Array, Array]:
