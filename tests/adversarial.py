@@ -181,13 +181,12 @@ def contact(
     rng: Rng, kinds: tuple[str, str], dim: int, sizes: tuple[float, float] = (1.0, 1.0), thin: float | None = None
 ) -> tuple[Body, Body]:
     """Two shapes that touch about the origin of the first, with a normal of a side or any other."""
-    along = unit(rng, 2)
+    frames = [np.eye(2)[0] if kind == "aabb" else unit(rng, 2) for kind in kinds]
     thins = [rng.uniform(0.1, 1) if thin is None else thin for _ in kinds]
-    a = body(rng, kinds[0], dim, sizes[0], thins[0], along)
-    b = body(rng, kinds[1], dim, sizes[1], thins[1])
+    a, b = (body(rng, *row) for row in zip(kinds, (dim, dim), sizes, thins, frames, strict=True))
     normal = unit(rng, dim)
-    if rng.random() < 0.5:
-        normal = np.eye(dim)[int(rng.integers(dim))] if "aabb" in kinds or dim == 3 else across(along)
+    if rng.random() < 0.6:
+        normal = np.eye(dim)[int(rng.integers(dim))] if dim == 3 else across(frames[int(rng.integers(2))])
     return touching(rng, a, b, normal * rng.choice([-1, 1]))
 
 
@@ -216,9 +215,11 @@ def needles(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
 
 
 def parallel(rng: Rng, kinds: tuple[str, str], dim: int) -> tuple[Body, ...]:
-    """Sides that are parallel but for rounding, side by side or one after the other on a line."""
+    """Sides that are parallel but for rounding or a little more, side by side or one after the other on a line."""
     along = np.array([1.0, 0.0]) if "aabb" in kinds or rng.random() < 0.3 else unit(rng, 2)
-    a, b = (body(rng, kind, dim, thin=10 ** rng.uniform(-3, 0), along=along) for kind in kinds)
+    tilted = along + across(along) * (10 ** rng.uniform(-17, -6) if rng.random() < 0.6 else 0)
+    frames = [along, tilted] if kinds[1] != "aabb" else [tilted, along]
+    a, b = (body(rng, kind, dim, thin=10 ** rng.uniform(-3, 0), along=f) for kind, f in zip(kinds, frames, strict=True))
     normal = np.eye(dim)[int(rng.integers(dim))] if dim == 3 else (along, across(along))[int(rng.integers(2))]
     return nudged(rng, *touching(rng, a, b, normal * rng.choice([-1, 1])))
 
