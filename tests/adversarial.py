@@ -141,7 +141,9 @@ def nudged(rng: Rng, *bodies: Body) -> tuple[Body, ...]:
 
 def exact_hull(points: Array) -> list[Shape]:
     """The hull of float64 points, its corners as they came."""
-    return [tuple(map(float, corner)) for corner in exact.hull(exact.fractions(*points.tolist()))]
+    rows = [tuple(row) for row in points.tolist()]
+    stored_as = dict(zip(exact.units(*rows), rows, strict=True))
+    return [stored_as[corner] for corner in exact.hull(stored_as)]
 
 
 def as_polygon(rng: Rng, points: Array) -> Shape | None:
