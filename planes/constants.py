@@ -98,6 +98,13 @@ CHUNK_SAMPLES = 2**18
 CHUNK_PAIRS = 2**21
 """(placement, item) box tests made at a time: 2 MB of booleans."""
 
+BOXES_MAX = 64
+"""Boxes that one mask may be covered by: with more, the mask itself is tested sooner."""
+
+OUTLINE_PIXELS = 2**18
+OUTLINE_CORNERS = 4096
+"""Blocks and corners of an outline before it is made simpler: each corner looks at all the others."""
+
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""
 

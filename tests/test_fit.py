@@ -1,0 +1,489 @@
+"""Volumes of masks: they contain every closed pixel square, in exact arithmetic, and are not larger than need be."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from planes import fit, outline
+from planes.arrays import Bools, Floats, InputError, Ints
+from planes.constants import BOXES_MAX, MASK_SIDE_MAX
+
+Point = tuple[Fraction, Fraction]
+HALF = Fraction(1, 2)
+
+
+def mask_of(*rows: str) -> Bools:
+    return np.array([[c == "#" for c in row] for row in rows])
+
+
+NAMED = {
+    "pixel": mask_of("#"),
+    "pixel in a corner": mask_of("...", "...", "..#"),
+    "row": mask_of("#####"),
+    "column": mask_of("#", "#", "#"),
+    "corner to corner": mask_of("#.", ".#"),
+    "ring": mask_of("####", "#..#", "####"),
+    "hole that a corner opens": mask_of("###.", "#.##", "##.#", ".###"),
+    "two far parts": mask_of("#.........", "..........", ".........#"),
+    "part within a hole": mask_of("#####", "#...#", "#.#.#", "#...#", "#####"),
+    "comb": mask_of("#.#.#.#", "#.#.#.#", "#######"),
+    "empty rows between": mask_of("##..", "....", "....", "..##"),
+    "spiral": mask_of("#######", "......#", "#####.#", "#...#.#", "#.###.#", "#.....#", "#######"),
+    "full": np.ones((5, 3), np.bool_),
+}
+
+
+def random_mask(rng: np.random.Generator, side: int) -> Bools:
+    """Noise, or blobs with holes, or blobs with noise cut out; never empty."""
+    shape = rng.integers(1, side + 1, 2)
+    mask = rng.random(shape) < rng.choice([0.05, 0.3, 0.6, 0.95])
+    if rng.random() < 0.7:
+        rough = np.pad(rng.random(shape), 2)
+        smooth = sum(rough[i : i + shape[0], j : j + shape[1]] for i in range(5) for j in range(5))
+        blobs = smooth > np.quantile(smooth, rng.random())
+        mask = blobs & mask if rng.random() < 0.3 else blobs
+    if not mask.any():
+        mask[tuple(rng.integers(0, shape))] = True
+    return np.asarray(mask)
+
+
+def random_masks(count: int, side: int, seed: int) -> Iterator[Bools]:
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield random_mask(rng, side)
+
+
+def corners_of(mask: Bools) -> list[Point]:
+    """Corners of the squares at both ends of each row: a convex set that holds them holds the row.
+
+    So it holds a row between two others with the same ends, which is left out.
+    """
+    ends = [(int(x[0]), int(x[-1])) if len(x := np.flatnonzero(row)) else None for row in mask]
+    found = set()
+    for y, here in enumerate(ends):
+        if here and not (0 < y < len(ends) - 1 and ends[y - 1] == here == ends[y + 1]):
+            found |= {(x, y + dy) for x in (here[0] - HALF, here[1] + HALF) for dy in (-HALF, HALF)}
+    return sorted(found)
+
+
+def turn(a: Point, b: Point, c: Point) -> Fraction:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def exact(points: Floats) -> list[Point]:
+    return [(Fraction(x), Fraction(y)) for x, y in points.tolist()]
+
+
+def holds_circle(circle: fit.Circle, mask: Bools) -> bool:
+    x, y = map(Fraction, circle.center_xy.tolist())
+    square = Fraction(circle.radius) ** 2
+    return all((p - x) ** 2 + (q - y) ** 2 <= square for p, q in corners_of(mask))
+
+
+def check_convex(points: Floats, mask: Bools) -> None:
+    ring = exact(points)
+    n = len(ring)
+    for i in range(n):
+        assert turn(ring[i], ring[(i + 1) % n], ring[(i + 2) % n]) > 0, "not strictly convex, or turning the other way"
+    turned = sum(ring[i][1] <= 0 < ring[(i + 1) % n][1] for i in range(n))
+    assert turned <= 1, "more than one turn"
+    corners = corners_of(mask)
+    for i in range(n):
+        assert all(turn(ring[i], ring[(i + 1) % n], p) >= 0 for p in corners), "a pixel square sticks out"
+
+
+def segments(points: Floats) -> Ints:
+    """Edges (n, 2, 2) in 1/4 px, whole numbers."""
+    whole = points * 4
+    assert np.array_equal(whole, np.rint(whole))
+    ends = whole.astype(np.int64)
+    return np.stack([ends, np.roll(ends, -1, axis=0)], axis=1)
+
+
+def turns(a: Ints, b: Ints, c: Ints) -> Ints:
+    return np.sign(
+        (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+    )
+
+
+def check_simple(points: Floats) -> None:
+    """No two edges that are not neighbours touch, and neighbours do not run back."""
+    edges = segments(points)
+    n = len(edges)
+    i, j = np.triu_indices(n, 2)
+    keep = ~((i == 0) & (j == n - 1))
+    (a, b), (c, d) = edges[i[keep]].swapaxes(0, 1), edges[j[keep]].swapaxes(0, 1)
+    apart = (np.maximum(a, b) < np.minimum(c, d)).any(axis=1) | (np.maximum(c, d) < np.minimum(a, b)).any(axis=1)
+    apart |= turns(a, b, c) * turns(a, b, d) > 0
+    apart |= turns(c, d, a) * turns(c, d, b) > 0
+    assert apart.all(), "edges meet"
+    a, b, c = edges[:, 0], edges[:, 1], np.roll(edges[:, 1], -1, axis=0)
+    assert (turns(a, b, c) != 0).all(), "a corner on a straight edge, or an edge that runs back"
+    assert area_of(points) > 0, "turning the other way"
+
+
+def area_of(points: Floats) -> Fraction:
+    ring = exact(points)
+    return sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(ring, ring[1:] + ring[:1], strict=True)) / 2
+
+
+def check_contains(points: Floats, mask: Bools) -> None:
+    """No edge meets an open pixel square, and each centre lies inside: so each closed square does."""
+    edges = segments(points)[:, None]
+    y, x = np.nonzero(mask)
+    centers = np.stack([x, y], axis=1) * 4
+    a, b = edges[..., 0, :], edges[..., 1, :]
+    beside = ((np.maximum(a, b) <= centers - 2) | (np.minimum(a, b) >= centers + 2)).any(axis=-1)
+    sides = np.stack([turns(a, b, centers + (dx, dy)) for dx in (-2, 2) for dy in (-2, 2)])  # noqa: RUF005
+    off = (sides >= 0).all(axis=0) | (sides <= 0).all(axis=0)
+    assert (beside | off).all(), "an edge cuts a pixel square"
+    up, down = a[..., 1] <= centers[:, 1], b[..., 1] <= centers[:, 1]
+    left = turns(a, b, centers)
+    winding = (up & ~down & (left > 0)).sum(axis=0) - (~up & down & (left < 0)).sum(axis=0)
+    assert (winding == 1).all(), "a centre lies outside"
+
+
+def check_boxes(found: fit.Boxes, mask: Bools, k: int) -> None:
+    rows = found.rows_xyxy
+    assert rows.shape == (len(rows), 4)
+    assert 1 <= len(rows) <= k
+    painted = np.zeros(mask.shape, np.bool_)
+    for x, y, x_max, y_max in (rows + 0.5).tolist():
+        assert all(v == int(v) for v in (x, y, x_max, y_max))
+        assert x < x_max <= mask.shape[1]
+        assert y < y_max <= mask.shape[0]
+        painted[int(y) : int(y_max), int(x) : int(x_max)] = True
+    assert (painted | ~mask).all(), "a pixel lies in no box"
+    assert found.false_area == int((painted & ~mask).sum())
+
+
+def check_all(mask: Bools, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    before = mask.copy()
+    check_convex(fit.hull(mask).points_xy, mask)
+    assert set(exact(fit.hull(mask).points_xy)) <= set(corners_of(mask))
+    assert holds_circle(fit.least_circle(mask), mask)
+    assert holds_circle(fit.pivot_circle(mask, rng.normal(0, 20, 2)), mask)
+    check_convex(fit.oriented_box(mask).corners_xy, mask)
+    n = int(rng.integers(4, 9))
+    ring = fit.convex(mask, n).points_xy
+    assert len(ring) == min(n, len(fit.hull(mask).points_xy))
+    check_convex(ring, mask)
+    k = int(rng.integers(1, BOXES_MAX + 1))
+    check_boxes(fit.boxes(mask, k), mask, k)
+    around = fit.concave(mask, float(rng.choice([0, 0.5, 1, 2, 5, 100]))).points_xy
+    check_simple(around)
+    check_contains(around, mask)
+    assert np.array_equal(mask, before)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_masks(name: str) -> None:
+    for seed in range(20):
+        check_all(NAMED[name], seed)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_masks_lie_in_their_volumes(seed: int) -> None:
+    for i, mask in enumerate(random_masks(120, 14, seed)):
+        check_all(mask, i)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(8, 40))
+def test_many_random_masks_lie_in_their_volumes(seed: int) -> None:
+    for i, mask in enumerate(random_masks(300, 30, seed)):
+        check_all(mask, i)
+
+
+def test_the_box_is_exact() -> None:
+    for mask in random_masks(300, 12, 5):
+        found, corners = fit.box(mask), corners_of(mask)
+        for axis in (0, 1):
+            assert found.min_xy[axis] == min(p[axis] for p in corners)
+            assert found.max_xy[axis] == max(p[axis] for p in corners)
+
+
+def least_square(points: list[Point]) -> Fraction:
+    """Squared radius of the least circle: of all pairs and triples, the least that contains all."""
+    found = []
+    for pair in itertools.combinations(points, 2):
+        found.append(tuple((a + b) / 2 for a, b in zip(*pair, strict=True)) + pair[:1])
+    for a, b, c in itertools.combinations(points, 3):
+        d = 2 * turn(a, b, c)
+        if d:
+            bx, by, cx, cy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+            u, v = bx * bx + by * by, cx * cx + cy * cy
+            found.append((a[0] + (cy * u - by * v) / d, a[1] + (bx * v - cx * u) / d, a))
+    squares = []
+    for x, y, on in found:
+        square = (on[0] - x) ** 2 + (on[1] - y) ** 2
+        if all((p - x) ** 2 + (q - y) ** 2 <= square for p, q in points):
+            squares.append(square)
+    return min(squares)
+
+
+def test_the_least_circle_is_least() -> None:
+    for mask in random_masks(60, 5, 11):
+        square = Fraction(fit.least_circle(mask).radius) ** 2
+        least = least_square([p for p in corners_of(mask) if p in set(exact(fit.hull(mask).points_xy))])
+        assert least <= square <= least * (1 + Fraction(1, 2**50))
+
+
+def test_a_circle_has_the_least_radius_for_its_center() -> None:
+    for mask in random_masks(300, 12, 13):
+        for circle in (fit.least_circle(mask), fit.pivot_circle(mask, (0.1, -3.7))):
+            assert not holds_circle(fit.Circle(circle.center_xy, math.nextafter(circle.radius, 0)), mask)
+
+
+def test_no_quarter_turn_changes_the_circle_about_the_pivot() -> None:
+    for mask in random_masks(100, 9, 17):
+        side = max(mask.shape)
+        square = np.zeros((side, side), np.bool_)
+        square[: mask.shape[0], : mask.shape[1]] = mask
+        pivot = ((side - 1) / 2, (side - 1) / 2)
+        assert len({fit.pivot_circle(np.rot90(square, i), pivot).radius for i in range(4)}) == 1
+
+
+def least_area(points: list[Point]) -> Fraction:
+    """Area of the least box with a side along any two of the points."""
+    areas = []
+    for a, b in itertools.combinations(points, 2):
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        along, across = [p * dx + q * dy for p, q in points], [p * dy - q * dx for p, q in points]
+        areas.append((max(along) - min(along)) * (max(across) - min(across)) / (dx * dx + dy * dy))
+    return min(areas)
+
+
+def test_the_oriented_box_is_least() -> None:
+    for mask in random_masks(200, 6, 19):
+        area = area_of(fit.oriented_box(mask).corners_xy)
+        least = least_area(corners_of(mask))
+        assert least <= area <= least * (1 + Fraction(1, 2**44))
+        p = fit.hull(mask).points_xy
+        for angle in np.linspace(0, np.pi / 2, 91):
+            c, s = np.cos(angle), np.sin(angle)
+            assert float(area) <= np.ptp(p[:, 0] * c + p[:, 1] * s) * np.ptp(p[:, 1] * c - p[:, 0] * s) * (1 + 1e-12)
+
+
+def test_the_oriented_box_has_right_angles() -> None:
+    for mask in random_masks(200, 20, 23):
+        a, b, c, d = fit.oriented_box(mask).corners_xy
+        assert abs(((b - a) * (c - b)).sum()) <= 1e-12 * area_of(np.array([a, b, c, d]))
+        assert np.abs((b - a) - (c - d)).max() <= 1e-12
+
+
+def test_one_box_more_never_covers_more() -> None:
+    for mask in [*random_masks(30, 20, 29), *NAMED.values()]:
+        found = [fit.boxes(mask, k) for k in range(1, BOXES_MAX + 1)]
+        for k, one in enumerate(found, 1):
+            check_boxes(one, mask, k)
+        assert all(a.false_area >= b.false_area for a, b in itertools.pairwise(found))
+        (row,), whole = found[0].rows_xyxy, fit.box(mask)
+        assert row.tolist() == [*whole.min_xy, *whole.max_xy]
+
+
+def least_false(mask: Bools, k: int) -> int:
+    """Fewest false pixels of k boxes, by trying all."""
+    h, w = mask.shape
+    paints = set()
+    for y, x in itertools.product(range(h), range(w)):
+        for y_end, x_end in itertools.product(range(y + 1, h + 1), range(x + 1, w + 1)):
+            painted = np.zeros(mask.shape, np.bool_)
+            painted[y:y_end, x:x_end] = True
+            paints.add(int("".join("01"[v] for v in painted.ravel().tolist()), 2))
+    goal = int("".join("01"[v] for v in mask.ravel().tolist()), 2)
+    best = mask.size
+    for some in itertools.combinations_with_replacement(paints, k):
+        union = 0
+        for one in some:
+            union |= one
+        if not goal & ~union:
+            best = min(best, (union & ~goal).bit_count())
+    return best
+
+
+def test_two_boxes_are_mostly_the_best_two() -> None:
+    masks = list(random_masks(60, 5, 31))
+    found = [fit.boxes(mask, 2).false_area for mask in masks]
+    best = [least_false(mask, 2) for mask in masks]
+    assert all(a >= b for a, b in zip(found, best, strict=True))
+    assert sum(a == b for a, b in zip(found, best, strict=True)) >= 54
+
+
+@pytest.mark.parametrize(
+    ("mask", "k"),
+    [
+        (mask_of("#..", "#..", "###"), 2),
+        (mask_of(".#.", "###", ".#."), 2),
+        (mask_of("####", "#..#", "#..#", "####"), 4),
+        (mask_of("##...", "##...", ".....", "...##"), 2),
+    ],
+)
+def test_what_boxes_can_cover_is_covered_without_a_false_pixel(mask: Bools, k: int) -> None:
+    assert fit.boxes(mask, k).false_area == 0
+    assert fit.boxes(mask, k - 1).false_area > 0
+    assert len(fit.boxes(mask, BOXES_MAX).rows_xyxy) <= mask.sum()
+
+
+def test_the_hull_of_a_plus() -> None:
+    ring = fit.hull(mask_of(".#.", "###", ".#.")).points_xy
+    assert ring.tolist() == [
+        [1.5, -0.5], [2.5, 0.5], [2.5, 1.5], [1.5, 2.5], [0.5, 2.5], [-0.5, 1.5], [-0.5, 0.5], [0.5, -0.5],
+    ]  # fmt: skip
+
+
+def test_the_circle_of_a_pixel() -> None:
+    circle = fit.least_circle(mask_of("...", "..#"))
+    assert circle.center_xy.tolist() == [2, 1]
+    assert 0.5 < Fraction(circle.radius) ** 2 < 0.5 + 1e-15
+
+
+def test_a_slanted_line_has_a_slanted_box() -> None:
+    mask = np.eye(12, dtype=bool)
+    corners = fit.oriented_box(mask).corners_xy
+    assert area_of(corners) == 24  # 12 sqrt(2) long, sqrt(2) wide
+    assert fit.boxes(mask, 1).false_area == 132
+
+
+def test_leaving_out_the_cheapest_edge() -> None:
+    """An octagon of a square without its corner pixels is the square again at four corners."""
+    mask = np.ones((6, 6), np.bool_)
+    mask[[0, 0, 5, 5], [0, 5, 0, 5]] = False
+    assert len(fit.convex(mask, 99).points_xy) == 8
+    assert area_of(fit.convex(mask, 4).points_xy) == 36
+    assert [area_of(fit.convex(mask, n).points_xy) for n in (8, 7, 6, 5)] == [34, Fraction(69, 2), 35, Fraction(71, 2)]
+
+
+def test_without_tolerance_the_outline_is_the_mask() -> None:
+    mask = mask_of("##.....", "##.###.", "#####..", "..####.", "....##.")
+    ring = fit.concave(mask, 0).points_xy
+    assert area_of(ring) == mask.sum()
+    assert fit.concave(mask_of("#"), 0).points_xy.tolist() == [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+
+
+def test_holes_are_filled_and_parts_are_bridged() -> None:
+    assert area_of(fit.concave(mask_of("####", "#..#", "####"), 0).points_xy) == 12
+    assert area_of(fit.concave(mask_of("#...#", ".....", "....."), 0).points_xy) == 5
+    assert area_of(fit.concave(mask_of("#.#..#"), 0).points_xy) == 6
+    assert area_of(fit.concave(mask_of("#.", ".#"), 0).points_xy) == 3
+
+
+def test_with_all_tolerance_a_shape_without_pockets_becomes_its_hull() -> None:
+    y, x = np.mgrid[:21, :21]
+    mask = (x - 10) ** 2 + (y - 10) ** 2 <= 104
+    assert set(exact(fit.concave(mask, 99).points_xy)) == set(exact(fit.hull(mask).points_xy))
+
+
+def test_the_outline_keeps_to_its_tolerance() -> None:
+    """Points along the edges are no farther from a pixel square than that."""
+    y, x = np.mgrid[:30, :30]
+    for tolerance, (a, b) in itertools.product((0.5, 1, 2, 4), ((1, 0), (3, 7), (-1, 2))):
+        mask = ((x - 15) ** 2 + (y - 15) ** 2 <= 200) & ~((a * (x - 13) + b * (y - 15) > 0) & (abs(x - y) < 6))
+        ring = fit.concave(fit_part(mask), tolerance).points_xy
+        along = np.linspace(ring, np.roll(ring, -1, axis=0), 40).reshape(-1, 1, 2)
+        pixels = np.argwhere(fit_part(mask))[:, ::-1]
+        off = np.maximum(np.abs(along - pixels) - 0.5, 0)
+        assert np.sqrt((off**2).sum(axis=2)).min(axis=1).max() <= tolerance + 1e-9
+        assert len(ring) <= len(fit.concave(fit_part(mask), 0).points_xy)
+
+
+def fit_part(mask: Bools) -> Bools:
+    """A mask whose outline at tolerance 0 is itself: its parts bridged, its holes filled."""
+    ring = fit.concave(mask, 0).points_xy
+    filled = np.zeros(mask.shape, np.bool_)
+    for (x, y), (x_next, y_next) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        if x == x_next:
+            low, high = sorted((int(y + 0.5), int(y_next + 0.5)))
+            filled[low:high, int(x + 0.5) :] ^= True
+    return filled
+
+
+def test_large_outlines_are_taken_by_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outline, "OUTLINE_CORNERS", 12)
+    for mask in random_masks(200, 24, 37):
+        ring = fit.concave(mask, 0).points_xy
+        assert len(ring) <= 12
+        check_simple(ring)
+        check_contains(ring, mask)
+    monkeypatch.setattr(outline, "OUTLINE_PIXELS", 30)
+    for mask in random_masks(200, 24, 41):
+        ring = fit.concave(mask, 1).points_xy
+        check_simple(ring)
+        check_contains(ring, mask)
+
+
+@pytest.mark.parametrize("kind", ["row", "column", "ends", "stairs"])
+def test_masks_as_long_as_they_may_be(kind: str) -> None:
+    n = MASK_SIDE_MAX
+    mask = np.zeros((n // 64, n) if kind == "stairs" else (1, n), np.bool_)
+    if kind == "stairs":
+        mask[np.arange(n) // 64, np.arange(n)] = True
+    else:
+        mask[0, [0, -1]] = True
+        mask[0] |= kind != "ends"
+    if kind == "column":
+        mask = mask.T
+    check_convex(fit.hull(mask).points_xy, mask)
+    assert holds_circle(fit.least_circle(mask), mask)
+    check_convex(fit.oriented_box(mask).corners_xy, mask)
+    check_convex(fit.convex(mask, 5).points_xy, mask)
+    check_boxes(fit.boxes(mask, 3), mask, 3)
+    check_simple(fit.concave(mask, 1).points_xy)
+
+
+def test_a_pivot_far_away_or_tiny() -> None:
+    mask = mask_of("#.", ".#")
+    for pivot in ((2.0**40, -(2.0**40)), (5e-324, 1e-300), (1e9 + 0.1, 0.3)):
+        circle = fit.pivot_circle(mask, pivot)
+        assert circle.center_xy.tolist() == list(pivot)
+        assert holds_circle(circle, mask)
+        assert not holds_circle(fit.Circle(circle.center_xy, math.nextafter(circle.radius, 0)), mask)
+
+
+def test_strided_masks_are_read_as_they_look() -> None:
+    mask = next(random_masks(1, 20, 43))
+    for view in (mask[::-1], mask.T, np.pad(mask, 3)[::2, 1::3]):
+        if view.any():
+            check_all(view, 1)
+
+
+FITS = {
+    "hull": fit.hull,
+    "box": fit.box,
+    "least_circle": fit.least_circle,
+    "pivot_circle": lambda mask: fit.pivot_circle(mask, (0, 0)),
+    "oriented_box": fit.oriented_box,
+    "boxes": lambda mask: fit.boxes(mask, 4),
+    "convex": lambda mask: fit.convex(mask, 8),
+    "concave": lambda mask: fit.concave(mask, 1),
+}
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_what_is_no_mask_is_refused(name: str) -> None:
+    for mask in (np.zeros((3, 4), bool), np.zeros((0, 5), bool), np.zeros((0, 0), bool)):
+        with pytest.raises(InputError, match="mask: expected a pixel or more, got none"):
+            FITS[name](mask)
+    with pytest.raises(InputError, match="mask: expected sides up to 32768 px"):
+        FITS[name](np.ones((1, MASK_SIDE_MAX + 1), bool))
+    with pytest.raises(InputError, match=r"mask\[0\]\[0\]: expected 0 or 1"):
+        FITS[name]([[2, 3]])
+
+
+def test_bad_settings_are_refused() -> None:
+    mask = mask_of("##")
+    for call, name in (
+        (lambda: fit.boxes(mask, 0), "k: "),
+        (lambda: fit.boxes(mask, BOXES_MAX + 1), "k: "),
+        (lambda: fit.convex(mask, 3), "n: "),
+        (lambda: fit.concave(mask, -1), "tolerance: "),
+        (lambda: fit.concave(mask, math.nan), "tolerance: "),
+        (lambda: fit.pivot_circle(mask, (math.inf, 0)), "pivot_xy"),
+    ):
+        with pytest.raises(InputError, match=name):
+            call()
