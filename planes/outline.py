@@ -6,7 +6,10 @@
 4. Inner corners go, the cheapest first, as long as all that was left out between two neighbours lies within the
    tolerance of their edge, and no other corner lies in the triangle that is added: so it stays simple, and only grows.
 
-Corners stay corners of pixels: nothing is rounded. Beyond OUTLINE_PIXELS or OUTLINE_CORNERS the mask is taken by square
+5. Outer edges go the same way: their neighbours are drawn out until they meet, at a place of 1/256 px that is rounded
+   outward, as long as no other corner or edge lies in what is added.
+
+All on whole numbers. Beyond OUTLINE_PIXELS or OUTLINE_CORNERS the mask is taken by square
 blocks of pixels, cut off at its box, in steps 1 to 3: it holds all pixels, up to a block's diagonal further out.
 """
 
@@ -19,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, Ints
-from planes.constants import OUTLINE_CORNERS, OUTLINE_PIXELS
+from planes.constants import OUTLINE_CORNERS, OUTLINE_PIXELS, SUB
 from planes.hull import Point, extents, turn
 from planes.spans import Spans
 
@@ -37,7 +40,8 @@ def outline(mask: Bools, tolerance: float) -> Floats:
     while len(ring := _boundary(_joined(_blocks(cropped, block)))) > OUTLINE_CORNERS:
         block *= 2
     corners = np.minimum(np.array(ring) * block, (right - left, bottom - top)) + np.array([left, top])
-    return np.array(_Simpler(corners, tolerance).points()) - 0.5
+    simpler = _Simpler(corners, tolerance)
+    return np.array(_without_edges(simpler.points(), simpler.offs(), tolerance)) / SUB - 0.5
 
 
 def _blocks(mask: Bools, block: int) -> Bools:
@@ -167,8 +171,12 @@ class _Simpler:
             self._leave_out(*heapq.heappop(self.heap)[1:])
 
     def points(self) -> list[Point]:
-        """Corners that are left, in order."""
-        return [self.at[i] for i in np.flatnonzero(self.left).tolist()]
+        """Corners that are left, in order, in 1/256 px."""
+        return [(x * SUB, y * SUB) for x, y in self.corners[self.left].tolist()]
+
+    def offs(self) -> list[float]:
+        """How far the edge from each corner that is left is from what was left out there, px."""
+        return [self._off(i, self.after[i]) for i in np.flatnonzero(self.left).tolist()]
 
     def _offer(self, i: int) -> None:
         """Put an inner corner on the heap, if its neighbours' edge would be near enough to all between them."""
@@ -211,4 +219,89 @@ def _distance(points: npt.NDArray[np.int64], a: Point, c: Point) -> float:
     dx, dy = c[0] - a[0], c[1] - a[1]
     x, y = points[:, 0] - a[0], points[:, 1] - a[1]
     share = np.clip((x * dx + y * dy) / max(dx * dx + dy * dy, 1), 0, 1)
-    return math.sqrt(float(((x - share * dx) ** 2 + (y - share * dy) ** 2).max()))
+    return math.sqrt(float(((x - share * dx) ** 2 + (y - share * dy) ** 2).max(initial=0)))
+
+
+def _without_edges(ring: list[Point], offs: list[float], tolerance: float) -> list[Point]:
+    """Leave out outer edges of a simple ring, the nearest to its new corner first.
+
+    Parameters
+    ----------
+    ring : corners in 1/256 px
+    offs : how far edge i, which begins at corner i, may be from the first outline already, px
+    tolerance : how far it may get, px
+    """
+    ring, offs = list(ring), list(offs)
+    drawn = [_drawn_out(ring, offs, i) for i in range(len(ring))]
+    while len(ring) > 3:
+        i = min(range(len(ring)), key=lambda k: drawn[k][0])
+        off, tip = drawn[i]
+        if off > tolerance:
+            break
+        if not _is_clear(ring, i, tip):
+            drawn[i] = math.inf, tip
+            continue
+        n = len(ring)
+        offs[i - 1], offs[(i + 1) % n] = max(offs[i - 1], off), max(offs[(i + 1) % n], off)
+        ring[i] = tip
+        offs[i] = offs[(i + 1) % n]
+        for values in (ring, offs, drawn):
+            del values[(i + 1) % n]
+        at = i - (i == n - 1)
+        for near in range(at - 2, at + 2):
+            drawn[near % (n - 1)] = _drawn_out(ring, offs, near % (n - 1))
+    return ring
+
+
+def _four(ring: list[Point], i: int) -> tuple[Point, Point, Point, Point]:
+    n = len(ring)
+    return ring[i - 1], ring[i], ring[(i + 1) % n], ring[(i + 2) % n]
+
+
+def _drawn_out(ring: list[Point], offs: list[float], i: int) -> tuple[float, Point]:
+    """Where the neighbours of edge i meet, rounded outward, and how far off that is; infinite if nowhere."""
+    a, b, c, d = _four(ring, i)
+    nowhere = math.inf, b
+    (p, q), (u, v) = (b[0] - a[0], b[1] - a[1]), (c[0] - d[0], c[1] - d[1])
+    angle = u * q - v * p
+    if turn(a, b, c) <= 0 or turn(b, c, d) <= 0 or angle <= 0:
+        return nowhere
+    share = turn(b, c, d)
+    near = (b[0] + p * share // angle, b[1] + q * share // angle)
+    around = ((near[0] + x, near[1] + y) for x in (-1, 0, 1, 2) for y in (-1, 0, 1, 2))
+    tips = [tip for tip in around if turn(a, tip, b) >= 0 and turn(tip, d, c) >= 0 and turn(b, tip, c) > 0]
+    if not tips:
+        return nowhere
+    tip = min(tips, key=lambda t: (turn(b, t, c), t))
+    return offs[i] + _distance(np.array([tip]), b, c) / SUB, tip
+
+
+def _is_clear(ring: list[Point], i: int, tip: Point) -> bool:
+    """Whether no other corner lies in the three closed triangles that a new corner adds, and no edge cuts them."""
+    a, b, c, d = _four(ring, i)
+    n = len(ring)
+    others = np.array([ring[(i + 3 + k) % n] for k in range(n - 4)], np.int64).reshape(-1, 2)
+    for triangle in ((a, tip, b), (b, tip, c), (c, tip, d)):
+        low, high = np.min(triangle, axis=0), np.max(triangle, axis=0)
+        close = others[((others >= low) & (others <= high)).all(axis=1)]
+        sides = [_turns(triangle[k], triangle[(k + 1) % 3], close) for k in range(3)]
+        if (np.min(sides, axis=0) >= 0).any():
+            return False
+    path = np.concatenate([[d], others, [a]])  # edges from d around to a
+    return not (_cut_by(a, tip, path[:-1]) or _cut_by(tip, d, path[1:]))
+
+
+def _turns(a: Point, b: Point, points: Ints) -> Ints:
+    found: Ints = (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
+    return found
+
+
+def _cut_by(a: Point, b: Point, path: Ints) -> bool:
+    """Whether a polyline crosses a segment; touching counts."""
+    start, end = path[:-1], path[1:]
+    sides = np.sign(_turns(a, b, path))
+    begins, ends = (start - a)[:, ::-1] * (end - start), (start - b)[:, ::-1] * (end - start)
+    of_a, of_b = (np.sign(v[:, 1] - v[:, 0]) for v in (begins, ends))
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    near = ((np.maximum(start, end) >= low) & (np.minimum(start, end) <= high)).all(axis=1)
+    return bool((near & (sides[:-1] * sides[1:] <= 0) & (of_a * of_b <= 0)).any())

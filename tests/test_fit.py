@@ -97,8 +97,8 @@ def check_convex(points: Floats, mask: Bools) -> None:
 
 
 def segments(points: Floats) -> Ints:
-    """Edges (n, 2, 2) in 1/4 px, whole numbers."""
-    whole = points * 4
+    """Edges (n, 2, 2) in 1/256 px, whole numbers."""
+    whole = points * 256
     assert np.array_equal(whole, np.rint(whole))
     ends = whole.astype(np.int64)
     return np.stack([ends, np.roll(ends, -1, axis=0)], axis=1)
@@ -135,10 +135,10 @@ def check_contains(points: Floats, mask: Bools) -> None:
     """No edge meets an open pixel square, and each centre lies inside: so each closed square does."""
     edges = segments(points)[:, None]
     y, x = np.nonzero(mask)
-    centers = np.stack([x, y], axis=1) * 4
+    centers = np.stack([x, y], axis=1) * 256
     a, b = edges[..., 0, :], edges[..., 1, :]
-    beside = ((np.maximum(a, b) <= centers - 2) | (np.minimum(a, b) >= centers + 2)).any(axis=-1)
-    sides = np.stack([turns(a, b, centers + (dx, dy)) for dx in (-2, 2) for dy in (-2, 2)])  # noqa: RUF005
+    beside = ((np.maximum(a, b) <= centers - 128) | (np.minimum(a, b) >= centers + 128)).any(axis=-1)
+    sides = np.stack([turns(a, b, centers + (dx, dy)) for dx in (-128, 128) for dy in (-128, 128)])  # noqa: RUF005
     off = (sides >= 0).all(axis=0) | (sides <= 0).all(axis=0)
     assert (beside | off).all(), "an edge cuts a pixel square"
     up, down = a[..., 1] <= centers[:, 1], b[..., 1] <= centers[:, 1]
@@ -373,10 +373,24 @@ def test_holes_are_filled_and_parts_are_bridged() -> None:
     assert area_of(fit.concave(mask_of("#.", ".#"), 0).points_xy) == 3
 
 
-def test_with_all_tolerance_a_shape_without_pockets_becomes_its_hull() -> None:
-    y, x = np.mgrid[:21, :21]
-    mask = (x - 10) ** 2 + (y - 10) ** 2 <= 104
-    assert set(exact(fit.concave(mask, 99).points_xy)) == set(exact(fit.hull(mask).points_xy))
+def test_a_disc_gets_few_corners() -> None:
+    """Fewer than its hull, though the hull leaves it by less."""
+    y, x = np.mgrid[:41, :41]
+    mask = (x - 20) ** 2 + (y - 20) ** 2 <= 404
+    counts = [len(fit.concave(mask, tolerance).points_xy) for tolerance in (0, 0.75, 1.5, 3, 9)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[2] < len(fit.hull(mask).points_xy) <= counts[1]
+    assert counts[4] <= 8
+    assert area_of(fit.concave(mask, 1.5).points_xy) < 1.1 * mask.sum()
+
+
+def test_an_outline_goes_round_a_spiral() -> None:
+    """A lot of tolerance, and still no edge may cross another."""
+    for tolerance in (0, 1, 2, 3):
+        ring = fit.concave(NAMED["spiral"], tolerance).points_xy
+        check_simple(ring)
+        check_contains(ring, NAMED["spiral"])
+    assert area_of(fit.concave(NAMED["spiral"], 0).points_xy) == NAMED["spiral"].sum()
 
 
 def test_the_outline_keeps_to_its_tolerance() -> None:
@@ -434,6 +448,19 @@ def test_masks_as_long_as_they_may_be(kind: str) -> None:
     check_convex(fit.convex(mask, 5).points_xy, mask)
     check_boxes(fit.boxes(mask, 3), mask, 3)
     check_simple(fit.concave(mask, 1).points_xy)
+
+
+@pytest.mark.parametrize("shape", [(64, MASK_SIDE_MAX), (MASK_SIDE_MAX, 64), (3000, 3000)])
+def test_a_few_pixels_far_apart(shape: tuple[int, int]) -> None:
+    """Long edges, small angles between them: coordinates that float64 rounds most."""
+    rng = np.random.default_rng(47)
+    for count in (3, 10, 200):
+        mask = np.zeros(shape, np.bool_)
+        mask[rng.integers(0, shape[0], count), rng.integers(0, shape[1], count)] = True
+        assert holds_circle(fit.least_circle(mask), mask)
+        check_convex(fit.oriented_box(mask).corners_xy, mask)
+        for n in (4, 5, 7):
+            check_convex(fit.convex(mask, n).points_xy, mask)
 
 
 def test_a_pivot_far_away_or_tiny() -> None:
