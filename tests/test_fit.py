@@ -370,6 +370,7 @@ def test_holes_are_filled_and_parts_are_bridged() -> None:
     assert area_of(fit.concave(mask_of("####", "#..#", "####"), 0).points_xy) == 12
     assert area_of(fit.concave(mask_of("#...#", ".....", "....."), 0).points_xy) == 5
     assert area_of(fit.concave(mask_of("#.#..#"), 0).points_xy) == 6
+    assert area_of(fit.concave(mask_of("#.#", *["..."] * 8, "###"), 0).points_xy) == 14  # the two shortest of three
     assert area_of(fit.concave(mask_of("#.", ".#"), 0).points_xy) == 3
 
 
