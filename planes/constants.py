@@ -122,3 +122,20 @@ LENGTH_TINY = 1e-140
 
 CHUNK_ROWS = 8192
 """Rows of a float filter worked on at a time: 64 KB for each of its arrays."""
+OVERSIZED_CELLS = 64
+"""A box over more cells of a grid is kept in a list beside it: one huge box among tiny ones would fill memory."""
+
+GRID_FRESH = 4096
+"""Cell entries that a grid keeps apart before it sorts them in with all others (or a 16th of those, if more)."""
+
+QUADTREE_CAPACITY = 16
+"""Boxes that a leaf of a quadtree holds before it splits: to test so many costs about as much as to go a level down."""
+
+QUADTREE_DEPTH = 16
+"""Levels of a quadtree: cells down to 2**-16 of the world; each pile of boxes in one spot costs four nodes a level."""
+
+BVH_LEAF = 8
+"""Most boxes in a leaf of a new BVH: at 4 to 8 a query tests about as many boxes as nodes."""
+
+BVH_SMALL = 64
+"""Boxes that are not worth a tree of their own when others come after them."""

@@ -13,8 +13,9 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "hulls", "volumes",
-        "overlap", "image", "kept", "sprite", "hull", "cover", "outline", "fit", "items", "compose", "labels",
-        "poses", "scenefile", "scene", "render", "sampling",
+        "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "image", "kept", "sprite", "hull",
+        "cover", "outline", "fit", "items", "compose", "labels", "poses", "scenefile", "scene", "render",
+        "sampling",
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",

@@ -1,0 +1,282 @@
+"""Boxes that come, move and go under ids of their own: the contract of every broad phase, and the plainest one.
+
+A box is a row (min of each axis, max of each axis); two overlap when their closed intervals do, on every axis.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals
+from planes.constants import CHUNK_PAIRS
+
+__all__ = ["BroadPhase", "BruteForce", "Work", "box_rows", "meets", "pieces", "sorted_pairs"]
+
+Pairs = tuple[Ints, Ints]
+AXES = "xyz"
+
+
+def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
+    """Check boxes: finite, min <= max on every axis, (N, 4) or (N, 6); -0.0 becomes 0.0, which it equals.
+
+    Raises
+    ------
+    InputError
+        If they are not; it names the row.
+    """
+    array = array_of(field, values)
+    if dim is None:
+        width = array.shape[-1] if array.ndim == 2 else 0
+        if width not in (4, 6):
+            raise InputError(f"{field}: expected shape (any, 4) or (any, 6), got {array.shape}")
+        dim = width // 2
+    rows = reals(field, values, (None, 2 * dim)) + 0.0
+    bad = rows[:, :dim] > rows[:, dim:]
+    if bad.any():
+        row, axis = np.argwhere(bad)[0].tolist()
+        low, high = rows[row, axis], rows[row, dim + axis]
+        raise InputError(f"{field}[{row}]: expected min <= max in {AXES[axis]}, got {low:.17g} and {high:.17g}")
+    return rows
+
+
+def meets(a: Floats, b: Floats) -> Bools:
+    """Whether boxes overlap, touching counts: (..., 2d) against (..., 2d), broadcast."""
+    dim = a.shape[-1] // 2
+    good = (a[..., 0] <= b[..., dim]) & (b[..., 0] <= a[..., dim])
+    for axis in range(1, dim):
+        good &= a[..., axis] <= b[..., dim + axis]
+        good &= b[..., axis] <= a[..., dim + axis]
+    return good
+
+
+def sorted_pairs(first: Ints, second: Ints, n: int) -> Ints:
+    """Pairs as (2, K), sorted by (first, second); every second is below n."""
+    key = np.sort(first * n + second) if n else first
+    return np.stack(np.divmod(key, n)) if n else np.empty((2, 0), np.int64)
+
+
+def pieces(lengths: Ints, limit: int) -> list[slice]:
+    """Cut groups into runs of about so many elements; a larger group is a run of its own."""
+    total = np.cumsum(lengths)
+    if not len(lengths) or total[-1] <= limit:
+        return [slice(0, len(lengths))]
+    cuts = np.flatnonzero(np.diff(total // limit)) + 1
+    edges = [0, *cuts.tolist(), len(lengths)]
+    return [slice(a, b) for a, b in itertools.pairwise(edges)]
+
+
+@dataclass
+class Work:
+    """What a query looked at, as (2, K) rows [query, node] and [query, box]; a box may be tested more than once.
+
+    Parameters
+    ----------
+    nodes : how many the structure has in all
+    visits, tests : pieces of both, in the order of the search
+    """
+
+    nodes: int
+    visits: list[Pairs] = field(default_factory=list)
+    tests: list[Pairs] = field(default_factory=list)
+
+    @property
+    def visited(self) -> Ints:
+        """Nodes that were looked into: (2, K) int64 [query, node], sorted."""
+        return _piled(self.visits)
+
+    @property
+    def tested(self) -> Ints:
+        """Boxes that were compared with the query: (2, K) int64 [query, box], sorted."""
+        return _piled(self.tests)
+
+
+class BroadPhase(ABC):
+    """Boxes in 2-D or 3-D, and which of them overlap a query: each structure gives the same rows.
+
+    Parameters
+    ----------
+    boxes : (N, 4) or (N, 6) float, min of each axis, then max of each; their ids are 0..N-1. Ids count up and are
+        never used again.
+
+    Raises
+    ------
+    InputError
+        If a box is not finite, or its min is beyond its max.
+    """
+
+    def __init__(self, boxes: object) -> None:
+        rows = box_rows("boxes", boxes)
+        self.dim = rows.shape[1] // 2
+        self._count = len(rows)
+        self._rows = rows
+        self._here = np.ones(len(rows), np.bool_)
+
+    def __len__(self) -> int:
+        return int(np.count_nonzero(self._here[: self._count]))
+
+    @property
+    def ids(self) -> Ints:
+        """Ids of the boxes that are there, sorted."""
+        return np.flatnonzero(self._here[: self._count])
+
+    @property
+    def boxes(self) -> Floats:
+        """Boxes of `ids`, as a copy."""
+        return self._rows[self.ids]
+
+    def query(self, boxes: object) -> Ints:
+        """Find the boxes that overlap each of these; touching counts.
+
+        Returns
+        -------
+        (2, K) int64 [query, id], sorted
+        """
+        rows = box_rows("boxes", boxes, self.dim)
+        return sorted_pairs(*self._find(rows, None), self._count)
+
+    def pairs(self) -> Ints:
+        """Find the boxes that overlap each other: (2, K) int64 ids [i, j] with i < j, sorted."""
+        ids = self.ids
+        query, found = self._find(self._rows[ids], None)
+        first = ids[query]
+        keep = first < found
+        return sorted_pairs(first[keep], found[keep], self._count)
+
+    def work(self, boxes: object) -> Work:
+        """Tell what a query of these boxes would look at."""
+        work = Work(self._node_count())
+        self._find(box_rows("boxes", boxes, self.dim), work)
+        return work
+
+    def insert(self, boxes: object) -> Ints:
+        """Add boxes; give their ids, (N,) int64."""
+        rows = box_rows("boxes", boxes, self.dim)
+        ids = np.arange(self._count, self._count + len(rows))
+        self._reserve(self._count + len(rows))
+        self._rows[ids], self._here[ids] = rows, True
+        self._count += len(rows)
+        if len(ids):
+            self._enter(ids)
+        return ids
+
+    def remove(self, ids: object) -> None:
+        """Take boxes out, by id."""
+        gone = self._living(ids)
+        if len(gone):
+            self._leave(gone)
+            self._here[gone] = False
+
+    def move(self, ids: object, boxes: object) -> None:
+        """Give boxes a new place and size; a small move costs little."""
+        moved = self._living(ids)
+        rows = box_rows("boxes", boxes, self.dim)
+        if len(rows) != len(moved):
+            raise InputError(f"boxes: expected shape ({len(moved)}, {2 * self.dim}), one for each id, got {rows.shape}")
+        if len(moved):
+            self._shift(moved, rows)
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise AssertionError naming the first invariant that does not hold."""
+
+    @abstractmethod
+    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+        """Overlapping (query, id), each once, in any order."""
+
+    @abstractmethod
+    def _node_count(self) -> int:
+        """How many nodes `work` may name."""
+
+    @abstractmethod
+    def _enter(self, ids: Ints) -> None:
+        """Take in boxes that are new in the table."""
+
+    @abstractmethod
+    def _leave(self, ids: Ints) -> None:
+        """Forget boxes that are still in the table."""
+
+    @abstractmethod
+    def _shift(self, ids: Ints, rows: Floats) -> None:
+        """Write new rows into the table, and follow."""
+
+    def _meeting(self, queries: Floats, query: Ints, ids: Ints, work: Work | None) -> Bools:
+        """Test candidates against the boxes as they are now."""
+        if work is not None:
+            work.tests.append((query, ids))
+        return meets(queries[query], self._rows[ids])
+
+    def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> Pairs:
+        """Test every named query against every named box, some millions of pairs at a time."""
+        wide = max(1, min(len(ids), CHUNK_PAIRS))
+        tall = max(1, CHUNK_PAIRS // wide)
+        found: list[Pairs] = []
+        for left in range(0, len(ids), wide):
+            some = ids[left : left + wide]
+            boxes = self._rows[some]
+            for top in range(0, len(which), tall):
+                rows = which[top : top + tall]
+                if work is not None:
+                    work.tests.append((np.repeat(rows, len(some)), np.tile(some, len(rows))))
+                q, b = np.nonzero(meets(queries[rows][:, None], boxes))
+                found.append((rows[q], some[b]))
+        query, box = _piled(found)
+        return query, box
+
+    def _living(self, ids: object) -> Ints:
+        array = integers("ids", ids, (None,), 0, 2**62)
+        known = array < self._count
+        known[known] = self._here[array[known]]
+        if not known.all():
+            row = int(np.argmin(known))
+            raise InputError(f"ids[{row}]: expected the id of a box that is there, got {array[row]}")
+        _, first = np.unique(array, return_index=True)
+        if len(first) < len(array):
+            row = int(np.setdiff1d(np.arange(len(array)), first)[0])
+            raise InputError(f"ids[{row}]: expected each id once, got {array[row]} again")
+        return array
+
+    def _reserve(self, n: int) -> None:
+        """Make room for n rows, twice as much as before, so that rows that come one by one are not copied each time."""
+        if n > len(self._rows):
+            more = max(n, 2 * len(self._rows)) - len(self._rows)
+            self._rows = np.concatenate((self._rows, np.zeros((more, 2 * self.dim))))
+            self._here = np.concatenate((self._here, np.zeros(more, np.bool_)))
+
+    def _check_table(self) -> None:
+        rows = self.boxes
+        assert np.isfinite(rows).all(), "a box is not finite"
+        assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
+
+
+class BruteForce(BroadPhase):
+    """Every query against every box: the reference, and the fastest for a few dozen."""
+
+    def check(self) -> None:
+        """Raise AssertionError naming the first invariant that does not hold."""
+        self._check_table()
+
+    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+        every = np.arange(len(queries))
+        if work is not None:
+            work.visits.append((every, np.zeros_like(every)))
+        return self._meeting_all(queries, every, self.ids, work)
+
+    def _node_count(self) -> int:
+        return 1
+
+    def _enter(self, ids: Ints) -> None:
+        pass
+
+    def _leave(self, ids: Ints) -> None:
+        pass
+
+    def _shift(self, ids: Ints, rows: Floats) -> None:
+        self._rows[ids] = rows
+
+
+def _piled(pieces: list[Pairs]) -> Ints:
+    return np.concatenate([np.empty((2, 0), np.int64), *(np.stack(piece) for piece in pieces)], axis=1)

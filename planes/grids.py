@@ -1,0 +1,279 @@
+"""A uniform grid of squares or cubes: each cell lists the boxes that reach into it.
+
+Cell k of an axis holds origin + cell * [k, k + 1). Rounding moves a border, for boxes and queries alike and never past
+one another, so two boxes that share a point share a cell, whatever the size of the coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planes.arrays import Floats, InputError, Ints, integer, integers, real
+from planes.boxes import BroadPhase, Pairs, Work, pieces
+from planes.constants import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
+from planes.spans import ragged
+
+__all__ = ["Grid"]
+
+NOWHERE, BESIDE, MAIN, FRESH = range(4)
+"""Where a box is listed."""
+
+KEY_BITS = {2: 31, 3: 21}
+"""Bits of a cell's number on each axis of a key, by dimension; cells beyond are one with the last."""
+
+LARGEST = float(np.finfo(np.float64).max)
+SMALLEST = float(np.finfo(np.float64).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class Listing:
+    """Boxes by cell: box[start[k] : start[k + 1]] reach into the cell of key[k]; keys ascend."""
+
+    key: Ints
+    start: Ints
+    box: Ints
+
+    @classmethod
+    def of(cls, key: Ints, box: Ints) -> Listing:
+        """Sort entries by cell."""
+        order = np.argsort(key, kind="stable")
+        key = key[order]
+        start = np.flatnonzero(np.diff(key, prepend=-1))
+        return cls(key[start], np.append(start, len(key)), box[order])
+
+    def entries(self) -> Pairs:
+        """Write all entries out as (key, box)."""
+        return np.repeat(self.key, np.diff(self.start)), self.box
+
+    def runs(self, key: Ints) -> Pairs:
+        """Find the entries of cells, as (start, length)."""
+        if not len(self.key):
+            return np.zeros_like(key), np.zeros_like(key)
+        place = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
+        length = np.where(self.key[place] == key, self.start[place + 1] - self.start[place], 0)
+        return self.start[place], length
+
+
+class Grid(BroadPhase):
+    """Boxes in the cells of a uniform grid, for worlds where most are of about one size.
+
+    Parameters
+    ----------
+    boxes : (N, 4) or (N, 6) float
+    cell : side of a cell; by default the median of the boxes' longest sides
+
+    Raises
+    ------
+    InputError
+        For boxes as in `BroadPhase`, or a side that is not positive.
+    """
+
+    def __init__(self, boxes: object, cell: float | None = None) -> None:
+        super().__init__(boxes)
+        self.cell = _side_of(self._rows) if cell is None else real("cell", cell, SMALLEST, LARGEST)
+        self.origin = _middle(self._rows[:, : self.dim])
+        self._bits = KEY_BITS[self.dim]
+        self._reach = 2 ** (self._bits - 1) - 1
+        self._low = np.empty((0, self.dim), np.int32)
+        self._high = np.empty((0, self.dim), np.int32)
+        self._home = np.empty(0, np.int8)
+        self._listings = [Listing.of(np.empty(0, np.int64), np.empty(0, np.int64))] * 2
+        self._beside = np.empty(0, np.int64)
+        self._stale = 0
+        self._enter(self.ids)
+
+    def owners(self, cell: object) -> Ints:
+        """List the boxes that reach into a cell, (d,) whole numbers: their ids, sorted."""
+        at = integers("cell", cell, (self.dim,), -self._reach, self._reach)
+        found = [self._beside[((self._low[self._beside] <= at) & (at <= self._high[self._beside])).all(axis=1)]]
+        for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
+            start, length = (int(v[0]) for v in listing.runs(self._keys(at[None])))
+            listed = listing.box[start : start + length]
+            found.append(listed[self._home[listed] == home])
+        return np.sort(np.concatenate(found))
+
+    def cells(self, box: int) -> Ints:
+        """List the cells that a box reaches into: (K, d), sorted.
+
+        Raises
+        ------
+        InputError
+            If there is no such box, or it is one of those too large for the cells to be listed.
+        """
+        ids = self._living([integer("box", box, 0, 2**62)])
+        if self._home[ids[0]] == BESIDE:
+            raise InputError(f"box: expected one over at most {OVERSIZED_CELLS} cells, got {box}, which is over more")
+        _, at = _written_out(self._low[ids], self._high[ids])
+        return at[np.lexsort(at.T[::-1])]
+
+    def check(self) -> None:
+        """Raise AssertionError naming the first invariant that does not hold."""
+        self._check_table()
+        ids = self.ids
+        low, high = self._span(self._rows[ids])
+        assert (self._low[ids] == low).all() and (self._high[ids] == high).all(), "a box is listed where it was"
+        large = _sizes(low, high) > OVERSIZED_CELLS
+        assert np.array_equal(np.sort(self._beside), ids[large]), "the list beside the grid is not the large boxes"
+        homes = self._home[ids]
+        assert ((homes == BESIDE) == large).all(), "a large box has a home in the grid"
+        assert (homes != NOWHERE).all(), "a box has no home"
+        kept = []
+        for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
+            assert (np.diff(listing.key) > 0).all(), "cells are not in order"
+            key, box = listing.entries()
+            good = self._home[box] == home
+            assert home == MAIN or good.all(), "a box that has gone is listed among the fresh ones"
+            assert home == FRESH or self._stale == np.count_nonzero(~good), "stale entries are miscounted"
+            kept.append(np.stack((key[good], box[good])))
+        listed = np.concatenate(kept, axis=1)
+        group, at = _written_out(low[~large], high[~large])
+        due = np.stack((self._keys(at), ids[~large][group]))
+        assert np.array_equal(_in_order(listed), _in_order(due)), "cells do not list the boxes that reach into them"
+
+    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+        low, high = self._span(queries)
+        sizes = _sizes(low, high)
+        wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].box) // 8)
+        found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)]
+        narrow = np.flatnonzero(~wide)
+        found.append(self._meeting_all(queries, narrow, self._beside, work))
+        for piece in pieces(sizes[narrow].astype(np.int64), CHUNK_SAMPLES):
+            some = narrow[piece]
+            group, at = _written_out(low[some], high[some])
+            for home in (MAIN, FRESH):
+                found += self._in_cells(queries, some[group], low[some][group], at, home, work)
+        query, box = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return query, box
+
+    def _in_cells(self, queries: Floats, query: Ints, low: Ints, at: Ints, home: int, work: Work | None) -> list[Pairs]:
+        """Search cells; a pair counts in the first cell that both share, so that it comes once."""
+        start, length = self._listings[home - MAIN].runs(self._keys(at))
+        some = np.flatnonzero(length)
+        query, low, at, start, length = query[some], low[some], at[some], start[some], length[some]
+        if work is not None:
+            before = len(self._listings[0].key) if home == FRESH else 0
+            work.visits.append((query, before + np.searchsorted(self._listings[home - MAIN].start, start)))
+        found: list[Pairs] = []
+        for piece in pieces(length, CHUNK_SAMPLES):
+            group, place = ragged(length[piece])
+            box = self._listings[home - MAIN].box[start[piece][group] + place]
+            first = self._home[box] == home
+            for axis in range(self.dim):
+                first &= np.maximum(low[piece, axis][group], self._low[box, axis]) == at[piece, axis][group]
+            box, asked = box[first], query[piece][group[first]]
+            good = self._meeting(queries, asked, box, work)
+            found.append((asked[good], box[good]))
+        return found
+
+    def _node_count(self) -> int:
+        return sum(len(listing.key) for listing in self._listings)
+
+    def _enter(self, ids: Ints) -> None:
+        short = len(self._rows) - len(self._home)
+        self._home = np.concatenate((self._home, np.zeros(short, np.int8)))
+        self._low, self._high = (
+            np.concatenate((part, np.zeros((short, self.dim), np.int32))) for part in (self._low, self._high)
+        )
+        low, high = self._span(self._rows[ids])
+        self._low[ids], self._high[ids] = low, high
+        large = _sizes(low, high) > OVERSIZED_CELLS
+        self._home[ids] = np.where(large, BESIDE, FRESH)
+        self._beside = np.concatenate((self._beside, ids[large]))
+        group, at = _written_out(low[~large], high[~large])
+        key, box = self._listings[1].entries()
+        key, box = np.concatenate((key, self._keys(at))), np.concatenate((box, ids[~large][group]))
+        if len(key) > max(GRID_FRESH, len(self._listings[0].box) // 16):
+            self._settle(key, box)
+        else:
+            self._listings[1] = Listing.of(key, box)
+
+    def _leave(self, ids: Ints) -> None:
+        homes = self._home[ids]
+        self._stale += int(_sizes(self._low[ids], self._high[ids])[homes == MAIN].sum())
+        self._home[ids] = NOWHERE
+        if (homes == BESIDE).any():
+            self._beside = self._beside[self._home[self._beside] == BESIDE]
+        key, box = self._listings[1].entries()
+        if (homes == FRESH).any():
+            keep = self._home[box] == FRESH
+            key, box = key[keep], box[keep]
+            self._listings[1] = Listing.of(key, box)
+        if 2 * self._stale > max(GRID_FRESH, len(self._listings[0].box)):
+            self._settle(key, box)
+
+    def _shift(self, ids: Ints, rows: Floats) -> None:
+        low, high = self._span(rows)
+        goes = ((low != self._low[ids]) | (high != self._high[ids])).any(axis=1)
+        if goes.any():
+            self._leave(ids[goes])
+        self._rows[ids] = rows
+        if goes.any():
+            self._enter(ids[goes])
+
+    def _settle(self, key: Ints, box: Ints) -> None:
+        """Sort the fresh entries in with all others, and drop the stale ones."""
+        old_key, old_box = self._listings[0].entries()
+        keep = self._home[old_box] == MAIN
+        self._home[box] = MAIN
+        main = Listing.of(np.concatenate((old_key[keep], key)), np.concatenate((old_box[keep], box)))
+        self._listings = [main, Listing.of(key[:0], box[:0])]
+        self._stale = 0
+
+    def _span(self, rows: Floats) -> Pairs:
+        """First and last cell of boxes on each axis, (N, d) each."""
+        with np.errstate(over="ignore"):
+            at = np.floor((rows.reshape(-1, 2, self.dim) - self.origin) / self.cell)
+        both = np.clip(at, -self._reach, self._reach).astype(np.int64)
+        return both[:, 0], both[:, 1]
+
+    def _keys(self, at: Ints) -> Ints:
+        """One whole number for each cell (N, d)."""
+        key: Ints = at[:, 0] + self._reach
+        for axis in range(1, self.dim):
+            key = (key << self._bits) | (at[:, axis] + self._reach)
+        return key
+
+
+def _sizes(low: Ints, high: Ints) -> Floats:
+    """How many cells lie from low to high: as floats, for there may be more than 2**63."""
+    return np.asarray(np.prod(high.astype(np.float64) - low + 1, axis=1))
+
+
+def _written_out(low: Ints, high: Ints) -> Pairs:
+    """Write every cell of a few boxes out, as (box number, cell (K, d))."""
+    low, high = low.astype(np.int64), high.astype(np.int64)
+    sides = high - low + 1
+    group, place = ragged(np.prod(sides, axis=1))
+    at = np.empty((len(group), low.shape[1]), np.int64)
+    for axis in reversed(range(low.shape[1])):
+        place, step = np.divmod(place, sides[group, axis])
+        at[:, axis] = low[group, axis] + step
+    return group, at
+
+
+def _in_order(entries: Ints) -> Ints:
+    return entries[:, np.lexsort(entries)]
+
+
+def _middle(values: Floats) -> Floats:
+    """Median of each column, one of its own values: a mean of two could overflow."""
+    if not len(values):
+        return np.zeros(values.shape[1])
+    return np.asarray(np.partition(values, len(values) // 2, axis=0)[len(values) // 2])
+
+
+def _side_of(rows: Floats) -> float:
+    """Median of the longest sides; of boxes without any, the spacing of the middle half of them."""
+    dim = rows.shape[1] // 2
+    with np.errstate(over="ignore"):
+        longest = np.minimum((rows[:, dim:] - rows[:, :dim]).max(axis=1, initial=0), LARGEST)
+    longest = longest[longest > 0]
+    if not len(longest) and len(rows):
+        n = len(rows)
+        part = np.partition(rows[:, :dim], (n // 4, 3 * n // 4), axis=0)
+        with np.errstate(over="ignore"):
+            longest = (part[3 * n // 4] - part[n // 4]).max(keepdims=True) / max(1, n / 2) ** (1 / dim)
+    side = float(_middle(longest[:, None])[0]) if len(longest) else 1.0
+    return min(max(side, SMALLEST), LARGEST) if side > 0 else 1.0

@@ -1,0 +1,368 @@
+"""A quadtree of boxes: cells that split in four, and leaves that list every box that reaches into them.
+
+A box goes to the left when its min <= the middle, to the right when its max >= the middle, to both when it straddles.
+Cells at the border go on without end, so nothing is ever outside. A cell is split when it holds more boxes than the
+capacity, may go deeper, and at most half of its boxes straddle a middle: splitting it would copy those, not part them.
+So the tree is a function of the boxes and the root cell, whatever the order in which they came.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, InputError, Ints, integer
+from planes.boxes import BroadPhase, Pairs, Work, pieces, sorted_pairs
+from planes.constants import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
+from planes.spans import ragged
+
+__all__ = ["Quadtree"]
+
+NODE = np.dtype(
+    [
+        ("cell", np.float64, 4),  # as drawn: the root in quarters
+        ("gate", np.float64, 4),  # the points that are this cell's own: beyond the first two, up to the last two
+        ("mid", np.float64, 2),
+        ("child", np.int64),  # first of four, -1 for a leaf
+        ("parent", np.int64),
+        ("depth", np.int64),  # -1 when the row is free
+        ("total", np.int64),  # boxes that reach into it
+        ("straddle", np.int64),  # those of them that cross a middle
+        ("start", np.int64),  # of a leaf's ids in the pool
+        ("length", np.int64),
+    ]
+)
+Paths = tuple[Ints, Ints, Bools]
+LARGEST = float(np.finfo(np.float64).max)
+BULK = 64
+"""The root cell holds the boxes but for one in so many on each side, and as much again: outliers do not stretch it."""
+
+
+class Quadtree(BroadPhase):
+    """Boxes in cells that split in four where they are many (2-D).
+
+    Parameters
+    ----------
+    boxes : (N, 4) float
+    capacity : boxes that a leaf holds before it splits
+    depth : deepest level, the root is level 0
+
+    Raises
+    ------
+    InputError
+        For boxes as in `BroadPhase`, boxes in 3-D, a capacity below 1 or a depth below 0.
+    """
+
+    def __init__(self, boxes: object, capacity: int = QUADTREE_CAPACITY, depth: int = QUADTREE_DEPTH) -> None:
+        super().__init__(boxes)
+        if self.dim != 2:
+            raise InputError(f"boxes: expected shape (any, 4), got {self._rows.shape}")
+        self.capacity = integer("capacity", capacity, 1, 2**31)
+        self.depth = integer("depth", depth, 0, 1000)
+        self._build()
+
+    @property
+    def leaves(self) -> Floats:
+        """Cells of the leaves, (L, 4) float; those at the border reach on beyond what is drawn."""
+        return np.asarray(self._nodes["cell"][self._leaf_numbers()])
+
+    def check(self) -> None:
+        """Raise AssertionError naming the first invariant that does not hold."""
+        self._check_table()
+        nodes, ids = self._nodes, self.ids
+        used = np.flatnonzero(nodes["depth"] >= 0)
+        inner = used[nodes["child"][used] >= 0]
+        children = (nodes["child"][inner][:, None] + np.arange(4)).ravel()
+        assert np.array_equal(np.sort(np.append(children, 0)), used), "a node is not the child of one parent"
+        assert (nodes["parent"][children] == np.repeat(inner, 4)).all(), "a child does not know its parent"
+        assert (nodes["depth"][children] == np.repeat(nodes["depth"][inner] + 1, 4)).all(), "a depth is wrong"
+        assert len(used) + 4 * len(self._free) == len(nodes), "a row is neither in use nor free"
+        which, node, straddle = self._paths(self._rows[ids])
+        assert np.array_equal(nodes["total"][used], np.bincount(node, minlength=len(nodes))[used]), "a total is wrong"
+        crossing = np.bincount(node[straddle], minlength=len(nodes))
+        assert np.array_equal(nodes["straddle"][used], crossing[used]), "straddling boxes are miscounted"
+        assert np.array_equal(self._overfull(used), nodes["child"][used] >= 0), "a cell should split or merge"
+        leaf = nodes["child"][node] < 0
+        due = sorted_pairs(node[leaf], ids[which[leaf]], self._count)
+        listed = sorted_pairs(*self._entries(self._leaf_numbers()), self._count)
+        assert np.array_equal(due, listed), "leaves do not list the boxes that reach into them"
+        assert nodes["length"].sum() == self._live, "the pool is miscounted"
+        assert np.count_nonzero(self._out(self._rows[ids])) == self._outside, "boxes outside are miscounted"
+
+    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+        every = np.arange(len(queries))
+        stack = [(every, np.zeros_like(every))]
+        found: list[Pairs] = [(every[:0], every[:0])]
+        while stack:
+            query, node = stack.pop()
+            if len(query) > CHUNK_SAMPLES:  # bounds the memory of a search that opens up wide
+                half = len(query) // 2
+                stack += [(query[half:], node[half:]), (query[:half], node[:half])]
+                continue
+            if work is not None:
+                work.visits.append((query, node))
+            child = self._nodes["child"][node]
+            leaf = child < 0
+            found += self._in_leaves(queries, query[leaf], node[leaf], work)
+            query, node, child = query[~leaf], node[~leaf], child[~leaf]
+            row, quarter = np.nonzero(_quarters(queries[query], self._nodes["mid"][node]))
+            if len(row):
+                stack.append((query[row], child[row] + quarter))
+        first, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return first, second
+
+    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
+        """Search leaves; a pair counts where its first common point belongs, so that it comes once."""
+        found: list[Pairs] = []
+        length = self._nodes["length"][leaf]
+        some = np.flatnonzero(length)
+        query, leaf, length = query[some], leaf[some], length[some]
+        for piece in pieces(length, CHUNK_SAMPLES):
+            group, place = ragged(length[piece])
+            box = self._pool[self._nodes["start"][leaf[piece]][group] + place]
+            asked = query[piece][group]
+            good = self._meeting(queries, asked, box, work)
+            asked, box, group = asked[good], box[good], group[good]
+            corner = np.maximum(queries[asked, :2], self._rows[box, :2])
+            gate = self._nodes["gate"][leaf[piece]][group]
+            own = ((gate[:, :2] < corner) & (corner <= gate[:, 2:])).all(axis=1)
+            found.append((asked[own], box[own]))
+        return found
+
+    def _node_count(self) -> int:
+        return int(np.count_nonzero(self._nodes["depth"] >= 0))
+
+    def _enter(self, ids: Ints) -> None:
+        self._outside += int(np.count_nonzero(self._out(self._rows[ids])))
+        if not self._rebuilt():
+            nothing = ids[:0]
+            self._change(nothing, self._paths(self._rows[nothing]), ids, self._paths(self._rows[ids]))
+
+    def _leave(self, ids: Ints) -> None:
+        self._outside -= int(np.count_nonzero(self._out(self._rows[ids])))
+        nothing = ids[:0]
+        self._change(ids, self._paths(self._rows[ids]), nothing, self._paths(self._rows[nothing]))
+
+    def _shift(self, ids: Ints, rows: Floats) -> None:
+        old = self._rows[ids]
+        self._rows[ids] = rows
+        self._outside += int(np.count_nonzero(self._out(rows))) - int(np.count_nonzero(self._out(old)))
+        if self._rebuilt():
+            return
+        before, after = self._paths(old), self._paths(rows)
+        keys = [(which * len(self._nodes) + node) * 2 + straddle for which, node, straddle in (before, after)]
+        goes = np.unique(np.setxor1d(keys[0], keys[1], assume_unique=True) // (2 * len(self._nodes)))
+        if len(goes):
+            self._change(ids, _only(before, goes), ids, _only(after, goes))
+
+    def _build(self) -> None:
+        """Begin anew, with a root cell that suits the boxes as they are."""
+        ids = self.ids
+        rows = self._rows[ids]
+        self._nodes = np.zeros(1, NODE)
+        self._nodes["cell"] = _root_of(rows)
+        self._nodes["gate"] = (-np.inf, -np.inf, np.inf, np.inf)
+        self._nodes["mid"] = _middle(self._nodes["cell"])
+        self._nodes["child"] = self._nodes["parent"] = -1
+        self._free = np.empty(0, np.int64)
+        self._pool = np.empty(0, np.int64)
+        self._used = self._live = 0
+        self._outside = int(np.count_nonzero(self._out(rows)))
+        self._nodes["total"] = len(ids)
+        self._nodes["straddle"] = np.count_nonzero(_quarters(rows, self._nodes["mid"]).sum(axis=1) > 1)
+        self._settle(np.zeros_like(ids), ids, np.zeros(1, np.int64))
+
+    def _rebuilt(self) -> bool:
+        """Begin anew when more than a quarter of the boxes lie outside the root cell."""
+        if 4 * self._outside <= len(self):
+            return False
+        self._build()
+        return True
+
+    def _out(self, rows: Floats) -> Bools:
+        cell = self._nodes["cell"][0]
+        return np.asarray(((rows[:, :2] < cell[:2]) | (rows[:, 2:] > cell[2:])).any(axis=1))
+
+    def _overfull(self, node: Ints) -> Bools:
+        """Whether cells must be split."""
+        rows = self._nodes[node]
+        full = (rows["total"] > self.capacity) & (rows["depth"] < self.depth)
+        return np.asarray(full & (2 * rows["straddle"] <= rows["total"]))
+
+    def _paths(self, rows: Floats) -> Paths:
+        """Every (box, node, whether it straddles) on the way from the root to the leaves."""
+        which = np.arange(len(rows))
+        node = np.zeros_like(which)
+        steps: list[Paths] = []
+        while len(which) or not steps:
+            reached = _quarters(rows[which], self._nodes["mid"][node])
+            steps.append((which, node, reached.sum(axis=1) > 1))
+            inner = self._nodes["child"][node] >= 0
+            row, quarter = np.nonzero(reached[inner])
+            which, node = which[inner][row], self._nodes["child"][node[inner]][row] + quarter
+        all_which, all_node, straddle = (np.concatenate(parts) for parts in zip(*steps, strict=True))
+        return all_which, all_node, straddle
+
+    def _change(self, gone: Ints, before: Paths, come: Ints, after: Paths) -> None:
+        """Take boxes off their paths and put them on others; then merge and split where it is due."""
+        nodes = self._nodes
+        for (_, node, straddle), sign in ((before, -1), (after, 1)):
+            np.add.at(nodes["total"], node, sign)
+            np.add.at(nodes["straddle"], node[straddle], sign)
+        touched = np.unique(np.concatenate((before[1], after[1])))
+        leaves = touched[nodes["child"][touched] < 0]
+        node, box = self._entries(leaves)
+        off, on = (nodes["child"][path[1]] < 0 for path in (before, after))
+        keep = ~np.isin(node * self._count + box, before[1][off] * self._count + gone[before[0][off]])
+        node = np.concatenate((node[keep], after[1][on]))
+        box = np.concatenate((box[keep], come[after[0][on]]))
+        inner = touched[nodes["child"][touched] >= 0]
+        node, box, leaves = self._merge(inner[~self._overfull(inner)], node, box, leaves)
+        self._settle(node, box, leaves)
+
+    def _merge(self, tops: Ints, node: Ints, box: Ints, leaves: Ints) -> tuple[Ints, Ints, Ints]:
+        """Make leaves of cells; give the entries and leaves to be written, with theirs."""
+        nodes = self._nodes
+        up = nodes["parent"][tops]
+        inside = np.zeros(len(tops), np.bool_)
+        while (up >= 0).any():  # a cell that goes within another one needs no merge of its own
+            inside |= np.isin(up, tops)
+            up = np.where(up >= 0, nodes["parent"][up], -1)
+        tops = tops[~inside]
+        if not len(tops):
+            return node, box, leaves
+        below, top, firsts = self._below(tops)
+        order = np.argsort(below)
+        below, top = below[order], top[order]
+        left = below[(nodes["child"][below] < 0) & ~np.isin(below, leaves)]
+        more_node, more_box = self._entries(left)
+        node, box = np.concatenate((node, more_node)), np.concatenate((box, more_box))
+        place = np.minimum(np.searchsorted(below, node), len(below) - 1)
+        node = np.where(below[place] == node, top[place], node)
+        node, box = sorted_pairs(node, box, self._count)
+        once = np.append(True, (np.diff(node) != 0) | (np.diff(box) != 0))[: len(node)]
+        self._live -= int(nodes["length"][below].sum())
+        nodes[below] = np.zeros((), NODE)
+        nodes["depth"][below] = -1
+        nodes["child"][tops] = -1
+        self._free = np.sort(np.concatenate((self._free, firsts)))
+        return node[once], box[once], np.union1d(np.setdiff1d(leaves, below), tops)
+
+    def _below(self, tops: Ints) -> tuple[Ints, Ints, Ints]:
+        """All nodes below some, the one that each is below, and the first ones of their fours."""
+        below, owner, firsts = [tops[:0]], [tops[:0]], [tops[:0]]
+        node, top = tops, tops
+        while len(node):
+            inner = self._nodes["child"][node] >= 0
+            first, top = self._nodes["child"][node[inner]], np.repeat(top[inner], 4)
+            node = (first[:, None] + np.arange(4)).ravel()
+            below.append(node)
+            owner.append(top)
+            firsts.append(first)
+        return np.concatenate(below), np.concatenate(owner), np.concatenate(firsts)
+
+    def _settle(self, node: Ints, box: Ints, leaves: Ints) -> None:
+        """Give leaves their entries, and split those that hold too many, level by level."""
+        done = []
+        while len(leaves):
+            splits = leaves[self._overfull(leaves)]
+            self._live -= int(self._nodes["length"][splits].sum())
+            self._nodes["length"][splits] = 0
+            goes = np.isin(node, splits) if len(splits) else np.zeros(len(node), np.bool_)
+            stay = np.setdiff1d(leaves, splits)
+            done.append((node[~goes], box[~goes], stay))
+            if not len(splits):
+                break
+            self._split(splits)
+            node, box = node[goes], box[goes]
+            row, quarter = np.nonzero(_quarters(self._rows[box], self._nodes["mid"][node]))
+            node, box = self._nodes["child"][node[row]] + quarter, box[row]
+            leaves = np.unique((self._nodes["child"][splits][:, None] + np.arange(4)).ravel())
+            straddle = _quarters(self._rows[box], self._nodes["mid"][node]).sum(axis=1) > 1
+            place = np.searchsorted(leaves, node)
+            self._nodes["total"][leaves] = np.bincount(place, minlength=len(leaves))
+            self._nodes["straddle"][leaves] = np.bincount(place[straddle], minlength=len(leaves))
+        if done:
+            all_node, all_box, all_leaves = (np.concatenate(parts) for parts in zip(*done, strict=True))
+            self._write(all_node, all_box, np.sort(all_leaves))
+
+    def _split(self, splits: Ints) -> None:
+        """Give cells their four children, with nothing in them yet."""
+        short = max(0, len(splits) - len(self._free))
+        if short:
+            short = max(short, len(self._nodes) // 4)
+            more = np.zeros(4 * short, NODE)
+            more["depth"] = -1
+            self._free = np.append(self._free, len(self._nodes) + 4 * np.arange(short))
+            self._nodes = np.concatenate((self._nodes, more))
+        nodes = self._nodes
+        first, self._free = self._free[: len(splits)], self._free[len(splits) :]
+        nodes["child"][splits] = first
+        parent = nodes[splits]
+        for quarter in range(4):
+            right, down = quarter % 2, quarter // 2
+            child = np.zeros(len(splits), NODE)
+            for bounds in ("cell", "gate"):
+                child[bounds] = parent[bounds]
+                child[bounds][:, 0 if right else 2] = parent["mid"][:, 0]
+                child[bounds][:, 1 if down else 3] = parent["mid"][:, 1]
+            child["mid"] = _middle(child["cell"])
+            child["child"], child["parent"], child["depth"] = -1, splits, parent["depth"] + 1
+            nodes[first + quarter] = child
+
+    def _write(self, node: Ints, box: Ints, leaves: Ints) -> None:
+        """Put the entries of leaves at the end of the pool; tidy it when half is waste."""
+        node, box = sorted_pairs(node, box, self._count)
+        length = np.bincount(np.searchsorted(leaves, node), minlength=len(leaves))
+        self._live += len(box) - int(self._nodes["length"][leaves].sum())
+        self._nodes["length"][leaves] = length
+        if self._used + len(box) > len(self._pool):
+            kept = np.setdiff1d(self._leaf_numbers(), leaves)
+            _, old = self._entries(kept)
+            self._nodes["start"][kept] = np.cumsum(self._nodes["length"][kept]) - self._nodes["length"][kept]
+            self._pool = np.concatenate((old, np.zeros(2 * len(box) + len(old), np.int64)))
+            self._used = len(old)
+        self._nodes["start"][leaves] = self._used + np.cumsum(length) - length
+        self._pool[self._used : self._used + len(box)] = box
+        self._used += len(box)
+
+    def _entries(self, leaves: Ints) -> Pairs:
+        """Write out what leaves list, as (leaf, box)."""
+        group, place = ragged(self._nodes["length"][leaves])
+        return leaves[group], self._pool[self._nodes["start"][leaves][group] + place]
+
+    def _leaf_numbers(self) -> Ints:
+        return np.flatnonzero((self._nodes["depth"] >= 0) & (self._nodes["child"] < 0))
+
+
+def _only(paths: Paths, which: Ints) -> Paths:
+    keep = np.isin(paths[0], which)
+    return paths[0][keep], paths[1][keep], paths[2][keep]
+
+
+def _quarters(rows: Floats, mid: Floats) -> Bools:
+    """Which quarters boxes reach into: (N, 4), by x, then y."""
+    left, up = (rows[:, :2] <= mid).T
+    right, down = (rows[:, 2:] >= mid).T
+    return np.stack((left & up, right & up, left & down, right & down), axis=1)
+
+
+def _middle(cell: Floats) -> Floats:
+    """Middle of cells; each half first, for the sum could overflow."""
+    return np.asarray(cell[:, :2] / 2 + cell[:, 2:] / 2)
+
+
+def _root_of(rows: Floats) -> Floats:
+    """Find a square around the bulk of the boxes."""
+    n = len(rows)
+    if not n:
+        return np.zeros(4)
+    low, high = rows[:, :2].min(axis=0), rows[:, 2:].max(axis=0)
+    first, last = n // BULK, n - 1 - n // BULK
+    bulk = np.partition(rows[:, :2] / 2 + rows[:, 2:] / 2, (first, last), axis=0)
+    half = bulk[last] / 2 - bulk[first] / 2
+    if half.max() > 0:
+        with np.errstate(over="ignore"):
+            low, high = np.maximum(low, bulk[first] - half), np.minimum(high, bulk[last] + half)
+    centre, half = low / 2 + high / 2, (high / 2 - low / 2).max()
+    with np.errstate(over="ignore"):
+        return np.asarray(np.clip(np.concatenate((centre - half, centre + half)), -LARGEST, LARGEST))
