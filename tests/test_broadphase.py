@@ -178,8 +178,9 @@ def test_ids_are_never_used_again(make: Maker, d: int) -> None:
     assert structure.ids.tolist() == [0, 1, 3]
 
 
+NAN = float("nan")
 BAD = {
-    "boxes[1][2]: expected a finite number, got nan": lambda s, d: s.insert([[0] * 2 * d, [0, 0, np.nan, 0, 0, 0][: 2 * d]]),
+    "boxes[1][2]: expected a finite number": lambda s, d: s.insert([[0] * 2 * d, [0, 0, NAN, 0, 0, 0][: 2 * d]]),
     "boxes[0]: expected min <= max in y, got 2 and 1": lambda s, d: s.query([[0, 2, 0][:d] + [1] * d]),
     "boxes: expected shape (any, ": lambda s, d: s.query([[0.0] * (2 * d + 1)]),
     "boxes: expected shape (2, ": lambda s, d: s.move([0, 1], [[0.0] * 2 * d]),
