@@ -21,7 +21,7 @@ AXES = "xyz"
 
 
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
-    """Check boxes: finite, min <= max on every axis, (N, 4) or (N, 6); -0.0 becomes 0.0, which it equals.
+    """Check boxes: finite, min <= max on every axis, (N, 4) or (N, 6). They come as a copy.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
         if width not in (4, 6):
             raise InputError(f"{field}: expected shape (any, 4) or (any, 6), got {array.shape}")
         dim = width // 2
-    rows = reals(field, values, (None, 2 * dim)) + 0.0
+    rows = reals(field, values, (None, 2 * dim))
     bad = rows[:, :dim] > rows[:, dim:]
     if bad.any():
         row, axis = np.argwhere(bad)[0].tolist()

@@ -148,11 +148,10 @@ class Quadtree(BroadPhase):
         self._outside += int(np.count_nonzero(self._out(rows))) - int(np.count_nonzero(self._out(old)))
         if self._rebuilt():
             return
-        before, after = self._paths(old), self._paths(rows)
-        keys = [(which * len(self._nodes) + node) * 2 + straddle for which, node, straddle in (before, after)]
-        goes = np.unique(np.setxor1d(keys[0], keys[1], assume_unique=True) // (2 * len(self._nodes)))
-        if len(goes):
-            self._change(ids, _only(before, goes), ids, _only(after, goes))
+        goes = self._rerouted(old, rows)
+        if goes.any():
+            ids = ids[goes]
+            self._change(ids, self._paths(old[goes]), ids, self._paths(rows[goes]))
 
     def _build(self) -> None:
         """Begin anew, with a root cell that suits the boxes as they are."""
@@ -201,6 +200,20 @@ class Quadtree(BroadPhase):
             which, node = which[inner][row], self._nodes["child"][node[inner]][row] + quarter
         all_which, all_node, straddle = (np.concatenate(parts) for parts in zip(*steps, strict=True))
         return all_which, all_node, straddle
+
+    def _rerouted(self, old: Floats, rows: Floats) -> Bools:
+        """Whether boxes that move take another path, or straddle where they did not."""
+        goes = np.zeros(len(rows), np.bool_)
+        which = np.arange(len(rows))
+        node = np.zeros_like(which)
+        while len(which):
+            mid = self._nodes["mid"][node]
+            before, after = _quarters(old[which], mid), _quarters(rows[which], mid)
+            goes[which[(before != after).any(axis=1)]] = True
+            on = (self._nodes["child"][node] >= 0) & ~goes[which]
+            row, quarter = np.nonzero(before[on])
+            which, node = which[on][row], self._nodes["child"][node[on]][row] + quarter
+        return goes
 
     def _change(self, gone: Ints, before: Paths, come: Ints, after: Paths) -> None:
         """Take boxes off their paths and put them on others; then merge and split where it is due."""
@@ -332,11 +345,6 @@ class Quadtree(BroadPhase):
 
     def _leaf_numbers(self) -> Ints:
         return np.flatnonzero((self._nodes["depth"] >= 0) & (self._nodes["child"] < 0))
-
-
-def _only(paths: Paths, which: Ints) -> Paths:
-    keep = np.isin(paths[0], which)
-    return paths[0][keep], paths[1][keep], paths[2][keep]
 
 
 def _quarters(rows: Floats, mid: Floats) -> Bools:
