@@ -285,6 +285,16 @@ def test_a_quadtree_is_what_a_new_one_is() -> None:
     assert sorted(tree.leaves.tolist()) == sorted(Quadtree(rows, capacity=4).leaves.tolist())
 
 
+def test_a_quadtree_begins_anew_only_when_boxes_leave_its_cell() -> None:
+    rows = uniform(np.random.default_rng(8), 500, 2)
+    tree = Quadtree(rows, capacity=4)
+    nodes, leaves = tree._nodes, len(tree.leaves)
+    tree.move(np.arange(500), rows + 1e-9)
+    assert tree._nodes is nodes
+    tree.move(np.arange(500), rows + 1000)
+    assert len(tree.leaves) > leaves / 2 and tree.leaves.min() >= 1000
+
+
 def test_a_small_move_leaves_a_bvh_alone() -> None:
     rng = np.random.default_rng(2)
     rows = uniform(rng, 1000, 2)
