@@ -16,7 +16,7 @@ import numpy.typing as npt
 from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
 from planes.constants import TRIG_BITS
 from planes.grid256 import unit
-from planes.hulls import convex_rows, outlines, rows_of, triangles
+from planes.rings import convex_rows, outlines, rows_of, triangles
 
 __all__ = ["Aabbs", "BoxSets", "Capsules", "Circles", "ConcavePolygons", "Core", "Obbs", "Parts", "Polygons", "Volumes"]
 

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 
 ORDER = {
     "planes": (
-        "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "hulls", "volumes",
+        "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
         "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "image", "kept", "sprite", "hull",
         "cover", "outline", "fit", "items", "compose", "labels", "poses", "scenefile", "scene", "render",
         "sampling",
