@@ -17,7 +17,7 @@ from planes.hull import extents
 __all__ = ["cover"]
 
 
-def cover(mask: Bools, k: int) -> tuple[Ints, int]:
+def cover(mask: Bools, k: int) -> Ints:
     """Cover a mask that is not empty by at most k boxes with few false pixels.
 
     Two ways, each a sequence in which one box more never covers more: cutting the worst box in two, from one box up;
@@ -25,12 +25,10 @@ def cover(mask: Bools, k: int) -> tuple[Ints, int]:
 
     Returns
     -------
-    (n, 4) boxes, n <= k; the pixels that they cover and the mask has not
+    (n, 4) boxes, n <= k
     """
-    pixels = int(np.count_nonzero(mask))
     few, many = _cut(mask, k)
-    boxes, area = min((few, _area(few)), _join(many, k), key=lambda found: found[1])
-    return boxes, area - pixels
+    return min((few, _area(few)), _join(many, k), key=lambda found: found[1])[0]
 
 
 def _area(boxes: Ints) -> int:

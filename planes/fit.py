@@ -1,15 +1,15 @@
-"""Masks to volumes that contain them: every closed pixel square of the mask lies in the volume, exactly.
+"""Pixels to volumes that contain them: every closed pixel square lies in the volume, exactly.
 
-Volumes are in px, pixel [0, 0] of the mask about the origin. Hulls and choices are made on whole numbers; what float64
-cannot hold is rounded outward. Rings turn from +x toward +y. An empty mask has no volume: it is refused.
+Pixels are a mask (h, w), with pixel [0, 0] about the origin, or Spans. Volumes are in px, and of one row. Hulls and
+choices are made on whole numbers; what float64 cannot hold is rounded outward. Rings turn from +x toward +y. A set
+without a pixel has no volume: it is refused.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -17,80 +17,39 @@ import numpy as np
 from planes.arrays import Bools, Floats, InputError, bools, integer, real, reals
 from planes.constants import BOXES_MAX, MASK_SIDE_MAX, POSITION_MAX
 from planes.cover import cover
-from planes.hull import Line, Point, edge_lines, extents, fewer_lines, hull_points, outward_corners
+from planes.hull import Extents, Line, Point, edge_lines, extents, fewer_lines, hull_points, outward_corners
 from planes.outline import outline
+from planes.spans import Spans
+from planes.volumes import Aabbs, BoxSets, Capsules, Circles, Obbs, Polygons
 
 __all__ = [
-    "Box", "Boxes", "Circle", "OrientedBox", "Ring", "box", "boxes", "concave", "convex", "hull", "least_circle",
-    "oriented_box", "pivot_circle",
+    "box", "boxes", "capsule", "concave", "convex", "hull", "least_circle", "oriented_box", "pivot_circle",
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Circle:
-    """Closed disc: center_xy (2,) float64, radius, px."""
-
-    center_xy: Floats
-    radius: float
-
-
-@dataclass(frozen=True, eq=False)
-class Box:
-    """Closed axis-aligned box: min_xy (2,), max_xy (2,) float64, px."""
-
-    min_xy: Floats
-    max_xy: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class OrientedBox:
-    """The hull of four corners: corners_xy (4, 2) float64, px, in turning order."""
-
-    corners_xy: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Boxes:
-    """Any of closed boxes: rows_xyxy (n, 4) float64 x_min, y_min, x_max, y_max, px.
-
-    false_area is what they cover and the mask does not, each place once, px^2.
-    """
-
-    rows_xyxy: Floats
-    false_area: int
-
-
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """Closed simple polygon: points_xy (n, 2) float64, px, the last joined to the first."""
-
-    points_xy: Floats
-
-
-def hull(mask: object) -> Ring:
+def hull(pixels: object) -> Polygons:
     """Convex hull of the pixel squares; its corners are pixel corners, none between its neighbours.
 
     Parameters
     ----------
-    mask : (h, w) bool with a pixel or more
+    pixels : (h, w) bool, or Spans, with a pixel or more
 
     Raises
     ------
     InputError
-        If the mask is empty, too large, or no mask.
+        If there is no pixel, or the mask is too large, or no mask.
     """
-    return Ring(np.array(hull_points(_checked(mask))) / 2)
+    return _polygon(np.array(_corners(pixels)) / 2)
 
 
-def box(mask: object) -> Box:
-    """Axis-aligned box of the pixel squares, exact; `mask` as in `hull`."""
-    rows, first, last = extents(_checked(mask))
-    low, high = (int(first.min()), int(rows[0])), (int(last.max()), int(rows[-1]))
-    return Box(np.array(low) - 0.5, np.array(high) + 0.5)
+def box(pixels: object) -> Aabbs:
+    """Axis-aligned box of the pixel squares, exact; `pixels` as in `hull`."""
+    rows, first, last = _extents(pixels)
+    return Aabbs([[first.min() - 0.5, rows[0] - 0.5]], [[last.max() + 0.5, rows[-1] + 0.5]])
 
 
-def least_circle(mask: object) -> Circle:
-    """Least circle that contains the pixel squares, found exactly; `mask` as in `hull`.
+def least_circle(pixels: object) -> Circles:
+    """Least circle that contains the pixel squares, found exactly; `pixels` as in `hull`.
 
     The centre is rounded, then the radius is the least float64 for that centre: above the true one by rounding alone.
 
@@ -99,24 +58,40 @@ def least_circle(mask: object) -> Circle:
     Elzinga and Hearn, "Geometrical solutions for some minimax location problems" (1972): let in the farthest point
     until none is outside. Few rounds, each over the hull's corners.
     """
-    points = hull_points(_checked(mask))
-    x, y, d = _least_center(points)
-    center = (x / (2 * d), y / (2 * d))
-    return Circle(np.array(center), _radius_about(points, center))
+    corners = _corners(pixels)
+    x, y, d = _least_center(corners)
+    return _circle(corners, (x / (2 * d), y / (2 * d)))
 
 
-def pivot_circle(mask: object, pivot_xy: Sequence[float]) -> Circle:
+def pivot_circle(pixels: object, pivot_xy: Sequence[float]) -> Circles:
     """Least circle about a pivot (2,) in px that contains the pixel squares, which no turn about it changes.
 
-    The centre is the pivot; the radius is rounded up. `mask` as in `hull`.
+    The centre is the pivot; the radius is rounded up. `pixels` as in `hull`.
     """
-    points = hull_points(_checked(mask))
-    pivot = reals("pivot_xy", pivot_xy, (2,), POSITION_MAX)
-    return Circle(pivot, _radius_about(points, (float(pivot[0]), float(pivot[1]))))
+    corners = _corners(pixels)
+    x, y = reals("pivot_xy", pivot_xy, (2,), POSITION_MAX).tolist()
+    return _circle(corners, (x, y))
 
 
-def oriented_box(mask: object) -> OrientedBox:
-    """Box of least area over all directions; `mask` as in `hull`.
+def capsule(pixels: object) -> Capsules:
+    """Capsule around the pixel squares: for what is long and thin, as a beam; `pixels` as in `hull`.
+
+    Its axis is that of the least box, whole or with round ends in place of the box's: the smaller of the two.
+    """
+    corners = _corners(pixels)
+    a, b, c, d = outward_corners(_least_sides(corners))
+    if ((b - a) ** 2).sum() < ((c - b) ** 2).sum():
+        a, b, c, d = b, c, d, a
+    begin, end = (a + d) / 2, (b + c) / 2
+    length, half = (math.sqrt((v * v).sum()) for v in (end - begin, (d - a) / 2))
+    inward = (end - begin) * min(half / length, 0.5)
+    found = [(p, q, _radius_about(corners, p, q)) for p, q in ((begin, end), (begin + inward, end - inward))]
+    p, q, radius = min(found, key=lambda made: (2 * math.dist(made[0], made[1]) + math.pi * made[2]) * made[2])
+    return Capsules([p], [q], radius)
+
+
+def oriented_box(pixels: object) -> Obbs:
+    """Box of least area over all directions; `pixels` as in `hull`.
 
     Its area is the least to rounding: corners that float64 does not hold are moved outward, so that the hull of the
     four stored corners contains the pixel squares.
@@ -126,35 +101,39 @@ def oriented_box(mask: object) -> OrientedBox:
     Freeman and Shapira (1975): a side lies on an edge of the hull. Toussaint, "Solving geometric problems with the
     rotating calipers" (1983).
     """
-    return OrientedBox(outward_corners(_least_sides(hull_points(_checked(mask)))))
+    return Obbs.from_corners(outward_corners(_least_sides(_corners(pixels)))[None])
 
 
-def boxes(mask: object, k: int) -> Boxes:
-    """Cover the pixel squares by at most k boxes (1 to 64) with few false pixels: never more of them for a greater k.
+def boxes(mask: object, k: int) -> BoxSets:
+    """Cover the pixel squares of a mask (h, w) by at most k boxes (1 to 64) with few false pixels.
 
-    Fewer than k boxes come where they cover the mask as well. They may overlap. `mask` as in `hull`.
+    Never more of them for a greater k. Fewer than k boxes come where they cover the mask as well. They may overlap.
     """
-    rows, false = cover(_checked(mask), integer("k", k, 1, BOXES_MAX))
-    return Boxes(rows.astype(np.float64) - 0.5, false)
+    rows = cover(_checked(mask), integer("k", k, 1, BOXES_MAX)) - 0.5
+    return BoxSets(rows[:, :2], rows[:, 2:], [0])
 
 
-def convex(mask: object, n: int) -> Ring:
+def convex(pixels: object, n: int) -> Polygons:
     """Convex polygon of at most n >= 4 corners that contains the hull: edges left out, each the cheapest in area.
 
-    The hull itself where it has no more corners. `mask` as in `hull`.
+    The hull itself where it has no more corners. `pixels` as in `hull`.
     """
-    lines = edge_lines(hull_points(_checked(mask)))
-    return Ring(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))))
+    lines = edge_lines(_corners(pixels))
+    return _polygon(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))))
 
 
-def concave(mask: object, tolerance: float) -> Ring:
-    """Outline that contains the pixel squares and leaves them by at most `tolerance` px; `mask` as in `hull`.
+def concave(mask: object, tolerance: float) -> Floats:
+    """Outline that contains the pixel squares of a mask (h, w) and leaves them by at most `tolerance` px.
 
     Parts are bridged and holes are filled first: the tolerance is from what that gives. A mask of very many pixels or
     corners is taken by square blocks of pixels first (see `planes.outline`).
+
+    Returns
+    -------
+    (n, 2) float, px: a simple polygon; `ConcavePolygons.from_concave(points, [0])` makes a volume of it
     """
     checked = _checked(mask)
-    return Ring(outline(checked, real("tolerance", tolerance, 0, MASK_SIDE_MAX)))
+    return outline(checked, real("tolerance", tolerance, 0, MASK_SIDE_MAX))
 
 
 def _checked(mask: object) -> Bools:
@@ -166,15 +145,48 @@ def _checked(mask: object) -> Bools:
     return checked
 
 
-def _radius_about(points: list[Point], center_px: tuple[float, float]) -> float:
-    """Least float64 radius, px, of a circle about a centre that contains points in half pixels."""
-    (a, b), (p, q) = (v.as_integer_ratio() for v in center_px)
-    scale = max(b, q)
-    x, y = 2 * a * (scale // b), 2 * p * (scale // q)
-    far = max((u * scale - x) ** 2 + (v * scale - y) ** 2 for u, v in points)
-    square = Fraction(far, 4 * scale * scale)
-    radius = math.nextafter(math.sqrt(square), 0)
-    while Fraction(radius) ** 2 < square:
+def _extents(pixels: object) -> Extents:
+    if not isinstance(pixels, Spans):
+        return extents(_checked(pixels))
+    if not len(pixels):
+        raise InputError("pixels: expected a pixel or more, got none")
+    begins = np.flatnonzero(np.diff(pixels.y, prepend=pixels.y[0] - 1))
+    return pixels.y[begins], pixels.x_first[begins], pixels.x_last[np.append(begins[1:], len(pixels)) - 1]
+
+
+def _corners(pixels: object) -> list[Point]:
+    """Corners of the hull, in half pixels."""
+    return hull_points(_extents(pixels))
+
+
+def _polygon(points: Floats) -> Polygons:
+    return Polygons(points, [0])
+
+
+def _circle(corners: list[Point], center: tuple[float, float]) -> Circles:
+    return Circles([center], _radius_about(corners, center, center))
+
+
+def _radius_about(corners: list[Point], a_px: Iterable[float], b_px: Iterable[float]) -> float:
+    """Least float64 radius, px, about a segment, or a point twice, that contains points in half pixels."""
+    ratios = [float(v).as_integer_ratio() for v in (*a_px, *b_px)]
+    scale = max(below for _, below in ratios)
+    ax, ay, bx, by = (2 * above * (scale // below) for above, below in ratios)
+    dx, dy = bx - ax, by - ay
+    length2 = dx * dx + dy * dy
+    far = Fraction(0)
+    for x, y in corners:
+        fx, fy = x * scale - ax, y * scale - ay
+        along, square = fx * dx + fy * dy, fx * fx + fy * fy
+        if along >= length2 > 0:
+            square += length2 - 2 * along
+        elif along > 0:
+            far = max(far, Fraction(square * length2 - along * along, length2))
+            continue
+        far = max(far, Fraction(square))
+    far /= 4 * scale * scale
+    radius = math.nextafter(math.sqrt(far), 0)
+    while Fraction(radius) ** 2 < far:
         radius = math.nextafter(radius, math.inf)
     return radius
 

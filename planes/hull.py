@@ -13,10 +13,12 @@ import numpy as np
 
 from planes.arrays import Bools, Floats, Ints
 
-__all__ = ["edge_lines", "extents", "fewer_lines", "hull_points", "outward_corners", "turn"]
+__all__ = ["Extents", "edge_lines", "extents", "fewer_lines", "hull_points", "outward_corners", "turn"]
 
 Point = tuple[int, int]
 Line = tuple[int, int, int]
+Extents = tuple[Ints, Ints, Ints]
+"""Rows that have pixels, rising, and the first and last column of each."""
 
 
 def turn(a: Point, b: Point, c: Point) -> int:
@@ -24,28 +26,31 @@ def turn(a: Point, b: Point, c: Point) -> int:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def extents(mask: Bools) -> tuple[Ints, Ints, Ints]:
+def extents(mask: Bools) -> Extents:
     """Rows that have pixels, and the first and last column of each."""
     rows = np.flatnonzero(mask.any(axis=1))
     some = mask if len(rows) == len(mask) else mask[rows]
     return rows, some.argmax(axis=1), mask.shape[1] - 1 - some[:, ::-1].argmax(axis=1)
 
 
-def hull_points(mask: Bools) -> list[Point]:
-    """Corners of the hull of a mask's pixel squares, none of them between its neighbours.
+def hull_points(extents: Extents) -> list[Point]:
+    """Corners of the hull of pixel squares, given by rows and their ends; none of them between its neighbours.
 
-    Only the ends of a row can be corners: O(rows) by the monotone chain, after one look at the pixels.
+    Only the ends of a row can be corners: O(rows) by the monotone chain.
 
     References
     ----------
     Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979).
     """
-    rows, first, last = extents(mask)
-    left, right = np.full(len(mask) + 1, mask.shape[1]), np.full(len(mask) + 1, -1)
-    left[rows], right[rows] = first, last
-    left[rows + 1], right[rows + 1] = np.minimum(left[rows + 1], first), np.maximum(right[rows + 1], last)
-    borders = np.flatnonzero(right >= 0)
-    y = 2 * borders - 1
+    rows, first, last = extents
+    place = rows - rows[0]
+    left = np.full(int(place[-1]) + 2, last.max() + 1)
+    right = np.full(len(left), first.min() - 1)
+    left[place], right[place] = first, last
+    left[place + 1] = np.minimum(left[place + 1], first)
+    right[place + 1] = np.maximum(right[place + 1], last)
+    borders = np.flatnonzero(left <= right)
+    y = 2 * (borders + rows[0]) - 1
     down = zip((2 * right[borders] + 1).tolist(), y.tolist(), strict=True)
     up = zip((2 * left[borders] - 1)[::-1].tolist(), y[::-1].tolist(), strict=True)
     return _chain(list(down)) + _chain(list(up))

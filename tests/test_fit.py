@@ -11,6 +11,8 @@ import pytest
 from planes import fit, outline
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.constants import BOXES_MAX, MASK_SIDE_MAX
+from planes.spans import Spans
+from planes.volumes import Aabbs, BoxSets, Capsules, Circles
 
 Point = tuple[Fraction, Fraction]
 HALF = Fraction(1, 2)
@@ -78,10 +80,23 @@ def exact(points: Floats) -> list[Point]:
     return [(Fraction(x), Fraction(y)) for x, y in points.tolist()]
 
 
-def holds_circle(circle: fit.Circle, mask: Bools) -> bool:
-    x, y = map(Fraction, circle.center_xy.tolist())
-    square = Fraction(circle.radius) ** 2
+def holds_circle(circle: Circles, mask: Bools) -> bool:
+    x, y = map(Fraction, circle.center[0].tolist())
+    square = Fraction(circle.radius[0]) ** 2
     return all((p - x) ** 2 + (q - y) ** 2 <= square for p, q in corners_of(mask))
+
+
+def holds_capsule(capsule: Capsules, mask: Bools) -> bool:
+    """Each corner is as near to the axis, or to an end of it, as the radius."""
+    (a,), (b,), square = exact(capsule.a_xy), exact(capsule.b_xy), Fraction(capsule.radius[0]) ** 2
+    d = b[0] - a[0], b[1] - a[1]
+    length2 = d[0] ** 2 + d[1] ** 2
+    for p, q in corners_of(mask):
+        along = (p - a[0]) * d[0] + (q - a[1]) * d[1]
+        share = min(max(along / length2, Fraction(0)), Fraction(1)) if length2 else Fraction(0)
+        if (p - a[0] - share * d[0]) ** 2 + (q - a[1] - share * d[1]) ** 2 > square:
+            return False
+    return True
 
 
 def check_convex(points: Floats, mask: Bools) -> None:
@@ -147,35 +162,50 @@ def check_contains(points: Floats, mask: Bools) -> None:
     assert (winding == 1).all(), "a centre lies outside"
 
 
-def check_boxes(found: fit.Boxes, mask: Bools, k: int) -> None:
-    rows = found.rows_xyxy
+def rows_of(found: BoxSets) -> Floats:
+    """Boxes (n, 4) of the one row of a set."""
+    assert found.starts.tolist() == [0]
+    boxes = found.parts
+    assert isinstance(boxes, Aabbs)
+    return np.concatenate([boxes.min, boxes.max], axis=1)
+
+
+def false_area(found: BoxSets, mask: Bools) -> int:
+    """Pixels in any box that are not in the mask; all of the mask are in one."""
+    painted = np.zeros(mask.shape, np.bool_)
+    for x, y, x_max, y_max in (rows_of(found) + 0.5).astype(int).tolist():
+        painted[y:y_max, x:x_max] = True
+    assert (painted | ~mask).all(), "a pixel lies in no box"
+    return int((painted & ~mask).sum())
+
+
+def check_boxes(found: BoxSets, mask: Bools, k: int) -> None:
+    rows = rows_of(found)
     assert rows.shape == (len(rows), 4)
     assert 1 <= len(rows) <= k
-    painted = np.zeros(mask.shape, np.bool_)
     for x, y, x_max, y_max in (rows + 0.5).tolist():
         assert all(v == int(v) for v in (x, y, x_max, y_max))
         assert x < x_max <= mask.shape[1]
         assert y < y_max <= mask.shape[0]
-        painted[int(y) : int(y_max), int(x) : int(x_max)] = True
-    assert (painted | ~mask).all(), "a pixel lies in no box"
-    assert found.false_area == int((painted & ~mask).sum())
+    false_area(found, mask)
 
 
 def check_all(mask: Bools, seed: int) -> None:
     rng = np.random.default_rng(seed)
     before = mask.copy()
-    check_convex(fit.hull(mask).points_xy, mask)
-    assert set(exact(fit.hull(mask).points_xy)) <= set(corners_of(mask))
+    check_convex(fit.hull(mask).points, mask)
+    assert set(exact(fit.hull(mask).points)) <= set(corners_of(mask))
     assert holds_circle(fit.least_circle(mask), mask)
     assert holds_circle(fit.pivot_circle(mask, rng.normal(0, 20, 2)), mask)
-    check_convex(fit.oriented_box(mask).corners_xy, mask)
+    check_convex(fit.oriented_box(mask).points, mask)
+    assert holds_capsule(fit.capsule(mask), mask)
     n = int(rng.integers(4, 9))
-    ring = fit.convex(mask, n).points_xy
-    assert len(ring) == min(n, len(fit.hull(mask).points_xy))
+    ring = fit.convex(mask, n).points
+    assert len(ring) == min(n, len(fit.hull(mask).points))
     check_convex(ring, mask)
     k = int(rng.integers(1, BOXES_MAX + 1))
     check_boxes(fit.boxes(mask, k), mask, k)
-    around = fit.concave(mask, float(rng.choice([0, 0.5, 1, 2, 5, 100]))).points_xy
+    around = fit.concave(mask, float(rng.choice([0, 0.5, 1, 2, 5, 100])))
     check_simple(around)
     check_contains(around, mask)
     assert np.array_equal(mask, before)
@@ -204,8 +234,8 @@ def test_the_box_is_exact() -> None:
     for mask in random_masks(300, 12, 5):
         found, corners = fit.box(mask), corners_of(mask)
         for axis in (0, 1):
-            assert found.min_xy[axis] == min(p[axis] for p in corners)
-            assert found.max_xy[axis] == max(p[axis] for p in corners)
+            assert found.min[0, axis] == min(p[axis] for p in corners)
+            assert found.max[0, axis] == max(p[axis] for p in corners)
 
 
 def least_square(points: list[Point]) -> Fraction:
@@ -229,15 +259,15 @@ def least_square(points: list[Point]) -> Fraction:
 
 def test_the_least_circle_is_least() -> None:
     for mask in random_masks(60, 5, 11):
-        square = Fraction(fit.least_circle(mask).radius) ** 2
-        least = least_square([p for p in corners_of(mask) if p in set(exact(fit.hull(mask).points_xy))])
+        square = Fraction(fit.least_circle(mask).radius[0]) ** 2
+        least = least_square([p for p in corners_of(mask) if p in set(exact(fit.hull(mask).points))])
         assert least <= square <= least * (1 + Fraction(1, 2**50))
 
 
 def test_a_circle_has_the_least_radius_for_its_center() -> None:
     for mask in random_masks(300, 12, 13):
         for circle in (fit.least_circle(mask), fit.pivot_circle(mask, (0.1, -3.7))):
-            assert not holds_circle(fit.Circle(circle.center_xy, math.nextafter(circle.radius, 0)), mask)
+            assert not holds_circle(Circles(circle.center, math.nextafter(circle.radius[0], 0)), mask)
 
 
 def test_no_quarter_turn_changes_the_circle_about_the_pivot() -> None:
@@ -246,7 +276,7 @@ def test_no_quarter_turn_changes_the_circle_about_the_pivot() -> None:
         square = np.zeros((side, side), np.bool_)
         square[: mask.shape[0], : mask.shape[1]] = mask
         pivot = ((side - 1) / 2, (side - 1) / 2)
-        assert len({fit.pivot_circle(np.rot90(square, i), pivot).radius for i in range(4)}) == 1
+        assert len({fit.pivot_circle(np.rot90(square, i), pivot).radius[0] for i in range(4)}) == 1
 
 
 def least_area(points: list[Point]) -> Fraction:
@@ -261,10 +291,10 @@ def least_area(points: list[Point]) -> Fraction:
 
 def test_the_oriented_box_is_least() -> None:
     for mask in random_masks(200, 6, 19):
-        area = area_of(fit.oriented_box(mask).corners_xy)
+        area = area_of(fit.oriented_box(mask).points)
         least = least_area(corners_of(mask))
         assert least <= area <= least * (1 + Fraction(1, 2**44))
-        p = fit.hull(mask).points_xy
+        p = fit.hull(mask).points
         for angle in np.linspace(0, np.pi / 2, 91):
             c, s = np.cos(angle), np.sin(angle)
             assert float(area) <= np.ptp(p[:, 0] * c + p[:, 1] * s) * np.ptp(p[:, 1] * c - p[:, 0] * s) * (1 + 1e-12)
@@ -272,7 +302,7 @@ def test_the_oriented_box_is_least() -> None:
 
 def test_the_oriented_box_has_right_angles() -> None:
     for mask in random_masks(200, 20, 23):
-        a, b, c, d = fit.oriented_box(mask).corners_xy
+        a, b, c, d = fit.oriented_box(mask).points
         assert abs(((b - a) * (c - b)).sum()) <= 1e-12 * area_of(np.array([a, b, c, d]))
         assert np.abs((b - a) - (c - d)).max() <= 1e-12
 
@@ -282,9 +312,9 @@ def test_one_box_more_never_covers_more() -> None:
         found = [fit.boxes(mask, k) for k in range(1, BOXES_MAX + 1)]
         for k, one in enumerate(found, 1):
             check_boxes(one, mask, k)
-        assert all(a.false_area >= b.false_area for a, b in itertools.pairwise(found))
-        (row,), whole = found[0].rows_xyxy, fit.box(mask)
-        assert row.tolist() == [*whole.min_xy, *whole.max_xy]
+        assert all(false_area(a, mask) >= false_area(b, mask) for a, b in itertools.pairwise(found))
+        (row,), whole = rows_of(found[0]), fit.box(mask)
+        assert row.tolist() == [*whole.min[0], *whole.max[0]]
 
 
 def least_false(mask: Bools, k: int) -> int:
@@ -309,7 +339,7 @@ def least_false(mask: Bools, k: int) -> int:
 
 def test_two_boxes_are_mostly_the_best_two() -> None:
     masks = list(random_masks(60, 5, 31))
-    found = [fit.boxes(mask, 2).false_area for mask in masks]
+    found = [false_area(fit.boxes(mask, 2), mask) for mask in masks]
     best = [least_false(mask, 2) for mask in masks]
     assert all(a >= b for a, b in zip(found, best, strict=True))
     assert sum(a == b for a, b in zip(found, best, strict=True)) >= 54
@@ -325,13 +355,13 @@ def test_two_boxes_are_mostly_the_best_two() -> None:
     ],
 )
 def test_what_boxes_can_cover_is_covered_without_a_false_pixel(mask: Bools, k: int) -> None:
-    assert fit.boxes(mask, k).false_area == 0
-    assert fit.boxes(mask, k - 1).false_area > 0
-    assert len(fit.boxes(mask, BOXES_MAX).rows_xyxy) <= mask.sum()
+    assert false_area(fit.boxes(mask, k), mask) == 0
+    assert false_area(fit.boxes(mask, k - 1), mask) > 0
+    assert len(rows_of(fit.boxes(mask, BOXES_MAX))) <= mask.sum()
 
 
 def test_the_hull_of_a_plus() -> None:
-    ring = fit.hull(mask_of(".#.", "###", ".#.")).points_xy
+    ring = fit.hull(mask_of(".#.", "###", ".#.")).points
     assert ring.tolist() == [
         [1.5, -0.5], [2.5, 0.5], [2.5, 1.5], [1.5, 2.5], [0.5, 2.5], [-0.5, 1.5], [-0.5, 0.5], [0.5, -0.5],
     ]  # fmt: skip
@@ -339,59 +369,84 @@ def test_the_hull_of_a_plus() -> None:
 
 def test_the_circle_of_a_pixel() -> None:
     circle = fit.least_circle(mask_of("...", "..#"))
-    assert circle.center_xy.tolist() == [2, 1]
-    assert 0.5 < Fraction(circle.radius) ** 2 < 0.5 + 1e-15
+    assert circle.center[0].tolist() == [2, 1]
+    assert 0.5 < Fraction(circle.radius[0]) ** 2 < 0.5 + 1e-15
+
+
+def test_a_capsule_follows_what_is_long() -> None:
+    assert fit.capsule(np.ones((1, 9), np.bool_)).radius[0] == pytest.approx(0.5)
+    y, x = np.mgrid[:40, :90]
+    along = np.clip((x - 20) * 0.8 + (y - 5) * 0.6, 0, 50)
+    beam = (x - 20 - 0.8 * along) ** 2 + (y - 5 - 0.6 * along) ** 2 <= 16
+    found = fit.capsule(beam)
+    assert found.radius[0] < 5.2  # 4 and half a pixel's diagonal; a capsule about the whole box's axis is no shorter
+    assert math.dist(found.a_xy[0], found.b_xy[0]) < 52
+    for mask in random_masks(100, 12, 43):
+        capsule = fit.capsule(mask)
+        assert not holds_capsule(Capsules(capsule.a_xy, capsule.b_xy, math.nextafter(capsule.radius[0], 0)), mask)
+
+
+def test_spans_have_the_volumes_of_their_mask() -> None:
+    for mask in random_masks(100, 14, 61):
+        spans = Spans.from_mask(mask, (-3, 7))
+        for name in ("hull", "box", "least_circle", "oriented_box", "capsule"):
+            here, there = getattr(fit, name)(mask).translated((-3, 7)).bounds(), getattr(fit, name)(spans).bounds()
+            assert np.allclose(here.min, there.min, rtol=0, atol=1e-12), name
+            assert np.allclose(here.max, there.max, rtol=0, atol=1e-12), name
+        assert np.array_equal(fit.hull(spans).points, fit.hull(mask).points + np.array([-3, 7]))
+    with pytest.raises(InputError, match="pixels: expected a pixel or more, got none"):
+        fit.hull(Spans.empty())
 
 
 def test_a_slanted_line_has_a_slanted_box() -> None:
     mask = np.eye(12, dtype=bool)
-    corners = fit.oriented_box(mask).corners_xy
+    corners = fit.oriented_box(mask).points
     assert area_of(corners) == 24  # 12 sqrt(2) long, sqrt(2) wide
-    assert fit.boxes(mask, 1).false_area == 132
+    assert false_area(fit.boxes(mask, 1), mask) == 132
 
 
 def test_leaving_out_the_cheapest_edge() -> None:
     """An octagon of a square without its corner pixels is the square again at four corners."""
     mask = np.ones((6, 6), np.bool_)
     mask[[0, 0, 5, 5], [0, 5, 0, 5]] = False
-    assert len(fit.convex(mask, 99).points_xy) == 8
-    assert area_of(fit.convex(mask, 4).points_xy) == 36
-    assert [area_of(fit.convex(mask, n).points_xy) for n in (8, 7, 6, 5)] == [34, Fraction(69, 2), 35, Fraction(71, 2)]
+    assert len(fit.convex(mask, 99).points) == 8
+    assert area_of(fit.convex(mask, 4).points) == 36
+    assert [area_of(fit.convex(mask, n).points) for n in (8, 7, 6, 5)] == [34, Fraction(69, 2), 35, Fraction(71, 2)]
 
 
 def test_without_tolerance_the_outline_is_the_mask() -> None:
     mask = mask_of("##.....", "##.###.", "#####..", "..####.", "....##.")
-    ring = fit.concave(mask, 0).points_xy
+    ring = fit.concave(mask, 0)
     assert area_of(ring) == mask.sum()
-    assert fit.concave(mask_of("#"), 0).points_xy.tolist() == [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+    assert fit.concave(mask_of("#"), 0).tolist() == [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
 
 
 def test_holes_are_filled_and_parts_are_bridged() -> None:
-    assert area_of(fit.concave(mask_of("####", "#..#", "####"), 0).points_xy) == 12
-    assert area_of(fit.concave(mask_of("#...#", ".....", "....."), 0).points_xy) == 5
-    assert area_of(fit.concave(mask_of("#.#..#"), 0).points_xy) == 6
-    assert area_of(fit.concave(mask_of("#.#", *["..."] * 8, "###"), 0).points_xy) == 14  # the two shortest of three
-    assert area_of(fit.concave(mask_of("#.", ".#"), 0).points_xy) == 3
+    assert area_of(fit.concave(mask_of("####", "#..#", "####"), 0)) == 12
+    assert area_of(fit.concave(mask_of("#...#", ".....", "....."), 0)) == 5
+    assert area_of(fit.concave(mask_of("#.#..#"), 0)) == 6
+    assert area_of(fit.concave(mask_of("#.#", *["..."] * 8, "###"), 0)) == 14  # the two shortest of three
+    assert area_of(fit.concave(mask_of("#.", ".#"), 0)) == 3
 
 
 def test_a_disc_gets_few_corners() -> None:
     """Fewer than its hull, though the hull leaves it by less."""
     y, x = np.mgrid[:41, :41]
     mask = (x - 20) ** 2 + (y - 20) ** 2 <= 404
-    counts = [len(fit.concave(mask, tolerance).points_xy) for tolerance in (0, 0.75, 1.5, 3, 9)]
+    counts = [len(fit.concave(mask, tolerance)) for tolerance in (0, 0.75, 1.5, 3, 9)]
     assert counts == sorted(counts, reverse=True)
-    assert counts[2] < len(fit.hull(mask).points_xy) <= counts[1]
+    assert counts[2] < len(fit.hull(mask).points) <= counts[1]
     assert counts[4] <= 8
-    assert area_of(fit.concave(mask, 1.5).points_xy) < 1.1 * mask.sum()
+    assert area_of(fit.concave(mask, 1.5)) < 1.1 * mask.sum()
 
 
 def test_an_outline_goes_round_a_spiral() -> None:
     """A lot of tolerance, and still no edge may cross another."""
     for tolerance in (0, 1, 2, 3):
-        ring = fit.concave(NAMED["spiral"], tolerance).points_xy
+        ring = fit.concave(NAMED["spiral"], tolerance)
         check_simple(ring)
         check_contains(ring, NAMED["spiral"])
-    assert area_of(fit.concave(NAMED["spiral"], 0).points_xy) == NAMED["spiral"].sum()
+    assert area_of(fit.concave(NAMED["spiral"], 0)) == NAMED["spiral"].sum()
 
 
 def test_the_outline_keeps_to_its_tolerance() -> None:
@@ -399,17 +454,17 @@ def test_the_outline_keeps_to_its_tolerance() -> None:
     y, x = np.mgrid[:30, :30]
     for tolerance, (a, b) in itertools.product((0.5, 1, 2, 4), ((1, 0), (3, 7), (-1, 2))):
         mask = ((x - 15) ** 2 + (y - 15) ** 2 <= 200) & ~((a * (x - 13) + b * (y - 15) > 0) & (abs(x - y) < 6))
-        ring = fit.concave(fit_part(mask), tolerance).points_xy
+        ring = fit.concave(fit_part(mask), tolerance)
         along = np.linspace(ring, np.roll(ring, -1, axis=0), 40).reshape(-1, 1, 2)
         pixels = np.argwhere(fit_part(mask))[:, ::-1]
         off = np.maximum(np.abs(along - pixels) - 0.5, 0)
         assert np.sqrt((off**2).sum(axis=2)).min(axis=1).max() <= tolerance + 1e-9
-        assert len(ring) <= len(fit.concave(fit_part(mask), 0).points_xy)
+        assert len(ring) <= len(fit.concave(fit_part(mask), 0))
 
 
 def fit_part(mask: Bools) -> Bools:
     """A mask whose outline at tolerance 0 is itself: its parts bridged, its holes filled."""
-    ring = fit.concave(mask, 0).points_xy
+    ring = fit.concave(mask, 0)
     filled = np.zeros(mask.shape, np.bool_)
     for (x, y), (x_next, y_next) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         if x == x_next:
@@ -421,13 +476,13 @@ def fit_part(mask: Bools) -> Bools:
 def test_large_outlines_are_taken_by_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outline, "OUTLINE_CORNERS", 12)
     for mask in random_masks(200, 24, 37):
-        ring = fit.concave(mask, 0).points_xy
+        ring = fit.concave(mask, 0)
         assert len(ring) <= 12
         check_simple(ring)
         check_contains(ring, mask)
     monkeypatch.setattr(outline, "OUTLINE_PIXELS", 30)
     for mask in random_masks(200, 24, 41):
-        ring = fit.concave(mask, 1).points_xy
+        ring = fit.concave(mask, 1)
         check_simple(ring)
         check_contains(ring, mask)
 
@@ -443,12 +498,12 @@ def test_masks_as_long_as_they_may_be(kind: str) -> None:
         mask[0] |= kind != "ends"
     if kind == "column":
         mask = mask.T
-    check_convex(fit.hull(mask).points_xy, mask)
+    check_convex(fit.hull(mask).points, mask)
     assert holds_circle(fit.least_circle(mask), mask)
-    check_convex(fit.oriented_box(mask).corners_xy, mask)
-    check_convex(fit.convex(mask, 5).points_xy, mask)
+    check_convex(fit.oriented_box(mask).points, mask)
+    check_convex(fit.convex(mask, 5).points, mask)
     check_boxes(fit.boxes(mask, 3), mask, 3)
-    check_simple(fit.concave(mask, 1).points_xy)
+    check_simple(fit.concave(mask, 1))
 
 
 @pytest.mark.parametrize("shape", [(64, MASK_SIDE_MAX), (MASK_SIDE_MAX, 64), (3000, 3000)])
@@ -459,18 +514,18 @@ def test_a_few_pixels_far_apart(shape: tuple[int, int]) -> None:
         mask = np.zeros(shape, np.bool_)
         mask[rng.integers(0, shape[0], count), rng.integers(0, shape[1], count)] = True
         assert holds_circle(fit.least_circle(mask), mask)
-        check_convex(fit.oriented_box(mask).corners_xy, mask)
+        check_convex(fit.oriented_box(mask).points, mask)
         for n in (4, 5, 7):
-            check_convex(fit.convex(mask, n).points_xy, mask)
+            check_convex(fit.convex(mask, n).points, mask)
 
 
 def test_a_pivot_far_away_or_tiny() -> None:
     mask = mask_of("#.", ".#")
     for pivot in ((2.0**40, -(2.0**40)), (5e-324, 1e-300), (1e9 + 0.1, 0.3)):
         circle = fit.pivot_circle(mask, pivot)
-        assert circle.center_xy.tolist() == list(pivot)
+        assert circle.center[0].tolist() == list(pivot)
         assert holds_circle(circle, mask)
-        assert not holds_circle(fit.Circle(circle.center_xy, math.nextafter(circle.radius, 0)), mask)
+        assert not holds_circle(Circles(circle.center, math.nextafter(circle.radius[0], 0)), mask)
 
 
 def test_strided_masks_are_read_as_they_look() -> None:
@@ -486,6 +541,7 @@ FITS = {
     "least_circle": fit.least_circle,
     "pivot_circle": lambda mask: fit.pivot_circle(mask, (0, 0)),
     "oriented_box": fit.oriented_box,
+    "capsule": fit.capsule,
     "boxes": lambda mask: fit.boxes(mask, 4),
     "convex": lambda mask: fit.convex(mask, 8),
     "concave": lambda mask: fit.concave(mask, 1),
