@@ -105,6 +105,24 @@ OUTLINE_PIXELS = 2**18
 OUTLINE_CORNERS = 4096
 """Blocks and corners of an outline before it is made simpler: each corner looks at all the others."""
 
+GROWN_PX = 0.5**0.5 + 1 / 256
+"""A turned or scaled frame's volume grows by half a pixel's diagonal, and what rounding may take."""
+
+TRIG_ERROR = 2.0**-29
+"""Relative length that a turn by a sine and cosine of 30 bits may gain or lose."""
+
+PLACE = 2.0**-16
+"""Corners of bounding volumes are multiples of it, px: far below 1/256, and whole shifts are exact."""
+
+CORNERS = 8
+"""Most corners of a polygon that goes before the pixels: with more, each pair costs more than it saves."""
+
+BOUNDING_CACHE_BYTES = 16 * 2**20
+"""Bounding volumes of masks kept for the next who asks, bytes."""
+
+BOUNDING_BYTES = 2048
+"""What a kept volume costs beside its corners, bytes."""
+
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""
 

@@ -51,7 +51,7 @@ from planes.kept import Kept
 from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
 
-__all__ = ["Form", "Sprite", "Variant", "as_sprite", "form_of", "picture_of", "rows_of", "variant_of"]
+__all__ = ["Form", "Sprite", "Variant", "as_sprite", "form_of", "frame_pivot", "picture_of", "rows_of", "variant_of"]
 
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
@@ -249,7 +249,7 @@ def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple
         image = np.zeros((*variant.mask.shape, 4), np.uint8)
         image[variant.mask] = (*(sprite.color or color), 255)
         return image, variant.pivot_x, variant.pivot_y
-    source, pivot_x, pivot_y = _source_pixels(frame.mask, _frame_pivot(sprite, frame), form)
+    source, pivot_x, pivot_y = _source_pixels(frame.mask, frame_pivot(sprite, frame), form)
     image = frame.image.reshape(-1, 4)[np.maximum(source, 0)]
     image[source < 0] = 0
     return image, pivot_x, pivot_y
@@ -266,7 +266,7 @@ def _make_variant(sprite: Sprite, form: Form) -> Variant:
         pivot_x, pivot_y = -SUB * x, -SUB * y
     else:
         frame = sprite.frames[form.frame]
-        source, pivot_x, pivot_y = _source_pixels(frame.mask, _frame_pivot(sprite, frame), form)
+        source, pivot_x, pivot_y = _source_pixels(frame.mask, frame_pivot(sprite, frame), form)
         mask = frame.mask.reshape(-1)[np.maximum(source, 0)] & (source >= 0) if frame.mask.size else frame.mask
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
@@ -358,7 +358,8 @@ def _squares(mapped: Ints, pivot: int, scale: int) -> list[Ints]:
     return [column, column - border] if border.any() else [column]
 
 
-def _frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:
+def frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:
+    """Where a frame is held, in 1/256 px from the centre of its pixel [0, 0]."""
     h, w = frame.mask.shape
     return sprite.pivot_256 or ((w - 1) * HALF, (h - 1) * HALF)
 

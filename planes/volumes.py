@@ -208,13 +208,25 @@ class _Hulls(Volumes):
         return Core(self.points, self.starts, rows_of(self.starts, len(self.points))[0], np.zeros(len(self)))
 
     @classmethod
-    def _around(cls, points: Floats, starts: Ints) -> Self:
+    def around(cls, points: Floats, starts: Ints) -> Self:
+        """Hulls of rows of points (M, 2), the first of each at `starts` (N,): whatever rounding made of them."""
         made = cls.__new__(cls)
         made.points, made.starts = outlines(reals("points", points, (None, 2)), starts)
         return made
 
+    def translated(self, xy: object) -> Self:
+        """Move by a vector (2,), or one for each row (N, 2); without rounding outlines stay outlines."""
+        row = rows_of(self.starts, len(self.points))[1]
+        by = _vectors("xy", xy, len(self), 2)[row]
+        points = self.points + by
+        if not ((points - by == self.points) & (points - self.points == by)).all():
+            return super().translated(xy)
+        made = type(self).__new__(type(self))
+        made.points, made.starts = points, self.starts
+        return made._of(self.original)
+
     def _moved(self, move: Move, factor: Floats) -> Self:
-        return self._around(move(self.points, rows_of(self.starts, len(self.points))[1]), self.starts)
+        return self.around(move(self.points, rows_of(self.starts, len(self.points))[1]), self.starts)
 
     def _chosen(self, rows: Ints) -> Self:
         made = type(self).__new__(type(self))
@@ -229,7 +241,7 @@ class Obbs(_Hulls):
     def from_corners(cls, corners: object) -> Self:
         """From corners (N, 4, 2), in any order."""
         array = reals("corners", corners, (None, 4, 2))
-        return cls._around(array.reshape(-1, 2), _even(len(array), 4)[0])
+        return cls.around(array.reshape(-1, 2), _even(len(array), 4)[0])
 
     @classmethod
     def from_center(cls, center: object, half_wh: object, angle_deg: object) -> Self:

@@ -14,7 +14,7 @@ ORDER = {
     "planes": (
         "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
         "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "image", "kept", "sprite", "hull",
-        "cover", "outline", "fit", "items", "compose", "labels", "poses", "scenefile", "scene", "render",
+        "cover", "outline", "fit", "bounding", "items", "compose", "labels", "poses", "scenefile", "scene", "render",
         "sampling",
     ),
     "weapons": (

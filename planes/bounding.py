@@ -1,0 +1,158 @@
+"""Bounding volumes of items: fitted to a frame once, and moved with the object from there.
+
+A pixel of a turned or scaled mask is set when its centre, mapped back, lies in a set pixel of the frame. So the frame's
+volume, moved by the pose, holds the centres, and grown by half a pixel's diagonal it holds the pixel squares. Flips and
+quarter turns are exact and need no growing. A shape has no frame: its volume is fitted to its mask as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planes import fit
+from planes.arrays import Bools, Floats
+from planes.constants import (
+    BOUNDING_BYTES,
+    BOUNDING_CACHE_BYTES,
+    CORNERS,
+    GROWN_PX,
+    PLACE,
+    SCALE_BITS,
+    SUB,
+    TRIG_BITS,
+    TRIG_ERROR,
+)
+from planes.kept import Kept
+from planes.sprite import Form, Sprite, Variant, frame_pivot
+from planes.volumes import Circles, Core, Obbs, Parts, Polygons, Volumes
+
+__all__ = ["KINDS", "Kind", "bounding", "fitted", "moved"]
+
+KINDS = ("circle", "oriented box", "boxes", "polygon")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of bounding volume, one of KINDS; `k` is the most boxes of "boxes"."""
+
+    name: str
+    k: int = 1
+
+
+def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
+    """Volumes of variants of sprites, one row each: they contain the pixel squares of the variants' masks.
+
+    Coordinates are px, with pixel [0, 0] of each mask about the origin, and whole multiples of PLACE but for circles:
+    a shift by whole pixels rounds nothing.
+    """
+    rows = [_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)]
+    cores = [row.parts.core() if isinstance(row, Parts) else row.core() for row in rows]
+    points = np.concatenate([np.zeros((0, 2)), *(core.points for core in cores)])
+    if kind.name == "circle":
+        return Circles(points, np.concatenate([np.zeros(0), *(core.radius for core in cores)]))
+    if kind.name == "oriented box":
+        return Obbs.from_corners(points.reshape(-1, 4, 2))
+    counts = np.concatenate([np.zeros(0, np.int64), *(core.counts for core in cores)])
+    rings = Polygons.around(points, np.cumsum(counts) - counts)
+    if kind.name == "polygon":
+        return rings
+    sizes = np.array([len(core.counts) for core in cores], np.int64)
+    return Parts(rings, np.cumsum(sizes) - sizes)
+
+
+def fitted(kind: Kind, mask: Bools) -> Volumes:
+    """Fit a volume of a kind to a mask with a pixel or more: one row, in px about its pixel [0, 0]."""
+    if kind.name == "circle":
+        return fit.least_circle(mask)
+    if kind.name == "oriented box":
+        return fit.oriented_box(mask)
+    return fit.boxes(mask, kind.k) if kind.name == "boxes" else fit.convex(mask, CORNERS)
+
+
+def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volumes:
+    """Move a volume of a frame with its object, so that it contains the pixel squares of the variant's mask.
+
+    Parameters
+    ----------
+    volume : one row that contains the pixel squares of the frame, in px about its pixel [0, 0]
+    pivot_256 : pivot of the frame, in 1/256 px from there
+    variant : the mask that the frame's flips, scale and turn make
+
+    Returns
+    -------
+    one row, in px about pixel [0, 0] of the variant's mask: circles stay circles; boxes and polygons become polygons
+    """
+    form = variant.key[1]
+    parts = volume.parts if isinstance(volume, Parts) else volume
+    core = parts.core()
+    offset = np.array(pivot_256) / SUB
+    place = np.array([variant.pivot_x, variant.pivot_y]) / SUB
+    least, most = (pick(form.scale_x, form.scale_y) / (1 << SCALE_BITS) for pick in (min, max))
+    reach = float(np.abs(core.points - offset).max() + core.radius.max()) * most
+    grown = 0.0 if form.plain else GROWN_PX + reach * TRIG_ERROR
+    if isinstance(parts, Circles):
+        return Circles(_turned(core.points - offset, form) + place, core.radius * most + grown)
+    points = core.points + _outward(core) * (grown / least)
+    rings = Polygons.around(_placed(_turned(points - offset, form) + place), core.starts)
+    return Parts(rings, volume.starts) if isinstance(volume, Parts) else rings
+
+
+def _turned(points: Floats, form: Form) -> Floats:
+    """Vectors from the pivot, flipped, scaled and turned as the mask is."""
+    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]])
+    x = -x if "x" in form.flip else x
+    y = -y if form.flip in ("y", "xy") else y
+    c, s = form.c, form.s
+    for _ in range(form.quarter):
+        c, s = -s, c
+    return np.stack([x * c - y * s, x * s + y * c], axis=1) / (1 << TRIG_BITS)
+
+
+def _outward(core: Core) -> Floats:
+    """How far each corner of convex rings moves when all edges move outward by 1 px."""
+    row = np.repeat(np.arange(len(core.starts)), core.counts)
+    place = np.arange(len(core.points)) - core.starts[row]
+    before = core.starts[row] + (place - 1) % core.counts[row]
+    step = core.points[core.starts[row] + (place + 1) % core.counts[row]] - core.points
+    normal = np.stack([step[:, 1], -step[:, 0]], axis=1) / np.sqrt((step**2).sum(axis=1))[:, None]
+    both = normal[before] + normal
+    return np.asarray(both / (1 + (normal[before] * normal).sum(axis=1))[:, None])
+
+
+def _placed(points: Floats) -> Floats:
+    return np.rint(points / PLACE) * PLACE
+
+
+def _bytes(row: Volumes) -> int:
+    core = row.parts.core() if isinstance(row, Parts) else row.core()
+    return core.points.nbytes + BOUNDING_BYTES
+
+
+_fitted: Kept[tuple[Any, ...], Volumes] = Kept(BOUNDING_CACHE_BYTES, _bytes)
+_bounding: Kept[tuple[Any, ...], Volumes] = Kept(BOUNDING_CACHE_BYTES, _bytes)
+
+
+def _bounding_of(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
+    return _bounding.get((kind, *variant.key), lambda: _make_bounding(kind, sprite, variant))
+
+
+def _make_bounding(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
+    if sprite.outline is not None:
+        return _on_grid(fitted(kind, variant.mask))
+    frame = sprite.frames[variant.key[1].frame]
+    volume = _fitted.get((kind, sprite.uid, variant.key[1].frame), lambda: _on_grid(fitted(kind, frame.mask)))
+    return moved(volume, frame_pivot(sprite, frame), variant)
+
+
+def _on_grid(volume: Volumes) -> Volumes:
+    """Corners on whole multiples of PLACE, outward where they are moved."""
+    if isinstance(volume, Circles | Parts):
+        return volume
+    core = volume.core()
+    if (_placed(core.points) == core.points).all():
+        return volume
+    return Polygons.around(_placed(core.points + 2 * PLACE * _outward(core)), core.starts)

@@ -1,0 +1,238 @@
+"""Bounding volumes hold the pixel squares of turned, scaled and flipped masks, in exact arithmetic."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from planes import fit
+from planes.arrays import Bools
+from planes.bounding import KINDS, Kind, bounding, fitted, moved
+from planes.constants import CORNERS, PLACE
+from planes.sprite import Sprite, Variant, form_of, frame_pivot, variant_of
+from planes.volumes import Aabbs, Circles, Obbs, Parts, Polygons, Volumes
+
+Point = tuple[Fraction, Fraction]
+HALF = Fraction(1, 2)
+EVERY = [Kind("circle"), Kind("oriented box"), Kind("boxes", 1), Kind("boxes", 5), Kind("polygon")]
+
+POSES = [
+    ("none", (1, 1), 0), ("x", (1, 1), 90), ("y", (1, 1), 180), ("xy", (1, 1), 270), ("none", (1, 1), 37),
+    ("x", (1, 1), 45), ("none", (2, 2), 0), ("none", (0.5, 0.5), 0), ("y", (3, 0.4), 0), ("x", (0.3, 2.7), 200.5),
+    ("none", (1, 1), 1e-4), ("none", (0.01, 0.01), 12), ("xy", (7.3, 7.3), -61),
+]  # fmt: skip
+
+
+def masks(rng: np.random.Generator, count: int, side: int) -> Iterator[Bools]:
+    """Noise of all densities, now and then a single pixel, or a thin line."""
+    for i in range(count):
+        mask = rng.random(rng.integers(1, side + 1, 2)) < rng.choice([0.03, 0.2, 0.5, 0.95])
+        if i % 7 == 3:
+            mask = np.eye(int(rng.integers(1, side + 1)), dtype=np.bool_)
+        if not mask.any():
+            mask[tuple(rng.integers(0, mask.shape))] = True
+        yield mask
+
+
+def outside(piece: list[Point], a: Point, b: Point) -> tuple[list[Point], list[Point]]:
+    """Cut a convex piece by the line through a and b: what is left of it inside, and outside."""
+    sides = [(b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) for p in piece]
+    inner: list[Point] = []
+    outer: list[Point] = []
+    for i, (p, s) in enumerate(zip(piece, sides, strict=True)):
+        q, t = piece[(i + 1) % len(piece)], sides[(i + 1) % len(piece)]
+        if s >= 0:
+            inner.append(p)
+        if s <= 0:
+            outer.append(p)
+        if s * t < 0:
+            cut = (p[0] + (q[0] - p[0]) * s / (s - t), p[1] + (q[1] - p[1]) * s / (s - t))
+            inner.append(cut)
+            outer.append(cut)
+    return inner, outer
+
+
+def area(piece: list[Point]) -> Fraction:
+    return sum((p[0] * q[1] - p[1] * q[0] for p, q in zip(piece, piece[1:] + piece[:1], strict=True)), Fraction(0))
+
+
+def covered(square: list[Point], rings: list[list[Point]]) -> bool:
+    """Whether convex rings cover a square: ring after ring takes its part away, and no area is left."""
+    left = [square]
+    for ring in rings:
+        rest = []
+        for piece in left:
+            inner = piece
+            for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
+                inner, outer = outside(inner, a, b)
+                if area(outer):
+                    rest.append(outer)
+                if not area(inner):
+                    break
+        left = rest
+    return not left
+
+
+def squares(mask: Bools) -> Iterator[list[Point]]:
+    """Pixel squares that have a neighbour missing: a convex part, or a union with none of them open, holds the rest."""
+    around = np.pad(mask, 1)
+    inner = around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
+    for y, x in np.argwhere(mask & ~inner).tolist():
+        low, high = (x - HALF, y - HALF), (x + HALF, y + HALF)
+        yield [low, (high[0], low[1]), high, (low[0], high[1])]
+
+
+def rings_of(volume: Volumes) -> list[list[Point]]:
+    core = volume.parts.core() if isinstance(volume, Parts) else volume.core()
+    parts = np.split(core.points, core.starts[1:])
+    return [[(Fraction(x), Fraction(y)) for x, y in part.tolist()] for part in parts]
+
+
+def holds(volume: Volumes, mask: Bools) -> bool:
+    """Whether the one row of a volume contains the pixel squares of a mask."""
+    assert len(volume) == 1
+    if isinstance(volume, Circles):
+        (x, y), r = map(Fraction, volume.center[0].tolist()), Fraction(volume.radius[0])
+        return all((p - x) ** 2 + (q - y) ** 2 <= r * r for square in squares(mask) for p, q in square)
+    rings = rings_of(volume)
+    return all(covered(square, rings) for square in squares(mask))
+
+
+def variant(sprite: Sprite, pose: tuple[str, tuple[float, float], float], frame: int = 0) -> Variant:
+    flip, scale, angle = pose
+    return variant_of(sprite, form_of(sprite, frame, flip, scale, angle))
+
+
+def check(sprite: Sprite, pose: tuple[str, tuple[float, float], float]) -> None:
+    seen = variant(sprite, pose)
+    if not seen.area:
+        return
+    for kind in EVERY:
+        volume = bounding(kind, [sprite], [seen])
+        assert holds(volume, seen.mask), (kind, pose)
+        if kind.name != "circle":
+            points = (volume.parts if isinstance(volume, Parts) else volume).core().points / PLACE
+            assert (points == np.rint(points)).all(), (kind, pose)
+
+
+def test_the_check_sees_what_sticks_out() -> None:
+    mask = np.ones((2, 3), np.bool_)
+    assert holds(fit.box(mask), mask)
+    assert holds(fit.boxes(mask, 3), mask)
+    assert not holds(Aabbs([[-0.5, -0.5]], [[2.5, np.nextafter(1.5, 0)]]), mask)
+    assert holds(Circles([[1, 0.5]], 1.8028), mask)
+    assert not holds(Circles([[1, 0.5]], 1.8027), mask)  # the root of 1.5**2 + 1
+    halves = Aabbs([[-0.5, -0.5], [1, -0.5]], [[1, 1.5], [2.5, 1.5]])
+    assert holds(Parts(halves, [0]), mask)  # no half holds the middle pixels: both together do
+    assert not holds(Parts(halves.translated([[0, 0], [1e-9, 0]]), [0]), mask)
+
+
+@pytest.mark.parametrize("pose", POSES, ids=str)
+def test_volumes_hold_turned_scaled_and_flipped_masks(pose: tuple[str, tuple[float, float], float]) -> None:
+    rng = np.random.default_rng(7)
+    for mask in masks(rng, 14, 9):
+        pivot = None if rng.random() < 0.5 else rng.normal(3, 6, 2).tolist()
+        check(Sprite.from_mask(mask, pivot_xy=pivot), pose)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(8))
+def test_volumes_hold_masks_of_many_poses(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    for mask in masks(rng, 120, 16):
+        scale = np.exp(rng.normal(0, 0.8, 2)).tolist() if rng.random() < 0.5 else [float(np.exp(rng.normal(0, 1)))] * 2
+        pose = (str(rng.choice(["none", "x", "y", "xy"])), (scale[0], scale[1]), float(rng.uniform(-400, 400)))
+        check(Sprite.from_mask(mask, pivot_xy=rng.normal(0, 30, 2).tolist()), pose)
+
+
+def test_far_pivots_and_great_scales() -> None:
+    """The sine's last bit times the way from the pivot is more than the growing alone would cover."""
+    mask = np.array([[True, False], [True, True]])
+    for pose in (("none", (256.0, 256.0), 33.3), ("x", (256.0, 1 / 256), 10), ("none", (1 / 256, 1 / 256), 44)):
+        sprite = Sprite.from_mask(mask, pivot_xy=(32000.25, -31000.5))
+        seen = variant(sprite, pose)
+        if not seen.area:
+            continue
+        edge = seen.mask & ~(np.random.default_rng(3).random(seen.mask.shape) < 0.99)
+        for kind in EVERY:
+            assert holds(bounding(kind, [sprite], [seen]), edge if edge.any() else seen.mask)
+
+
+@pytest.mark.parametrize("name", ["circle", "oriented box", "polygon"])
+def test_long_thin_masks(name: str) -> None:
+    """Needles: corners go far when their edges move out."""
+    mask = np.zeros((41, 1200), np.bool_)
+    mask[np.arange(1200) // 30, np.arange(1200)] = True
+    sprite = Sprite.from_mask(mask)
+    for angle in (1.0, 33.0, 91.5):
+        seen = variant(sprite, ("none", (1.0, 1.0), angle))
+        assert holds(bounding(Kind(name), [sprite], [seen]), seen.mask & (np.arange(seen.mask.shape[1]) % 40 < 2))
+
+
+def test_shapes_are_fitted_as_they_are() -> None:
+    for sprite in (
+        Sprite.circle(4.3), Sprite.box(7, 2.5), Sprite.polygon([(0, 0), (9, 1), (3, 8)]),
+        Sprite.polygon([(-6, -6), (6, -6), (6, 6), (-6, 6)], [[(-2, -2), (2, -2), (2, 2), (-2, 2)]]),
+    ):  # fmt: skip
+        for pose in POSES:
+            check(sprite, pose)
+
+
+def test_flips_and_quarter_turns_are_exact() -> None:
+    mask = np.array([[0, 1, 1, 0, 0], [1, 1, 0, 0, 1], [0, 1, 1, 1, 0]], np.bool_)
+    sprite = Sprite.from_mask(mask, pivot_xy=(1.25, 7.5))
+    for flip in ("none", "x", "y", "xy"):
+        for angle in (0, 90, 180, 270):
+            seen = variant(sprite, (flip, (1.0, 1.0), angle))
+            for name in ("boxes", "polygon"):
+                kind = Kind(name, 4)
+                volume, refitted = bounding(kind, [sprite], [seen]), fitted(kind, seen.mask)
+                low, high = volume.bounds(), refitted.bounds()
+                assert low.min.tolist() == high.min.tolist()
+                assert low.max.tolist() == high.max.tolist()
+            circle, again = (bounding(Kind("circle"), [sprite], [v]) for v in (seen, variant(sprite, POSES[0])))
+            assert isinstance(circle, Circles)
+            assert isinstance(again, Circles)
+            assert circle.radius == again.radius
+
+
+def test_a_turn_about_the_pivot_keeps_the_circle_about_it() -> None:
+    mask = np.array([[0, 1, 1], [1, 1, 0]], np.bool_)
+    sprite = Sprite.from_mask(mask, pivot_xy=(0.5, 2))
+    circle = fit.pivot_circle(mask, (0.5, 2))
+    radii = set()
+    for angle in (10, 20, 130, 300):
+        seen = variant(sprite, ("none", (1.0, 1.0), angle))
+        turned = moved(circle, frame_pivot(sprite, sprite.frames[0]), seen)
+        assert isinstance(turned, Circles)
+        assert holds(turned, seen.mask)
+        assert np.allclose(turned.center[0] * 256, (seen.pivot_x, seen.pivot_y), rtol=0, atol=1e-9)
+        radii.add(float(turned.radius[0]))
+    assert len(radii) == 1
+    assert circle.radius[0] < radii.pop() < circle.radius[0] + 0.72
+
+
+def test_rows_are_those_of_one_at_a_time() -> None:
+    sprites = [Sprite.from_mask(mask) for mask in masks(np.random.default_rng(5), 9, 7)]
+    poses = [POSES[3 * i % len(POSES)] for i in range(9)]
+    seen = [variant(sprite, pose) for sprite, pose in zip(sprites, poses, strict=True)]
+    some = [(s, v) for s, v in zip(sprites, seen, strict=True) if v.area]
+    for kind in EVERY:
+        rows = bounding(kind, [s for s, _ in some], [v for _, v in some])
+        assert isinstance(
+            rows, {"circle": Circles, "oriented box": Obbs, "boxes": Parts, "polygon": Polygons}[kind.name]
+        )
+        assert len(rows) == len(some)
+        for i, (sprite, one) in enumerate(some):
+            alone, row = bounding(kind, [sprite], [one]), rows.take([i])
+            assert row.bounds().min.tolist() == alone.bounds().min.tolist()
+            assert row.bounds().max.tolist() == alone.bounds().max.tolist()
+        assert len(bounding(kind, [], [])) == 0
+
+
+def test_kinds() -> None:
+    mask = np.ones((9, 40), np.bool_) & (np.hypot(*np.meshgrid(np.arange(40) / 2, np.arange(9))) < 12)
+    assert len(rings_of(fitted(Kind("polygon"), mask))[0]) <= CORNERS
+    assert len(rings_of(fitted(Kind("boxes", 6), mask))) == 6
+    assert {kind.name for kind in EVERY} == set(KINDS)
