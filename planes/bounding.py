@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from planes import fit
-from planes.arrays import Bools, Floats
+from planes.arrays import Bools, Floats, Ints
 from planes.constants import (
     BOUNDING_BYTES,
     BOUNDING_CACHE_BYTES,
@@ -27,10 +27,11 @@ from planes.constants import (
     TRIG_ERROR,
 )
 from planes.kept import Kept
+from planes.rings import rows_of
 from planes.sprite import Form, Sprite, Variant, frame_pivot
 from planes.volumes import Circles, Core, Obbs, Parts, Polygons, Volumes
 
-__all__ = ["KINDS", "Kind", "bounding", "fitted", "moved"]
+__all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "joined", "moved"]
 
 KINDS = ("circle", "oriented box", "boxes", "polygon")
 
@@ -49,19 +50,66 @@ def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant])
     Coordinates are px, with pixel [0, 0] of each mask about the origin, and whole multiples of PLACE but for circles:
     a shift by whole pixels rounds nothing.
     """
-    rows = [_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)]
-    cores = [row.parts.core() if isinstance(row, Parts) else row.core() for row in rows]
+    return joined(
+        kind, [_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)]
+    )
+
+
+def joined(kind: Kind, volumes: Sequence[Volumes]) -> Volumes:
+    """All rows of volumes of one kind."""
+    cores = [volume.parts.core() if isinstance(volume, Parts) else volume.core() for volume in volumes]
     points = np.concatenate([np.zeros((0, 2)), *(core.points for core in cores)])
     if kind.name == "circle":
         return Circles(points, np.concatenate([np.zeros(0), *(core.radius for core in cores)]))
     if kind.name == "oriented box":
         return Obbs.from_corners(points.reshape(-1, 4, 2))
-    counts = np.concatenate([np.zeros(0, np.int64), *(core.counts for core in cores)])
-    rings = Polygons.around(points, np.cumsum(counts) - counts)
+    rings = Polygons.around(points, _starts([core.counts for core in cores]))
     if kind.name == "polygon":
         return rings
-    sizes = np.array([len(core.counts) for core in cores], np.int64)
-    return Parts(rings, np.cumsum(sizes) - sizes)
+    return Parts(rings, _starts([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)]))
+
+
+def _starts(counts: Sequence[Ints]) -> Ints:
+    every = np.concatenate([np.zeros(0, np.int64), *counts])
+    return np.asarray(np.cumsum(every) - every)
+
+
+class Bounds:
+    """Volumes of one kind of the masks in use, made when they are first asked for.
+
+    Parameters
+    ----------
+    kind : of the volumes
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self.kind = kind
+        self.volumes = joined(kind, [])
+        self._masks = np.zeros(0, np.int64)
+        self._row = np.zeros(0, np.int64)
+
+    def rows(self, masks: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant], ids: Ints) -> Ints:
+        """Find the rows in `volumes` of the masks of items.
+
+        Parameters
+        ----------
+        masks : (n,) a number for each item's mask: equal masks have one
+        sprites, variants : of all items
+        ids : (n,) which of them
+        """
+        used, first, of = np.unique(masks, return_index=True, return_inverse=True)
+        new = ~np.isin(used, self._masks)
+        if new.any():
+            items = ids[first[new]].tolist()
+            more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
+            every = np.concatenate([self._masks, used[new]])
+            order = np.argsort(every)
+            self.volumes = joined(self.kind, [self.volumes, more])
+            self._masks, self._row = (
+                every[order],
+                np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
+            )
+        return np.asarray(self._row[np.searchsorted(self._masks, used)][of])
 
 
 def fitted(kind: Kind, mask: Bools) -> Volumes:

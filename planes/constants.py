@@ -117,11 +117,17 @@ PLACE = 2.0**-16
 CORNERS = 8
 """Most corners of a polygon that goes before the pixels: with more, each pair costs more than it saves."""
 
-BOUNDING_CACHE_BYTES = 16 * 2**20
+PAIRS_AT_ONCE = 2**14
+"""Pairs of volumes compared at a time: a megabyte or two with their corners."""
+
+BOUNDING_CACHE_BYTES = 32 * 2**20
 """Bounding volumes of masks kept for the next who asks, bytes."""
 
-BOUNDING_BYTES = 2048
+BOUNDING_BYTES = 1024
 """What a kept volume costs beside its corners, bytes."""
+
+INDEX_SLACK = 4096
+"""Boxes that came and went which an index tolerates beside half of its own, before it is built anew."""
 
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""

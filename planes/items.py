@@ -6,15 +6,18 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import takewhile
 
 import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, InputError, Ints
+from planes.bounding import Bounds, Kind
 from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
 from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
+from planes.volumes import Volumes
 
 __all__ = ["Items", "MaskAtlas", "Role", "Stack", "clipped", "overlapping"]
 
@@ -158,6 +161,7 @@ class Items:
         self._journal_rows = 0
         self._forgotten = 0
         self._stack: tuple[int, Stack] | None = None
+        self._bounds: dict[Kind, Bounds] = {}
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
 
@@ -225,15 +229,22 @@ class Items:
 
     def changed_boxes(self, version: int) -> Ints | None:
         """Boxes (n, 4) where deciding items were or are, changed after a version; None if that is forgotten."""
+        changes = self._since(version)
+        if changes is None:
+            return None
+        every = np.concatenate([np.zeros((0, 4), np.int64), *(box for _, *both in changes for box in both)])
+        return every[every[:, 0] <= every[:, 2]]
+
+    def changed_ids(self, version: int) -> Ints | None:
+        """Items changed after a version, each once, sorted; None if that is forgotten."""
+        changes = self._since(version)
+        return None if changes is None else np.unique(np.concatenate([np.zeros(0, np.int64), *(c[0] for c in changes)]))
+
+    def _since(self, version: int) -> list[tuple[Ints, Ints, Ints]] | None:
+        """Journal (ids, boxes before, boxes after) after a version, the last first."""
         if version < self._forgotten:
             return None
-        boxes = [np.zeros((0, 4), np.int64)]
-        for at, _, before, after in reversed(self._journal):
-            if at <= version:
-                break
-            boxes += [before, after]
-        every = np.concatenate(boxes)
-        return every[every[:, 0] <= every[:, 2]]
+        return [entry[1:] for entry in takewhile(lambda entry: entry[0] > version, reversed(self._journal))]
 
     def boxes(self, ids: Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of items; x_max < x_min where nothing is there to be met."""
@@ -273,6 +284,12 @@ class Items:
             ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat
         )
 
+    def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
+        """Volumes of masks, and the row of each item's: in px about its mask's pixel [0, 0]."""
+        bounds = self._bounds.setdefault(kind, Bounds(kind))
+        rows = bounds.rows(self.offset[ids], self.sprites, self.variants, ids)
+        return bounds.volumes, rows
+
     def _use(self, item: int, variant: Variant) -> None:
         self.offset[item] = self.atlas.take(variant)
         self.pivot_256[item] = variant.pivot_x, variant.pivot_y
@@ -280,6 +297,7 @@ class Items:
 
     def _compact(self) -> None:
         """Lay the masks in use out anew, without the others."""
+        self._bounds.clear()
         self.atlas = MaskAtlas()
         for item in np.flatnonzero(self.alive[: self.count]).tolist():
             self.offset[item] = self.atlas.take(self.variants[item])

@@ -15,6 +15,7 @@ from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integ
 from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
+from planes.index import Index
 from planes.items import ROLES, Items, Role
 from planes.labels import plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
@@ -83,6 +84,7 @@ class Scene:
         self.weapons: dict[str, Any] = {}
         self.shots: list[Any] = []
         self._code_plane: CodePlane | None = None
+        self._indexes: dict[str, Index] = {}
 
     @classmethod
     def from_planes(
@@ -301,6 +303,12 @@ class Scene:
         if self._code_plane is None and self.bounds is not None and plane_fits(self.bounds):
             self._code_plane = CodePlane(self.bounds)
         return self._code_plane
+
+    def index(self, structure: str) -> Index:
+        """The broad phase of the items that decide, "none", "grid", "quadtree" or "bvh"; it follows the scene."""
+        if structure not in self._indexes:
+            self._indexes[structure] = Index(structure)
+        return self._indexes[structure]
 
     def content_hash(self) -> str:
         """Hash of all that decides hits: equal scenes answer every shot alike."""

@@ -325,7 +325,15 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "seed, 5000 digits": (lambda: shot(seed=DIGITS), "seed: expected .*got a int that is too long to show"),
     "seed, array": (lambda: shot(seed=np.array([1, 2])), r"seed: expected one, or one for each of 1 shots, got shape"),
     "shot numbers, too few": (lambda: shot(at=[(1, 2), (3, 4)], shot=[1]), r"shot: expected shape \(2,\), got \(1,\)"),
-    "prefilter": (lambda: shot(prefilter="boxes"), "prefilter: .*got 'boxes' .did you mean 'box'"),
+    "prefilter": (lambda: shot(prefilter="boxs"), "prefilter: .*got 'boxs' .did you mean 'box"),
+    "prefilter, a number": (lambda: shot(prefilter=3), "prefilter: expected one of .*got 3"),
+    "prefilter, no box": (lambda: shot(prefilter="0 boxes"), "prefilter: expected 1 to 64 boxes, got 0"),
+    "prefilter, too many": (lambda: shot(prefilter="65 boxes"), "prefilter: expected 1 to 64 boxes, got 65"),
+    "broadphase": (lambda: shot(broadphase="quad"), "broadphase: .*got 'quad' .did you mean 'quadtree'"),
+    "broadphase, no boxes": (
+        lambda: shot(broadphase="grid", prefilter="none"),
+        "broadphase: expected 'none' without a pre-filter, got 'grid'",
+    ),
     "strategy": (lambda: shot(strategy="composd"), "strategy: .*got 'composd' .did you mean 'composed'"),
     # what may be asked of hits
     "rows of shot 1 of 1": (lambda: shot().of(1), "shot: expected a whole number from 0 to 0, got 1"),

@@ -31,6 +31,7 @@ ONE = 2**30
 FAR = 10**9
 SCENES_IN_PART = 100
 PARTS, LONG_PARTS = 10, 90
+PREFILTERS = ("box", "circle", "oriented box", "1 boxes", "3 boxes", "polygon", "swept")
 
 
 # The oracle: from a scene and the arguments of `fire` to rows and verdict counts, one sample at a time
@@ -327,6 +328,10 @@ def check_battle(seed: int) -> int:
     for strategy, prefilter in itertools.product(strategies, ("none", "box", "auto")):
         hits = volley.fired(scene, strategy=strategy, prefilter=prefilter)
         assert told(hits) == truth, f"{seed=} {strategy} {prefilter}"
+    for prefilter in rng.sample(PREFILTERS, 2):
+        strategy, broadphase = rng.choice(strategies), rng.choice(("none", "grid", "quadtree", "bvh"))
+        hits = volley.fired(scene, strategy=strategy, prefilter=prefilter, broadphase=broadphase)
+        assert told(hits) == truth, f"{seed=} {strategy} {prefilter} {broadphase}"
     assert told(volley.fired(scene)) == truth, f"{seed=}"
     rows, verdicts = [], []
     for which in range(len(volley.shots)):

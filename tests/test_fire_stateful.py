@@ -179,6 +179,9 @@ class ChangingScene(RuleBasedStateMachine):
         assert told(hits) == truth
         if scene.bounds is not None:
             assert volley.fired(scene, strategy="composed") == hits
+        for broadphase in ("grid", "quadtree", "bvh"):
+            assert volley.fired(scene, strategy="direct", broadphase=broadphase) == hits
+            scene.index(broadphase).read(scene.items).check()
         return hits
 
     @rule()

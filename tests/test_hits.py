@@ -530,9 +530,8 @@ def test_what_a_scene_does_not_need_is_left_out() -> None:
     scene = Scene()
     hits = fire(scene, Disc(3), (4, 4))
     _, left_out, bytes_made = stages(hits)
-    assert {"weights", "outside", "occluders", "pre-filter", "walk", "code plane"} == set(left_out) and bytes_made[
-        "patterns"
-    ] > 0
+    unused = {"weights", "outside", "occluders", "broad phase", "volumes", "pre-filter", "walk", "code plane"}
+    assert unused == set(left_out) and bytes_made["patterns"] > 0
     for role in ("background", "mover", "hud"):
         scene.add(square(3), role=role)
     assert {"background", "mover", "hud"} <= set(stages(fire(scene, Disc(3), (4, 4)))[1])

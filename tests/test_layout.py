@@ -14,8 +14,8 @@ ORDER = {
     "planes": (
         "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
         "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "image", "kept", "sprite", "hull",
-        "cover", "outline", "fit", "bounding", "items", "compose", "labels", "poses", "scenefile", "scene", "render",
-        "sampling",
+        "cover", "outline", "fit", "bounding", "items", "index", "compose", "labels", "poses", "scenefile", "scene",
+        "render", "sampling",
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits", "firing",

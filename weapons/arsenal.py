@@ -20,7 +20,7 @@ from planes.scene import Scene
 from planes.schema import Flag, Mask, Number, Numbers, Optional, Ref, Rows, Value, Whole, Word
 from planes.spans import Spans
 from planes.sprite import Form, Sprite, rows_of, variant_of
-from weapons.pattern import FALLOFFS, Pattern, make_pattern
+from weapons.pattern import FALLOFFS, Pattern, Swept, make_pattern
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
@@ -104,6 +104,10 @@ class Plain(Weapon):
     def spans(self, c: int, s: int) -> Spans:
         """Pixels about the shot's pixel, aimed along the direction (c, s) of length 2**30."""
         raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+
+    def swept(self, c: int, s: int) -> Swept | None:
+        """The segment that the pattern lies along, if it has one, and how far from it centres may lie."""
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +259,11 @@ class Beam(Plain):
 
     def spans(self, c: int, s: int) -> Spans:
         """A segment with round ends."""
-        return beam(ORIGIN, turned(np.array([_snapped(self.length), 0]), c, s), _snapped(self.width / 2))
+        return beam(*self.swept(c, s))
+
+    def swept(self, c: int, s: int) -> Swept:
+        """From the shot's pixel as far as it reaches."""
+        return ORIGIN, turned(np.array([_snapped(self.length), 0]), c, s), _snapped(self.width / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,7 +379,11 @@ _kept: Kept[tuple[Plain, int, int], Pattern] = Kept(PATTERN_CACHE_BYTES, lambda 
 
 def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
     """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept."""
-    return _kept.get((weapon, c, s), lambda: make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256))
+
+    def make() -> Pattern:
+        return make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256, weapon.swept(c, s))
+
+    return _kept.get((weapon, c, s), make)
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:

@@ -1,36 +1,74 @@
 """The pre-filter: which items may a placed pattern touch, and which of them does the shot refuse.
 
-It may keep too much; it never drops a hit.
+1. Boxes: one by one, or by a broad phase (grid, quadtree, BVH) that follows the scene.
+2. Volumes: the item's and the pattern's (circle, oriented box, k boxes, polygon, swept), about the pattern's origin.
+
+It may keep too much; it never drops a hit: a pixel that is shared lies, with its whole square, in both volumes.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
-from planes.arrays import Bools, Ints
-from planes.items import Stack, overlapping
+from planes import fit
+from planes.arrays import Bools, InputError, Ints, choice
+from planes.bounding import Kind
+from planes.constants import BOXES_MAX, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
+from planes.index import Index
+from planes.items import Items, Stack, overlapping
+from planes.overlap import overlap
 from planes.sampling import Pairs
-from weapons.volley import Shots
+from planes.volumes import Capsules, Circles, Obbs, Polygons, Volumes
+from weapons.pattern import Pattern, Swept
+from weapons.volley import Shots, Volley
 
-__all__ = ["PREFILTERS", "pairs_of", "refused"]
+__all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "pattern_volumes", "prefilter_of", "refused"]
 
-PREFILTERS = ("auto", "none", "box")
+PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "boxes", "polygon", "swept")
+BOXES = 4
+"""Boxes of the pre-filter "boxes" where no number is given."""
 
 
-def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack, prefilter: str) -> Pairs:
-    """Pairs of placements and items, front to back.
+@dataclass(frozen=True)
+class Prefilter:
+    """What goes before the pixels: a name of PREFILTERS, and the items' kind of volume beyond boxes."""
+
+    name: str
+    kind: Kind | None = None
+
+    def __str__(self) -> str:
+        return f"{self.kind.k} boxes" if self.kind and self.name == "boxes" else self.name
+
+
+BOX = Prefilter("box")
+
+
+def prefilter_of(text: object) -> Prefilter:
+    """Read the name of a pre-filter: one of PREFILTERS, or "8 boxes"."""
+    counted = re.fullmatch(r"([0-9]{1,3}) boxes", text) if isinstance(text, str) else None
+    if counted:
+        k = int(counted[1])
+        if not 1 <= k <= BOXES_MAX:
+            raise InputError(f"prefilter: expected 1 to {BOXES_MAX} boxes, got {k}")
+        return Prefilter("boxes", Kind("boxes", k))
+    name = choice("prefilter", text, PREFILTERS)
+    kinds = {"swept": Kind("circle"), "boxes": Kind("boxes", BOXES)}
+    return Prefilter(name, None if name in PREFILTERS[:3] else kinds.get(name, Kind(name)))
+
+
+def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
+    """Pairs of placements and items whose boxes share a pixel, front to back.
 
     Parameters
     ----------
     boxes_xyxy : (P, 4) inclusive boxes of the placements
     shot : (P,) whose they are
-    prefilter : "none" pairs everything; "box" (and "auto") what shares a pixel of its box
     """
-    if prefilter == "none":
-        placement = np.repeat(np.arange(len(boxes_xyxy)), len(stack))
-        rank = np.tile(np.arange(len(stack)), len(boxes_xyxy))
-    else:
-        placement, rank = np.nonzero(overlapping(boxes_xyxy[:, None], stack.box_xyxy[None]))
+    placement, rank = np.nonzero(overlapping(boxes_xyxy[:, None], stack.box_xyxy[None]))
     return Pairs(placement, rank, refused(stack, rank, shots, shot[placement]))
 
 
@@ -40,3 +78,97 @@ def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
     if not shots.exclude.shape[1]:
         return np.asarray(foreign)
     return np.asarray(foreign | (stack.owner[rank][:, None] == shots.exclude[shot]).any(axis=1))
+
+
+@dataclass
+class Candidates:
+    """The pre-filter of one call.
+
+    Parameters
+    ----------
+    items, stack : what may be hit, and its order
+    prefilter : what goes before the pixels
+    index : the broad phase; None compares all boxes
+    why : why this pre-filter
+    """
+
+    items: Items
+    stack: Stack
+    prefilter: Prefilter = BOX
+    index: Index | None = None
+    why: str = "boxes that share a pixel"
+
+    def pairs(self, volley: Volley, placements: Ints, boxes_xyxy: Ints, shots: Shots) -> Pairs:
+        """Pairs of some placements and the items that they may touch, front to back.
+
+        Parameters
+        ----------
+        placements : (P,) rising numbers of placements of the volley
+        boxes_xyxy : (P, 4) inclusive boxes of what is asked of each
+        """
+        row, rank = self._boxes(boxes_xyxy)
+        placement = placements[row]
+        if self.prefilter.kind:
+            near = volley.count[placement] > 0  # the box of an empty pattern lies within others
+            near[near] = self._near(self.prefilter.kind, volley, placement[near], rank[near])
+            placement, rank = placement[near], rank[near]
+        return Pairs(placement, rank, refused(self.stack, rank, shots, volley.shot[placement]))
+
+    def _boxes(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """Rows and ranks of boxes that share a pixel; of all, without a pre-filter."""
+        n, m = len(boxes_xyxy), len(self.stack)
+        if self.prefilter.name == "none":
+            return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
+        if self.index is None:
+            row, rank = np.nonzero(overlapping(boxes_xyxy[:, None], self.stack.box_xyxy[None]))
+            return row, rank
+        some = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
+        row, item = self.index.query(self.items, boxes_xyxy[some])
+        rank_of = np.zeros(self.items.count, np.int64)
+        rank_of[self.stack.ids] = np.arange(m)
+        row, rank = np.divmod(np.sort(some[row] * m + rank_of[item]), m)
+        return row, rank
+
+    def _near(self, kind: Kind, volley: Volley, placement: Ints, rank: Ints) -> Bools:
+        """Whether the volumes of pattern and item meet, or may: no exact stage is needed here."""
+        if not len(rank):
+            return np.zeros(0, np.bool_)
+        volumes, row = self.items.bounding(kind, self.stack.ids[rank])
+        fired, of_pattern = np.unique(volley.pattern[placement], return_inverse=True)
+        patterns = pattern_volumes(self.prefilter.name, [volley.table.patterns[i] for i in fired.tolist()])
+        found = np.zeros(len(rank), np.bool_)
+        for first in range(0, len(rank), PAIRS_AT_ONCE):
+            part = slice(first, first + PAIRS_AT_ONCE)
+            shift = self.stack.box_xyxy[rank[part], :2] - volley.xy[placement[part]]
+            items = volumes.take(row[part]).translated(shift)
+            found[part] = overlap(items, patterns.take(of_pattern[part]), conservative=True)
+        return found
+
+
+def pattern_volumes(name: str, patterns: Sequence[Pattern]) -> Volumes:
+    """Volumes of patterns, none empty, for a pre-filter: a row each, which contains the pixel squares."""
+    rows = [pattern.volume(name, lambda pattern: _fitted(name, pattern)) for pattern in patterns]
+    cores = [row.core() for row in rows]
+    points = np.concatenate([core.points for core in cores])
+    if name == "circle":
+        return Circles(points, np.concatenate([core.radius for core in cores]))
+    if name == "swept":
+        return Capsules(points[0::2], points[1::2], np.concatenate([core.radius for core in cores]))
+    if name == "oriented box":
+        return Obbs.from_corners(points.reshape(-1, 4, 2))
+    counts = np.concatenate([core.counts for core in cores])
+    return Polygons.around(points, np.cumsum(counts) - counts)
+
+
+def _fitted(name: str, pattern: Pattern) -> Volumes:
+    if name == "swept":
+        return fit.capsule(pattern.spans) if pattern.swept is None else _along(pattern.swept)
+    if name == "circle":
+        return fit.least_circle(pattern.spans)
+    return fit.oriented_box(pattern.spans) if name == "oriented box" else fit.convex(pattern.spans, CORNERS)
+
+
+def _along(swept: Swept) -> Capsules:
+    """Capsule around the squares whose centres are within the radius of a segment, and those that meet it."""
+    a, b, radius = swept
+    return Capsules(a[None] / SUB, b[None] / SUB, max(radius / SUB, GROWN_PX) + GROWN_PX)

@@ -18,7 +18,7 @@ from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict,
 from planes.scene import Scene
 from planes.spans import Box, Spans, each_pixel
 from weapons.arsenal import Weapon, pierces
-from weapons.candidates import pairs_of, refused
+from weapons.candidates import Candidates, pairs_of, refused
 from weapons.plan import Plan
 from weapons.resolve import Sight, direct
 from weapons.volley import Shots, Volley, volley_of
@@ -156,7 +156,7 @@ def blockers_of(detail: Detail) -> list[Blocked]:
     if not len(ranks):
         return []
     behind: dict[int, list[Behind]] = {rank: [] for rank in ranks.tolist()}
-    every = np.unique(pairs_of(detail.volley.boxes, detail.volley.shot, detail.shots, stack, "box").rank)
+    every = np.unique(pairs_of(detail.volley.boxes, detail.volley.shot, detail.shots, stack).rank)
     refuses = refused(stack, every, detail.shots, np.zeros(len(every), np.int64))
     for rank in every[~refuses & ~stack.occluder[every]].tolist():
         on = detail.on(rank)
@@ -203,7 +203,7 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     """Objects within NEAR_PX of the pattern of one shot that were not hit, nearest first, then by id."""
     stack, volley = detail.stack, detail.volley
     boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
-    near = np.unique(pairs_of(boxes, volley.shot, detail.shots, stack, "box").rank)
+    near = np.unique(pairs_of(boxes, volley.shot, detail.shots, stack).rank)
     found = []
     for rank in near.tolist():
         if stack.occluder[rank] or int(stack.ids[rank]) in hit:
@@ -223,7 +223,7 @@ def margins_of(scene: Scene, weapon: Weapon, shot: Shots) -> dict[int, float]:
     stack = scene.items.stack()
     hit = np.zeros((len(shift), len(stack)), np.bool_)
     placements = len(volley.shot)
-    sight = Sight(stack, scene.bounds, pierces(weapon), "box", Plan())
+    sight = Sight(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
     step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
     for first in range(0, len(shift), step):
         met = direct(_shifted(volley, shift[first : first + step]), shot, sight)
@@ -258,7 +258,7 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
     runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
-    pairs = pairs_of(volley.boxes, volley.shot, shots, stack, "box")
+    pairs = pairs_of(volley.boxes, volley.shot, shots, stack)
     events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
@@ -334,7 +334,7 @@ def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
         some = (first <= last) & (spans.y >= bounds[1]) & (spans.y <= bounds[3])
         runs = Runs(zero, spans.y, first, last, zero).take(some)
     box = stack.box_xyxy[rank][None]
-    pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack, "box")
+    pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack)
     events, _ = walk(runs, pairs, stack, pierce, HIT)
     own = events.rank == rank
     return int((events.x_last - events.x_first + 1)[own].sum())

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from planes.arrays import InputError, choice
+from planes.arrays import InputError
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import Verdict
 from planes.scene import Scene
 from weapons.arsenal import Weapon, pierces
-from weapons.candidates import PREFILTERS
 from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import Plan, chosen_strategy, leave_out_unused
+from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Volley, checked_shots, volley_of
 
@@ -33,6 +32,7 @@ def fire(
     seed: object = 0,
     shot: object = None,
     prefilter: str = "auto",
+    broadphase: str = "auto",
     strategy: str = "auto",
 ) -> Hits:
     """Decide what shots hit.
@@ -49,7 +49,9 @@ def fire(
         for each shot (N,), or several for each (N, K) or for all (1, K), padded with -1
     seed : of the pellets, 0 .. 2**64 - 1
     shot : numbers of the shots, 0 .. N-1 by default: a shot of a batch fired again alone under its number is the same
-    prefilter : "auto", "none", "box": what goes before the pixels; it changes no row
+    prefilter : "auto", "none", "box", "circle", "oriented box", "4 boxes" (1 to 64), "polygon", "swept": what goes
+        before the pixels; it changes no row
+    broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row
     strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row
 
     Each of aim, toward, accept, exclude, seed and shot is one for all shots or one for each.
@@ -61,20 +63,22 @@ def fire(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    choice("prefilter", prefilter, PREFILTERS)
     plan, stack = Plan(), scene.items.stack()
-    sight = Sight(stack, scene.bounds, pierces(weapon), prefilter, plan)
     if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
         accept = scene.category_bits(*accept)
     shots = checked_shots(weapon, at, aim, toward, accept, exclude, seed, shot)
     first = volley_of(weapon, shots.take(0, 1))
-    name, why = chosen_strategy(strategy, scene, stack, first.table, len(first.shot) * len(shots))
+    placements = len(first.shot) * len(shots)
+    name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
+    asked = placements if name == "direct" or pierces(weapon) or shots.choosy else 0
+    candidates = chosen_candidates(prefilter, broadphase, scene, stack, first.table, asked)
+    sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
     plane = scene.code_plane() if name == "composed" else None
     codes = plane.read(scene.items) if plane else None
     if plane and codes is not None:
         plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * codes.itemsize)
     rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
-    step = _shots_per_part(first, len(stack))
+    step = _shots_per_part(first, len(stack) if candidates.index is None else len(stack) // INDEXED)
     for begin in range(0, len(shots), step):
         part = shots.take(begin, min(begin + step, len(shots)))
         volley = first if len(shots) == 1 else volley_of(weapon, part)
@@ -85,8 +89,12 @@ def fire(
             met = direct(volley, part, sight)
         rows.append(rows_of_met(met, volley, stack.ids, begin))
         verdicts.append(met.counts.reshape(len(part), -1, len(Verdict)).sum(axis=1))
-    leave_out_unused(plan, scene, stack, first.table, why)
+    leave_out_unused(plan, scene, candidates, first.table, why)
     return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
+
+
+INDEXED = 16
+"""Of the items, a broad phase is taken to give one in so many for a placement."""
 
 
 def _shots_per_part(first: Volley, items: int) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,8 +11,12 @@ from planes.arrays import InputError, Ints
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
+from planes.volumes import Volumes
 
-__all__ = ["FALLOFFS", "Pattern", "PatternTable", "falloff_weights", "make_pattern"]
+__all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "make_pattern"]
+
+Swept = tuple[Ints, Ints, int]
+"""Ends (2,) of a segment and a radius, in 1/256 px."""
 
 FALLOFFS = ("linear", "smooth")
 _DOUBT = 2.0**-30  # the float below is right to 2**-34; nearer to a whole number than this, integers decide
@@ -20,10 +24,22 @@ _DOUBT = 2.0**-30  # the float below is right to 2**-34; nearer to a whole numbe
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """A set of pixels about the origin, and prefix sums of their weights in span order (None: all at full weight)."""
+    """A set of pixels about the origin, and prefix sums of their weights in span order (None: all at full weight).
+
+    `swept` is the segment that the pixels lie along, if the weapon has one: their centres lie within the radius of it,
+    or their squares meet it.
+    """
 
     spans: Spans
     prefix: Ints | None
+    swept: Swept | None = None
+    _volumes: dict[str, Volumes] = field(default_factory=dict, repr=False)
+
+    def volume(self, name: str, fitted: Callable[[Pattern], Volumes]) -> Volumes:
+        """A volume of the pixels, made once for each name."""
+        if name not in self._volumes:
+            self._volumes[name] = fitted(self)
+        return self._volumes[name]
 
     @property
     def nbytes(self) -> int:
@@ -31,14 +47,14 @@ class Pattern:
         return 3 * self.spans.y.nbytes + (0 if self.prefix is None else self.prefix.nbytes) + 1024
 
 
-def make_pattern(spans: Spans, falloff: str | None, reach_256: int) -> Pattern:
+def make_pattern(spans: Spans, falloff: str | None, reach_256: int, swept: Swept | None = None) -> Pattern:
     """Weigh the pixels of a set by their distance from the origin."""
     if falloff is None:
-        return Pattern(spans, None)
+        return Pattern(spans, None, swept)
     if spans.count > MASK_AREA_MAX:
         raise InputError(f"falloff: expected a pattern of at most {MASK_AREA_MAX} px, got {spans.count}")
     weights = falloff_weights((spans.pixels() ** 2).sum(axis=1), falloff, reach_256)
-    return Pattern(spans, np.concatenate([[0], np.cumsum(weights)]))
+    return Pattern(spans, np.concatenate([[0], np.cumsum(weights)]), swept)
 
 
 def falloff_weights(distance2: Ints, falloff: str, reach_256: int) -> Ints:
@@ -70,12 +86,14 @@ class PatternTable:
 
     Parameters
     ----------
+    patterns : they themselves
     begin : (n + 1,) first span of each pattern
     count : (n,) pixels of each
     box_xyxy : (n, 4) inclusive; x_max < x_min for an empty pattern
     """
 
     def __init__(self, patterns: Sequence[Pattern]) -> None:
+        self.patterns = patterns
         spans = [p.spans for p in patterns]
         self.y = np.concatenate([s.y for s in spans])
         self.x_first = np.concatenate([s.x_first for s in spans])

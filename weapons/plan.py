@@ -6,29 +6,54 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from planes.arrays import InputError, choice
 from planes.compose import area
+from planes.constants import SUB
+from planes.index import STRUCTURES
 from planes.items import Role, Stack
 from planes.scene import Scene
+from weapons.candidates import BOX, Candidates, prefilter_of
 from weapons.pattern import PatternTable
 
-__all__ = ["STRATEGIES", "Plan", "PlanSum", "Stage", "chosen_strategy", "leave_out_unused", "plan_lines"]
+__all__ = [
+    "BROADPHASES",
+    "STRATEGIES",
+    "Plan",
+    "PlanSum",
+    "Stage",
+    "chosen_candidates",
+    "chosen_strategy",
+    "leave_out_unused",
+    "plan_lines",
+]
 
 STRATEGIES = ("auto", "direct", "composed")
+BROADPHASES = ("auto", *STRUCTURES)
 
 DIRECT_PLACEMENT_NS, DIRECT_PAIR_NS, DIRECT_PIXEL_NS = 300.0, 5.3, 20.0
 COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
 REDRAW_PIXEL_NS = 0.5
-"""Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
+SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
+BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.3, 70_000.0, 1200.0, 250.0, 850.0
+"""Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
+ratios only."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage that ran, or one that was left out: why, and how many bytes it made."""
+    """A stage that ran, or one that was left out: why, how many bytes it made, and of a filter (kept, of how many)."""
 
     name: str
     why: str
     bytes_made: int = 0
+    pairs: tuple[int, int] | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """A stage that ran, as JSON."""
+        told = {"stage": self.name, "why": self.why, "bytes": self.bytes_made}
+        return told if self.pairs is None else {**told, "pairs": list(self.pairs)}
 
 
 @dataclass
@@ -38,13 +63,13 @@ class Plan:
     ran: list[Stage] = field(default_factory=list)
     left_out: list[Stage] = field(default_factory=list)
 
-    def run(self, name: str, why: str, bytes_made: int = 0) -> None:
-        """Record a stage that ran; the bytes of its runs for the parts of a batch add up."""
+    def run(self, name: str, why: str, bytes_made: int = 0, pairs: tuple[int, int] | None = None) -> None:
+        """Record a stage that ran; the numbers of its runs for the parts of a batch add up."""
         for i, stage in enumerate(self.ran):
             if stage.name == name:
-                self.ran[i] = Stage(name, stage.why, stage.bytes_made + bytes_made)
+                self.ran[i] = Stage(name, stage.why, stage.bytes_made + bytes_made, added(stage.pairs, pairs))
                 return
-        self.ran.append(Stage(name, why, bytes_made))
+        self.ran.append(Stage(name, why, bytes_made, pairs))
 
     def has_run(self, name: str) -> bool:
         """Whether a stage ran."""
@@ -57,9 +82,14 @@ class Plan:
     def to_dict(self) -> dict[str, list[dict[str, object]]]:
         """The plan as JSON."""
         return {
-            "ran": [{"stage": s.name, "why": s.why, "bytes": s.bytes_made} for s in self.ran],
+            "ran": [stage.to_dict() for stage in self.ran],
             "left_out": [{"stage": s.name, "why": s.why} for s in self.left_out],
         }
+
+
+def added(a: tuple[int, int] | None, b: tuple[int, int] | None) -> tuple[int, int] | None:
+    """Sum of two counts of pairs, of which either may be missing."""
+    return (a[0] + b[0], a[1] + b[1]) if a and b else a or b
 
 
 class PlanSum:
@@ -74,10 +104,14 @@ class PlanSum:
         self.calls += 1
         for ran, stages in ((True, plan.ran), (False, plan.left_out)):
             for stage in stages:
-                new = {"stage": stage.name, "why": stage.why, "bytes": 0, "calls": 0}
-                told = self._sums[ran].setdefault(stage.name, new)
+                told = self._sums[ran].get(stage.name)
+                if told is None:
+                    self._sums[ran][stage.name] = {**stage.to_dict(), "calls": 1}
+                    continue
                 told["bytes"] += stage.bytes_made
                 told["calls"] += 1
+                if stage.pairs:
+                    told["pairs"] = [a + b for a, b in zip(told["pairs"], stage.pairs, strict=True)]
 
     def to_dict(self) -> dict[str, list[dict[str, Any]]]:
         """As `Plan.to_dict`, and with each stage in how many `calls` it was so."""
@@ -91,7 +125,9 @@ def plan_lines(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) 
         for stage in plan[key]:
             often = "" if calls == 1 else f", {stage['calls']} of {calls} calls"
             made = f", {stage['bytes']:,} bytes" if stage.get("bytes") else ""
-            lines.append(f"{verb:8} {stage['stage']}{often}{made}: {stage['why']}")
+            kept, of = stage.get("pairs", (0, 0))
+            tested = f", tested {kept:,} of {of:,}" if of else ""
+            lines.append(f"{verb:8} {stage['stage']}{often}{tested}{made}: {stage['why']}")
     return lines
 
 
@@ -123,13 +159,84 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
     return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
 
 
-def leave_out_unused(plan: Plan, scene: Scene, stack: Stack, table: PatternTable, why_strategy: str) -> None:
+def chosen_candidates(
+    prefilter: object, broadphase: object, scene: Scene, stack: Stack, table: PatternTable, asked: int
+) -> Candidates:
+    """Pre-filter and broad phase of a call, and why: those asked for, or the cheaper ones by the cost model.
+
+    Parameters
+    ----------
+    table : patterns of the first shot; the others' are about alike
+    asked : placements that will be asked for
+
+    Raises
+    ------
+    InputError
+        If one is not known, or boxes are asked for in a broad phase and not as a pre-filter.
+    """
+    wanted = prefilter_of(prefilter)
+    structure = choice("broadphase", broadphase, BROADPHASES)
+    if wanted.name == "none":
+        if structure not in ("auto", "none"):
+            raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
+        return Candidates(scene.items, stack, wanted, None, "none: every item")
+    if wanted.name == "auto":
+        wanted = prefilter_of("swept") if _sweep_pays(stack, table, asked) else BOX
+    told = "box" if wanted == BOX else f"box, then {wanted}"
+    if structure == "auto":
+        structure = "bvh" if _bvh_pays(scene, len(stack), asked) else "none"
+    if structure == "none":
+        return Candidates(scene.items, stack, wanted, None, told)
+    return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
+
+
+def _sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
+    """Whether capsules around long, slanting patterns drop enough of what their boxes meet.
+
+    Expected pairs are those of items of the mean size, spread evenly over the box around all.
+    """
+    pattern = table.patterns[0] if table.patterns else None
+    if pattern is None or pattern.swept is None or asked * len(stack) * SWEPT_DROPPED_NS < SWEPT_CALL_NS:
+        return False
+    a, b, radius = pattern.swept
+    item_wh = (stack.box_xyxy[:, 2:] - stack.box_xyxy[:, :2]).mean(axis=0) + 1
+    world_wh = stack.box_xyxy[:, 2:].max(axis=0) - stack.box_xyxy[:, :2].min(axis=0) + 1
+    box_wh = np.minimum((np.abs(b - a) + 2 * radius) / SUB + item_wh, world_wh)
+    width = 2 * radius / SUB + float(np.sqrt((item_wh**2).sum()))
+    length = float(np.sqrt((((b - a) / SUB) ** 2).sum())) + width
+    pairs = asked * len(stack) * float((box_wh / world_wh).prod())
+    dropped = pairs * (1 - min(length * width / float(box_wh.prod()), 1))
+    return dropped * SWEPT_DROPPED_NS > pairs * SWEPT_PAIR_NS + SWEPT_CALL_NS
+
+
+def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
+    """Whether a BVH answers sooner than all boxes one by one, with what it costs to bring it up to date.
+
+    One that is not there is made when what it would have saved so far is as much as it costs: never more than twice
+    the cost of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
+    """
+    saved = placements * (items * BOX_PAIR_NS - BVH_PLACEMENT_NS) - BVH_CALL_NS
+    if saved <= 0:
+        return False
+    index = scene.index("bvh")
+    owed = index.owed(scene.items)
+    if index.boxes is not None:
+        return saved > owed * BVH_MOVED_NS
+    index.missed += saved
+    return index.missed > owed * BVH_BUILT_NS
+
+
+def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, why_strategy: str) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
+    if not plan.has_run("broad phase"):
+        plan.leave_out("broad phase", "few pairs: every box is compared")
+    if candidates.prefilter.kind is None:
+        plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     if table.prefix is None:
         plan.leave_out("weights", "the weapon has no falloff")
     if scene.bounds is None:
         plan.leave_out("outside", "the scene has no bounds")
-    if not stack.occluder.any():
+    if not candidates.stack.occluder.any():
         plan.leave_out("occluders", "the scene has none")
     if not plan.has_run("code plane"):
         plan.leave_out("code plane", f"direct: {why_strategy}")

@@ -12,7 +12,7 @@ from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack, clipped
 from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, split, walk
 from planes.spans import Box, merged_runs
-from weapons.candidates import pairs_of, refused
+from weapons.candidates import Candidates, refused
 from weapons.plan import Plan
 from weapons.volley import Shots, Volley
 
@@ -29,7 +29,7 @@ class Sight:
     stack: Stack
     bounds: Box | None
     pierce: bool
-    prefilter: str
+    candidates: Candidates
     plan: Plan
 
 
@@ -58,9 +58,7 @@ def direct(volley: Volley, shots: Shots, sight: Sight) -> Met:
     counts = _inside(volley, boxes, sight.bounds)
     if not len(sight.stack):
         return _met(volley, Runs.joined([]), [], counts)
-    pairs = pairs_of(boxes, volley.shot, shots, sight.stack, sight.prefilter)
-    how = "none: every item" if sight.prefilter == "none" else "box: items whose box shares a pixel with the pattern's"
-    sight.plan.run("pre-filter", how, pairs.rank.nbytes * 2)
+    pairs = _candidates(volley, np.arange(len(boxes)), boxes, shots, sight)
     runs = _under_items(volley, pairs, sight)
     return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
 
@@ -115,10 +113,19 @@ def _look_behind(volley: Volley, runs: Runs, shots: Shots, sight: Sight, counts:
     last = np.append(first[1:], len(runs)) - 1
     left, right = np.minimum.reduceat(runs.x_first, first), np.maximum.reduceat(runs.x_last, first)
     boxes = np.stack([left, runs.y[first], right, runs.y[last]], axis=1)
-    near = pairs_of(boxes, volley.shot[busy], shots, sight.stack, sight.prefilter)
-    sight.plan.run("pre-filter", "for samples that look behind the front item", near.rank.nbytes * 2)
-    pairs = Pairs(busy[near.placement], near.rank, near.refused)
+    pairs = _candidates(volley, busy, boxes, shots, sight)
     return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
+
+
+def _candidates(volley: Volley, placements: Ints, boxes: Ints, shots: Shots, sight: Sight) -> Pairs:
+    """Items that placements may touch, and the record of how they were found."""
+    pairs = sight.candidates.pairs(volley, placements, boxes, shots)
+    possible = len(placements) * len(sight.stack)
+    index = sight.candidates.index
+    if index:
+        sight.plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew")
+    sight.plan.run("pre-filter", sight.candidates.why, pairs.rank.nbytes * 2, (len(pairs.rank), possible))
+    return pairs
 
 
 def _walked(runs: Runs, pairs: Pairs, sight: Sight, counts: Ints) -> list[Events]:

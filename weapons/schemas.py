@@ -69,7 +69,8 @@ def _all(keys: dict[str, Value]) -> Within:
     return Within(Keys(keys, tuple(keys)))
 
 
-PLAN = _all({"ran": Rows(_all({**STAGE, "bytes": COUNT})), "left_out": Rows(_all(STAGE))})
+RAN = Keys({**STAGE, "bytes": COUNT, "pairs": Wholes((2,), 0, 2**62)}, ("stage", "why", "bytes"))
+PLAN = _all({"ran": Rows(Within(RAN)), "left_out": Rows(_all(STAGE))})
 ROW = _all(
     {
         **ITEM,

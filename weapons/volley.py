@@ -43,6 +43,11 @@ class Shots:
     def __len__(self) -> int:
         return len(self.number)
 
+    @property
+    def choosy(self) -> bool:
+        """Whether any shot may refuse an item."""
+        return bool((self.accept != ALL).any() or self.exclude.shape[1])
+
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
         part = slice(first, last)

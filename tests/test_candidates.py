@@ -1,0 +1,301 @@
+"""The pre-filter: no choice of it loses a hit, and it looks at no more than it must."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planes.items
+from planes import InputError, Scene, Sprite
+from planes.arrays import Bools
+from planes.constants import INDEX_SLACK
+from planes.index import STRUCTURES, Index
+from planes.items import overlapping
+from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, fire, plan
+from weapons.arsenal import Plain, pattern_of
+from weapons.candidates import prefilter_of
+from weapons.plan import Stage
+
+VOLUMES = ("circle", "oriented box", "1 boxes", "4 boxes", "polygon", "swept")
+BROADPHASES = ("none", "grid", "quadtree", "bvh")
+WEAPONS: list[Weapon] = [
+    Point(), Disc(1.5), Disc(9, pierce=True), Ring(6, 7), Box(5, 2), Cone(reach=20, angle=25), Beam(length=40, width=1),
+    Beam(length=70, width=6, pierce=True), Spread(Disc(1), count=5, radius=9), Stencil(["##...", "..###"]),
+    Rounds(Beam(length=30, width=2), count=3, recoil_xy=(1, -2), recoil_deg=11),
+]  # fmt: skip
+
+
+def blob(rng: np.random.Generator, side: int) -> Bools:
+    mask = rng.random(rng.integers(1, side + 1, 2)) < rng.choice([0.1, 0.5, 0.9])
+    mask[tuple(rng.integers(0, mask.shape))] = True
+    return np.asarray(mask)
+
+
+def crowd(seed: int, count: int = 40, side: int = 120, world: bool = True) -> Scene:
+    """Sprites and shapes, turned, scaled and flipped."""
+    rng = np.random.default_rng(seed)
+    scene = Scene((side, side)) if world else Scene()
+    sprites: list[Any] = [Sprite.from_mask(blob(rng, 14), pivot_xy=rng.normal(4, 5, 2).tolist()) for _ in range(6)]
+    sprites += [Sprite.circle(4.4), Sprite.polygon([(0, 0), (9, 2), (1, 7)]), Sprite.box(12, 1)]
+    for i in range(count):
+        scene.add(
+            sprites[rng.integers(len(sprites))],
+            rng.uniform(0, side, 2),
+            angle=float(rng.choice([0, 90, 270, rng.uniform(0, 360)])),
+            scale=rng.choice([1, 1, 0.5, 2.3, 0.07], 2).tolist(),
+            flip=str(rng.choice(["none", "x", "y", "xy"])),
+            layer=int(rng.integers(3)),
+            role="occluder" if i % 5 == 4 else "hittable",
+        )
+    return scene
+
+
+def pairs_tested(scene: Scene, weapon: Weapon, at: Any, **how: Any) -> tuple[int, int]:
+    stages = [stage for stage in fire(scene, weapon, at, strategy="direct", **how).plan.ran if stage.pairs]
+    assert [stage.name for stage in stages] == ["pre-filter"]
+    assert stages[0].pairs
+    return stages[0].pairs
+
+
+@pytest.mark.parametrize("broadphase", BROADPHASES)
+@pytest.mark.parametrize("prefilter", VOLUMES)
+def test_no_hit_is_lost(prefilter: str, broadphase: str) -> None:
+    rng = np.random.default_rng(1)
+    found = 0
+    for seed, weapon in itertools.product(range(3), WEAPONS):
+        scene = crowd(seed, world=seed != 1)
+        at, aim = rng.uniform(-5, 125, (60, 2)), rng.uniform(-180, 180, 60)
+        truth = fire(scene, weapon, at, aim=aim, prefilter="none", strategy="direct")
+        hits = fire(scene, weapon, at, aim=aim, prefilter=prefilter, broadphase=broadphase, strategy="direct")
+        assert hits == truth
+        found += len(hits)
+    assert found > 700
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("prefilter", ["box", *VOLUMES])
+def test_no_hit_of_a_million_is_lost(prefilter: str) -> None:
+    """10^6 random shots for each pre-filter: half of them at the gaps that a volume would close, with thin weapons."""
+    per_scene, found = 10_000, 0
+    for seed in range(100):
+        rng = np.random.default_rng(1000 + seed)
+        scene = crowd(seed, 25, 90, world=seed % 2 == 0)
+        weapon = WEAPONS[seed % len(WEAPONS)]
+        at, aim = rng.uniform(0, 90, (per_scene, 2)), rng.choice(np.arange(48) * 7.5, per_scene)
+        broadphase = BROADPHASES[seed % 4]
+        truth = fire(scene, weapon, at, aim=aim, prefilter="none", strategy="direct")
+        hits = fire(scene, weapon, at, aim=aim, prefilter=prefilter, broadphase=broadphase, strategy="direct")
+        assert hits == truth, seed
+        found += len(hits)
+    assert found > 300_000
+
+
+@pytest.mark.parametrize("prefilter", VOLUMES)
+def test_volumes_drop_what_boxes_keep(prefilter: str) -> None:
+    """Shots in the corner of a disc's box, and beside a diagonal line: boxes share pixels, volumes do not touch."""
+    disc, line = Sprite.circle(30), Sprite.from_mask(np.eye(60, dtype=np.bool_))
+    sprite, beside = (disc, (128, 128)) if prefilter in ("circle", "swept") else (line, (108, 92))
+    scene = Scene()
+    scene.add(sprite, (100, 100))
+    assert pairs_tested(scene, Disc(2), beside, prefilter="box") == (1, 1)
+    kept = 1 if prefilter == "1 boxes" else 0
+    assert pairs_tested(scene, Disc(2), beside, prefilter=prefilter) == (kept, 1)
+    assert pairs_tested(scene, Disc(2), (100, 100), prefilter=prefilter) == (1, 1)
+
+
+def test_a_beam_beside_a_disc() -> None:
+    scene = Scene()
+    scene.add(Sprite.circle(10), (60, 20))
+    for prefilter, kept in (("box", 1), ("circle", 1), ("swept", 0), ("oriented box", 0), ("polygon", 0)):
+        tested = pairs_tested(scene, Beam(length=100, width=2), (0, 0), aim=45, prefilter=prefilter)
+        assert tested == (kept, 1), prefilter
+
+
+def test_candidates_are_fewer_with_tighter_volumes() -> None:
+    scene = crowd(5, 60)
+    at = np.random.default_rng(2).uniform(0, 120, (300, 2))
+    tested = {p: pairs_tested(scene, Disc(3), at, prefilter=p)[0] for p in ("none", "box", *VOLUMES)}
+    assert tested["none"] == 300 * len(scene.items.stack())
+    assert all(tested[p] < tested["box"] < 300 * 10 for p in VOLUMES)
+    assert tested["4 boxes"] < tested["1 boxes"]
+    assert tested["polygon"] < tested["circle"]
+    hits = fire(scene, Disc(3), at, accept=["default"], strategy="direct")
+    assert len(hits) < tested["polygon"]
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+@pytest.mark.parametrize("weapon", [w for w in WEAPONS if isinstance(w, Plain)], ids=lambda w: type(w).__name__)
+def test_a_pattern_lies_in_its_volume(weapon: Plain, name: str) -> None:
+    """A one-pixel object at each pixel of the pattern is a candidate, wherever in the world."""
+    for angle in (0, 30, 45, 131):
+        c, s = (round(f(math.radians(angle)) * 2**30) for f in (math.cos, math.sin))
+        if not weapon.directed:
+            c, s = 2**30, 0
+        pixels = pattern_of(weapon, c, s).spans.pixels()
+        scene = Scene()
+        pixel = Sprite.from_mask([[True]])
+        for xy in pixels.tolist():
+            scene.add(pixel, (xy[0] + 10**6, xy[1] - 10**9))
+        tested, of = (
+            pairs_tested(
+                scene, weapon, (10**6, -(10**9)), prefilter=name, toward=(10**6 + c / 2**10, -(10**9) + s / 2**10)
+            )
+            if weapon.directed
+            else pairs_tested(scene, weapon, (10**6, -(10**9)), prefilter=name)
+        )
+        assert tested == of == len(pixels)
+
+
+def test_names_of_prefilters() -> None:
+    assert str(prefilter_of("boxes")) == "4 boxes"
+    assert str(prefilter_of("12 boxes")) == "12 boxes"
+    assert str(prefilter_of("oriented box")) == "oriented box"
+    assert prefilter_of("box").kind is None
+    with pytest.raises(InputError, match="prefilter: expected 1 to 64 boxes, got 99"):
+        prefilter_of("99 boxes")
+
+
+def why(stages: list[Stage], name: str) -> str:
+    return next((stage.why for stage in stages if stage.name == name), "")
+
+
+def test_the_plan_tells_what_was_tested() -> None:
+    scene = crowd(3, 30)
+    told = fire(scene, Disc(3), (60, 60), prefilter="circle", broadphase="grid", strategy="direct").plan
+    assert why(told.ran, "pre-filter") == "box, then circle, by grid"
+    count = len(scene.items.stack())
+    assert why(told.ran, "broad phase") == f"grid: {count} boxes placed anew"
+    assert not why(told.left_out, "broad phase")
+    assert not why(told.left_out, "volumes")
+    told = fire(scene, Disc(3), (60, 60), broadphase="grid", strategy="direct").plan
+    assert why(told.ran, "broad phase") == "grid: 0 boxes placed anew"
+    assert why(told.left_out, "volumes") == "boxes are the pre-filter"
+    told = fire(scene, Disc(3), (60, 60), prefilter="none", strategy="direct").plan
+    assert why(told.left_out, "volumes") == "no pre-filter"
+    assert why(told.left_out, "broad phase") == "few pairs: every box is compared"
+    (row,) = (stage for stage in told.to_dict()["ran"] if stage["stage"] == "pre-filter")
+    assert row["pairs"] == [count, count]
+
+
+def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
+    scene = crowd(3, 20)
+    for shots in (1, 1000):
+        fire(scene, Disc(1), np.full((shots, 2), 50.0), strategy="direct")
+    assert scene.index("bvh").boxes is None
+    many = crowd(4, 3000, 2000)
+    at = np.random.default_rng(1).uniform(0, 2000, (3000, 2))
+    hits = fire(many, Disc(1), at, strategy="direct")
+    assert why(hits.plan.ran, "broad phase").startswith(f"bvh: {len(many.items.stack())} boxes")
+    assert hits == fire(many, Disc(1), at, strategy="direct", broadphase="none")
+
+
+def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as no shot alone pays for it none is made; then what was lost adds up."""
+    monkeypatch.setattr(plan, "BOX_PAIR_NS", 400.0)
+    scene = crowd(7, 600, 900)
+    lost = 400.0 * len(scene.items.stack()) - plan.BVH_PLACEMENT_NS - plan.BVH_CALL_NS
+    due = math.floor(len(scene.items.stack()) * plan.BVH_BUILT_NS / lost) + 1
+    assert due > 2
+    made = []
+    for _ in range(due + 2):
+        fire(scene, Point(), (3, 3), strategy="direct")
+        made.append(scene.index("bvh").boxes is not None)
+    assert made.index(True) == due - 1
+    scene.move(scene.ids(), (5, 5))  # to follow all would cost more than the shot saves
+    assert not why(fire(scene, Point(), (3, 3), strategy="direct").plan.ran, "broad phase") or lost > 250.0 * 600
+
+
+def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
+    scene = crowd(6, 900, 900)
+    at = np.random.default_rng(4).uniform(0, 900, (50, 2))
+    long = fire(scene, Beam(length=600, width=2), at, aim=40, strategy="direct")
+    assert why(long.plan.ran, "pre-filter").startswith("box, then swept")
+    for weapon, aim in ((Beam(length=600, width=2), 0), (Beam(length=4, width=2), 40), (Disc(200), 0)):
+        told = fire(scene, weapon, at, aim=aim if isinstance(weapon, Beam) else None, strategy="direct").plan
+        assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
+
+
+# The index
+
+
+def expected(scene: Scene, boxes: np.ndarray) -> list[tuple[int, int]]:
+    stack = scene.items.stack()
+    row, rank = np.nonzero(overlapping(boxes[:, None], stack.box_xyxy[None]))
+    return sorted(zip(row.tolist(), stack.ids[rank].tolist(), strict=True))
+
+
+def change(scene: Scene, rng: np.random.Generator) -> None:
+    ids = scene.ids()
+    some = rng.choice(ids, min(len(ids), int(rng.integers(1, 4))), replace=False) if len(ids) else []
+    kind = rng.integers(6)
+    if kind == 0 or not len(ids):
+        scene.add(blob(rng, 6), rng.uniform(0, 60, 2), role=str(rng.choice(["hittable", "occluder", "mover"])))
+    elif kind == 1:
+        scene.remove(some)
+    elif kind == 2:
+        scene.set(some, role=str(rng.choice(["hittable", "mover", "background"])))
+    elif kind == 3:
+        scene.set(some, angle=float(rng.uniform(0, 360)))
+    else:
+        scene.move(some, rng.uniform(0, 60, (len(some), 2)))
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("remembered", [0, 5, 10**6])
+def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", remembered)
+    rng = np.random.default_rng(8)
+    scene = Scene()
+    index = scene.index(structure)
+    assert scene.index(structure) is index
+    followed = 0
+    for _ in range(120):
+        for _ in range(int(rng.integers(0, 5))):
+            change(scene, rng)
+        owed = index.owed(scene.items)
+        corner = rng.integers(-5, 60, (4, 2))
+        boxes = np.concatenate([corner, corner + rng.integers(0, 20, (4, 2))], axis=1)
+        row, item = index.query(scene.items, boxes)
+        assert sorted(zip(row.tolist(), item.tolist(), strict=True)) == expected(scene, boxes)
+        assert index.followed == owed
+        assert index.owed(scene.items) == 0
+        index.read(scene.items).check()
+        followed += owed
+    assert followed > 100
+
+
+def test_a_change_owes_what_it_changes() -> None:
+    scene = crowd(2, 200)
+    index = scene.index("grid")
+    assert index.owed(scene.items) == len(scene.items.stack())
+    index.read(scene.items)
+    scene.move([3, 7], (5, 5))
+    scene.move([3], (6, 5))
+    assert index.owed(scene.items) == index.owed(scene.items) == 2
+    index.read(scene.items)
+    assert index.owed(scene.items) == 0
+
+
+def test_an_index_forgets_boxes_that_came_and_went() -> None:
+    scene = crowd(2, 10)
+    index = scene.index("bvh")
+    first = index.read(scene.items)
+    rounds = 0
+    while index.read(scene.items) is first:
+        ids = [scene.add([[True]], (i, i)) for i in range(500)]
+        index.read(scene.items)
+        scene.remove(ids)
+        rounds += 1
+        assert rounds < 20
+    assert rounds > INDEX_SLACK // 1000
+    boxes = np.array([[0, 0, 200, 200]])
+    assert [pair[1] for pair in expected(scene, boxes)] == sorted(index.query(scene.items, boxes)[1].tolist())
+
+
+def test_unknown_structures_are_refused() -> None:
+    with pytest.raises(InputError, match=r"structure: expected one of .*got 'octree'"):
+        Index("octree")
