@@ -1,0 +1,373 @@
+"""Do two closed triangles in space share a point, and which faces of two meshes? Moller's seven steps on exact signs.
+
+Moller measures where each triangle cuts the line that the two planes have in common, and compares the intervals. Here
+nothing is measured: once it is known which corners lie on which side of the other plane, the order of two ends of
+intervals is the sign of one determinant of four corners. All signs are exact on the float64 inputs, so nothing has to
+be near enough to zero. Triangles that are a segment or a point are closed sets like others.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
+from planes.broadphase import Bvh
+from planes.constants import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY
+from planes.exact import ORIENT3D_ERROR, orient2d, orient3d
+
+__all__ = ["Mesh", "meeting_faces", "triangles_meet"]
+
+Corners = Floats
+"""Triangles of n rows, as columns (3, 3, n): corner, axis, row."""
+
+Sides = Ints
+"""On which sides of a plane three corners lie: one number (n,) for their signs, 9 s0 + 3 s1 + s2 + 13."""
+
+COLUMNS = 18
+SIDES = [(s0, s1, s2) for s0, s1, s2 in product((-1, 0, 1), repeat=3)]
+IN_PLANE = SIDES.index((0, 0, 0))
+KEPT = ((1, 2), (2, 0), (0, 1))
+"""Axes that are left when x, y or z is dropped, in the order that keeps the turning sense."""
+
+
+def triangles_meet(a: npt.ArrayLike, b: npt.ArrayLike, conservative: bool = False) -> Bools:
+    """Tell which triangles in space share a point; touching counts.
+
+    Parameters
+    ----------
+    a, b : (..., 3, 3) float, finite: three corners (x, y, z), which may be equal, or on one line; leading axes
+        broadcast
+    conservative : leave the exact stage out: yes where floats cannot tell, never no where it is yes
+
+    Returns
+    -------
+    (...) bool
+
+    Raises
+    ------
+    InputError
+        If a or b is not finite or not of this shape, or their leading axes do not broadcast.
+
+    References
+    ----------
+    Moller, *A Fast Triangle-Triangle Intersection Test* (1997); the order of ends by determinants: Guigue and
+    Devillers, *Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates* (2003).
+    """
+    first, second = _triangles("a", a), _triangles("b", b)
+    quick = flag("conservative", conservative)
+    try:
+        np.broadcast_shapes(first.shape, second.shape)
+    except ValueError:
+        raise InputError(f"b: expected axes that broadcast with {first.shape}, got {second.shape}") from None
+    columns = [p[..., i, k] for p in (first, second) for i, k in product(range(3), repeat=2)]
+    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
+    modes: Any = [["readonly"]] * COLUMNS + [["writeonly", "allocate"]]
+    types: Any = [np.float64] * COLUMNS + [np.bool_]
+    chunks = np.nditer([*columns, None], flags, modes, types, buffersize=CHUNK_ROWS)
+    with chunks, np.errstate(all="ignore"):
+        for *rows, found in chunks:
+            pair = np.stack(rows).reshape(2, 3, 3, len(found))
+            found[...] = _meet(pair[0], pair[1], quick)
+        return np.asarray(chunks.operands[-1])
+
+
+class Mesh:
+    """Triangles that share points, and a tree of the boxes around them, made when it is first used.
+
+    Parameters
+    ----------
+    points : (V, 3) float, finite: x, y, z
+    faces : (F, 3) whole numbers of points; any two or three of a face may be the same
+
+    Raises
+    ------
+    InputError
+        If a point is not finite, or a face names a point that is not there.
+    """
+
+    def __init__(self, points: npt.ArrayLike, faces: npt.ArrayLike) -> None:
+        self.points = reals("points", points, (None, 3))
+        self.faces = integers("faces", faces, (None, 3), 0, len(self.points) - 1)
+        self.points.flags.writeable = self.faces.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @cached_property
+    def corners(self) -> Floats:
+        """Corners of the faces, (F, 3, 3)."""
+        return np.asarray(self.points[self.faces])
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """Boxes of the faces, (F, 6): least x, y, z, then greatest."""
+        return np.concatenate((self.corners.min(axis=1), self.corners.max(axis=1)), axis=1)
+
+    @cached_property
+    def tree(self) -> Bvh:
+        """The boxes as a hierarchy."""
+        return Bvh(self.boxes)
+
+
+def meeting_faces(a: Mesh, b: Mesh, conservative: bool = False) -> Ints:
+    """Find the faces of two meshes that share a point: first by boxes in a tree, then by `triangles_meet`.
+
+    Parameters
+    ----------
+    a, b : meshes; b's tree is asked
+    conservative : as in `triangles_meet`
+
+    Returns
+    -------
+    (2, K) int64 [face of a, face of b], sorted
+
+    Raises
+    ------
+    InputError
+        If one is no mesh.
+    """
+    for name, mesh in (("a", a), ("b", b)):
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"{name}: expected a mesh, got {type(mesh).__name__}")
+    pairs = b.tree.query(a.boxes)
+    some = [pairs[:, k : k + CHUNK_SAMPLES] for k in range(0, pairs.shape[1], CHUNK_SAMPLES)]
+    meet = [triangles_meet(a.corners[i], b.corners[j], conservative) for i, j in some]
+    return pairs[:, np.concatenate(meet)] if meet else pairs
+
+
+def _triangles(field: str, values: npt.ArrayLike) -> Floats:
+    """Check triangles; finite float64 is not copied."""
+    array = array_of(field, values)
+    if array.shape[-2:] != (3, 3):
+        raise InputError(f"{field}: expected shape (..., 3, 3), got {array.shape}")
+    if array.dtype == np.float64 and np.isfinite((array.min(initial=0), array.max(initial=0))).all():
+        return array
+    return reals(field, values, (*(None,) * (array.ndim - 2), 3, 3))
+
+
+def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
+    """Take one chunk through the seven steps; a row that is decided leaves it."""
+    found = np.zeros(a.shape[-1], np.bool_)
+    bound = _bound(a, b)
+    # 1. The plane of the second; 2. no, where all corners of the first lie strictly on one side of it.
+    first = _sides(b, a, bound, conservative)
+    keep = ~_APART[first]
+    same = np.flatnonzero(_TOUCHED[first])
+    same = same[_share_corner(a.take(same, axis=2), b.take(same, axis=2))]
+    found[same], keep[same] = True, False
+    left = np.flatnonzero(keep)
+    a, b, first = a.take(left, axis=2), b.take(left, axis=2), first[left]
+    # 3. The plane of the first; 4. no, where all corners of the second lie strictly on one side of it.
+    second = _sides(a, b, bound, conservative)
+    keep = ~_APART[second]
+    # A plane that holds all of the other, or that is none: a case of its own; for floats, any corner in a plane is.
+    odd = _TOUCHED if conservative else _WITHIN
+    special = keep & (odd[first] | odd[second])
+    if special.any():
+        some = np.flatnonzero(special)
+        rows = a.take(some, axis=2), b.take(some, axis=2), first[some], second[some]
+        found[left[some]] = _special(*rows, conservative)
+        keep &= ~special
+    # 5. The line of both planes; 6. the interval of each triangle on it; 7. yes, where they overlap.
+    some = np.flatnonzero(keep)
+    found[left[some]] = _intervals_meet(a, b, some, len(SIDES) * first[some] + second[some], conservative)
+    return found
+
+
+def _bound(a: Corners, b: Corners) -> float:
+    """Bound the error of the determinants of a chunk, as orient3d does, from the largest difference of coordinates."""
+    reach = 0.0
+    for axis in range(3):
+        low = min(p[:, axis].min(initial=np.inf) for p in (a, b))
+        high = max(p[:, axis].max(initial=-np.inf) for p in (a, b))
+        reach = max(reach, float(high - low))
+    return 6 * ORIENT3D_ERROR * reach * (reach * reach + FLOAT_TINY) + FLOAT_TINY
+
+
+def _sides(plane: Corners, corners: Corners, bound: float, conservative: bool) -> Sides:
+    """Tell on which sides of the plane of a triangle three corners lie: the signs of their distances to it.
+
+    The determinants are those of orient3d, with what belongs to the plane, its normal, worked out once for all three.
+    """
+    p, q, r = plane
+    (ex, ey, ez), (fx, fy, fz) = p - r, q - r
+    normal = np.stack((ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx))
+    values = np.empty((3, p.shape[-1]))
+    for corner, value in zip(corners, values, strict=True):
+        x, y, z = np.multiply(normal, corner - r)
+        np.add(np.add(x, y, out=x), z, out=value)
+    signs = (values > 0).view(np.int8) - (values < 0).view(np.int8)
+    size = np.abs(values, out=values)
+    if not (size.min(initial=np.inf) > bound and size.max(initial=0) < FLOAT_HUGE):
+        i, row = np.nonzero(~((size > bound) & (size < FLOAT_HUGE)))
+        seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
+        signs[i[seen], row[seen]] = 0
+        i, row = i[~seen], row[~seen]
+        signs[i, row] = orient3d(p.T[row], q.T[row], corners[i, :, row], r.T[row], conservative)
+    return np.asarray(9 * signs[0] + 3 * signs[1] + signs[2] + IN_PLANE, np.int64)
+
+
+def _plainly_in(triangle: Corners, points: Floats) -> Bools:
+    """Tell which points (3, n) are corners of a triangle, or level with all of it on an axis: in its plane, surely."""
+    same = triangle == points
+    return np.asarray(same.all(axis=1).any(axis=0) | same.all(axis=0).any(axis=0))
+
+
+def _share_corner(a: Corners, b: Corners) -> Bools:
+    return np.asarray((a[:, None] == b).all(axis=2).any(axis=(0, 1)))
+
+
+def _intervals_meet(a: Corners, b: Corners, rows: Ints, way: Ints, conservative: bool) -> Bools:
+    """Compare the ends of the intervals on the line of both planes; way is 27 first + second sides.
+
+    A triangle's interval lies between its edges pq and pr, where p is the corner that is alone on its side of the other
+    plane. The order of where pq of one and pq of the other cross the line is a sign of these four corners.
+    """
+    found = np.zeros(len(rows), np.bool_)
+    (p, s), (q, t), (r, u) = (_ALONE[k].take(way, axis=1) for k in range(3))
+    ends = _picked(a, p, rows), _picked(a, q, rows), _picked(b, s, rows), _picked(b, t, rows)
+    left = np.flatnonzero(orient3d(*ends, conservative) >= 0)
+    rows, p, r, s, u = rows[left], p[left], r[left], s[left], u[left]
+    ends = _picked(a, p, rows), _picked(a, r, rows), _picked(b, s, rows), _picked(b, u, rows)
+    found[left] = orient3d(*ends, conservative) <= 0
+    return found
+
+
+def _picked(corners: Corners, which: Ints, rows: Ints) -> Floats:
+    """One corner of each row, as rows (m, 3)."""
+    n = corners.shape[-1]
+    place = which * (3 * n) + rows
+    flat = corners.reshape(-1)
+    return np.stack([flat.take(place + axis * n) for axis in range(3)]).T
+
+
+def _special(a: Corners, b: Corners, first: Sides, second: Sides, conservative: bool) -> Bools:
+    """Decide the rows in which a triangle lies in the other's plane, or has no area and so no plane."""
+    found = _boxes_meet(a, b)
+    if conservative:
+        return found
+    one, two = (np.ascontiguousarray(p.transpose(2, 0, 1)) for p in (a, b))
+    for sides, flat, other in ((first, one, two), (second, two, one)):
+        through = np.flatnonzero(found & (sides != IN_PLANE))  # then it is the other whose plane is none
+        found[through] = _pierces(flat[through], sides[through], other[through])
+    within = np.flatnonzero(found & (first == IN_PLANE) & (second == IN_PLANE))
+    found[within] = _coplanar_meet(one[within], two[within])
+    return found
+
+
+def _boxes_meet(a: Corners, b: Corners) -> Bools:
+    lows, highs = (a.min(axis=0), b.min(axis=0)), (a.max(axis=0), b.max(axis=0))
+    return np.asarray(((lows[0] <= highs[1]) & (lows[1] <= highs[0])).all(axis=0))
+
+
+def _pierces(segment: Floats, sides: Sides, triangle: Floats) -> Bools:
+    """Tell where a triangle without an area, on both sides of another's plane or at it, goes through the other."""
+    rows = np.arange(len(segment))
+    p, q = segment[rows, _HIGHEST[sides]], segment[rows, _LOWEST[sides]]
+    signs = np.stack([orient3d(p, q, triangle[:, i], triangle[:, (i + 1) % 3]) for i in range(3)])
+    return np.asarray((signs >= 0).all(axis=0) | (signs <= 0).all(axis=0))
+
+
+def _coplanar_meet(a: Floats, b: Floats) -> Bools:
+    """The coplanar case: drop an axis that is not in the common plane, then look for an edge that separates.
+
+    Two segments may have no plane in common; then they are apart. What lies on one line has no plane of its own, and
+    no such edge either: there the boxes have told.
+    """
+    found = np.ones(len(a), np.bool_)
+    axis = _axis(a)
+    flat = np.flatnonzero(axis < 0)
+    axis[flat] = _axis(b[flat])
+    flat = flat[axis[flat] < 0]
+    (p, q), (r, s) = _ends(a[flat]), _ends(b[flat])
+    found[flat[orient3d(p, q, r, s) != 0]] = False
+    for three in ((p, q, r), (p, q, s), (p, r, s)):
+        none = np.flatnonzero(axis[flat] < 0)
+        axis[flat[none]] = _axis(np.stack([point[none] for point in three], axis=1))
+    rows = np.flatnonzero(found)
+    found[rows] = ~_parted(_dropped(a[rows], axis[rows]), _dropped(b[rows], axis[rows]))
+    return found
+
+
+def _axis(triangles: Floats) -> Ints:
+    """Choose an axis (m,) such that the triangle still has an area when it is dropped; -1 when it has none in space.
+
+    The largest part of the normal, by floats, is the first guess; the exact sign of the area decides.
+    """
+    e, f = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    normal = [e[:, i] * f[:, j] - e[:, j] * f[:, i] for i, j in KEPT]
+    guess = np.argmax(np.abs(np.stack(normal, axis=1)), axis=1)
+    axis = np.full(len(triangles), -1)
+    for k in range(3):
+        left = np.flatnonzero(axis < 0)
+        tried = (guess[left] + k) % 3
+        flat = _dropped(triangles[left], tried)
+        good = orient2d(flat[:, 0], flat[:, 1], flat[:, 2]) != 0
+        axis[left[good]] = tried[good]
+    return axis
+
+
+def _dropped(points: Floats, axis: Ints) -> Floats:
+    """Points (m, k, 3) without one coordinate of each row; without any but the first where the axis is -1."""
+    return np.take_along_axis(points, np.array(KEPT)[axis][:, None], axis=2)
+
+
+def _ends(segments: Floats) -> tuple[Floats, Floats]:
+    """Two ends of three points on a line: the order of all coordinates, one after the other, is that on the line."""
+    order = np.lexsort(segments.transpose(2, 0, 1)[::-1], axis=-1)
+    rows = np.arange(len(segments))
+    return segments[rows, order[:, 0]], segments[rows, order[:, 2]]
+
+
+def _parted(a: Floats, b: Floats) -> Bools:
+    """Tell where all of one triangle in 2-D (m, 3, 2) lies strictly beyond an edge of the other; a row that is, leaves.
+
+    A segment has an edge on either side.
+    """
+    parted = np.zeros(len(a), np.bool_)
+    for one, two in ((a, b), (b, a)):
+        turn = orient2d(one[:, 0], one[:, 1], one[:, 2])
+        for i in range(3):
+            left = np.flatnonzero(~parted)
+            p, q = one[left, i, None], one[left, (i + 1) % 3, None]
+            side = orient2d(p, q, two[left])
+            right_of, left_of = (side < 0).all(axis=1), (side > 0).all(axis=1)
+            parted[left] = (right_of & (turn[left] >= 0)) | (left_of & (turn[left] <= 0))
+    return parted
+
+
+def _alone(sides: tuple[int, ...]) -> tuple[int, bool]:
+    """Choose the corner that is alone on its side of a plane, and tell whether that side is the upper one.
+
+    Corners in the plane count as on the other side; one that is in the plane alone, with both others on one side, is
+    alone. Both edges from this corner cross the plane, or end there, in one point each.
+    """
+    for sign in (1, -1):
+        if sides.count(sign) == 1 and sides.count(-sign) + sides.count(0) == 2:
+            return sides.index(sign), sign > 0
+    return (sides.index(0), sides.count(-1) == 2) if sides.count(0) == 1 else (0, True)
+
+
+def _corners_of_ends() -> Ints:
+    """Name the corners p, q, r of both triangles (3, 2, 27 * 27), such that the intervals have one direction.
+
+    When the corner alone of one lies below the plane of the other, that plane is turned over: its q and r are swapped.
+    """
+    rows = []
+    for (first, first_up), (second, second_up) in product([_alone(sides) for sides in SIDES], repeat=2):
+        one, two = (1, 2) if second_up else (2, 1), (1, 2) if first_up else (2, 1)
+        rows.append([(first, second), *((first + i, second + j) for i, j in zip(one, two, strict=True))])
+    return np.moveaxis(np.array(rows) % 3, 0, -1).copy()
+
+
+_APART = np.array([abs(sum(sides)) == 3 for sides in SIDES])
+_WITHIN = np.array([sides == (0, 0, 0) for sides in SIDES])
+_TOUCHED = np.array([0 in sides for sides in SIDES])
+_HIGHEST = np.array([sides.index(max(sides)) for sides in SIDES])
+_LOWEST = np.array([sides.index(min(sides)) for sides in SIDES])
+_ALONE = _corners_of_ends()
