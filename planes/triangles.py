@@ -266,11 +266,14 @@ def _boxes_meet(a: Corners, b: Corners) -> Bools:
 
 
 def _pierces(segment: Floats, sides: Sides, triangle: Floats) -> Bools:
-    """Tell where a triangle without an area, on both sides of another's plane or at it, goes through the other."""
+    """Tell where a triangle without an area, which crosses another's plane or ends there, goes through the other.
+
+    Seen from its upper end, all edges of the other then turn the same way about it.
+    """
     rows = np.arange(len(segment))
     p, q = segment[rows, _HIGHEST[sides]], segment[rows, _LOWEST[sides]]
     signs = np.stack([orient3d(p, q, triangle[:, i], triangle[:, (i + 1) % 3]) for i in range(3)])
-    return np.asarray((signs >= 0).all(axis=0) | (signs <= 0).all(axis=0))
+    return np.asarray((signs >= 0).all(axis=0))
 
 
 def _coplanar_meet(a: Floats, b: Floats) -> Bools:
@@ -286,7 +289,7 @@ def _coplanar_meet(a: Floats, b: Floats) -> Bools:
     flat = flat[axis[flat] < 0]
     (p, q), (r, s) = _ends(a[flat]), _ends(b[flat])
     found[flat[orient3d(p, q, r, s) != 0]] = False
-    for three in ((p, q, r), (p, q, s), (p, r, s)):
+    for three in ((p, q, r), (p, r, s)):  # no corner is shared, so p is not r
         none = np.flatnonzero(axis[flat] < 0)
         axis[flat[none]] = _axis(np.stack([point[none] for point in three], axis=1))
     rows = np.flatnonzero(found)
