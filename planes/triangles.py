@@ -18,7 +18,7 @@ import numpy.typing as npt
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
 from planes.broadphase import Bvh
 from planes.constants import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY
-from planes.exact import ORIENT3D_ERROR, orient2d, orient3d
+from planes.exact import ORIENT3D_ERROR, Signs, orient2d, orient3d
 
 __all__ = ["Mesh", "meeting_faces", "triangles_meet"]
 
@@ -153,7 +153,7 @@ def _triangles(field: str, values: npt.ArrayLike) -> Floats:
 def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     """Take one chunk through the seven steps; a row that is decided leaves it."""
     found = np.zeros(a.shape[-1], np.bool_)
-    bound = _bound(a, b)
+    bound = _bound(_chunk_reach(a, b))
     # 1. The plane of the second; 2. no, where all corners of the first lie strictly on one side of it.
     first = _sides(b, a, bound, conservative)
     keep = ~_APART[first]
@@ -179,13 +179,24 @@ def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     return found
 
 
-def _bound(a: Corners, b: Corners) -> float:
-    """Bound the error of the determinants of a chunk, as orient3d does, from the largest difference of coordinates."""
+def _chunk_reach(a: Corners, b: Corners) -> float:
+    """Largest difference of two coordinates on one axis, over all rows."""
     reach = 0.0
     for axis in range(3):
         low = min(p[:, axis].min(initial=np.inf) for p in (a, b))
         high = max(p[:, axis].max(initial=-np.inf) for p in (a, b))
         reach = max(reach, float(high - low))
+    return reach
+
+
+def _row_reach(a: Corners, b: Corners) -> Floats:
+    """Largest difference of two coordinates on one axis, row by row."""
+    low, high = np.minimum(a.min(axis=0), b.min(axis=0)), np.maximum(a.max(axis=0), b.max(axis=0))
+    return np.asarray((high - low).max(axis=0))
+
+
+def _bound(reach: Any) -> Any:
+    """Bound the error of a determinant as orient3d does, from the largest difference of coordinates."""
     return 6 * ORIENT3D_ERROR * reach * (reach * reach + FLOAT_TINY) + FLOAT_TINY
 
 
@@ -204,12 +215,22 @@ def _sides(plane: Corners, corners: Corners, bound: float, conservative: bool) -
     signs = (values > 0).view(np.int8) - (values < 0).view(np.int8)
     size = np.abs(values, out=values)
     if not (size.min(initial=np.inf) > bound and size.max(initial=0) < FLOAT_HUGE):
-        i, row = np.nonzero(~((size > bound) & (size < FLOAT_HUGE)))
-        seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
-        signs[i[seen], row[seen]] = 0
-        i, row = i[~seen], row[~seen]
-        signs[i, row] = orient3d(p.T[row], q.T[row], corners[i, :, row], r.T[row], conservative)
+        sure = (size > bound) & (size < FLOAT_HUGE)
+        rows = np.flatnonzero(~(sure[0] & sure[1] & sure[2]))
+        chosen = plane.take(rows, axis=2), corners.take(rows, axis=2)
+        signs[:, rows] = _doubtful(signs.take(rows, axis=1), size.take(rows, axis=1), *chosen, conservative)
     return np.asarray(9 * signs[0] + 3 * signs[1] + signs[2] + IN_PLANE, np.int64)
+
+
+def _doubtful(signs: Signs, size: Floats, plane: Corners, corners: Corners, conservative: bool) -> Signs:
+    """Give the signs (3, n) of rows that the chunk's bound leaves in doubt: a bound of their own, a look, orient3d."""
+    i, row = np.nonzero(~((size > _bound(_row_reach(plane, corners))) & (size < FLOAT_HUGE)))
+    seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
+    signs[i[seen], row[seen]] = 0
+    i, row = i[~seen], row[~seen]
+    p, q, r = (plane[k, :, row] for k in range(3))
+    signs[i, row] = orient3d(p, q, corners[i, :, row], r, conservative)
+    return signs
 
 
 def _plainly_in(triangle: Corners, points: Floats) -> Bools:
