@@ -213,7 +213,7 @@ def test_stretched_along_an_axis(axis: int) -> None:
 
 
 def test_one_is_small_and_the_other_reaches_far_from_it() -> None:
-    """A corner of the small one touches the large one at its corner; the rest lies on one side, toward the far end."""
+    """A corner of the small one touches the large one at its corner, or all of it lies in the other's plane."""
     rng = np.random.default_rng(8)
     sides = rng.uniform(1e9, 2e9, (2, 300, 3))
     corner = rng.uniform(0, 1, (300, 3))
@@ -224,11 +224,14 @@ def test_one_is_small_and_the_other_reaches_far_from_it() -> None:
     away = rng.normal(size=(2, 300, 3))
     away *= np.sign((away * normal).sum(axis=2))[..., None]
     small = np.stack((place, place + away[0], place + away[1]), axis=1)
-    expected = truth(small, large)
-    assert 0.2 < expected.mean() < 0.8
-    for sign in (1, -1):
-        assert (triangles_meet(small * sign, large * sign) == expected).all()
-        assert (triangles_meet(large * sign, small * sign) == expected).all()
+    shares = rng.uniform(-2e-10, 4e-10, (2, 300, 3, 1))
+    level = corner[:, None] + shares[0] * sides[0][:, None] + shares[1] * sides[1][:, None]
+    for near in (small, level):
+        expected = truth(near, large)
+        assert 0.2 < expected.mean() < 0.8
+        for sign in (1, -1):
+            assert (triangles_meet(near * sign, large * sign) == expected).all()
+            assert (triangles_meet(large * sign, near * sign) == expected).all()
 
 
 def test_products_at_the_end_of_the_range() -> None:
