@@ -8,13 +8,14 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals
 from planes.constants import CHUNK_PAIRS
 
-__all__ = ["BroadPhase", "BruteForce", "Work", "box_rows", "meets", "pieces", "sorted_pairs"]
+__all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "sorted_pairs"]
 
 Pairs = tuple[Ints, Ints]
 AXES = "xyz"
@@ -69,6 +70,22 @@ def pieces(lengths: Ints, limit: int) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
+class Cells(NamedTuple):
+    """Nodes of a structure, to be drawn: cells, quarters, boxes about boxes; each before what is in it.
+
+    Parameters
+    ----------
+    number : (C,) int64, as `Work.visited` names them
+    box : (C, 2d) float64, in the units of the boxes: infinite where a cell has no end, and with its min beyond its max
+        where a node holds nothing any more
+    leaf : (C,) bool, whether it lists boxes itself
+    """
+
+    number: Ints
+    box: Floats
+    leaf: Bools
+
+
 @dataclass
 class Work:
     """What a query looked at, as (2, K) rows [query, node] and [query, box]; a box may be tested more than once.
@@ -85,12 +102,12 @@ class Work:
 
     @property
     def visited(self) -> Ints:
-        """Nodes that were looked into: (2, K) int64 [query, node], sorted."""
+        """Nodes that were looked into: (2, K) int64 [query, node], in the order of the search."""
         return _piled(self.visits)
 
     @property
     def tested(self) -> Ints:
-        """Boxes that were compared with the query: (2, K) int64 [query, box], sorted."""
+        """Boxes that were compared with the query: (2, K) int64 [query, box], in the order of the search."""
         return _piled(self.tests)
 
 
@@ -180,6 +197,10 @@ class BroadPhase(ABC):
             self._shift(moved, rows)
 
     @abstractmethod
+    def cell_boxes(self) -> Cells:
+        """Tell where the nodes are that a query may visit."""
+
+    @abstractmethod
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
 
@@ -255,18 +276,25 @@ class BroadPhase(ABC):
 class BruteForce(BroadPhase):
     """Every query against every box: the reference, and the fastest for a few dozen."""
 
+    def cell_boxes(self) -> Cells:
+        """Tell where the nodes are that a query may visit: one box about all, or none."""
+        rows = self.boxes
+        hull = np.concatenate((rows[:, : self.dim].min(axis=0), rows[:, self.dim :].max(axis=0))) if len(rows) else rows
+        some = hull.reshape(-1, 2 * self.dim)
+        return Cells(np.arange(len(some)), some, np.ones(len(some), np.bool_))
+
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
         self._check_table()
 
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
         every = np.arange(len(queries))
-        if work is not None:
+        if work is not None and len(self):
             work.visits.append((every, np.zeros_like(every)))
         return self._meeting_all(queries, every, self.ids, work)
 
     def _node_count(self) -> int:
-        return 1
+        return min(len(self), 1)
 
     def _enter(self, ids: Ints) -> None:
         pass

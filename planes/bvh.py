@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, integers, real
-from planes.boxes import BroadPhase, Pairs, Work, box_rows, meets, pieces
+from planes.boxes import BroadPhase, Cells, Pairs, Work, box_rows, meets, pieces
 from planes.constants import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from planes.spans import ragged
 
@@ -101,6 +101,13 @@ class Bvh(BroadPhase):
         self._place = np.empty(0, np.int64)
         if self._count:
             self._enter(self.ids)
+
+    def cell_boxes(self) -> Cells:
+        """Tell where the nodes are, tree by tree, each from the top down."""
+        levels = [(level, level is tree.levels[-1]) for tree in self._trees for level in tree.levels]
+        box = np.concatenate([np.empty((0, 2 * self.dim)), *(level for level, _ in levels)])
+        leaf = np.repeat([last for _, last in levels], [len(level) for level, _ in levels]).astype(np.bool_)
+        return Cells(np.arange(len(box)), box, leaf)
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""

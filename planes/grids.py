@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, integer, integers, real
-from planes.boxes import BroadPhase, Pairs, Work, pieces
+from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces
 from planes.constants import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from planes.spans import ragged
 
@@ -107,6 +107,15 @@ class Grid(BroadPhase):
             raise InputError(f"box: expected one over at most {OVERSIZED_CELLS} cells, got {box}, which is over more")
         _, at = _written_out(self._low[ids], self._high[ids])
         return at[np.lexsort(at.T[::-1])]
+
+    def cell_boxes(self) -> Cells:
+        """Tell where the cells are that list boxes; one that lists old and fresh ones has two numbers."""
+        key = np.concatenate([listing.key for listing in self._listings])
+        at = np.stack([key >> self._bits * axis for axis in reversed(range(self.dim))], axis=1) & 2**self._bits - 1
+        with np.errstate(over="ignore"):
+            low = self.origin + self.cell * (at - self._reach)
+            box = np.clip(np.concatenate((low, low + self.cell), axis=1), -LARGEST, LARGEST)
+        return Cells(np.arange(len(key)), box, np.ones(len(key), np.bool_))
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""

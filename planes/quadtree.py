@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, integer
-from planes.boxes import BroadPhase, Pairs, Work, pieces, sorted_pairs
+from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, sorted_pairs
 from planes.constants import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
 from planes.spans import ragged
 
@@ -64,6 +64,12 @@ class Quadtree(BroadPhase):
     def leaves(self) -> Floats:
         """Cells of the leaves, (L, 4) float; those at the border reach on beyond what is drawn."""
         return np.asarray(self._nodes["cell"][self._leaf_numbers()])
+
+    def cell_boxes(self) -> Cells:
+        """Tell where the cells are, from the root down; those at the border reach on without end."""
+        number = np.flatnonzero(self._nodes["depth"] >= 0)
+        number = number[np.argsort(self._nodes["depth"][number], kind="stable")]
+        return Cells(number, self._nodes["gate"][number], self._nodes["child"][number] < 0)
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""

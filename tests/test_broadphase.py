@@ -12,6 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from planes import InputError
 from planes.arrays import Floats, Ints
+from planes.boxes import meets
 from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
 
 Maker = Callable[[Floats], BroadPhase]
@@ -337,6 +338,64 @@ def test_work_tells_what_was_looked_at(make: Maker, d: int) -> None:
     assert work.visited.size and work.visited[1].max() < work.nodes
     if not isinstance(structure, BruteForce) and not (isinstance(structure, Quadtree) and not structure.depth):
         assert len(tested) < 20 * 500 / 4
+
+
+@pytest.mark.parametrize(("make", "d"), ALL)
+def test_cells_are_where_a_query_looks(make: Maker, d: int) -> None:
+    rng = np.random.default_rng(7)
+
+    def small(n: int) -> Floats:
+        return boxes_from(rng.uniform(0, 60, (n, d)), rng.uniform(0, 1, (n, d)))
+
+    structure = make(small(400))
+    for step in range(4):
+        structure.check()
+        number, box, leaf = structure.cell_boxes()
+        boxes, queries = structure.boxes, small(20)
+        work = structure.work(queries)
+        assert len(np.unique(number)) == len(number) == len(box) == len(leaf) == work.nodes
+        assert meets(boxes[:, None], box[leaf]).any(axis=1).all(), "a box is in no leaf"
+        place = {int(n): k for k, n in enumerate(number)}
+        visited = np.array([place[n] for n in work.visited[1].tolist()], np.int64)
+        if not isinstance(structure, Bvh):
+            assert meets(box[visited], queries[work.visited[0]]).all(), "a cell was visited in vain"
+        for query, found in structure.query(queries).T.tolist():
+            mine = visited[work.visited[0] == query]
+            shared = meets(boxes[structure.ids == found], box[mine]) & meets(queries[query], box[mine])
+            assert (shared & leaf[mine]).any(), "a pair shares no leaf that was visited"
+        structure.remove(structure.ids[:: step + 3])
+        structure.move(structure.ids[:100], small(100))
+        structure.insert(small(30))
+    structure.remove(structure.ids)
+    number, box, leaf = structure.cell_boxes()
+    visited = structure.work(small(9)).visited[1]
+    assert len(number) == len(box) == len(leaf) and set(visited.tolist()) <= set(number.tolist())
+
+
+def test_cells_of_each_structure() -> None:
+    rows = np.array([[0, 0, 1, 1], [7, 0, 8, 1], [0, 7, 1, 8], [7, 7, 8, 8.0]])
+    number, box, leaf = Quadtree(rows, capacity=3).cell_boxes()
+    inf = np.inf
+    quarters = [[-inf, -inf, 4, 4], [4, -inf, inf, 4], [-inf, 4, 4, inf], [4, 4, inf, inf]]
+    assert box.tolist() == [[-inf, -inf, inf, inf], *quarters]
+    assert leaf.tolist() == [False, True, True, True, True] and number.tolist() == [0, 1, 2, 3, 4]
+    _, box, leaf = Grid(rows, cell=4).cell_boxes()
+    assert box.tolist() == [[-1, -1, 3, 3], [-1, 7, 3, 11], [7, -1, 11, 3], [7, 7, 11, 11]] and leaf.all()
+    _, box, leaf = Grid([[0, 1, 2, 0.5, 1.5, 2.5]], cell=1).cell_boxes()
+    assert box.tolist() == [[0, 1, 2, 1, 2, 3]]
+    _, box, leaf = Bvh(np.tile(rows, (5, 1))).cell_boxes()
+    assert box.tolist() == [[0, 0, 8, 8], *rows[[0, 2, 1, 3]].tolist()]
+    assert leaf.tolist() == [False, True, True, True, True]
+    _, box, leaf = BruteForce(rows).cell_boxes()
+    assert box.tolist() == [[0, 0, 8, 8]] and leaf.tolist() == [True]
+
+
+@pytest.mark.parametrize(("make", "d"), ALL)
+def test_nothing_has_no_cell_that_holds_anything(make: Maker, d: int) -> None:
+    structure = make(np.empty((0, 2 * d)))
+    number, box, leaf = structure.cell_boxes()
+    assert box.shape == (len(number), 2 * d) and leaf.dtype == np.bool_ and len(leaf) == len(number) <= 1
+    assert structure.work(np.zeros((3, 2 * d))).tested.shape == (2, 0)
 
 
 @pytest.mark.parametrize("d", [2, 3])
