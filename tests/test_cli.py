@@ -107,7 +107,7 @@ def test_an_interrupt_is_one_line_and_leaves_the_old_report(
 RUN = [sys.executable, "-W", "error", "-m", "weapons"]
 
 
-@pytest.mark.parametrize("word", ["report", "fire", "new"])
+@pytest.mark.parametrize("word", ["report", "fire", "new", "compare", "demo"])
 def test_help_shows_examples(word: str) -> None:
     shown = subprocess.run([*RUN, word, "--help"], capture_output=True, text=True, check=True).stdout
     examples = shown.split("examples:\n")[1].splitlines()
@@ -124,6 +124,7 @@ def test_help_shows_examples(word: str) -> None:
         (["report", "x", "--aim", "left"], "argument --aim: invalid float value: 'left'"),
         (["fire", "x"], "the following arguments are required: SHOTS.jsonl"),
         (["new", "a", "b\nc"], "unrecognized arguments: b c"),
+        (["demo", "octree"], "argument KIND: invalid choice: 'octree' (choose from "),
     ],
 )
 def test_bad_words_are_one_line_and_exit_2(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,6 +19,7 @@ from planes.items import Role
 from planes.scene import Scene, load_scene
 from planes.scenefile import FILE_NAME, scene_folder
 from weapons.arsenal import arsenal_of
+from weapons.demo import KINDS, write_demo
 from weapons.differences import differences
 from weapons.facts import report_of
 from weapons.orders import Order, fire_order, order_from_json, orders_of
@@ -87,6 +88,18 @@ examples:
 COMPARE_HELP = """\
 Say what differs between two reports, in words, and draw them side by side: what was hit in only one of them, in both.
 Exit code: 0 the same, 1 they differ, 2 bad input. Versions and plans are not compared.
+"""
+
+DEMO_HELP = """\
+Show a broad phase at work: objects that move, cells that split and merge with them, and a query in its two steps, to
+find the leaves, and to compare within them. It counts the tests that it makes beside those of brute force.
+"""
+
+DEMO_EXAMPLES = """\
+examples:
+  hitplanes demo quadtree
+  hitplanes demo grid -o grid.gif
+  hitplanes demo bvh -o frames
 """
 
 COMPARE_EXAMPLES = """\
@@ -193,6 +206,10 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw them, too")
     told = "scene of one of them or of both, to draw them on; may be given twice"
     one.add_argument("--scene", type=Path, metavar="SCENE", action="append", help=told)
+    one = _word(words, demo, "show a quadtree, a grid or a BVH in motion", DEMO_HELP, DEMO_EXAMPLES)
+    one.add_argument("kind", choices=tuple(KINDS), metavar="KIND", help=f"one of {', '.join(KINDS)}")
+    told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
+    one.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=told)
     return top
 
 
@@ -330,3 +347,8 @@ def compare(arguments: argparse.Namespace) -> int:
     for line in lines or ["no difference"]:
         _say(line)
     return 1 if lines else 0
+
+
+def demo(arguments: argparse.Namespace) -> None:
+    """Write the animation of a broad phase, and say where it is."""
+    _say(f"a {KINDS[arguments.kind].name} in motion is in {write_demo(arguments.kind, arguments.output)}")

@@ -13,7 +13,7 @@ from planes.image import write_png, write_text
 from planes.scenefile import FILE_NAME, laid_out
 from planes.schema import Mask
 
-__all__ = ["write_starter"]
+__all__ = ["empty_folder", "write_starter"]
 
 SCHEMAS = Path(__file__).parent / "schemas"
 
@@ -87,7 +87,7 @@ def write_starter(folder: Path) -> None:
         "ground.png": _ground(),
         "score.png": _score(),
     }
-    made = _empty(folder)
+    made = empty_folder(folder)
     try:
         for name, image in images.items():
             write_png(folder / name, image)
@@ -102,7 +102,7 @@ def write_starter(folder: Path) -> None:
         raise
 
 
-def _empty(folder: Path) -> bool:
+def empty_folder(folder: Path) -> bool:
     """Make the folder, unless it is there and empty; tells whether it was made."""
     try:
         folder.mkdir()

@@ -1,0 +1,357 @@
+"""A broad phase at work: boxes that move, cells that follow, and a query in its two steps, side by side.
+
+Step 1 goes through the nodes of the structure, step 2 compares the query with the boxes that the leaves list. All
+that is drawn is what `BroadPhase.work` tells, so one code shows the three structures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from planes.arrays import Bools, Floats, Image, InputError, Ints
+from planes.boxes import BroadPhase, Cells, meets
+from planes.bvh import Bvh
+from planes.constants import SUB, TRIG_BITS
+from planes.grid256 import unit
+from planes.grids import Grid
+from planes.quadtree import Quadtree
+from planes.render import blend
+from weapons.animation import can_write_gif, write_frames, write_gif
+from weapons.marks import MARKS
+from weapons.panel import CARD, FAINT, GROUND, INK, Entry, Legend, Text, draw_texts
+from weapons.words import percent
+
+__all__ = ["FRAMES", "KINDS", "Moment", "demo_frames", "moments", "write_demo"]
+
+FRAMES, MILLISECONDS = 80, 70
+"""Pictures of one round, after which all is as it was; and how long each is shown."""
+
+WIDTH, HEIGHT = 300, 248
+"""The world, px; each step has it once."""
+
+FLOCKS, FLOCK, WANDERERS = 3, 60, 120
+"""Groups that keep together, how many boxes each has, and boxes that go their own way."""
+
+MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392
+"""Around the two panes, between them, and above them; px."""
+
+NAME, BAR, CHART = 96, 170, 180
+"""Widths of a bar's name, of the longest bar, and of the chart of all frames, px."""
+
+WALL = 6
+"""No box has its centre nearer to the edge of the world, px."""
+
+MIDDLE = np.array([WIDTH / 2, HEIGHT / 2])
+
+QUERY_HALF, QUERY_REACH, QUERY_TURNS = np.array([20.0, 16.0]), np.array([[112.0, 88.0]]), np.array([[1, 2]])
+"""The query, a shot's box, by half its sides; and the figure of eight that it goes along, px."""
+
+SEED = 22
+"""Of the boxes' orbits."""
+
+
+class Kind(NamedTuple):
+    """A structure that can be shown: its names, long and short, what its leaves are called, and how it is made."""
+
+    title: str
+    name: str
+    leaves: str
+    make: Callable[[Floats], BroadPhase]
+
+
+KINDS = {
+    "quadtree": Kind("Quadtree", "quadtree", "leaves", lambda boxes: Quadtree(boxes, capacity=6)),
+    "grid": Kind("Uniform grid", "grid", "cells", lambda boxes: Grid(boxes, cell=20)),
+    "bvh": Kind("Bounding volume hierarchy", "BVH", "leaves", Bvh),
+}
+"""Coarser than they would be made for speed, so that cells can be seen."""
+
+Color = tuple[int, int, int]
+FOUND: Color = MARKS["hit"][0]
+TESTED: Color = (246, 228, 150)
+VISITED: Color = MARKS["occluded"][0]
+REST: Color = (96, 102, 114)
+CELL: Color = (80, 86, 98)
+ON_THE_WAY: Color = (62, 116, 148)
+
+TINT = 84
+"""Opacity of a leaf that is opened, of 255."""
+
+RING = 1.4
+"""Thickness of a ring, px."""
+
+ROOM = 16
+"""How far beyond a picture a disc may begin, px."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One frame: the structure as it is, and what one query looks at.
+
+    Parameters
+    ----------
+    cells : nodes of the structure
+    visited : (C,) bool, nodes that the query looked into
+    boxes : (N, 4) float, px
+    tests : how often a box was compared with the query; one that reaches into several leaves counts in each
+    tested, found : (N,) bool
+    query : (4,) float, px
+    """
+
+    cells: Cells
+    visited: Bools
+    boxes: Floats
+    tests: int
+    tested: Bools
+    found: Bools
+    query: Floats
+
+    @property
+    def entered(self) -> Bools:
+        """Leaves that the query opened: (C,) bool."""
+        return np.asarray(self.visited & self.cells.leaf & meets(self.cells.box, self.query))
+
+
+def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
+    """Move boxes through a structure, and ask it at each step.
+
+    Parameters
+    ----------
+    kind : one of KINDS
+    frames : steps of one round
+
+    Raises
+    ------
+    InputError
+        If there is no such structure.
+    """
+    if kind not in KINDS:
+        raise InputError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    places, half = _orbits(frames)
+    track = _on_ellipse(frames, MIDDLE[None], QUERY_REACH, QUERY_TURNS, np.random.default_rng(SEED))[:, 0]
+    structure = KINDS[kind].make(_around(places[0], half))
+    ids = structure.ids
+    for centres, aim in zip(places, track, strict=True):
+        boxes = _around(centres, half)
+        structure.move(ids, boxes)
+        yield _moment(structure, boxes, _around(aim, QUERY_HALF))
+
+
+def _around(centre: Floats, half: Floats) -> Floats:
+    return np.concatenate((centre - half, centre + half), axis=-1)
+
+
+def _moment(structure: BroadPhase, boxes: Floats, query: Floats) -> Moment:
+    work, cells = structure.work(query[None]), structure.cell_boxes()
+    tested, found = np.zeros((2, len(boxes)), np.bool_)
+    tested[work.tested[1]] = True
+    found[structure.query(query[None])[1]] = True
+    visited = np.isin(cells.number, work.visited[1])
+    return Moment(cells, visited, boxes, work.tested.shape[1], tested, found, query)
+
+
+def _orbits(frames: int) -> tuple[Floats, Floats]:
+    """Centres (frames, N, 2) of the boxes, and half their sides (N, 1), px: the last frame leads to the first one."""
+    rng = np.random.default_rng(SEED)
+    places = np.concatenate((_flocks(frames, rng), _wanderers(frames, rng)), axis=1)
+    half = rng.choice([1.5, 2.0, 2.5, 3.5], (places.shape[1], 1))
+    return np.clip(places, WALL, MIDDLE * 2 - WALL), half
+
+
+def _flocks(frames: int, rng: np.random.Generator) -> Floats:
+    """Places of boxes that go round the middle of their flock, each flock round the middle of the world."""
+    n, reach = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]])
+    turns = np.array([[1, 1], [-1, 1], [1, -1]])
+    leaders = _on_ellipse(frames, np.tile(MIDDLE, (FLOCKS, 1)), reach, turns, rng)
+    reach = np.abs(rng.normal(0, 22, (n, 2))) + 3
+    own = _on_ellipse(frames, np.zeros((n, 2)), reach, rng.choice([-2, -1, 1, 2], (n, 2)), rng)
+    return np.asarray(np.repeat(leaders, FLOCK, axis=1) + own)
+
+
+def _wanderers(frames: int, rng: np.random.Generator) -> Floats:
+    """Places of boxes that go round some middle of their own, and stay in the world."""
+    reach = rng.uniform(5, (70, 60), (WANDERERS, 2))
+    least = reach + WALL
+    about = least + rng.uniform(0, 1, (WANDERERS, 2)) * 2 * (MIDDLE - least)
+    return _on_ellipse(frames, about, reach, rng.choice([-2, -1, 1, 2], (WANDERERS, 2)), rng)
+
+
+def _on_ellipse(frames: int, middle: Floats, reach: Floats, turns: Ints, rng: np.random.Generator) -> Floats:
+    """Places (frames, N, 2) of points that go round in x and y as often as their turns say, from anywhere on."""
+    begin = rng.integers(0, 360, middle.shape)
+    angle = 360 * np.arange(frames)[:, None, None] * turns / frames + begin
+    return np.asarray(np.rint((middle + reach * (unit(angle)[0] / 2**TRIG_BITS)) * SUB) / SUB)
+
+
+def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
+    """Write one round of a structure as a GIF, or as PNG files into a folder; tells where to.
+
+    Parameters
+    ----------
+    kind : one of KINDS
+    output : a name that ends in .gif, or of a folder. Where OpenCV writes no GIF, the ending is left out, and that is
+        the folder.
+
+    Raises
+    ------
+    InputError
+        If there is no such structure, or the output cannot be written.
+    """
+    pictures = demo_frames(kind, frames)
+    if output.suffix.lower() == ".gif" and can_write_gif():
+        write_gif(output, pictures, MILLISECONDS)
+        return output
+    folder = output.with_suffix("") if output.suffix.lower() == ".gif" else output
+    write_frames(folder, pictures)
+    return folder
+
+
+def demo_frames(kind: str, frames: int = FRAMES) -> Iterator[Image]:
+    """Draw one round of a structure, (h, w, 3) bytes a frame, RGB; `moments` tells what and what it raises."""
+    history: list[Moment] = []
+    for moment in moments(kind, frames):
+        history.append(moment)
+        yield picture_of(kind, history, frames)
+
+
+def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Image:
+    """Draw the last of some moments: both steps, a legend, and the tests made so far."""
+    now, shown = history[-1], KINDS[kind]
+    page = np.empty((PAGE_HEIGHT, 2 * (MARGIN + WIDTH) + GAP, 3), np.uint8)
+    page[:] = GROUND
+    left, right = MARGIN, MARGIN + WIDTH + GAP
+    page[TOP : TOP + HEIGHT, left : left + WIDTH] = _first_step(now)
+    page[TOP : TOP + HEIGHT, right : right + WIDTH] = _second_step(now)
+    listed = int(now.cells.leaf.sum())
+    texts = [
+        Text(left, 20, f"{shown.title}: {len(now.boxes)} moving objects, one query a frame", INK, bold=True),
+        Text(left, TOP - 8, f"1  find the {shown.leaves}: {now.entered.sum()} of {listed}", VISITED),
+        Text(right, TOP - 8, f"2  compare within them: {now.found.sum()} found", FOUND),
+    ]
+    texts += _legend(now, page.shape[1]).draw(page, left, TOP + HEIGHT + 10)
+    texts += _counters(page, shown.name, history, frames)
+    draw_texts(page, texts)
+    return page
+
+
+def _first_step(now: Moment) -> Image:
+    """Draw the cells; those that the query looks into stand out, and the leaves that it opens are filled."""
+    pane = _pane()
+    for box in now.cells.box[now.entered]:
+        _fill(pane, box, VISITED, TINT)
+    _discs(pane, now, np.ones(len(now.boxes), np.bool_), REST)
+    for which, color in ((~now.visited, CELL), (now.visited & ~now.entered, ON_THE_WAY), (now.entered, VISITED)):
+        for box in now.cells.box[which]:
+            _frame(pane, box, color)
+    _frame(pane, now.query, INK, 2)
+    return pane
+
+
+def _second_step(now: Moment) -> Image:
+    """Draw the boxes: those that were compared with the query as rings, those that overlap it filled."""
+    pane = _pane()
+    for box in now.cells.box[now.entered]:
+        _fill(pane, box, VISITED, TINT // 2)
+    _discs(pane, now, ~now.tested, REST)
+    _frame(pane, now.query, INK, 2)
+    _discs(pane, now, now.tested & ~now.found, TESTED, hollow=True)
+    _discs(pane, now, now.found, FOUND)
+    return pane
+
+
+def _pane() -> Image:
+    pane = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+    pane[:] = CARD
+    return pane
+
+
+def _discs(pane: Image, now: Moment, which: Bools, color: Color, hollow: bool = False) -> None:
+    """Draw boxes as the discs within them; hollow ones are a little larger, to be seen as rings."""
+    centre = (now.boxes[:, :2] + now.boxes[:, 2:]) / 2
+    radius = (now.boxes[:, 2] - now.boxes[:, 0]) / 2
+    _round(pane, centre[which], radius[which] + hollow, color, hollow)
+
+
+def _round(picture: Image, centre: Floats, radius: Floats, color: Color, hollow: bool = False) -> None:
+    """Blend discs or rings with soft edges: centres (N, 2) and radii (N,), px."""
+    across = np.arange(-1, 2 * int(radius.max(initial=0)) + 3)
+    first = np.floor(centre - radius[:, None]).astype(np.int64)
+    x, y = (first[:, axis, None] + across for axis in (0, 1))
+    far = np.hypot((x - centre[:, :1])[:, None, :], (y - centre[:, 1:])[:, :, None])
+    inside = radius[:, None, None] + 0.5 - far
+    soft = np.clip(inside, 0, 1) - hollow * np.clip(inside - RING, 0, 1)
+    alpha = np.zeros((picture.shape[0] + 2 * ROOM, picture.shape[1] + 2 * ROOM), np.uint8)
+    np.maximum.at(alpha, (y[:, :, None] + ROOM, x[:, None, :] + ROOM), np.rint(255 * soft).astype(np.uint8))
+    blend(picture, color, alpha, -ROOM, -ROOM)
+
+
+def _corners(box: Floats) -> tuple[int, int, int, int]:
+    x0, y0, x1, y1 = np.rint(np.clip(box, -2, 2 * WIDTH)).astype(int).tolist()
+    return x0, y0, x1, y1
+
+
+def _fill(pane: Image, box: Floats, color: Color, alpha: int) -> None:
+    x0, y0, x1, y1 = _corners(box)
+    if x0 < x1 and y0 < y1:
+        blend(pane, color, np.full((y1 - y0, x1 - x0), alpha, np.uint8), x0, y0)
+
+
+def _frame(pane: Image, box: Floats, color: Color, thick: int = 1) -> None:
+    """Draw the border of a box that holds something."""
+    x0, y0, x1, y1 = _corners(box)
+    if x0 <= x1 and y0 <= y1:
+        cv2.rectangle(pane, (x0, y0), (x1, y1), color, thick)
+
+
+def _legend(now: Moment, width: int) -> Legend:
+    """One mark for each way in which a cell or a box is drawn."""
+    marks = np.empty((6, 14, 14, 3), np.uint8)
+    marks[:] = CARD
+    query, entered, way, rest, tested, found = marks
+    cv2.rectangle(query, (1, 3), (12, 10), INK, 2)
+    blend(entered, VISITED, np.full((14, 14), TINT, np.uint8), 0, 0)
+    cv2.rectangle(entered, (0, 0), (13, 13), VISITED, 1)
+    cv2.rectangle(way, (0, 0), (13, 13), ON_THE_WAY, 1)
+    for mark, color in ((rest, REST), (tested, TESTED), (found, FOUND)):
+        _round(mark, np.full((1, 2), 6.5), np.full(1, 4.0), color, color == TESTED)
+    words = ("query", "opened", "on the way", "not tested", "compared", "found")
+    entries = [Entry(word, mark) for word, mark in zip(words, marks, strict=True)]
+    if now.cells.leaf.all():
+        del entries[2]
+    return Legend(entries, width)
+
+
+def _counters(page: Image, name: str, history: Sequence[Moment], frames: int) -> list[Text]:
+    """Tests of this frame against those of brute force, as bars of one scale; and of all frames so far, as a chart."""
+    now, top = history[-1], TOP + HEIGHT + 44
+    left, n = MARGIN + NAME, len(now.boxes)
+    texts = []
+    rows = (("brute force", n, REST, f"{n} tests"), (name, now.tests, TESTED, f"{now.tests} tests"))
+    for row, (word, tests, color, told) in enumerate(rows):
+        y, wide = top + 22 * row, round(BAR * tests / n)
+        page[y : y + 13, left : left + wide] = color
+        texts.append(Text(left - 8, y + 11, word, FAINT, right=True))
+        texts.append(Text(left + wide + 8, y + 11, told, INK if row else FAINT))
+    page[top + 22 : top + 35, left : left + round(BAR * now.found.sum() / n)] = FOUND
+    _chart(page[top : top + 35, page.shape[1] - MARGIN - CHART : page.shape[1] - MARGIN], history, frames)
+    saved = 1 - sum(moment.tests for moment in history) / (n * len(history))
+    middle = page.shape[1] - MARGIN - CHART - 10
+    texts.append(Text(middle, top + 11, "tests saved", FAINT, right=True))
+    texts.append(Text(middle, top + 33, percent(saved), INK, bold=True, right=True))
+    return texts
+
+
+def _chart(part: Image, history: Sequence[Moment], frames: int) -> None:
+    """A column for each frame so far: tests of brute force, of the structure, and boxes that were found."""
+    high, wide = part.shape[:2]
+    for frame, moment in enumerate(history):
+        column = part[:, frame * wide // frames : (frame + 1) * wide // frames]
+        column[:] = CELL
+        for count, color in ((moment.tests, TESTED), (int(moment.found.sum()), FOUND)):
+            column[high - round(high * count / len(moment.boxes)) :] = color
