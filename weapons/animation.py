@@ -16,8 +16,8 @@ __all__ = ["can_write_gif", "write_frames", "write_gif"]
 NO_DITHER = 3
 """What OpenCV takes for none, unlike what it says: by -1 to 2 it strews dots over even ground."""
 
-COLORS = 7
-"""Binary digits of the number of colours: 128 are enough for flat drawings, and make smaller files than 256."""
+COLORS = 6
+"""Binary digits of the number of colours: 64 are enough for flat drawings, and make small files."""
 
 
 def can_write_gif() -> bool:

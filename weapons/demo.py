@@ -41,7 +41,7 @@ FLOCKS, FLOCK, WANDERERS = 3, 60, 120
 MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392
 """Around the two panes, between them, and above them; px."""
 
-NAME, BAR, CHART = 96, 170, 180
+NAME, BAR, CHART = 96, 160, 180
 """Widths of a bar's name, of the longest bar, and of the chart of all frames, px."""
 
 WALL = 6
