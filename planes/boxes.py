@@ -1,6 +1,8 @@
 """Boxes that come, move and go under ids of their own: the contract of every broad phase, and the plainest one.
 
 A box is a row (min of each axis, max of each axis); two overlap when their closed intervals do, on every axis.
+
+Searches read rows by `take` and `flatnonzero`: by brackets numpy takes up to ten times as long for the same.
 """
 
 from __future__ import annotations
@@ -228,7 +230,7 @@ class BroadPhase(ABC):
         """Test candidates against the boxes as they are now."""
         if work is not None:
             work.tests.append((query, ids))
-        return meets(queries[query], self._rows[ids])
+        return meets(queries.take(query, axis=0), self._rows.take(ids, axis=0))
 
     def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> Pairs:
         """Test every named query against every named box, some millions of pairs at a time."""

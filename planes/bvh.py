@@ -148,8 +148,8 @@ class Bvh(BroadPhase):
                 continue
             if work is not None:
                 work.visits.append((query, offsets[level] + node))
-            good = meets(tree.levels[level][node], queries[query])
-            query, node = query[good], node[good]
+            good = np.flatnonzero(meets(tree.levels[level].take(node, axis=0), queries.take(query, axis=0)))
+            query, node = query.take(good), node.take(good)
             if not len(query):
                 continue
             if level + 1 < len(tree.levels):
@@ -163,12 +163,12 @@ class Bvh(BroadPhase):
         length = tree.starts[leaf + 1] - tree.starts[leaf]
         for piece in pieces(length, CHUNK_SAMPLES):
             group, place = ragged(length[piece])
-            box = tree.ids[tree.starts[leaf[piece]][group] + place]
-            asked = query[piece][group]
+            box = tree.ids.take(tree.starts[leaf[piece]].take(group) + place)
+            asked = query[piece].take(group)
             if tree.gone:
                 asked, box = asked[box >= 0], box[box >= 0]
-            good = self._meeting(queries, asked, box, work)
-            found.append((asked[good], box[good]))
+            good = np.flatnonzero(self._meeting(queries, asked, box, work))
+            found.append((asked.take(good), box.take(good)))
         return found
 
     def _node_count(self) -> int:

@@ -152,7 +152,7 @@ class Grid(BroadPhase):
             some = narrow[piece]
             group, at = _written_out(low[some], high[some])
             for home in (MAIN, FRESH):
-                found += self._in_cells(queries, some[group], low[some][group], at, home, work)
+                found += self._in_cells(queries, some.take(group), low[some].take(group, axis=0), at, home, work)
         query, box = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return query, box
 
@@ -160,20 +160,22 @@ class Grid(BroadPhase):
         """Search cells; a pair counts in the first cell that both share, so that it comes once."""
         start, length = self._listings[home - MAIN].runs(self._keys(at))
         some = np.flatnonzero(length)
-        query, low, at, start, length = query[some], low[some], at[some], start[some], length[some]
+        query, low, at, start, length = (part.take(some, axis=0) for part in (query, low, at, start, length))
         if work is not None:
             before = len(self._listings[0].key) if home == FRESH else 0
             work.visits.append((query, before + np.searchsorted(self._listings[home - MAIN].start, start)))
         found: list[Pairs] = []
         for piece in pieces(length, CHUNK_SAMPLES):
             group, place = ragged(length[piece])
-            box = self._listings[home - MAIN].box[start[piece][group] + place]
-            first = self._home[box] == home
+            box = self._listings[home - MAIN].box.take(start[piece].take(group) + place)
+            first = self._home.take(box) == home
+            shared = np.maximum(low[piece].take(group, axis=0), self._low.take(box, axis=0))
             for axis in range(self.dim):
-                first &= np.maximum(low[piece, axis][group], self._low[box, axis]) == at[piece, axis][group]
-            box, asked = box[first], query[piece][group[first]]
-            good = self._meeting(queries, asked, box, work)
-            found.append((asked[good], box[good]))
+                first &= shared[:, axis] == at[piece, axis].take(group)
+            keep = np.flatnonzero(first)
+            box, asked = box.take(keep), query[piece].take(group.take(keep))
+            good = np.flatnonzero(self._meeting(queries, asked, box, work))
+            found.append((asked.take(good), box.take(good)))
         return found
 
     def _node_count(self) -> int:

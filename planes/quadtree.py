@@ -8,7 +8,10 @@ So the tree is a function of the boxes and the root cell, whatever the order in 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, integer
 from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, sorted_pairs
@@ -17,20 +20,21 @@ from planes.spans import ragged
 
 __all__ = ["Quadtree"]
 
-NODE = np.dtype(
-    [
-        ("cell", np.float64, 4),  # as drawn: the root in quarters
-        ("gate", np.float64, 4),  # the points that are this cell's own: beyond the first two, up to the last two
-        ("mid", np.float64, 2),
-        ("child", np.int64),  # first of four, -1 for a leaf
-        ("parent", np.int64),
-        ("depth", np.int64),  # -1 when the row is free
-        ("total", np.int64),  # boxes that reach into it
-        ("straddle", np.int64),  # those of them that cross a middle
-        ("start", np.int64),  # of a leaf's ids in the pool
-        ("length", np.int64),
-    ]
-)
+Nodes = dict[str, npt.NDArray[Any]]
+"""Rows of nodes, an array for each of FIELDS."""
+
+FIELDS: dict[str, tuple[type, int]] = {
+    "cell": (np.float64, 4),  # as drawn: the root in quarters
+    "gate": (np.float64, 4),  # the points that are this cell's own: beyond the first two, up to the last two
+    "mid": (np.float64, 2),
+    "child": (np.int64, 0),  # first of four, -1 for a leaf
+    "parent": (np.int64, 0),
+    "depth": (np.int64, 0),  # -1 when the row is free
+    "total": (np.int64, 0),  # boxes that reach into it
+    "straddle": (np.int64, 0),  # those of them that cross a middle
+    "start": (np.int64, 0),  # of a leaf's ids in the pool
+    "length": (np.int64, 0),
+}
 Paths = tuple[Ints, Ints, Bools]
 LARGEST = float(np.finfo(np.float64).max)
 BULK = 64
@@ -81,10 +85,10 @@ class Quadtree(BroadPhase):
         assert np.array_equal(np.sort(np.append(children, 0)), used), "a node is not the child of one parent"
         assert (nodes["parent"][children] == np.repeat(inner, 4)).all(), "a child does not know its parent"
         assert (nodes["depth"][children] == np.repeat(nodes["depth"][inner] + 1, 4)).all(), "a depth is wrong"
-        assert len(used) + 4 * len(self._free) == len(nodes), "a row is neither in use nor free"
+        assert len(used) + 4 * len(self._free) == len(nodes["depth"]), "a row is neither in use nor free"
         which, node, straddle = self._paths(self._rows[ids])
-        assert np.array_equal(nodes["total"][used], np.bincount(node, minlength=len(nodes))[used]), "a total is wrong"
-        crossing = np.bincount(node[straddle], minlength=len(nodes))
+        reaching, crossing = (np.bincount(part, minlength=len(nodes["depth"])) for part in (node, node[straddle]))
+        assert np.array_equal(nodes["total"][used], reaching[used]), "a total is wrong"
         assert np.array_equal(nodes["straddle"][used], crossing[used]), "straddling boxes are miscounted"
         assert np.array_equal(self._overfull(used), nodes["child"][used] >= 0), "a cell should split or merge"
         leaf = nodes["child"][node] < 0
@@ -106,32 +110,32 @@ class Quadtree(BroadPhase):
                 continue
             if work is not None:
                 work.visits.append((query, node))
-            child = self._nodes["child"][node]
-            leaf = child < 0
-            found += self._in_leaves(queries, query[leaf], node[leaf], work)
-            query, node, child = query[~leaf], node[~leaf], child[~leaf]
-            row, quarter = np.nonzero(_quarters(queries[query], self._nodes["mid"][node]))
+            child = self._nodes["child"].take(node)
+            leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
+            found += self._in_leaves(queries, query.take(leaf), node.take(leaf), work)
+            query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
+            row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
             if len(row):
-                stack.append((query[row], child[row] + quarter))
+                stack.append((query.take(row), child.take(inner.take(row)) + quarter))
         first, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return first, second
 
     def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
         """Search leaves; a pair counts where its first common point belongs, so that it comes once."""
         found: list[Pairs] = []
-        length = self._nodes["length"][leaf]
+        length = self._nodes["length"].take(leaf)
         some = np.flatnonzero(length)
-        query, leaf, length = query[some], leaf[some], length[some]
+        query, leaf, length = query.take(some), leaf.take(some), length.take(some)
         for piece in pieces(length, CHUNK_SAMPLES):
             group, place = ragged(length[piece])
-            box = self._pool[self._nodes["start"][leaf[piece]][group] + place]
-            asked = query[piece][group]
-            good = self._meeting(queries, asked, box, work)
-            asked, box, group = asked[good], box[good], group[good]
-            corner = np.maximum(queries[asked, :2], self._rows[box, :2])
-            gate = self._nodes["gate"][leaf[piece]][group]
-            own = ((gate[:, :2] < corner) & (corner <= gate[:, 2:])).all(axis=1)
-            found.append((asked[own], box[own]))
+            box = self._pool.take(self._nodes["start"].take(leaf[piece]).take(group) + place)
+            asked = query[piece].take(group)
+            good = np.flatnonzero(self._meeting(queries, asked, box, work))
+            asked, box, group = asked.take(good), box.take(good), group.take(good)
+            corner = np.maximum(queries.take(asked, axis=0), self._rows.take(box, axis=0))[:, :2]
+            gate = self._nodes["gate"].take(leaf[piece].take(group), axis=0)
+            own = np.flatnonzero(((gate[:, :2] < corner) & (corner <= gate[:, 2:])).all(axis=1))
+            found.append((asked.take(own), box.take(own)))
         return found
 
     def _node_count(self) -> int:
@@ -163,17 +167,17 @@ class Quadtree(BroadPhase):
         """Begin anew, with a root cell that suits the boxes as they are."""
         ids = self.ids
         rows = self._rows[ids]
-        self._nodes = np.zeros(1, NODE)
-        self._nodes["cell"] = _root_of(rows)
-        self._nodes["gate"] = (-np.inf, -np.inf, np.inf, np.inf)
-        self._nodes["mid"] = _middle(self._nodes["cell"])
-        self._nodes["child"] = self._nodes["parent"] = -1
+        self._nodes = nodes = _nodes(1)
+        nodes["cell"][0] = _root_of(rows)
+        nodes["gate"][0] = (-np.inf, -np.inf, np.inf, np.inf)
+        nodes["mid"][:] = _middle(nodes["cell"])
+        nodes["child"][0] = nodes["parent"][0] = -1
         self._free = np.empty(0, np.int64)
         self._pool = np.empty(0, np.int64)
         self._used = self._live = 0
         self._outside = int(np.count_nonzero(self._out(rows)))
-        self._nodes["total"] = len(ids)
-        self._nodes["straddle"] = np.count_nonzero(_quarters(rows, self._nodes["mid"]).sum(axis=1) > 1)
+        nodes["total"][0] = len(ids)
+        nodes["straddle"][0] = np.count_nonzero(_quarters(rows, nodes["mid"]).sum(axis=1) > 1)
         self._settle(np.zeros_like(ids), ids, np.zeros(1, np.int64))
 
     def _rebuilt(self) -> bool:
@@ -189,9 +193,8 @@ class Quadtree(BroadPhase):
 
     def _overfull(self, node: Ints) -> Bools:
         """Whether cells must be split."""
-        rows = self._nodes[node]
-        full = (rows["total"] > self.capacity) & (rows["depth"] < self.depth)
-        return np.asarray(full & (2 * rows["straddle"] <= rows["total"]))
+        total, depth, straddle = (self._nodes[name][node] for name in ("total", "depth", "straddle"))
+        return np.asarray((total > self.capacity) & (depth < self.depth) & (2 * straddle <= total))
 
     def _paths(self, rows: Floats) -> Paths:
         """Every (box, node, whether it straddles) on the way from the root to the leaves."""
@@ -260,7 +263,7 @@ class Quadtree(BroadPhase):
         node, box = sorted_pairs(node, box, self._count)
         once = np.append(True, (np.diff(node) != 0) | (np.diff(box) != 0))[: len(node)]
         self._live -= int(nodes["length"][below].sum())
-        nodes[below] = np.zeros((), NODE)
+        nodes["length"][below] = 0
         nodes["depth"][below] = -1
         nodes["child"][tops] = -1
         self._free = np.sort(np.concatenate((self._free, firsts)))
@@ -308,25 +311,27 @@ class Quadtree(BroadPhase):
         """Give cells their four children, with nothing in them yet."""
         short = max(0, len(splits) - len(self._free))
         if short:
-            short = max(short, len(self._nodes) // 4)
-            more = np.zeros(4 * short, NODE)
-            more["depth"] = -1
-            self._free = np.append(self._free, len(self._nodes) + 4 * np.arange(short))
-            self._nodes = np.concatenate((self._nodes, more))
+            rows = len(self._nodes["depth"])
+            short = max(short, rows // 4)
+            more = _nodes(4 * short)
+            more["depth"][:] = -1
+            self._free = np.append(self._free, rows + 4 * np.arange(short))
+            self._nodes.update({name: np.concatenate((self._nodes[name], more[name])) for name in FIELDS})
         nodes = self._nodes
         first, self._free = self._free[: len(splits)], self._free[len(splits) :]
         nodes["child"][splits] = first
-        parent = nodes[splits]
         for quarter in range(4):
-            right, down = quarter % 2, quarter // 2
-            child = np.zeros(len(splits), NODE)
+            right, down, child = quarter % 2, quarter // 2, first + quarter
             for bounds in ("cell", "gate"):
-                child[bounds] = parent[bounds]
-                child[bounds][:, 0 if right else 2] = parent["mid"][:, 0]
-                child[bounds][:, 1 if down else 3] = parent["mid"][:, 1]
-            child["mid"] = _middle(child["cell"])
-            child["child"], child["parent"], child["depth"] = -1, splits, parent["depth"] + 1
-            nodes[first + quarter] = child
+                part = nodes[bounds][splits]
+                part[:, 0 if right else 2] = nodes["mid"][splits, 0]
+                part[:, 1 if down else 3] = nodes["mid"][splits, 1]
+                nodes[bounds][child] = part
+            nodes["mid"][child] = _middle(nodes["cell"][child])
+            nodes["child"][child], nodes["parent"][child] = -1, splits
+            nodes["depth"][child] = nodes["depth"][splits] + 1
+            for counter in ("total", "straddle", "start", "length"):
+                nodes[counter][child] = 0
 
     def _write(self, node: Ints, box: Ints, leaves: Ints) -> None:
         """Put the entries of leaves at the end of the pool; tidy it when half is waste."""
@@ -351,6 +356,10 @@ class Quadtree(BroadPhase):
 
     def _leaf_numbers(self) -> Ints:
         return np.flatnonzero((self._nodes["depth"] >= 0) & (self._nodes["child"] < 0))
+
+
+def _nodes(n: int) -> Nodes:
+    return {name: np.zeros((n, wide) if wide else n, kind) for name, (kind, wide) in FIELDS.items()}
 
 
 def _quarters(rows: Floats, mid: Floats) -> Bools:
