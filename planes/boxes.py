@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ import numpy as np
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals
 from planes.constants import CHUNK_PAIRS
 
-__all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "sorted_pairs"]
+__all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "piled", "sorted_pairs"]
 
 Pairs = tuple[Ints, Ints]
 AXES = "xyz"
@@ -60,6 +61,11 @@ def sorted_pairs(first: Ints, second: Ints, n: int) -> Ints:
     """Pairs as (2, K), sorted by (first, second); every second is below n."""
     key = np.sort(first * n + second) if n else first
     return np.stack(np.divmod(key, n)) if n else np.empty((2, 0), np.int64)
+
+
+def piled(found: Sequence[Pairs]) -> Ints:
+    """Join pairs that were found in pieces: (2, K) int64."""
+    return np.concatenate([np.empty((2, 0), np.int64), *(np.stack(piece) for piece in found)], axis=1)
 
 
 def pieces(lengths: Ints, limit: int) -> list[slice]:
@@ -105,12 +111,12 @@ class Work:
     @property
     def visited(self) -> Ints:
         """Nodes that were looked into: (2, K) int64 [query, node], in the order of the search."""
-        return _piled(self.visits)
+        return piled(self.visits)
 
     @property
     def tested(self) -> Ints:
         """Boxes that were compared with the query: (2, K) int64 [query, box], in the order of the search."""
-        return _piled(self.tests)
+        return piled(self.tests)
 
 
 class BroadPhase(ABC):
@@ -237,16 +243,16 @@ class BroadPhase(ABC):
         wide = max(1, min(len(ids), CHUNK_PAIRS))
         tall = max(1, CHUNK_PAIRS // wide)
         found: list[Pairs] = []
-        for left in range(0, len(ids), wide):
+        for left in range(0, len(ids) if len(which) else 0, wide):
             some = ids[left : left + wide]
-            boxes = self._rows[some]
+            boxes = self._rows.take(some, axis=0)
             for top in range(0, len(which), tall):
                 rows = which[top : top + tall]
                 if work is not None:
                     work.tests.append((np.repeat(rows, len(some)), np.tile(some, len(rows))))
                 q, b = np.nonzero(meets(queries[rows][:, None], boxes))
                 found.append((rows[q], some[b]))
-        query, box = _piled(found)
+        query, box = piled(found)
         return query, box
 
     def _living(self, ids: object) -> Ints:
@@ -306,7 +312,3 @@ class BruteForce(BroadPhase):
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         self._rows[ids] = rows
-
-
-def _piled(pieces: list[Pairs]) -> Ints:
-    return np.concatenate([np.empty((2, 0), np.int64), *(np.stack(piece) for piece in pieces)], axis=1)

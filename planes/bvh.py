@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, integers, real
-from planes.boxes import BroadPhase, Cells, Pairs, Work, box_rows, meets, pieces
+from planes.boxes import BroadPhase, Cells, Pairs, Work, box_rows, meets, pieces, piled
 from planes.constants import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from planes.spans import ragged
 
@@ -125,14 +125,13 @@ class Bvh(BroadPhase):
         assert np.array_equal(np.sort(listed), self.ids), "trees do not list each box once"
 
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        none = np.empty(0, np.int64)
-        found = [(none, none)]
+        found: list[Pairs] = []
         number = 0
         for tree in self._trees:
             found += self._in_tree(tree, queries, number, work)
             number += sum(map(len, tree.levels))
-        first, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return first, second
+        query, box = piled(found)
+        return query, box
 
     def _in_tree(self, tree: Tree, queries: Floats, number: int, work: Work | None) -> list[Pairs]:
         """Go down with all queries at once; a front that opens up wide is halved, which bounds the memory."""
@@ -343,7 +342,12 @@ def _hulls(rows: Floats, first: Ints) -> Floats:
 
 def _holds(outer: Floats, inner: Floats) -> Bools:
     dim = outer.shape[1] // 2
-    return np.asarray(((outer[:, :dim] <= inner[:, :dim]) & (inner[:, dim:] <= outer[:, dim:])).all(axis=1))
+    good = outer[:, 0] <= inner[:, 0]
+    for axis in range(1, dim):
+        good &= outer[:, axis] <= inner[:, axis]
+    for axis in range(dim, 2 * dim):
+        good &= inner[:, axis] <= outer[:, axis]
+    return good
 
 
 def _girths(rows: Floats) -> Floats:

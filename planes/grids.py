@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, integer, integers, real
-from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces
+from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, piled
 from planes.constants import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from planes.spans import ragged
 
@@ -145,7 +145,7 @@ class Grid(BroadPhase):
         low, high = self._span(queries)
         sizes = _sizes(low, high)
         wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].box) // 8)
-        found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)]
+        found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)] if wide.any() else []
         narrow = np.flatnonzero(~wide)
         found.append(self._meeting_all(queries, narrow, self._beside, work))
         for piece in pieces(sizes[narrow].astype(np.int64), CHUNK_SAMPLES):
@@ -153,7 +153,7 @@ class Grid(BroadPhase):
             group, at = _written_out(low[some], high[some])
             for home in (MAIN, FRESH):
                 found += self._in_cells(queries, some.take(group), low[some].take(group, axis=0), at, home, work)
-        query, box = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        query, box = piled(found)
         return query, box
 
     def _in_cells(self, queries: Floats, query: Ints, low: Ints, at: Ints, home: int, work: Work | None) -> list[Pairs]:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, integer
-from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, sorted_pairs
+from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, piled, sorted_pairs
 from planes.constants import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
 from planes.spans import ragged
 
@@ -101,7 +101,7 @@ class Quadtree(BroadPhase):
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
         every = np.arange(len(queries))
         stack = [(every, np.zeros_like(every))]
-        found: list[Pairs] = [(every[:0], every[:0])]
+        leaves: list[Pairs] = []
         while stack:
             query, node = stack.pop()
             if len(query) > CHUNK_SAMPLES:  # bounds the memory of a search that opens up wide
@@ -112,15 +112,15 @@ class Quadtree(BroadPhase):
                 work.visits.append((query, node))
             child = self._nodes["child"].take(node)
             leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
-            found += self._in_leaves(queries, query.take(leaf), node.take(leaf), work)
+            leaves.append((query.take(leaf), node.take(leaf)))
             query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
             row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
             if len(row):
                 stack.append((query.take(row), child.take(inner.take(row)) + quarter))
-        first, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return first, second
+        query, leaf = piled(leaves)
+        return self._in_leaves(queries, query, leaf, work)
 
-    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
+    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> Pairs:
         """Search leaves; a pair counts where its first common point belongs, so that it comes once."""
         found: list[Pairs] = []
         length = self._nodes["length"].take(leaf)
@@ -132,11 +132,14 @@ class Quadtree(BroadPhase):
             asked = query[piece].take(group)
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
             asked, box, group = asked.take(good), box.take(good), group.take(good)
-            corner = np.maximum(queries.take(asked, axis=0), self._rows.take(box, axis=0))[:, :2]
+            corner = np.maximum(queries.take(asked, axis=0), self._rows.take(box, axis=0))
             gate = self._nodes["gate"].take(leaf[piece].take(group), axis=0)
-            own = np.flatnonzero(((gate[:, :2] < corner) & (corner <= gate[:, 2:])).all(axis=1))
-            found.append((asked.take(own), box.take(own)))
-        return found
+            own = (gate[:, 0] < corner[:, 0]) & (corner[:, 0] <= gate[:, 2])
+            own &= (gate[:, 1] < corner[:, 1]) & (corner[:, 1] <= gate[:, 3])
+            mine = np.flatnonzero(own)
+            found.append((asked.take(mine), box.take(mine)))
+        asked, box = piled(found)
+        return asked, box
 
     def _node_count(self) -> int:
         return int(np.count_nonzero(self._nodes["depth"] >= 0))
@@ -177,7 +180,7 @@ class Quadtree(BroadPhase):
         self._used = self._live = 0
         self._outside = int(np.count_nonzero(self._out(rows)))
         nodes["total"][0] = len(ids)
-        nodes["straddle"][0] = np.count_nonzero(_quarters(rows, nodes["mid"]).sum(axis=1) > 1)
+        nodes["straddle"][0] = np.count_nonzero(_straddling(_quarters(rows, nodes["mid"])))
         self._settle(np.zeros_like(ids), ids, np.zeros(1, np.int64))
 
     def _rebuilt(self) -> bool:
@@ -188,13 +191,16 @@ class Quadtree(BroadPhase):
         return True
 
     def _out(self, rows: Floats) -> Bools:
-        cell = self._nodes["cell"][0]
-        return np.asarray(((rows[:, :2] < cell[:2]) | (rows[:, 2:] > cell[2:])).any(axis=1))
+        x, y, x_max, y_max = self._nodes["cell"][0].tolist()
+        return np.asarray((rows[:, 0] < x) | (rows[:, 1] < y) | (rows[:, 2] > x_max) | (rows[:, 3] > y_max))
 
     def _overfull(self, node: Ints) -> Bools:
         """Whether cells must be split."""
         total, depth, straddle = (self._nodes[name][node] for name in ("total", "depth", "straddle"))
         return np.asarray((total > self.capacity) & (depth < self.depth) & (2 * straddle <= total))
+
+    def _reached(self, box: Ints, node: Ints) -> Bools:
+        return _quarters(self._rows.take(box, axis=0), self._nodes["mid"].take(node, axis=0))
 
     def _paths(self, rows: Floats) -> Paths:
         """Every (box, node, whether it straddles) on the way from the root to the leaves."""
@@ -202,11 +208,13 @@ class Quadtree(BroadPhase):
         node = np.zeros_like(which)
         steps: list[Paths] = []
         while len(which) or not steps:
-            reached = _quarters(rows[which], self._nodes["mid"][node])
-            steps.append((which, node, reached.sum(axis=1) > 1))
-            inner = self._nodes["child"][node] >= 0
-            row, quarter = np.nonzero(reached[inner])
-            which, node = which[inner][row], self._nodes["child"][node[inner]][row] + quarter
+            mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
+            reached = _quarters(rows.take(which, axis=0), mid)
+            steps.append((which, node, _straddling(reached)))
+            inner = np.flatnonzero(child >= 0)
+            row, quarter = np.divmod(np.flatnonzero(reached.take(inner, axis=0)), 4)
+            row = inner.take(row)
+            which, node = which.take(row), child.take(row) + quarter
         all_which, all_node, straddle = (np.concatenate(parts) for parts in zip(*steps, strict=True))
         return all_which, all_node, straddle
 
@@ -216,12 +224,13 @@ class Quadtree(BroadPhase):
         which = np.arange(len(rows))
         node = np.zeros_like(which)
         while len(which):
-            mid = self._nodes["mid"][node]
-            before, after = _quarters(old[which], mid), _quarters(rows[which], mid)
-            goes[which[(before != after).any(axis=1)]] = True
-            on = (self._nodes["child"][node] >= 0) & ~goes[which]
-            row, quarter = np.nonzero(before[on])
-            which, node = which[on][row], self._nodes["child"][node[on]][row] + quarter
+            mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
+            before, after = _quarters(old.take(which, axis=0), mid), _quarters(rows.take(which, axis=0), mid)
+            goes[which.take(np.flatnonzero(before != after) >> 2)] = True
+            on = np.flatnonzero((child >= 0) & ~goes.take(which))
+            row, quarter = np.divmod(np.flatnonzero(before.take(on, axis=0)), 4)
+            row = on.take(row)
+            which, node = which.take(row), child.take(row) + quarter
         return goes
 
     def _change(self, gone: Ints, before: Paths, come: Ints, after: Paths) -> None:
@@ -296,10 +305,10 @@ class Quadtree(BroadPhase):
                 break
             self._split(splits)
             node, box = node[goes], box[goes]
-            row, quarter = np.nonzero(_quarters(self._rows[box], self._nodes["mid"][node]))
-            node, box = self._nodes["child"][node[row]] + quarter, box[row]
-            leaves = np.unique((self._nodes["child"][splits][:, None] + np.arange(4)).ravel())
-            straddle = _quarters(self._rows[box], self._nodes["mid"][node]).sum(axis=1) > 1
+            row, quarter = np.divmod(np.flatnonzero(self._reached(box, node)), 4)
+            node, box = self._nodes["child"].take(node.take(row)) + quarter, box.take(row)
+            leaves = np.sort((self._nodes["child"][splits][:, None] + np.arange(4)).ravel())
+            straddle = _straddling(self._reached(box, node))
             place = np.searchsorted(leaves, node)
             self._nodes["total"][leaves] = np.bincount(place, minlength=len(leaves))
             self._nodes["straddle"][leaves] = np.bincount(place[straddle], minlength=len(leaves))
@@ -364,9 +373,15 @@ def _nodes(n: int) -> Nodes:
 
 def _quarters(rows: Floats, mid: Floats) -> Bools:
     """Which quarters boxes reach into: (N, 4), by x, then y."""
-    left, up = (rows[:, :2] <= mid).T
-    right, down = (rows[:, 2:] >= mid).T
+    left, up = (rows[:, axis] <= mid[:, axis] for axis in (0, 1))
+    right, down = (rows[:, 2 + axis] >= mid[:, axis] for axis in (0, 1))
     return np.stack((left & up, right & up, left & down, right & down), axis=1)
+
+
+def _straddling(reached: Bools) -> Bools:
+    """Whether more than one quarter is reached: they are bytes of 0 or 1, read as one number of 32 bits."""
+    number = reached.view(np.uint32)[:, 0]
+    return np.asarray(number & (number - 1) != 0)
 
 
 def _middle(cell: Floats) -> Floats:
