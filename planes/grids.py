@@ -17,6 +17,9 @@ from planes.spans import ragged
 
 __all__ = ["Grid"]
 
+FIRST_BITS = 3
+"""Lowest bits of an entry: one for each axis, set where the cell is the first one of the box. The rest is its id."""
+
 NOWHERE, BESIDE, MAIN, FRESH = range(4)
 """Where a box is listed."""
 
@@ -29,23 +32,23 @@ SMALLEST = float(np.finfo(np.float64).tiny)
 
 @dataclass(frozen=True, eq=False)
 class Listing:
-    """Boxes by cell: box[start[k] : start[k + 1]] reach into the cell of key[k]; keys ascend."""
+    """Boxes by cell: entry[start[k] : start[k + 1]] tell those that reach into the cell of key[k]; keys ascend."""
 
     key: Ints
     start: Ints
-    box: Ints
+    entry: Ints
 
     @classmethod
-    def of(cls, key: Ints, box: Ints) -> Listing:
+    def of(cls, key: Ints, entry: Ints) -> Listing:
         """Sort entries by cell."""
         order = np.argsort(key, kind="stable")
         key = key[order]
         start = np.flatnonzero(np.diff(key, prepend=-1))
-        return cls(key[start], np.append(start, len(key)), box[order])
+        return cls(key[start], np.append(start, len(key)), entry[order])
 
     def entries(self) -> Pairs:
-        """Write all entries out as (key, box)."""
-        return np.repeat(self.key, np.diff(self.start)), self.box
+        """Write all entries out as (key, entry)."""
+        return np.repeat(self.key, np.diff(self.start)), self.entry
 
     def runs(self, key: Ints) -> Pairs:
         """Find the entries of cells, as (start, length)."""
@@ -90,7 +93,7 @@ class Grid(BroadPhase):
         found = [self._beside[((self._low[self._beside] <= at) & (at <= self._high[self._beside])).all(axis=1)]]
         for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
             start, length = (int(v[0]) for v in listing.runs(self._keys(at[None])))
-            listed = listing.box[start : start + length]
+            listed = listing.entry[start : start + length] >> FIRST_BITS
             found.append(listed[self._home[listed] == home])
         return np.sort(np.concatenate(found))
 
@@ -131,20 +134,19 @@ class Grid(BroadPhase):
         kept = []
         for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
             assert (np.diff(listing.key) > 0).all(), "cells are not in order"
-            key, box = listing.entries()
-            good = self._home[box] == home
+            key, entry = listing.entries()
+            good = self._home[entry >> FIRST_BITS] == home
             assert home == MAIN or good.all(), "a box that has gone is listed among the fresh ones"
             assert home == FRESH or self._stale == np.count_nonzero(~good), "stale entries are miscounted"
-            kept.append(np.stack((key[good], box[good])))
+            kept.append(np.stack((key[good], entry[good])))
         listed = np.concatenate(kept, axis=1)
-        group, at = _written_out(low[~large], high[~large])
-        due = np.stack((self._keys(at), ids[~large][group]))
+        due = np.stack(self._listed(ids[~large]))
         assert np.array_equal(_in_order(listed), _in_order(due)), "cells do not list the boxes that reach into them"
 
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
         low, high = self._span(queries)
         sizes = _sizes(low, high)
-        wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].box) // 8)
+        wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].entry) // 8)
         found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)] if wide.any() else []
         narrow = np.flatnonzero(~wide)
         found.append(self._meeting_all(queries, narrow, self._beside, work))
@@ -152,28 +154,33 @@ class Grid(BroadPhase):
             some = narrow[piece]
             group, at = _written_out(low[some], high[some])
             for home in (MAIN, FRESH):
-                found += self._in_cells(queries, some.take(group), low[some].take(group, axis=0), at, home, work)
+                found += self._in_cells(queries, some.take(group), at, _first(at, low[some], group), home, work)
         query, box = piled(found)
         return query, box
 
-    def _in_cells(self, queries: Floats, query: Ints, low: Ints, at: Ints, home: int, work: Work | None) -> list[Pairs]:
-        """Search cells; a pair counts in the first cell that both share, so that it comes once."""
+    def _in_cells(
+        self, queries: Floats, query: Ints, at: Ints, first: Ints, home: int, work: Work | None
+    ) -> list[Pairs]:
+        """Search cells; a pair counts in the first cell that both share, so that it comes once.
+
+        On each axis that is the first one of either.
+        """
         start, length = self._listings[home - MAIN].runs(self._keys(at))
         some = np.flatnonzero(length)
-        query, low, at, start, length = (part.take(some, axis=0) for part in (query, low, at, start, length))
+        query, first, start, length = (part.take(some) for part in (query, first, start, length))
         if work is not None:
             before = len(self._listings[0].key) if home == FRESH else 0
             work.visits.append((query, before + np.searchsorted(self._listings[home - MAIN].start, start)))
         found: list[Pairs] = []
         for piece in pieces(length, CHUNK_SAMPLES):
             group, place = ragged(length[piece])
-            box = self._listings[home - MAIN].box.take(start[piece].take(group) + place)
-            first = self._home.take(box) == home
-            shared = np.maximum(low[piece].take(group, axis=0), self._low.take(box, axis=0))
-            for axis in range(self.dim):
-                first &= shared[:, axis] == at[piece, axis].take(group)
-            keep = np.flatnonzero(first)
-            box, asked = box.take(keep), query[piece].take(group.take(keep))
+            entry = self._listings[home - MAIN].entry.take(start[piece].take(group) + place)
+            shared = (entry | first[piece].take(group)) & (1 << self.dim) - 1
+            here = np.flatnonzero(shared == (1 << self.dim) - 1)
+            box, asked = entry.take(here) >> FIRST_BITS, query[piece].take(group.take(here))
+            if home == MAIN and self._stale:
+                keep = np.flatnonzero(self._home.take(box) == MAIN)
+                box, asked = box.take(keep), asked.take(keep)
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
             found.append((asked.take(good), box.take(good)))
         return found
@@ -192,13 +199,18 @@ class Grid(BroadPhase):
         large = _sizes(low, high) > OVERSIZED_CELLS
         self._home[ids] = np.where(large, BESIDE, FRESH)
         self._beside = np.concatenate((self._beside, ids[large]))
-        group, at = _written_out(low[~large], high[~large])
-        key, box = self._listings[1].entries()
-        key, box = np.concatenate((key, self._keys(at))), np.concatenate((box, ids[~large][group]))
-        if len(key) > max(GRID_FRESH, len(self._listings[0].box) // 16):
-            self._settle(key, box)
+        both = zip(self._listings[1].entries(), self._listed(ids[~large]), strict=True)
+        key, entry = (np.concatenate(parts) for parts in both)
+        if len(key) > max(GRID_FRESH, len(self._listings[0].entry) // 16):
+            self._settle(key, entry)
         else:
-            self._listings[1] = Listing.of(key, box)
+            self._listings[1] = Listing.of(key, entry)
+
+    def _listed(self, ids: Ints) -> Pairs:
+        """Write out the cells of boxes that are not too large, as (key, entry)."""
+        low = self._low[ids].astype(np.int64)
+        group, at = _written_out(low, self._high[ids])
+        return self._keys(at), ids[group] << FIRST_BITS | _first(at, low, group)
 
     def _leave(self, ids: Ints) -> None:
         homes = self._home[ids]
@@ -206,13 +218,13 @@ class Grid(BroadPhase):
         self._home[ids] = NOWHERE
         if (homes == BESIDE).any():
             self._beside = self._beside[self._home[self._beside] == BESIDE]
-        key, box = self._listings[1].entries()
+        key, entry = self._listings[1].entries()
         if (homes == FRESH).any():
-            keep = self._home[box] == FRESH
-            key, box = key[keep], box[keep]
-            self._listings[1] = Listing.of(key, box)
-        if 2 * self._stale > max(GRID_FRESH, len(self._listings[0].box)):
-            self._settle(key, box)
+            keep = self._home[entry >> FIRST_BITS] == FRESH
+            key, entry = key[keep], entry[keep]
+            self._listings[1] = Listing.of(key, entry)
+        if 2 * self._stale > max(GRID_FRESH, len(self._listings[0].entry)):
+            self._settle(key, entry)
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         low, high = self._span(rows)
@@ -223,13 +235,13 @@ class Grid(BroadPhase):
         if goes.any():
             self._enter(ids[goes])
 
-    def _settle(self, key: Ints, box: Ints) -> None:
+    def _settle(self, key: Ints, entry: Ints) -> None:
         """Sort the fresh entries in with all others, and drop the stale ones."""
-        old_key, old_box = self._listings[0].entries()
-        keep = self._home[old_box] == MAIN
-        self._home[box] = MAIN
-        main = Listing.of(np.concatenate((old_key[keep], key)), np.concatenate((old_box[keep], box)))
-        self._listings = [main, Listing.of(key[:0], box[:0])]
+        old_key, old_entry = self._listings[0].entries()
+        keep = self._home[old_entry >> FIRST_BITS] == MAIN
+        self._home[entry >> FIRST_BITS] = MAIN
+        main = Listing.of(np.concatenate((old_key[keep], key)), np.concatenate((old_entry[keep], entry)))
+        self._listings = [main, Listing.of(key[:0], entry[:0])]
         self._stale = 0
 
     def _span(self, rows: Floats) -> Pairs:
@@ -262,6 +274,14 @@ def _written_out(low: Ints, high: Ints) -> Pairs:
         place, step = np.divmod(place, sides[group, axis])
         at[:, axis] = low[group, axis] + step
     return group, at
+
+
+def _first(at: Ints, low: Ints, group: Ints) -> Ints:
+    """Tell of cells (K, d) whether they are the first ones of their boxes, low[group]: a bit for each axis."""
+    bits = np.zeros(len(at), np.int64)
+    for axis in range(at.shape[1]):
+        bits |= (at[:, axis] == low[:, axis].take(group)).astype(np.int64) << axis
+    return bits
 
 
 def _in_order(entries: Ints) -> Ints:

@@ -257,7 +257,7 @@ def test_a_huge_box_among_tiny_ones_fills_no_memory() -> None:
     for structure in (Grid(rows), Quadtree(rows)):
         assert structure.query([[5, 5, 5, 5]]).shape[1] >= 200
         structure.check()
-    assert sum(len(listing.box) for listing in Grid(rows)._listings) < 120_000
+    assert sum(len(listing.entry) for listing in Grid(rows)._listings) < 120_000
     assert len(Quadtree(rows)._pool) < 30 * len(rows)
 
 
