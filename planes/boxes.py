@@ -139,6 +139,8 @@ class BroadPhase(ABC):
         self._count = len(rows)
         self._rows = rows
         self._here = np.ones(len(rows), np.bool_)
+        self.written = 0
+        """Entries and nodes that were written so far, to build and to change: what changes cost, without a clock."""
 
     def __len__(self) -> int:
         return int(np.count_nonzero(self._here[: self._count]))

@@ -56,18 +56,21 @@ class Tree:
         """Whether a quarter of the leaves are twice as large as when they were new, or half of the boxes have gone."""
         return bool(4 * np.count_nonzero(self._worn) > len(self._worn) or 2 * self.gone >= len(self.ids))
 
-    def refit(self, places: Ints) -> None:
-        """Follow a change of outer boxes, up to the root."""
+    def refit(self, places: Ints) -> int:
+        """Follow a change of outer boxes, up to the root; tells how many rows it read and wrote."""
         leaf = np.unique(np.searchsorted(self.starts, places, side="right") - 1)
         group, place = ragged(self.starts[leaf + 1] - self.starts[leaf])
         first = np.flatnonzero(np.diff(group, prepend=-1))
         hulls = _hulls(self.outer[self.starts[leaf][group] + place], first)
         self.levels[-1][leaf] = hulls
+        written = len(group) + len(leaf)
         self._worn[leaf] = _girths(hulls) / 2 - self._slack > self._new[leaf]
         for upper, lower in zip(self.levels[-2::-1], self.levels[:0:-1], strict=True):
             leaf = np.unique(leaf >> 2)
             children = lower[(leaf[:, None] << 2) + np.arange(4)]
             upper[leaf] = _hulls(children.reshape(-1, children.shape[-1]), np.arange(0, 4 * len(leaf), 4))
+            written += len(leaf)
+        return written
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
@@ -211,13 +214,14 @@ class Bvh(BroadPhase):
     def _follow(self, number: int, places: Ints) -> None:
         """Refit a tree where it changed, or plant it anew when it is worn."""
         tree = self._trees[number]
-        tree.refit(places)
+        self.written += tree.refit(places)
         if tree.worn and len(tree.living):
             self._plant(number, np.sort(tree.living))
 
     def _plant(self, number: int, ids: Ints) -> None:
         tree = Tree(ids, self._rows[ids], self.slack)
         self._trees[number : number + 1] = [tree]
+        self.written += len(ids) + sum(map(len, tree.levels))
         self._home[tree.ids] = number
         self._place[tree.ids] = np.arange(len(tree.ids))
 

@@ -149,7 +149,7 @@ CHUNK_ROWS = 8192
 OVERSIZED_CELLS = 64
 """A box over more cells of a grid is kept in a list beside it: one huge box among tiny ones would fill memory."""
 
-GRID_FRESH = 4096
+GRID_FRESH = 512
 """Cell entries that a grid keeps apart before it sorts them in with all others (or a 16th of those, if more)."""
 
 QUADTREE_CAPACITY = 16

@@ -112,12 +112,15 @@ class Grid(BroadPhase):
         return at[np.lexsort(at.T[::-1])]
 
     def cell_boxes(self) -> Cells:
-        """Tell where the cells are that list boxes; one that lists old and fresh ones has two numbers."""
+        """Tell where the cells are that list boxes; one that lists settled and fresh ones has two numbers."""
         key = np.concatenate([listing.key for listing in self._listings])
         at = np.stack([key >> self._bits * axis for axis in reversed(range(self.dim))], axis=1) & 2**self._bits - 1
         with np.errstate(over="ignore"):
             low = self.origin + self.cell * (at - self._reach)
             box = np.clip(np.concatenate((low, low + self.cell), axis=1), -LARGEST, LARGEST)
+        main = self._listings[0]
+        living = np.append(0, np.cumsum(self._home[main.entry >> FIRST_BITS] == MAIN))[main.start]
+        box[np.flatnonzero(np.diff(living) == 0)] = np.repeat((np.inf, -np.inf), self.dim)
         return Cells(np.arange(len(key)), box, np.ones(len(key), np.bool_))
 
     def check(self) -> None:
@@ -201,10 +204,16 @@ class Grid(BroadPhase):
         self._beside = np.concatenate((self._beside, ids[large]))
         both = zip(self._listings[1].entries(), self._listed(ids[~large]), strict=True)
         key, entry = (np.concatenate(parts) for parts in both)
-        if len(key) > max(GRID_FRESH, len(self._listings[0].entry) // 16):
+        settled = len(self._listings[0].entry)
+        if not settled or len(key) > max(GRID_FRESH, settled // 16):
             self._settle(key, entry)
         else:
-            self._listings[1] = Listing.of(key, entry)
+            self._relist(key, entry)
+
+    def _relist(self, key: Ints, entry: Ints) -> None:
+        """Sort the fresh entries."""
+        self._listings[1] = Listing.of(key, entry)
+        self.written += len(key)
 
     def _listed(self, ids: Ints) -> Pairs:
         """Write out the cells of boxes that are not too large, as (key, entry)."""
@@ -222,8 +231,8 @@ class Grid(BroadPhase):
         if (homes == FRESH).any():
             keep = self._home[entry >> FIRST_BITS] == FRESH
             key, entry = key[keep], entry[keep]
-            self._listings[1] = Listing.of(key, entry)
-        if 2 * self._stale > max(GRID_FRESH, len(self._listings[0].entry)):
+            self._relist(key, entry)
+        if 2 * self._stale > len(self._listings[0].entry):
             self._settle(key, entry)
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
@@ -242,6 +251,7 @@ class Grid(BroadPhase):
         self._home[entry >> FIRST_BITS] = MAIN
         main = Listing.of(np.concatenate((old_key[keep], key)), np.concatenate((old_entry[keep], entry)))
         self._listings = [main, Listing.of(key[:0], entry[:0])]
+        self.written += len(main.entry)
         self._stale = 0
 
     def _span(self, rows: Floats) -> Pairs:

@@ -240,6 +240,7 @@ class Quadtree(BroadPhase):
             np.add.at(nodes["total"], node, sign)
             np.add.at(nodes["straddle"], node[straddle], sign)
         touched = np.unique(np.concatenate((before[1], after[1])))
+        self.written += len(touched)
         leaves = touched[nodes["child"][touched] < 0]
         node, box = self._entries(leaves)
         off, on = (nodes["child"][path[1]] < 0 for path in (before, after))
@@ -328,6 +329,7 @@ class Quadtree(BroadPhase):
             self._nodes.update({name: np.concatenate((self._nodes[name], more[name])) for name in FIELDS})
         nodes = self._nodes
         first, self._free = self._free[: len(splits)], self._free[len(splits) :]
+        self.written += 4 * len(first)
         nodes["child"][splits] = first
         for quarter in range(4):
             right, down, child = quarter % 2, quarter // 2, first + quarter
@@ -354,9 +356,11 @@ class Quadtree(BroadPhase):
             self._nodes["start"][kept] = np.cumsum(self._nodes["length"][kept]) - self._nodes["length"][kept]
             self._pool = np.concatenate((old, np.zeros(2 * len(box) + len(old), np.int64)))
             self._used = len(old)
+            self.written += len(old)
         self._nodes["start"][leaves] = self._used + np.cumsum(length) - length
         self._pool[self._used : self._used + len(box)] = box
         self._used += len(box)
+        self.written += len(box)
 
     def _entries(self, leaves: Ints) -> Pairs:
         """Write out what leaves list, as (leaf, box)."""

@@ -228,16 +228,21 @@ def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Im
     left, right = MARGIN, MARGIN + WIDTH + GAP
     page[TOP : TOP + HEIGHT, left : left + WIDTH] = _first_step(now)
     page[TOP : TOP + HEIGHT, right : right + WIDTH] = _second_step(now)
-    listed = int(now.cells.leaf.sum())
+    opened, leaves = _distinct(now.cells.box[now.entered]), _distinct(now.cells.box[now.cells.leaf])
     texts = [
         Text(left, 20, f"{shown.title}: {len(now.boxes)} moving objects, one query a frame", INK, bold=True),
-        Text(left, TOP - 8, f"1  find the {shown.leaves}: {now.entered.sum()} of {listed}", VISITED),
+        Text(left, TOP - 8, f"1  find the {shown.leaves}: {opened} of {leaves}", VISITED),
         Text(right, TOP - 8, f"2  compare within them: {now.found.sum()} found", FOUND),
     ]
     texts += _legend(now, page.shape[1]).draw(page, left, TOP + HEIGHT + 10)
     texts += _counters(page, shown.name, history, frames)
     draw_texts(page, texts)
     return page
+
+
+def _distinct(boxes: Floats) -> int:
+    """How many cells hold something: a grid has two numbers for one that lists settled and fresh boxes."""
+    return len(np.unique(boxes[boxes[:, 0] <= boxes[:, 2]], axis=0))
 
 
 def _first_step(now: Moment) -> Image:
