@@ -110,6 +110,10 @@ def test_opened_leaves_are_filled_and_outlined(kind: str) -> None:
             inside[box[1] : box[3] + 1, box[0] : box[2] + 1] = True
         assert inside.any()
         assert not (pane[inside] == plain).all(axis=1).any(), "an opened leaf has the colour of the ground"
+        once = (np.array(demo.CARD) * (255 - demo.TINT) + np.array(demo.VISITED) * demo.TINT + 127) // 255
+        twice = (once * (255 - demo.TINT) + np.array(demo.VISITED) * demo.TINT + 127) // 255
+        assert (pane[inside] == once).all(axis=1).any()
+        assert kind == "bvh" or not (pane[inside] == twice).all(axis=1).any(), "a cell was filled twice"
         blue = (pane == demo.VISITED).all(axis=2)
         assert blue.any() and not (blue & ~inside).any()
 

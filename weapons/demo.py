@@ -228,7 +228,7 @@ def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Im
     left, right = MARGIN, MARGIN + WIDTH + GAP
     page[TOP : TOP + HEIGHT, left : left + WIDTH] = _first_step(now)
     page[TOP : TOP + HEIGHT, right : right + WIDTH] = _second_step(now)
-    opened, leaves = _distinct(now.cells.box[now.entered]), _distinct(now.cells.box[now.cells.leaf])
+    opened, leaves = (len(_distinct(now.cells.box[which])) for which in (now.entered, now.cells.leaf))
     texts = [
         Text(left, 20, f"{shown.title}: {len(now.boxes)} moving objects, one query a frame", INK, bold=True),
         Text(left, TOP - 8, f"1  find the {shown.leaves}: {opened} of {leaves}", VISITED),
@@ -240,15 +240,15 @@ def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Im
     return page
 
 
-def _distinct(boxes: Floats) -> int:
-    """How many cells hold something: a grid has two numbers for one that lists settled and fresh boxes."""
-    return len(np.unique(boxes[boxes[:, 0] <= boxes[:, 2]], axis=0))
+def _distinct(boxes: Floats) -> Floats:
+    """Cells that hold something, each once: a grid has two numbers for one that lists settled and fresh boxes."""
+    return np.unique(boxes[boxes[:, 0] <= boxes[:, 2]], axis=0)
 
 
 def _first_step(now: Moment) -> Image:
     """Draw the cells; those that the query looks into stand out, and the leaves that it opens are filled."""
     pane = _pane()
-    for box in now.cells.box[now.entered]:
+    for box in _distinct(now.cells.box[now.entered]):
         _fill(pane, box, VISITED, TINT)
     _discs(pane, now, np.ones(len(now.boxes), np.bool_), REST)
     for which, color in ((~now.visited, CELL), (now.visited & ~now.entered, ON_THE_WAY), (now.entered, VISITED)):
@@ -261,7 +261,7 @@ def _first_step(now: Moment) -> Image:
 def _second_step(now: Moment) -> Image:
     """Draw the boxes: those that were compared with the query as rings, those that overlap it filled."""
     pane = _pane()
-    for box in now.cells.box[now.entered]:
+    for box in _distinct(now.cells.box[now.entered]):
         _fill(pane, box, VISITED, TINT // 2)
     _discs(pane, now, ~now.tested, REST)
     _frame(pane, now.query, INK, 2)

@@ -19,7 +19,13 @@ try:
 except ImportError:
     shapely = None
 
-QUERIES = 1000
+QUERIES, SINGLE, BRUTE = 10_000, 200, 500
+"""Queries of a call, calls of one query each, and queries that brute force is timed by."""
+
+HEAD = """\
+                    ms  us/query  us/query    batch       ms  looked into, %        all moved      1 % moved
+                build     alone  in batch  vs brute   pairs    nodes    boxes       ms  written       ms  written"""
+"""`written` is in parts, %, of what building writes."""
 
 
 def worlds(n: int, rng: np.random.Generator) -> dict[str, Floats]:
@@ -59,10 +65,23 @@ def planted(boxes: object) -> object:
     return tree
 
 
-def line(name: str, build: float, query: float, brute: float, rest: str) -> None:
+def singly(ask: Callable[[int], object]) -> float:
+    """Seconds of a call with one query."""
+    return timed(lambda: [ask(k) for k in range(SINGLE)])[0] / SINGLE
+
+
+def line(name: str, build: float, singles: float, query: float, brute: float, rest: str = "") -> None:
     """Print one row."""
-    ratio = f"{brute / query:9.1f}x"
-    print(f"  {name:10} {build * 1e3:9.1f} {query / QUERIES * 1e6:9.2f} {ratio} {rest}")
+    told = f"{build * 1e3:8.1f} {singles * 1e6:9.1f} {query / QUERIES * 1e6:9.2f} {brute / query:8.1f}x"
+    print(f"  {name:10} {told} {rest}")
+
+
+def moved(made: BroadPhase, ids: Ints, built: int, rng: np.random.Generator) -> str:
+    """Milliseconds of a small move, and the entries and nodes that it wrote, in parts of those of building."""
+    near = made.boxes[ids] + np.tile(rng.normal(0, 0.02, (len(ids), 2)), 2)
+    before, begin = made.written, time.perf_counter()
+    made.move(ids, near)
+    return f"{(time.perf_counter() - begin) * 1e3:8.2f} {100 * (made.written - before) / built:8.2f}"
 
 
 def structures(rows: Floats, queries: Floats, brute: float, expected: Ints, rng: np.random.Generator) -> None:
@@ -70,20 +89,32 @@ def structures(rows: Floats, queries: Floats, brute: float, expected: Ints, rng:
     for kind in (Grid, Quadtree, Bvh):
         build, made = timed(lambda kind=kind: kind(rows))
         assert isinstance(made, BroadPhase)
+        built = made.written
         query, got = timed(lambda made=made: made.query(queries))
         assert np.array_equal(got, expected), kind
+        singles = singly(lambda k, made=made: made.query(queries[k : k + 1]))
+        pairs, _ = timed(made.pairs)
         work = made.work(queries)
-        share, tests = (p.shape[1] / QUERIES for p in (work.visited, work.tested))
+        nodes, tests = (part.shape[1] / QUERIES for part in (work.visited, work.tested))
         few = rng.permutation(len(rows))[: len(rows) // 100]
-        moves = []
-        for ids in (np.arange(len(rows)), few):
-            step = rng.normal(0, 0.02, (len(ids), 2))
-            near = made.boxes[ids] + np.tile(step, 2)
-            begin = time.perf_counter()
-            made.move(ids, near)
-            moves.append((time.perf_counter() - begin) * 1e3)
-        rest = f"{100 * share / work.nodes:9.4f} {tests:9.1f} {100 * tests / len(rows):9.4f}"
-        line(kind.__name__, build, query, brute, f"{rest} {moves[0]:9.1f} {moves[1]:8.2f}")
+        moved(made, made.ids, built, rng)  # a box that has not moved yet has no room in a BVH
+        moves = " ".join(moved(made, ids, built, rng) for ids in (made.ids, few))
+        rest = f"{pairs * 1e3:7.0f} {100 * nodes / work.nodes:8.4f} {100 * tests / len(rows):8.4f} {moves}"
+        line(kind.__name__, build, singles, query, brute, rest)
+
+
+def peer(rows: Floats, queries: Floats, brute: float, expected: Ints) -> None:
+    """Time shapely's tree, its answers sorted as the project's are, and as they come; its boxes are made beforehand."""
+    made, asked = (shapely.box(*part.T) for part in (rows, queries))
+    build, tree = timed(lambda: planted(made))
+    query, got = timed(lambda: tree_pairs(tree, asked))
+    singles = singly(lambda k: tree_pairs(tree, asked[k : k + 1]))
+    pairs, _ = timed(lambda: tree_pairs(tree, made))
+    line("STRtree", build, singles, query, brute, f"{pairs * 1e3:7.0f}")
+    bare, pairs = (timed(lambda q=q: tree.query(q))[0] for q in (asked, made))  # type: ignore[attr-defined]
+    line("unsorted", build, singly(lambda k: tree.query(asked[k])), bare, brute, f"{pairs * 1e3:7.0f}")
+    if not np.array_equal(got, expected):
+        print("  (other pairs)")
 
 
 def main() -> None:
@@ -91,22 +122,19 @@ def main() -> None:
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     rng = np.random.default_rng(1)
     for name, rows in worlds(n, rng).items():
-        queries = rows[rng.permutation(n)[:QUERIES]]
+        queries = rows[rng.integers(0, n, QUERIES)]
         plain = BruteForce(rows)
-        brute, expected = timed(lambda plain=plain, queries=queries: plain.query(queries))
-        assert isinstance(expected, np.ndarray)
+        few, _ = timed(lambda plain=plain, queries=queries: plain.query(queries[:BRUTE]))
+        brute, expected = few * QUERIES / BRUTE, Bvh(rows).query(queries)
+        assert np.array_equal(plain.query(queries[:BRUTE]), expected[:, expected[0] < BRUTE])
         print(f"{n} boxes, {name}: {expected.shape[1] / QUERIES:.1f} found a query, {QUERIES} queries a call")
-        print("              build ms  us/query  vs brute   nodes %     tests   boxes %  all move  1% move, ms")
-        line("BruteForce", 0, brute, brute, "")
+        print(HEAD)
+        line("BruteForce", 0, few / BRUTE, brute, brute)
         structures(rows, queries, brute, expected, rng)
         if shapely is None:
             print("  (shapely is not installed)")
-            continue
-        made, asked = (shapely.box(*part.T) for part in (rows, queries))
-        build, tree = timed(lambda made=made: planted(made))
-        query, got = timed(lambda tree=tree, asked=asked: tree_pairs(tree, asked))
-        same = "" if np.array_equal(got, expected) else "(other pairs)"
-        line("STRtree", build, query, brute, same)
+        else:
+            peer(rows, queries, brute, expected)
 
 
 if __name__ == "__main__":
