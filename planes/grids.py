@@ -170,6 +170,8 @@ class Grid(BroadPhase):
         """
         start, length = self._listings[home - MAIN].runs(self._keys(at))
         some = np.flatnonzero(length)
+        if not len(some):
+            return []
         query, first, start, length = (part.take(some) for part in (query, first, start, length))
         if work is not None:
             before = len(self._listings[0].key) if home == FRESH else 0

@@ -377,9 +377,12 @@ def _nodes(n: int) -> Nodes:
 
 def _quarters(rows: Floats, mid: Floats) -> Bools:
     """Which quarters boxes reach into: (N, 4), by x, then y."""
-    left, up = (rows[:, axis] <= mid[:, axis] for axis in (0, 1))
-    right, down = (rows[:, 2 + axis] >= mid[:, axis] for axis in (0, 1))
-    return np.stack((left & up, right & up, left & down, right & down), axis=1)
+    left, up = rows[:, 0] <= mid[:, 0], rows[:, 1] <= mid[:, 1]
+    right, down = rows[:, 2] >= mid[:, 0], rows[:, 3] >= mid[:, 1]
+    reached = np.empty((len(rows), 4), np.bool_)
+    for quarter, (x, y) in enumerate(((left, up), (right, up), (left, down), (right, down))):
+        np.logical_and(x, y, out=reached[:, quarter])
+    return reached
 
 
 def _straddling(reached: Bools) -> Bools:

@@ -12,7 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from planes import InputError
 from planes.arrays import Floats, Ints
-from planes.boxes import meets
+from planes.boxes import meets, pieces
 from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
 from planes.constants import GRID_FRESH
 
@@ -187,6 +187,7 @@ BAD = {
     "boxes: expected shape (any, ": lambda s, d: s.query([[0.0] * (2 * d + 1)]),
     "boxes: expected shape (2, ": lambda s, d: s.move([0, 1], [[0.0] * 2 * d]),
     "ids[1]: expected the id of a box that is there, got 9": lambda s, d: s.remove([0, 9]),
+    "ids[0]: expected the id of a box that is there, got 3": lambda s, d: s.remove([3]),
     "ids[0]: expected the id of a box that is there, got 2": lambda s, d: s.move([2], [[0.0] * 2 * d]),
     "ids[2]: expected each id once, got 0 again": lambda s, d: s.remove([0, 1, 0]),
     "ids[0]: expected a whole number from 0": lambda s, d: s.remove([-1]),
@@ -330,6 +331,42 @@ def test_a_small_move_costs_little_in_any_world(make: Maker, d: int, n: int) -> 
         assert written(structure, lambda k=k: structure.move([k], rows[[n - 1 - k]])) < far
     assert written(structure, lambda: structure.move(ids, rng.permutation(rows))) > n / 2
     structure.check()
+
+
+def test_a_grid_keeps_little_that_is_stale_or_fresh() -> None:
+    rng = np.random.default_rng(3)
+    rows = uniform(rng, 2000, 2)
+    grid = Grid(rows, cell=2)
+    due = len(grid._listings[0].entry)
+    for _ in range(10):
+        grid.move(np.arange(2000), uniform(rng, 2000, 2))
+        assert sum(len(listing.entry) for listing in grid._listings) < 2.5 * due
+    grid = Grid(rows[:0], cell=2)
+    for k in range(0, 2000, 10):
+        grid.insert(rows[k : k + 10])
+        assert len(grid._listings[1].entry) <= GRID_FRESH
+    assert grid.written < 200 * 2000
+    assert_same(BruteForce(rows), grid, rows[:40])
+
+
+def test_work_is_cut_in_pieces() -> None:
+    assert pieces(np.array([3, 3, 3, 3]), 12) == [slice(0, 4)]
+    assert pieces(np.array([3, 3, 3, 3, 3]), 6) == [slice(0, 1), slice(1, 3), slice(3, 5)]
+    assert pieces(np.array([1, 99, 1, 1]), 10) == [slice(0, 1), slice(1, 4)]
+    assert pieces(np.array([], int), 10) == [slice(0, 0)]
+
+
+@pytest.mark.parametrize(("make", "d"), ALL)
+def test_answers_do_not_depend_on_the_pieces(make: Maker, d: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(9)
+    rows, queries = one_huge(rng, 300, d), np.concatenate((uniform(rng, 40, d), one_huge(rng, 3, d)))
+    structure = make(rows)
+    structure.insert(rows[:20])
+    due = structure.query(queries), structure.pairs(), np.sort(structure.work(queries).tested[1])
+    for module in ("boxes", "grids", "quadtree", "bvh"):
+        monkeypatch.setattr(f"planes.{module}.CHUNK_{'PAIRS' if module == 'boxes' else 'SAMPLES'}", 37)
+    got = structure.query(queries), structure.pairs(), np.sort(structure.work(queries).tested[1])
+    assert all(np.array_equal(a, b) for a, b in zip(got, due, strict=True))
 
 
 def test_queries_write_nothing() -> None:
