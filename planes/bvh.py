@@ -259,17 +259,19 @@ class PartsBvh:
         rows = box_rows("boxes", boxes, self._bounds.dim)
         query, owner = self._bounds.query(rows)
         group, part = ragged(self._starts[owner + 1] - self._starts[owner])
-        good = meets(rows[query[group]], self._parts[self._starts[owner[group]] + part])
-        return np.stack((query[group], owner[group], part))[:, good]
+        query, owner = query.take(group), owner.take(group)
+        parts = self._parts.take(self._starts.take(owner) + part, axis=0)
+        good = np.flatnonzero(meets(rows.take(query, axis=0), parts))
+        return np.stack((query, owner, part)).take(good, axis=1)
 
     def pairs(self) -> Ints:
         """Find the objects that overlap each other: (2, K) int64 [i, j] with i < j, sorted."""
         first, second = self._bounds.pairs()
         group, part = ragged(self._starts[first + 1] - self._starts[first])
-        left = self._parts[self._starts[first[group]] + part]
+        left = self._parts.take(self._starts[first[group]] + part, axis=0)
         again, other = ragged((self._starts[second + 1] - self._starts[second])[group])
-        right = self._parts[self._starts[second[group]][again] + other]
-        good = group[again[meets(left[again], right)]]
+        right = self._parts.take(self._starts[second[group]].take(again) + other, axis=0)
+        good = group[again[meets(left.take(again, axis=0), right)]]
         return _once(np.stack((first[good], second[good])))
 
     def insert(self, boxes: object, starts: object) -> Ints:

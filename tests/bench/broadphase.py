@@ -1,6 +1,6 @@
 """Broad phases side by side: build, query and move 10^5 boxes, against brute force and shapely's STRtree if installed.
 
-python tests/bench/broadphase.py [boxes]
+pip install -e '.[peers]'; python tests/bench/broadphase.py [boxes]
 """
 
 from __future__ import annotations
