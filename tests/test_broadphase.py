@@ -278,6 +278,14 @@ def test_a_quadtree_splits_in_four_and_merges() -> None:
     assert len(tree.leaves) == 1, "splitting would copy more than half of the boxes"
 
 
+def test_a_quadtree_is_no_deeper_and_no_fuller_than_told() -> None:
+    rows = np.tile(np.random.default_rng(1).uniform(0, 60, (400, 2)), 2)
+    assert [len(Quadtree(rows, capacity=1, depth=depth).leaves) for depth in range(4)] == [1, 4, 16, 64]
+    tree = Quadtree(rows, capacity=5)
+    tested = tree.work(rows).tested[0]
+    assert np.bincount(tested).max() == 5
+
+
 def test_a_quadtree_is_what_a_new_one_is() -> None:
     rng = np.random.default_rng(8)
     rows = uniform(rng, 500, 2)

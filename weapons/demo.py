@@ -76,7 +76,7 @@ Color = tuple[int, int, int]
 FOUND: Color = MARKS["hit"][0]
 TESTED: Color = (246, 228, 150)
 VISITED: Color = MARKS["occluded"][0]
-REST: Color = (96, 102, 114)
+REST: Color = (88, 94, 106)
 CELL: Color = (80, 86, 98)
 ON_THE_WAY: Color = (62, 116, 148)
 
@@ -259,13 +259,14 @@ def _first_step(now: Moment) -> Image:
 
 
 def _second_step(now: Moment) -> Image:
-    """Draw the boxes: those that were compared with the query as rings, those that overlap it filled."""
+    """Draw the boxes: those that were compared with the query as rings, those that overlap it filled, with a rim."""
     pane = _pane()
     for box in _distinct(now.cells.box[now.entered]):
         _fill(pane, box, VISITED, TINT // 2)
     _discs(pane, now, ~now.tested, REST)
     _frame(pane, now.query, INK, 2)
-    _discs(pane, now, now.tested & ~now.found, TESTED, hollow=True)
+    _discs(pane, now, now.tested & ~now.found, TESTED, 1, hollow=True)
+    _discs(pane, now, now.found, INK, 1)
     _discs(pane, now, now.found, FOUND)
     return pane
 
@@ -276,11 +277,11 @@ def _pane() -> Image:
     return pane
 
 
-def _discs(pane: Image, now: Moment, which: Bools, color: Color, hollow: bool = False) -> None:
-    """Draw boxes as the discs within them; hollow ones are a little larger, to be seen as rings."""
+def _discs(pane: Image, now: Moment, which: Bools, color: Color, more: int = 0, hollow: bool = False) -> None:
+    """Draw boxes as the discs within them, or as rings; of a radius that is greater by so many px."""
     centre = (now.boxes[:, :2] + now.boxes[:, 2:]) / 2
     radius = (now.boxes[:, 2] - now.boxes[:, 0]) / 2
-    _round(pane, centre[which], radius[which] + hollow, color, hollow)
+    _round(pane, centre[which], radius[which] + more, color, hollow)
 
 
 def _round(picture: Image, centre: Floats, radius: Floats, color: Color, hollow: bool = False) -> None:
@@ -323,8 +324,8 @@ def _legend(now: Moment, width: int) -> Legend:
     blend(entered, VISITED, np.full((14, 14), TINT, np.uint8), 0, 0)
     cv2.rectangle(entered, (0, 0), (13, 13), VISITED, 1)
     cv2.rectangle(way, (0, 0), (13, 13), ON_THE_WAY, 1)
-    for mark, color in ((rest, REST), (tested, TESTED), (found, FOUND)):
-        _round(mark, np.full((1, 2), 6.5), np.full(1, 4.0), color, color == TESTED)
+    for mark, color, radius in ((rest, REST, 4.0), (tested, TESTED, 4.0), (found, INK, 5.0), (found, FOUND, 4.0)):
+        _round(mark, np.full((1, 2), 6.5), np.array([radius]), color, color == TESTED)
     words = ("query", "opened", "on the way", "not tested", "compared", "found")
     entries = [Entry(word, mark) for word, mark in zip(words, marks, strict=True)]
     if now.cells.leaf.all():
