@@ -301,6 +301,8 @@ def test_a_quadtree_begins_anew_only_when_boxes_leave_its_cell() -> None:
     tree = Quadtree(rows, capacity=4)
     nodes, leaves = tree._nodes, len(tree.leaves)
     tree.move(np.arange(500), rows + 1e-9)
+    tree.move(np.arange(100), rows[:100] + 1000)
+    tree.move(np.arange(100), rows[:100])
     assert tree._nodes is nodes
     tree.move(np.arange(500), rows + 1000)
     assert len(tree.leaves) > leaves / 2 and tree.leaves.min() >= 1000
