@@ -318,7 +318,7 @@ class Quadtree(BroadPhase):
             self._write(all_node, all_box, np.sort(all_leaves))
 
     def _split(self, splits: Ints) -> None:
-        """Give cells their four children, with nothing in them yet."""
+        """Give cells their four children, with nothing in them yet: the length of a free row is 0."""
         short = max(0, len(splits) - len(self._free))
         if short:
             rows = len(self._nodes["depth"])
@@ -341,8 +341,6 @@ class Quadtree(BroadPhase):
             nodes["mid"][child] = _middle(nodes["cell"][child])
             nodes["child"][child], nodes["parent"][child] = -1, splits
             nodes["depth"][child] = nodes["depth"][splits] + 1
-            for counter in ("total", "straddle", "start", "length"):
-                nodes[counter][child] = 0
 
     def _write(self, node: Ints, box: Ints, leaves: Ints) -> None:
         """Put the entries of leaves at the end of the pool; tidy it when half is waste."""
