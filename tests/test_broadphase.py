@@ -397,6 +397,25 @@ def test_a_worn_bvh_is_planted_anew() -> None:
     tree.check()
 
 
+def test_a_bvh_shrinks_when_boxes_go() -> None:
+    rows = uniform(np.random.default_rng(2), 4000, 2)
+    tree = Bvh(rows)
+    tree.remove(np.arange(3000))
+    assert tree.work(rows[:1]).nodes <= 2 * Bvh(rows[3000:]).work(rows[:1]).nodes
+
+
+def test_nodes_of_several_trees_have_numbers_of_their_own() -> None:
+    rows = uniform(np.random.default_rng(2), 200, 2)
+    tree = Bvh(rows)
+    tree.insert(rows[:80] + 1000)
+    assert len(tree._trees) == 2
+    number, box, leaf = tree.cell_boxes()
+    for query in (rows[:1], rows[:1] + 1000):
+        visited = tree.work(query).visited[1]
+        assert len(np.unique(visited)) == len(visited)
+        assert meets(box[np.isin(number, visited) & leaf], query).any()
+
+
 def test_boxes_that_come_one_by_one_make_few_trees() -> None:
     rows = uniform(np.random.default_rng(4), 600, 2)
     tree = Bvh(rows[:0])
