@@ -351,6 +351,9 @@ def test_a_grid_keeps_little_that_is_stale_or_fresh() -> None:
     for _ in range(10):
         grid.move(np.arange(2000), uniform(rng, 2000, 2))
         assert sum(len(listing.entry) for listing in grid._listings) < 2.5 * due
+    for k in range(0, 1800, 100):
+        grid.remove(np.arange(k, k + 100))
+        assert len(grid._listings[0].entry) <= max(2.2 * due * (1900 - k) / 2000, 100)
     grid = Grid(rows[:0], cell=2)
     for k in range(0, 2000, 10):
         grid.insert(rows[k : k + 10])
