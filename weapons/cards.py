@@ -125,6 +125,8 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
     lines += _rest(shot["blockers"], NOT_LINES, " block")
     lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in shot["why_not"][:NOT_LINES]]
     lines += _rest(shot["why_not"], NOT_LINES, " near it")
+    if "tested" in shot:
+        lines.append([_tested(shot["tested"])])
     return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines)
 
 
@@ -145,6 +147,12 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
     return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
+
+
+def _tested(tested: Mapping[str, Any]) -> str:
+    """How many objects and occluders a shot's pixels were tested with, of how many."""
+    cells = f", {tested['opened']} cells opened" if tested["opened"] else ""
+    return f"tested {len(tested['objects'])} of {tested['of']} objects and occluders{cells}"
 
 
 def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:

@@ -186,6 +186,9 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
     one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
     one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
+    told = "fire with it and draw its volumes: box, circle, 'oriented box', '4 boxes', polygon, swept"
+    one.add_argument("--prefilter", metavar="NAME", help=told)
+    one.add_argument("--broadphase", metavar="NAME", help="fire with it and draw its cells: grid, quadtree, bvh")
     one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
     one = _word(words, fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
     one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
@@ -234,7 +237,10 @@ def report(arguments: argparse.Namespace) -> None:
     _check_not_of_scene(scene, arguments.scene, arguments.output, arguments.json)
     _note_empty(scene)
     orders = _orders(arguments, scene)
-    facts = report_of(scene, [fire_order(scene, order) for order in orders], [order.name for order in orders])
+    how = {"prefilter": arguments.prefilter, "broadphase": arguments.broadphase}
+    asked = {name: value for name, value in how.items() if value is not None}
+    fired = [fire_order(scene, order, **asked) for order in orders]
+    facts = report_of(scene, fired, [order.name for order in orders], **asked)
     write_png(arguments.output, picture_of_report(facts, scene))
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")

@@ -21,6 +21,7 @@ from planes.spans import Box, Spans
 from weapons.arsenal import parts_of
 from weapons.heat import heat_of
 from weapons.hits import HitRow, Hits
+from weapons.sieve import Sieve, sieve_of
 from weapons.volley import volley_of
 
 __all__ = ["FORMAT", "SHOTS_MAX", "report_of"]
@@ -36,7 +37,14 @@ NEAR_OUTSIDE = 48
 """How far beyond the bounds samples are shown, px."""
 
 
-def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None = None) -> dict[str, Any]:
+def report_of(
+    scene: Scene,
+    fired: Sequence[Hits],
+    names: Sequence[str] | None = None,
+    *,
+    prefilter: str | None = None,
+    broadphase: str | None = None,
+) -> dict[str, Any]:
     """Tell, as JSON, all that a picture of shots needs.
 
     Up to 24 shots are told one by one, with their samples as runs [y, x_first, x_last] by verdict, each pixel once
@@ -47,6 +55,8 @@ def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None =
     scene : what was fired on
     fired : answers of `fire` on it, of one shot or of many
     names : of their weapons; by default the kinds
+    prefilter, broadphase : what the picture shows of the way to the hits: the volumes of a pre-filter ("circle",
+        "4 boxes", ...), the cells of a broad phase ("grid", "quadtree", "bvh"), and how many objects were tested
 
     Raises
     ------
@@ -59,6 +69,7 @@ def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None =
     each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
     told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
     view = view_of(scene, fired)
+    sieve = sieve_of(scene, view, prefilter, broadphase)
     return {
         "format": FORMAT,
         "version": version("hitplanes"),
@@ -74,7 +85,17 @@ def report_of(scene: Scene, fired: Sequence[Hits], names: Sequence[str] | None =
         "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
         "shots": told,
         "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
+        **({} if sieve is None else {"filter": _sifted(sieve, each if told else [], told)}),
     }
+
+
+def _sifted(sieve: Sieve, each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Tell what each shot was tested with, and what the pre-filter is."""
+    opened = [np.zeros(0, np.int64)]
+    for (hits, _, row), shot in zip(each, told, strict=True):
+        shot["tested"], cells = sieve.told(hits, row)
+        opened.append(cells)
+    return sieve.to_dict(np.unique(np.concatenate(opened)))
 
 
 def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:

@@ -94,8 +94,8 @@ def order_from_json(
         )
 
 
-def fire_order(scene: Scene, order: Order) -> Hits:
-    """Fire one shot."""
+def fire_order(scene: Scene, order: Order, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
+    """Fire one shot; pre-filter and broad phase as for `fire`."""
     return fire(
         scene,
         order.weapon,
@@ -106,6 +106,8 @@ def fire_order(scene: Scene, order: Order) -> Hits:
         exclude=order.exclude or None,
         seed=order.seed,
         shot=[order.shot],
+        prefilter=prefilter,
+        broadphase=broadphase,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from planes.arrays import Image
 from weapons.marks import HEAT, MARKS, glyph
+from weapons.sketch import SKETCH
 from weapons.world import HATCH, OUTLINES, World
 
 __all__ = [
@@ -158,6 +159,9 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     for kind, word in (("hit", "object hit"), ("blocked", "object blocked"), ("other", told)):
         if f"object {kind}" in painted:
             entries.append(Entry(word, _outlined(kind)))
+    for name, color in SKETCH.items():
+        if name in painted:
+            entries.append(Entry(name, _boxed(color, name)))
     if "occluder" in painted:
         rows, columns = np.mgrid[:14, :14]
         mark = _blank(14)
@@ -191,6 +195,18 @@ def _outlined(kind: str) -> Image:
     border[thick:-thick, thick:-thick] = False
     rows, columns = np.ogrid[:14, :14]
     mark[border & ((kind != "blocked") | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
+    return mark
+
+
+def _boxed(color: Color, name: str) -> Image:
+    """Border of a volume, or of a cell with its ground."""
+    mark = _blank(14)
+    thick = 2 if name == "volume tested" else 1
+    if name == "cell opened":
+        mark[:] = (np.array(color) + 2 * mark.astype(np.int64)) // 3
+    border = np.ones((14, 14), np.bool_)
+    border[thick:-thick, thick:-thick] = False
+    mark[border] = color
     return mark
 
 

@@ -5,7 +5,7 @@ Everything is drawn in whole numbers; text comes last, as a layer of its own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from planes.arrays import Image, InputError
@@ -15,6 +15,7 @@ from weapons.cards import batch_cards, shot_card
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import Text, draw_texts, page_of
+from weapons.sketch import draw_cells, draw_volumes
 from weapons.world import World, factor_of
 
 __all__ = ["picture_of_report"]
@@ -42,10 +43,12 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
         raise InputError(f"scene: expected hash {report['scene']['hash']}, got {scene.content_hash()}: it has changed")
     view = tuple(report["view_xyxy"])
     world = World(scene, report["scene"]["bounds_xyxy"], view, factor_of(view))
+    if "filter" in report:
+        draw_cells(world, report)
     if report["batch"]:
         texts, cards = _heat(world, report, scene), batch_cards(report)
     else:
-        texts = _shots(world, report["shots"], scene)
+        texts = _shots(world, report, scene)
         cards = [shot_card(shot, number, scene) for number, shot in enumerate(report["shots"])]
     page, texts = page_of(report, world, texts, cards)
     if text:
@@ -53,8 +56,9 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     return page
 
 
-def _shots(world: World, shots: Sequence[Mapping[str, Any]], scene: Scene) -> list[Text]:
+def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     """Mark every sample of every shot, outline the objects, and write over them who is who."""
+    shots = report["shots"]
     hit = {row["object"] for shot in shots for row in shot["rows"]}
     blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]} - hit
     world.outline_seen([item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked])
@@ -63,6 +67,8 @@ def _shots(world: World, shots: Sequence[Mapping[str, Any]], scene: Scene) -> li
     for kind, items in (("blocked", blocked), ("hit", hit)):
         for item in sorted(items):
             world.outline(item, kind)
+    if "filter" in report:
+        draw_volumes(world, report, scene)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)
     for number, shot in enumerate(shots):

@@ -13,10 +13,12 @@ from typing import Any
 from planes.arrays import InputError, within
 from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, VIEW_MAX
 from planes.image import read_text, write_text
+from planes.index import STRUCTURES
 from planes.sampling import Verdict
 from planes.scenefile import OBJECT, SCENE
 from planes.schema import (
     Const,
+    Flag,
     Keys,
     Mapped,
     Names,
@@ -85,34 +87,48 @@ ROW = _all(
         "runs": RUNS,
     }
 )
-TOLD = _all(
+TESTED = _all(
     {
-        "shot": Whole(0, 2**63 - 1),
-        "weapon": Text(),
-        "at": Numbers((2,), POSITION_MAX),
-        "at_xy": PIXEL,
-        "aim": Optional(Number(-180, 180)),
-        "seed": Whole(0, SEED_MAX),
-        "accept": Optional(Names()),
-        "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
-        "verdicts": _all(dict(VERDICTS)),
-        "rows": Rows(ROW),
-        "why_not": Rows(
-            _all(
-                {
-                    **ITEM,
-                    "reason": Word(REASONS),
-                    "samples": COUNT,
-                    "by": Rows(_all({**ITEM, "samples": COUNT})),
-                    "distance": Number(0),
-                }
-            )
-        ),
-        "blockers": Rows(
-            _all({**ITEM, "samples": COUNT, "blocked": Rows(_all({**ITEM, "samples": COUNT, "at_xy": PIXEL}))})
-        ),
-        "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))),
-        "plan": PLAN,
+        "objects": Wholes((None,), 0, ITEMS_MAX - 1),
+        "of": COUNT,
+        "opened": COUNT,
+        "patterns": Rows(_all({"points": Numbers((None, 2), FARTHEST)})),
+    }
+)
+SHOT_TOLD: dict[str, Value] = {
+    "shot": Whole(0, 2**63 - 1),
+    "weapon": Text(),
+    "at": Numbers((2,), POSITION_MAX),
+    "at_xy": PIXEL,
+    "aim": Optional(Number(-180, 180)),
+    "seed": Whole(0, SEED_MAX),
+    "accept": Optional(Names()),
+    "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
+    "verdicts": _all(dict(VERDICTS)),
+    "rows": Rows(ROW),
+    "why_not": Rows(
+        _all(
+            {
+                **ITEM,
+                "reason": Word(REASONS),
+                "samples": COUNT,
+                "by": Rows(_all({**ITEM, "samples": COUNT})),
+                "distance": Number(0),
+            }
+        )
+    ),
+    "blockers": Rows(
+        _all({**ITEM, "samples": COUNT, "blocked": Rows(_all({**ITEM, "samples": COUNT, "at_xy": PIXEL}))})
+    ),
+    "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))),
+    "plan": PLAN,
+}
+TOLD = Within(Keys({**SHOT_TOLD, "tested": TESTED}, tuple(SHOT_TOLD)))
+FILTER = _all(
+    {
+        "prefilter": Text(),
+        "broadphase": Word(tuple(STRUCTURES)),
+        "cells": Rows(_all({"box_xyxy": Numbers((4,), FARTHEST), "opened": Flag()})),
     }
 )
 HEAT = _all(
@@ -153,7 +169,7 @@ KEYS: dict[str, Value] = {
     "shots": Rows(TOLD),
     "batch": Optional(BATCH),
 }
-REPORT = Keys(KEYS, tuple(KEYS))
+REPORT = Keys({**KEYS, "filter": FILTER}, tuple(KEYS))
 """The table of a report."""
 
 

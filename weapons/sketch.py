@@ -1,0 +1,90 @@
+"""The pre-filter drawn over the world: the cells that were opened, and the volumes that were tested or passed over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+
+from planes.arrays import Floats
+from planes.constants import MASK_SIDE_MAX
+from planes.items import overlapping
+from planes.render import blend
+from planes.scene import Scene
+from weapons.candidates import prefilter_of
+from weapons.sieve import outline_of, rectangle
+from weapons.world import OUTLINES_MAX, World
+
+__all__ = ["SKETCH", "draw_cells", "draw_volumes"]
+
+SKETCH = {
+    "volume tested": (96, 226, 150),
+    "volume passed over": (150, 156, 168),
+    "volume of the shot": (255, 255, 255),
+    "cell opened": (86, 180, 233),
+    "cell": (96, 102, 114),
+}
+"""Colours of what may be drawn of a pre-filter."""
+
+OPENED = 26
+"""Opacity of the ground of a cell that was opened, of 255."""
+
+
+def draw_cells(world: World, report: Mapping[str, Any]) -> None:
+    """Draw the cells of the broad phase; those that were opened are filled, too."""
+    cells = report["filter"]["cells"]
+    for opened, name in ((False, "cell"), (True, "cell opened")):
+        for cell in cells:
+            if cell["opened"] is not opened:
+                continue
+            x, y, x_max, y_max = cell["box_xyxy"]
+            ring = _placed(world, np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)]))
+            if opened:
+                (left, top), (right, low) = (np.clip(v, -1, max(world.image.shape)) for v in (ring[0], ring[2]))
+                ground = np.full((max(low - top, 0), max(right - left, 0)), OPENED, np.uint8)
+                blend(world.image, SKETCH[name], ground, int(left), int(top))
+            cv2.polylines(world.image, [ring], True, SKETCH[name], 1)
+            world.painted.add(name)
+
+
+def draw_volumes(world: World, report: Mapping[str, Any], scene: Scene) -> None:
+    """Draw the volumes of what lies in view: of items that were passed over, of those tested, and of the shots."""
+    tested = {item for shot in report["shots"] for item in shot["tested"]["objects"]}
+    found = _item_outlines(world, report, scene)
+    for name, wanted in (("volume passed over", False), ("volume tested", True)):
+        for item, rings in found.items():
+            if (item in tested) is wanted:
+                _draw(world, rings, name)
+    for shot in report["shots"]:
+        _draw(world, [np.array(pattern["points"]) for pattern in shot["tested"]["patterns"]], "volume of the shot")
+
+
+def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dict[int, list[Floats]]:
+    """Outlines of the volumes of items in view, in the world."""
+    wanted, stack = prefilter_of(report["filter"]["prefilter"]), scene.items.stack()
+    if wanted.name == "none":
+        return {}
+    reach = np.array(world.view) + np.array([-1, -1, 1, 1]) * (max(world.image.shape) // world.factor)
+    seen = np.flatnonzero(overlapping(reach, stack.box_xyxy))[:OUTLINES_MAX]
+    ids = stack.ids[seen]
+    if wanted.kind is None:
+        return {item: [rectangle(box)] for item, box in zip(ids.tolist(), stack.box_xyxy[seen], strict=True)}
+    volumes, row = scene.items.bounding(wanted.kind, ids)
+    corner = stack.box_xyxy[seen, :2]
+    return {
+        item: [ring + corner[i] for ring in outline_of(volumes, int(row[i]))] for i, item in enumerate(ids.tolist())
+    }
+
+
+def _draw(world: World, rings: list[Floats], name: str) -> None:
+    for ring in rings:
+        cv2.polylines(world.image, [_placed(world, ring)], True, SKETCH[name], 1 + (name == "volume tested"))
+        world.painted.add(name)
+
+
+def _placed(world: World, points: Floats) -> np.ndarray:
+    """Points of the world in the picture, whole pixels: those far off are brought nearer."""
+    near = np.clip(points - world.view[:2] + 0.5, -MASK_SIDE_MAX, MASK_SIDE_MAX)
+    return np.rint(near * world.factor).astype(np.int32)
