@@ -27,9 +27,10 @@ def told(scene: Scene, *shots: tuple[Weapon, tuple[float, float]]) -> dict[str, 
     return report_of(scene, [fire(scene, weapon, at) for weapon, at in shots])
 
 
-def gallery_report(scene: Scene) -> dict[str, Any]:
+def gallery_report(scene: Scene, prefilter: str | None = None, broadphase: str | None = None) -> dict[str, Any]:
     orders = orders_of(scene, arsenal_of(scene))
-    return report_of(scene, [fire_order(scene, order) for order in orders], [order.name for order in orders])
+    fired, names = [fire_order(scene, order) for order in orders], [order.name for order in orders]
+    return report_of(scene, fired, names, prefilter=prefilter, broadphase=broadphase)
 
 
 def blank(scene: Scene | None, view: tuple[int, int, int, int], factor: int) -> World:
@@ -121,12 +122,15 @@ def test_text_is_a_layer_of_its_own() -> None:
     assert not np.array_equal(with_text, without)
 
 
-@pytest.mark.parametrize("kind", ["shots", "batch", "out of view"])
+@pytest.mark.parametrize("kind", ["shots", "batch", "out of view", "circles", "boxes", "polygons"])
 def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
     scene = load_scene(GALLERY)
     weapons = arsenal_of(scene)
     reports = {
         "shots": lambda: gallery_report(scene),
+        "circles": lambda: gallery_report(scene, "circle", "quadtree"),
+        "boxes": lambda: gallery_report(scene, "4 boxes", "grid"),
+        "polygons": lambda: gallery_report(scene, "polygon", "bvh"),
         "batch": lambda: report_of(scene, [fire(scene, weapons["shotgun"], [(8 * i, 5 * i) for i in range(60)])]),
         "out of view": lambda: told(scene, (weapons["blast"], (-300, 100)), (weapons["pistol"], (1e4, 9e4))),
     }
@@ -134,7 +138,14 @@ def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
     assert hashlib.sha256(picture.tobytes()).hexdigest()[:16] == PICTURE_HASHES[kind]
 
 
-PICTURE_HASHES = {"shots": "6a419542aeceeb09", "batch": "e3b0fa4f5bb513a2", "out of view": "ef14ea21b7c2bff0"}
+PICTURE_HASHES = {
+    "shots": "6a419542aeceeb09",
+    "batch": "e3b0fa4f5bb513a2",
+    "out of view": "ef14ea21b7c2bff0",
+    "circles": "f9bfd80ab527913b",
+    "boxes": "2b999d27dcfac936",
+    "polygons": "4fa7e278c188e432",
+}
 """Of pictures without text; look at a picture before changing its hash."""
 
 

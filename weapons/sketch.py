@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 
-from planes.arrays import Floats
+from planes.arrays import Floats, Ints
 from planes.constants import MASK_SIDE_MAX
 from planes.items import overlapping
 from planes.render import blend
 from planes.scene import Scene
+from planes.spans import ragged
 from weapons.candidates import prefilter_of
 from weapons.sieve import outline_of, rectangle
 from weapons.world import OUTLINES_MAX, World
@@ -27,6 +27,9 @@ SKETCH = {
     "cell": (96, 102, 114),
 }
 """Colours of what may be drawn of a pre-filter."""
+
+BRUSH = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+"""Pixels that a thick line sets for each of its own."""
 
 OPENED = 26
 """Opacity of the ground of a cell that was opened, of 255."""
@@ -45,8 +48,7 @@ def draw_cells(world: World, report: Mapping[str, Any]) -> None:
                 (left, top), (right, low) = (np.clip(v, -1, max(world.image.shape)) for v in (ring[0], ring[2]))
                 ground = np.full((max(low - top, 0), max(right - left, 0)), OPENED, np.uint8)
                 blend(world.image, SKETCH[name], ground, int(left), int(top))
-            cv2.polylines(world.image, [ring], True, SKETCH[name], 1)
-            world.painted.add(name)
+            _trace(world, ring, name)
 
 
 def draw_volumes(world: World, report: Mapping[str, Any], scene: Scene) -> None:
@@ -80,11 +82,28 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
 
 def _draw(world: World, rings: list[Floats], name: str) -> None:
     for ring in rings:
-        cv2.polylines(world.image, [_placed(world, ring)], True, SKETCH[name], 1 + (name == "volume tested"))
+        _trace(world, _placed(world, ring), name)
+
+
+def _trace(world: World, ring: Ints, name: str) -> None:
+    """Draw a closed line through points of the picture, twice as thick where a volume was tested.
+
+    Not by OpenCV: where a line leaves the picture its pixels depend on the version.
+    """
+    step = np.roll(ring, -1, axis=0) - ring
+    edge, place = ragged(np.maximum(np.abs(step).max(axis=1), 1))
+    count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True), 1)
+    at = ring[edge] + (2 * step[edge] * place[:, None] + count) // (2 * count)
+    if name == "volume tested":
+        at = (at[:, None] + BRUSH).reshape(-1, 2)
+    height, width = world.image.shape[:2]
+    x, y = at[((at >= 0) & (at < (width, height))).all(axis=1)].T
+    world.image[y, x] = SKETCH[name]
+    if len(x):
         world.painted.add(name)
 
 
-def _placed(world: World, points: Floats) -> np.ndarray:
+def _placed(world: World, points: Floats) -> Ints:
     """Points of the world in the picture, whole pixels: those far off are brought nearer."""
     near = np.clip(points - world.view[:2] + 0.5, -MASK_SIDE_MAX, MASK_SIDE_MAX)
-    return np.rint(near * world.factor).astype(np.int32)
+    return np.rint(near * world.factor).astype(np.int64)

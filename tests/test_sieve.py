@@ -1,0 +1,184 @@
+"""What a report tells and draws of the way to its hits: objects tested, volumes, cells."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planes import InputError, Scene, Sprite, load_scene
+from weapons import Beam, Disc, Point, Spread, Weapon, fire
+from weapons.cli import main
+from weapons.facts import SHOTS_MAX, report_of
+from weapons.marks import MARKS
+from weapons.picture import picture_of_report
+from weapons.schemas import REPORT
+from weapons.sieve import CELLS_MAX, PATTERNS_MAX
+from weapons.sketch import SKETCH
+from weapons.world import factor_of
+
+GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
+WAYS = [
+    ("box", None), ("circle", "grid"), ("oriented box", "quadtree"), ("4 boxes", "bvh"), ("polygon", "none"),
+    ("swept", "grid"), (None, "quadtree"), ("none", None),
+]  # fmt: skip
+
+
+def yard() -> Scene:
+    """Three targets and a wall, far from one another."""
+    scene = Scene((200, 120), name="yard")
+    for name, xy in (("west", (30, 40)), ("mid", (90, 60)), ("east", (160, 90))):
+        scene.add(Sprite.circle(9), xy, name=name)
+    scene.add(Sprite.box(4, 40), (120, 60), role="occluder", name="wall")
+    return scene
+
+
+def report(scene: Scene, weapon: Weapon, at: Any, **how: Any) -> dict[str, Any]:
+    return report_of(scene, [fire(scene, weapon, at, aim=30 if isinstance(weapon, Beam) else None)], **how)
+
+
+def colors(picture: np.ndarray) -> set[tuple[int, ...]]:
+    return set(map(tuple, np.unique(picture.reshape(-1, 3), axis=0).tolist()))
+
+
+@pytest.mark.parametrize(("prefilter", "broadphase"), WAYS)
+def test_what_was_tested_is_told(prefilter: str | None, broadphase: str | None) -> None:
+    scene = yard()
+    told = report(scene, Disc(20), (90, 60), prefilter=prefilter, broadphase=broadphase)
+    REPORT.check("report", json.loads(json.dumps(told)))
+    assert told["filter"]["prefilter"] == (prefilter or "box")
+    assert told["filter"]["broadphase"] == (broadphase or "none")
+    (shot,) = told["shots"]
+    every = sorted(scene.find(name) for name in ("west", "mid", "east", "wall"))
+    near = [scene.find("mid")]
+    assert shot["tested"]["objects"] == (every if prefilter == "none" else near)
+    assert shot["tested"]["of"] == 4
+    assert (shot["tested"]["opened"] > 0) == (broadphase not in (None, "none"))
+    assert any(cell["opened"] for cell in told["filter"]["cells"]) == (broadphase not in (None, "none"))
+    patterns = [np.array(pattern["points"]) for pattern in shot["tested"]["patterns"]]
+    assert len(patterns) == (prefilter != "none")
+    for ring in patterns:  # about the shot, and around it
+        assert (ring.min(axis=0) <= (90 - 20.5, 60 - 20.5)).all()
+        assert (ring.max(axis=0) >= (90 + 20.5, 60 + 20.5)).all()
+        assert (np.abs(ring - (90, 60)) < 35).all()
+
+
+def test_without_a_word_nothing_is_told_or_drawn() -> None:
+    scene = yard()
+    told = report(scene, Disc(20), (90, 60))
+    assert "filter" not in told
+    assert "tested" not in told["shots"][0]
+    assert not colors(picture_of_report(told, scene, text=False)) & {SKETCH["volume tested"], SKETCH["cell"]}
+
+
+@pytest.mark.parametrize(("prefilter", "broadphase"), WAYS)
+def test_volumes_and_cells_are_drawn_and_in_the_legend(prefilter: str | None, broadphase: str | None) -> None:
+    scene = yard()
+    told = report(scene, Disc(20), (90, 60), prefilter=prefilter, broadphase=broadphase)
+    seen = colors(picture_of_report(told, scene, text=False))
+    drawn = {name for name, color in SKETCH.items() if color in seen and color not in (c for c, _ in MARKS.values())}
+    volumes = set() if prefilter == "none" else {"volume tested", "volume passed over"}
+    assert drawn >= volumes
+    assert ("volume tested" in drawn) == (prefilter != "none")
+    assert ("cell" in drawn) <= (broadphase in ("grid", "quadtree", "bvh"))
+    if broadphase == "grid":
+        assert "cell" in drawn
+
+
+def test_a_volume_is_drawn_around_its_object() -> None:
+    """Outside of the mask, within its box and what a circle adds; and the scene is drawn as without it elsewhere."""
+    scene = Scene((80, 60))
+    scene.add(Sprite.box(20, 10), (40, 30))
+    told = report(scene, Point(), (40, 30), prefilter="box")
+    factor = factor_of(tuple(told["view_xyxy"]))
+    picture = picture_of_report(told, scene, text=False)
+    y, x = np.nonzero((picture == SKETCH["volume tested"]).all(axis=2))
+    keep = y < 44 + 60 * factor  # not the legend
+    left, top = min(x[keep]), min(y[keep])
+    width, height = np.ptp(x[keep]), np.ptp(y[keep])
+    assert abs(width - 21 * factor) <= 3
+    assert abs(height - 11 * factor) <= 3
+    assert abs((left - (picture.shape[1] - 80 * factor) // 2) - 29.5 * factor - factor / 2) <= 2
+    assert abs((top - 44) - 24.5 * factor - factor / 2) <= 2
+
+
+def test_pellets_have_volumes_of_their_own_and_not_too_many() -> None:
+    scene = yard()
+    told = report(scene, Spread(Disc(1), count=100, radius=30), (90, 60), prefilter="circle")
+    assert len(told["shots"][0]["tested"]["patterns"]) == PATTERNS_MAX
+
+
+def test_a_batch_tells_cells_but_no_volumes() -> None:
+    scene = yard()
+    many = [(i, 60) for i in range(SHOTS_MAX + 1)]
+    told = report(scene, Point(), many, prefilter="circle", broadphase="grid")
+    assert not told["shots"]
+    assert told["filter"]["cells"]
+    REPORT.check("report", json.loads(json.dumps(told)))
+    picture_of_report(told, scene)
+
+
+def test_of_very_many_cells_the_opened_ones_are_told() -> None:
+    scene = Scene((2000, 2000))
+    pixel = Sprite.from_mask([[True]])
+    rng = np.random.default_rng(1)
+    for xy in rng.integers(0, 2000, (CELLS_MAX + 1500, 2)).tolist():
+        scene.add(pixel, xy)
+    told = report(scene, Disc(200), (1000, 1000), broadphase="grid")
+    assert 0 < len(told["filter"]["cells"]) < 1000
+    assert all(cell["opened"] for cell in told["filter"]["cells"])
+
+
+def test_cells_are_cut_to_the_view() -> None:
+    scene = Scene()
+    for x in range(0, 10**6, 1000):
+        scene.add(Sprite.circle(200), (x, 0))
+    for broadphase in ("grid", "quadtree", "bvh"):
+        told = report(scene, Disc(9), (5000, 0), broadphase=broadphase)
+        x, y, x_max, y_max = told["view_xyxy"]
+        for cell in told["filter"]["cells"]:
+            left, top, right, low = cell["box_xyxy"]
+            assert x - 1 <= left <= right <= x_max + 1
+            assert y - 1 <= top <= low <= y_max + 1
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        ({"prefilter": "auto"}, "prefilter: expected one to be shown, got 'auto'"),
+        ({"prefilter": "cirle"}, r"prefilter: .*did you mean 'circle'"),
+        ({"broadphase": "tree"}, "broadphase: expected one of"),
+        ({"prefilter": "none", "broadphase": "grid"}, "broadphase: expected 'none' without a pre-filter, got 'grid'"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(how: dict[str, str], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        report(yard(), Point(), (1, 1), **how)
+
+
+def test_the_command_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["report", str(GALLERY), "-o", str(tmp_path / "r.png"), "--json", str(tmp_path / "r.json"), "--plan"]
+    assert main([*words, "--prefilter", "4 boxes", "--broadphase", "grid"]) == 0
+    out = capsys.readouterr().out
+    assert "pre-filter, tested 1 of 26" in out
+    assert "box, then 4 boxes, by grid" in out
+    found = json.loads((tmp_path / "r.json").read_text())
+    assert found["filter"]["prefilter"] == "4 boxes"
+    scene = load_scene(GALLERY)
+    assert found["shots"][0]["tested"]["of"] == len(scene.items.stack())
+    assert main([*words, "--prefilter", "sphere"]) == 2
+    assert "prefilter: expected one of" in capsys.readouterr().err
+
+
+def test_a_sketch_leaves_the_rest_to_be_seen() -> None:
+    """Volumes are thin lines: under them the picture is as without."""
+    scene = yard()
+    plain, drawn = (
+        picture_of_report(report(scene, Disc(8), (90, 60), **how), scene, text=False)[: 44 + 120 * 8]
+        for how in ({}, {"prefilter": "polygon"})
+    )
+    changed = (plain != drawn).any(axis=2).mean()
+    assert 0 < changed < 0.03
