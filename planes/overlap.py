@@ -59,12 +59,13 @@ def contains_point(volume: Volumes, xy: object, conservative: bool = False) -> B
 
 
 def separating_axis(a: Volumes, b: Volumes) -> Floats:
-    """Find an edge whose line separates two hulls without radii, row by row.
+    """Find a line that separates two hulls without radii, row by row.
 
     Returns
     -------
-    (N, 4) float: rows (x0, y0, x1, y1), two corners of one hull: all of the other lies beyond their line; NaN where
-    the rows overlap, or where only the end of a segment or a single point parts them
+    (N, 4) float: rows (x0, y0, x1, y1), two points of the line: one hull touches it, the other lies beyond. They are
+    corners of the first; where no edge parts two hulls without areas, the line goes along x or y. NaN where the rows
+    overlap
 
     Raises
     ------
@@ -75,7 +76,8 @@ def separating_axis(a: Volumes, b: Volumes) -> Floats:
         raise InputError("separating_axis: expected boxes or polygons in 2-D")
     n = _rows(len(a), len(b))
     i, j = (np.arange(n) if len(v) == n else np.zeros(n, np.int64) for v in (a, b))
-    one, two = a.take(i).core(), b.take(j).core()
+    hulls = a.take(i), b.take(j)
+    one, two = (v.core() for v in hulls)
     found = np.full((n, 4), np.nan)
     left = np.arange(n)
     for first, second in ((one, two), (two, one)):
@@ -84,6 +86,21 @@ def separating_axis(a: Volumes, b: Volumes) -> Floats:
             rows = left[parted]
             found[rows] = np.concatenate([first.point(rows, k), first.point(rows, k + 1)], axis=1)
             left = left[~parted]
+    found[left] = _line_between(*(v.take(left).bounds() for v in hulls))
+    return found
+
+
+def _line_between(a: Aabbs, b: Aabbs) -> Floats:
+    """Lines along x or y by which boxes are apart: b lies to the left of the way along them; NaN where it does not."""
+    found = np.full((len(a), 4), np.nan)
+    zero, one = np.zeros(len(a)), np.ones(len(a))
+    for apart, line in (
+        (a.max[:, 0] < b.min[:, 0], (a.max[:, 0], zero, a.max[:, 0], one)),
+        (b.max[:, 0] < a.min[:, 0], (a.min[:, 0], one, a.min[:, 0], zero)),
+        (a.max[:, 1] < b.min[:, 1], (one, a.max[:, 1], zero, a.max[:, 1])),
+        (b.max[:, 1] < a.min[:, 1], (zero, a.min[:, 1], one, a.min[:, 1])),
+    ):
+        found[apart] = np.stack(line, axis=1)[apart]
     return found
 
 

@@ -190,12 +190,23 @@ def test_separating_axis_is_a_witness() -> None:
         line = separating_axis(a, b)
         apart = ~np.isnan(line[:, 0])
         assert not overlap(a, b)[apart].any() and 0 < apart.sum() < 300
-        if "polygons" in (one, two):
-            assert (apart == ~overlap(a, b)).all()
+        assert (apart == ~overlap(a, b)).all()
         for i in np.flatnonzero(apart).tolist():
             sides = [orient2d(line[i, :2], line[i, 2:], v.take([i]).core().points) for v in (a, b)]
             ends = [(s.min(), s.max()) for s in sides]
             assert (ends[0][0] >= 0 and ends[1][1] < 0) or (ends[1][0] >= 0 and ends[0][1] < 0)
+
+
+def test_a_separating_axis_of_what_no_edge_parts() -> None:
+    """Points, and segments on one line: along x or y through what comes first."""
+    low: Any = [[0, 0], [0, 0], [0, 0], [4, 4], [2, 7]]
+    high: Any = [[0, 0], [2, 0], [0, 2], [4, 4], [2, 7]]
+    others: Any = [[3, 5], [3, 0], [0, 3], [3, 4], [2, 6]]
+    found = separating_axis(Aabbs(low, high), Aabbs(others, others))
+    assert found.tolist() == [[1, 0, 0, 0], [2, 0, 2, 1], [1, 2, 0, 2], [4, 1, 4, 0], [0, 7, 1, 7]]
+    slanted = Obbs.from_corners([[[0, 0], [2, 2]] * 2]), Obbs.from_corners([[[3, 3], [5, 5]] * 2])
+    assert separating_axis(*slanted).tolist() == [[1, 2, 0, 2]]
+    assert np.isnan(separating_axis(slanted[0], slanted[0])).all()
 
 
 def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
