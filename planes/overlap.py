@@ -6,12 +6,14 @@ with them by the distances of edges. Every sign is exact on the float64 inputs.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of
+from planes.axes import edge_parts, hulls_sign
 from planes.exact import circles_sign, orient2d, point_segment_sign, segment_segment_sign
 from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons, Volumes
 
@@ -82,7 +84,7 @@ def separating_axis(a: Volumes, b: Volumes) -> Floats:
     left = np.arange(n)
     for first, second in ((one, two), (two, one)):
         for k in range(int(first.counts.max(initial=0))):
-            parted = _edge_parts(first, second, left, k, False)
+            parted = edge_parts(first, second, left, k, False)
             rows = left[parted]
             found[rows] = np.concatenate([first.point(rows, k), first.point(rows, k + 1)], axis=1)
             left = left[~parted]
@@ -152,7 +154,8 @@ def _circles_capsules(a: Circles, b: Capsules, conservative: bool) -> Bools:
 
 
 def _aabbs_aabbs(a: Aabbs, b: Aabbs, conservative: bool) -> Bools:
-    return np.asarray(((a.min <= b.max) & (b.min <= a.max)).all(axis=1))
+    axes = ((a.min[:, k] <= b.max[:, k]) & (b.min[:, k] <= a.max[:, k]) for k in range(a.d))
+    return np.asarray(functools.reduce(np.logical_and, axes))
 
 
 def _capsules_capsules(a: Capsules, b: Capsules, conservative: bool) -> Bools:
@@ -165,13 +168,21 @@ def _hulls_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
     Bounds come first. They also part what no edge does: segments on one line, and single points.
     """
     one, two = a.core(), b.core()
-    left = np.flatnonzero(_aabbs_aabbs(a.bounds(), b.bounds(), conservative))
+    found, left = _quickly(a, b, one, two)
     for first, second in ((one, two), (two, one)):
         for k in range(int(first.counts[left].max(initial=0))):
-            left = left[~_edge_parts(first, second, left, k, conservative)]
-    found = np.zeros(len(a), np.bool_)
+            left = left[~edge_parts(first, second, left, k, conservative)]
     found[left] = True
     return found
+
+
+def _quickly(a: Volumes, b: Volumes, one: Core, two: Core) -> tuple[Bools, Ints]:
+    """Where bounds and floats are sure that rows overlap, and the rows of which they are not sure."""
+    found = np.zeros(len(a), np.bool_)
+    left = np.flatnonzero(_aabbs_aabbs(a.bounds(), b.bounds(), False))
+    signs = hulls_sign(one, two, left)
+    found[left[signs < 0]] = True
+    return found, left[signs == 0]
 
 
 def _flat(core: Core, rows: Ints) -> Bools:
@@ -180,24 +191,10 @@ def _flat(core: Core, rows: Ints) -> Bools:
     return np.asarray((core.counts[rows] < 3) | (p == q).all(axis=1) | (p == s).all(axis=1))
 
 
-def _edge_parts(first: Core, second: Core, rows: Ints, k: int, conservative: bool) -> Bools:
-    """Where all of the second lies strictly outside edge k of the first; a segment has an edge on either side."""
-    parted = np.flatnonzero(k < first.counts[rows])
-    here = rows[parted]
-    p, q = first.point(here, k), first.point(here, k + 1)
-    for j in range(int(second.counts[here].max(initial=0))):
-        outside = orient2d(p, q, second.point(here, np.minimum(j, second.counts[here] - 1)), conservative) < 0
-        parted, here, p, q = parted[outside], here[outside], p[outside], q[outside]
-    found = np.zeros(len(rows), np.bool_)
-    found[parted] = True
-    return found
-
-
 def _round_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
     """A circle or capsule: one of its points lies in the hull, or an edge is as near as the radius."""
     one, two = a.core(), b.core()
-    found = np.zeros(len(a), np.bool_)
-    left = np.flatnonzero(_aabbs_aabbs(a.bounds(), b.bounds(), conservative))
+    found, left = _quickly(a, b, one, two)
     inside = _holds(two, one, left, conservative)
     found[left[inside]] = True
     left = left[~inside]

@@ -6,6 +6,7 @@ made of (`original`): turning from there again and again adds no rounding.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
@@ -40,15 +41,15 @@ class Core:
 
     def extent(self) -> tuple[Floats, Floats]:
         """Least and greatest coordinates (N, d) of the points of each row."""
-        most = int(self.counts.max())
-        if len(self.points) == most * len(self.counts):  # as many points in each row: no gathering
-            corners = list(self.points.reshape(len(self.counts), most, -1).transpose(1, 0, 2))
+        n, most = len(self.counts), int(self.counts.max())
+        low, high = np.empty((2, n, self.points.shape[1]))
+        if len(self.points) == most * n:  # as many points in each row: no gathering
+            corners = list(self.points.reshape(n, most, -1).transpose(1, 2, 0))
         else:
-            rows = np.arange(len(self.counts))
-            corners = [self.point(rows, np.minimum(k, self.counts - 1)) for k in range(most)]
-        low = high = corners[0]
-        for corner in corners[1:]:
-            low, high = np.minimum(low, corner), np.maximum(high, corner)
+            corners = [self.point(np.arange(n), np.minimum(k, self.counts - 1)).T for k in range(most)]
+        for axis, values in enumerate(zip(*corners, strict=True)):
+            low[:, axis] = functools.reduce(np.minimum, values)
+            high[:, axis] = functools.reduce(np.maximum, values)
         return low, high
 
 
@@ -173,8 +174,14 @@ class Aabbs(Volumes):
 
     def corners(self) -> Floats:
         """Corners (N, 4, 2) of boxes in 2-D, in order."""
-        (x0, y0), (x1, y1) = self.min.T, self.max.T
-        return np.stack([np.stack(p, axis=1) for p in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=1)
+        made = np.empty((len(self), 4, 2))
+        made[:, [0, 3], 0], made[:, [1, 2], 0] = self.min[:, :1], self.max[:, :1]
+        made[:, :2, 1], made[:, 2:, 1] = self.min[:, 1:], self.max[:, 1:]
+        return made
+
+    def bounds(self) -> Aabbs:
+        """The boxes themselves."""
+        return Aabbs._made(self.min, self.max)
 
     def core(self) -> Core:
         """Four corners in 2-D; in 3-D min and max."""
