@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError
+from planes.arrays import Bools, Floats, InputError, Ints
 from planes.constants import CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
 
 __all__ = ["Signs", "circles_sign", "orient2d", "orient3d", "point_segment_sign", "segment_segment_sign"]
 
 Signs = npt.NDArray[np.int8]
 Numbers = npt.NDArray[Any]
+
+NO_ROWS = np.zeros(0, np.int64)
 
 WORK_ROWS = 16
 """Arrays of a chunk that a predicate may work in."""
@@ -183,18 +185,20 @@ def segment_segment_sign(
     for p, q, s in ((b, c, d), (c, a, b), (d, a, b)):
         sign = np.minimum(sign, point_segment_sign(p, q, s, r, r2, conservative))
     grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
-    crossing = _cross(a, b, c, d, conservative)
+    crossing = _cross(a, b, c, d, sign >= 0, conservative)
     return np.asarray(np.where(crossing, np.minimum(sign, -grown.astype(np.int8)), sign), np.int8)
 
 
-def _cross(a: Floats, b: Floats, c: Floats, d: Floats, conservative: bool) -> Bools:
-    """Where two segments pass through each other; conservative, also where they might."""
-    met = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
-    boxes = met[..., 0] & met[..., 1]
+def _cross(a: Floats, b: Floats, c: Floats, d: Floats, asked: Bools, conservative: bool) -> Bools:
+    """Where two segments pass through each other, of those rows asked for; conservative, also where they might."""
+    boxes = asked
+    for k in range(2):
+        p, q, s, t = (v[..., k] for v in (a, b, c, d))
+        boxes = boxes & (np.minimum(p, q) <= np.maximum(s, t)) & (np.minimum(s, t) <= np.maximum(p, q))
     crossing = np.zeros(boxes.shape, np.bool_)
     if not boxes.any():
         return crossing
-    a, b, c, d = (np.broadcast_to(v, met.shape)[boxes] for v in (a, b, c, d))
+    a, b, c, d = (np.broadcast_to(v, (*boxes.shape, 2))[boxes] for v in (a, b, c, d))
     sides = orient2d(a, b, c, conservative) * orient2d(a, b, d, conservative)
     others = orient2d(c, d, a, conservative) * orient2d(c, d, b, conservative)
     least = 0 if conservative else -1
@@ -214,36 +218,48 @@ def _columns(field: str, points: npt.ArrayLike, d: int) -> list[Floats]:
 
 
 def _signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> Signs:
-    """Run over the rows of all columns, broadcast, a chunk at a time in the same memory."""
+    """Run over the rows of all columns, broadcast, a chunk at a time in the same memory; then over those in doubt."""
     work = np.empty((WORK_ROWS, CHUNK_ROWS))
     flags: Any = ["external_loop", "buffered", "zerosize_ok"]
     modes: Any = [["readonly"]] * len(columns) + [["writeonly", "allocate"]]
     types: Any = [np.float64] * len(columns) + [np.int8]
-    chunks = np.nditer([*columns, None], flags, modes, types, buffersize=CHUNK_ROWS)
+    doubts, kept, done = [], [], 0
+    chunks = np.nditer([*columns, None], flags, modes, types, order="C", buffersize=CHUNK_ROWS)
     with chunks, np.errstate(all="ignore"):
         for *rows, signs in chunks:
-            if len(signs):
-                _chunk(predicate, rows, work[:, : len(signs)], signs, conservative)
-        return np.asarray(chunks.operands[-1])
+            if len(signs) and len(doubt := _chunk(predicate, rows, work[:, : len(signs)], signs)):
+                doubts.append(done + doubt)
+                kept.append([row[doubt] for row in rows])
+            done += len(signs)
+        found = np.asarray(chunks.operands[-1])
+        if doubts:
+            rows = [np.concatenate(column) for column in zip(*kept, strict=True)]
+            found.reshape(-1)[np.concatenate(doubts)] = _row_signs(predicate, rows, conservative)
+    return found
 
 
-def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs, conservative: bool) -> None:
-    """Fill the signs of one chunk; rows in doubt by a bound of their own, then by integers."""
+def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs) -> Ints:
+    """Fill the signs of one chunk, and give the rows that one bound for all of them leaves in doubt."""
     value, magnitudes = predicate.value(columns, work)
     np.subtract((value > 0).view(np.int8), (value < 0).view(np.int8), out=signs)
     bound = predicate.bound(*(max(m.max(), -m.min()) for m in magnitudes))
     size = np.abs(value, out=value)
     if size.min() > bound and size.max() < FLOAT_HUGE:
-        return
-    doubt = np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
-    rows = [column[doubt] for column in columns]
-    value, magnitudes = predicate.value(rows, work[:, : len(doubt)])
-    bounds = predicate.bound(*(np.abs(m).reshape(-1, len(doubt)).max(axis=0) for m in magnitudes))
+        return NO_ROWS
+    return np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
+
+
+def _row_signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> Signs:
+    """Signs by a bound for each row, and where that leaves a doubt by whole numbers."""
+    n = len(columns[0])
+    value, magnitudes = predicate.value(columns, np.empty((WORK_ROWS, n)))
+    bounds = predicate.bound(*(np.abs(m).reshape(-1, n).max(axis=0) for m in magnitudes))
     size = np.abs(value)
+    signs = (value > 0).view(np.int8) - (value < 0).view(np.int8)
     left = np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
-    if not len(left):
-        return
-    signs[doubt[left]] = 0 if conservative else _exact(predicate, [row[left] for row in rows])
+    if len(left):
+        signs[left] = 0 if conservative else _exact(predicate, [column[left] for column in columns])
+    return signs
 
 
 def _exact(predicate: Predicate, columns: list[Floats]) -> Signs:

@@ -19,6 +19,9 @@ from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons
 
 __all__ = ["contains_point", "overlap", "separating_axis"]
 
+Rows = Ints | None
+"""Numbers of rows, or all of them."""
+
 Test = Callable[[Any, Any, bool], Bools]
 """Two volumes of equal length, row against row, and whether the exact stage is left out."""
 
@@ -50,7 +53,7 @@ def overlap(a: Volumes, b: Volumes, conservative: bool = False) -> Bools:
     if a.d != b.d:
         raise InputError(f"b: expected volumes in {a.d}-D, got {b.d}-D")
     n = _rows(len(a), len(b))
-    i, j = (np.arange(n) if len(v) == n else np.zeros(n, np.int64) for v in (a, b))
+    i, j = (None if len(v) == n else np.zeros(n, np.int64) for v in (a, b))
     return _pairs(a, b, i, j, conservative)
 
 
@@ -77,8 +80,7 @@ def separating_axis(a: Volumes, b: Volumes) -> Floats:
     if any(type(v) not in (Aabbs, Obbs, Polygons) or v.d != 2 for v in (a, b)):
         raise InputError("separating_axis: expected boxes or polygons in 2-D")
     n = _rows(len(a), len(b))
-    i, j = (np.arange(n) if len(v) == n else np.zeros(n, np.int64) for v in (a, b))
-    hulls = a.take(i), b.take(j)
+    hulls = tuple(v if len(v) == n else v.take(np.zeros(n, np.int64)) for v in (a, b))
     one, two = (v.core() for v in hulls)
     found = np.full((n, 4), np.nan)
     left = np.arange(n)
@@ -112,31 +114,29 @@ def _rows(n: int, m: int) -> int:
     return n if m == 1 else m
 
 
-def _pairs(a: Volumes, b: Volumes, i: Ints, j: Ints, conservative: bool) -> Bools:
+def _pairs(a: Volumes, b: Volumes, i: Rows, j: Rows, conservative: bool) -> Bools:
     """Overlap of row i of a with row j of b; sets of parts overlap when any of their parts do."""
     if isinstance(b, Parts):
-        return _any_part(b, j, lambda of, part: _pairs(a, b.parts, i[of], part, conservative))
+        return _any_part(b, j, lambda of, part: _pairs(a, b.parts, of if i is None else i[of], part, conservative))
     if isinstance(a, Parts):
-        return _any_part(a, i, lambda of, part: _pairs(a.parts, b, part, j[of], conservative))
+        return _any_part(a, i, lambda of, part: _pairs(a.parts, b, part, of if j is None else j[of], conservative))
     test = TABLE.get((type(a), type(b)))
     if test is None:
         raise InputError(f"b: expected a volume that {type(a).__name__} are tested with, got {type(b).__name__}")
-    return test(_rows_of(a, i), _rows_of(b, j), conservative) if len(i) else np.zeros(0, np.bool_)
+    one, two = (volume if rows is None else volume.take(rows) for volume, rows in ((a, i), (b, j)))
+    return test(one, two, conservative) if len(one) else np.zeros(0, np.bool_)
 
 
-def _rows_of(volume: Volumes, rows: Ints) -> Volumes:
-    whole = len(rows) == len(volume) and bool((rows == np.arange(len(volume))).all())
-    return volume if whole else volume.take(rows)
-
-
-def _any_part(sets: Parts, rows: Ints, test: Callable[[Ints, Ints], Bools]) -> Bools:
+def _any_part(sets: Parts, rows: Rows, test: Callable[[Ints, Ints], Bools]) -> Bools:
     """Test all parts of rows at once; `test` takes places in rows and numbers of parts."""
-    if not len(rows):
+    starts, counts = sets.starts, np.diff(np.append(sets.starts, len(sets.parts)))
+    if rows is not None:
+        starts, counts = starts[rows], counts[rows]
+    if not len(starts):
         return np.zeros(0, np.bool_)
-    counts = np.diff(np.append(sets.starts, len(sets.parts)))[rows]
     first = np.cumsum(counts) - counts
-    of = np.repeat(np.arange(len(rows)), counts)
-    return np.logical_or.reduceat(test(of, sets.starts[rows][of] + np.arange(len(of)) - first[of]), first)
+    of = np.repeat(np.arange(len(starts)), counts)
+    return np.logical_or.reduceat(test(of, starts[of] + np.arange(len(of)) - first[of]), first)
 
 
 def _circles_circles(a: Circles, b: Circles, conservative: bool) -> Bools:
