@@ -1,4 +1,4 @@
-"""Rows of points to convex outlines, exactly: hulls, tests of convexity, and simple polygons cut into triangles.
+"""Rows of points to convex outlines, exactly: hulls, tests of convexity, and simple polygons cut into parts.
 
 Orientation as in the frame: an outline turns from +x towards +y.
 """
@@ -10,7 +10,7 @@ import numpy as np
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.exact import orient2d
 
-__all__ = ["convex_rows", "hull", "outlines", "rows_of", "triangles"]
+__all__ = ["convex_parts", "convex_rows", "hull", "outlines", "rows_of"]
 
 Point = tuple[float, float]
 Whole = tuple[int, int]
@@ -93,8 +93,11 @@ def hull(points: list[Point]) -> list[Point]:
     return found
 
 
-def triangles(points: list[Point]) -> list[tuple[int, int, int]]:
-    """Cut a simple polygon into triangles on its own points, as indices; points on edges are welcome.
+def convex_parts(points: list[Point]) -> list[list[int]]:
+    """Cut a simple polygon into convex parts on its own points, as indices; points on edges are welcome.
+
+    Triangles first; then diagonals that no part needs to be convex are left out: at most four times as many parts
+    stay as there must be.
 
     Raises
     ------
@@ -103,11 +106,49 @@ def triangles(points: list[Point]) -> list[tuple[int, int, int]]:
 
     References
     ----------
-    Meisters, *Polygons have ears* (1975).
+    Meisters, *Polygons have ears* (1975); Hertel and Mehlhorn, *Fast triangulation of simple polygons* (1983).
     """
     whole = _whole(points)
     _refuse_crossing(whole)
-    n = len(points)
+    parts = {i: _with_points_on_edges(part, whole) for i, part in enumerate(_triangles(whole))}
+    owner = {edge: i for i, part in parts.items() for edge in _edges(part)}
+    for u, v in list(owner):
+        i, j = owner[u, v], owner.get((v, u))
+        if j is None or j == i:
+            continue
+        merged = _merged(parts[i], parts[j], u, v, whole)
+        if merged:
+            parts[i] = merged
+            owner |= dict.fromkeys(_edges(parts.pop(j)), i)
+    return [_without_straight(part, whole) for part in parts.values()]
+
+
+def _edges(part: list[int]) -> list[tuple[int, int]]:
+    return list(zip(part, part[1:] + part[:1], strict=True))
+
+
+def _with_points_on_edges(part: list[int], whole: list[Whole]) -> list[int]:
+    """A part with all points that lie on its edges, so that it shares whole edges with its neighbours."""
+    found = []
+    for u, v in _edges(part):
+        a, b = whole[u], whole[v]
+        on = [i for i, p in enumerate(whole) if i not in (u, v) and _turn(a, b, p) == 0 and _within(a, b, p)]
+        found += [u, *sorted(on, key=lambda i: whole[i], reverse=a > b)]
+    return found
+
+
+def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> list[int]:
+    """Two parts as one, without their common edge uv (of a; of b it is vu); empty where that is not convex."""
+    k, m = a.index(v), b.index(u)
+    a, b = a[k:] + a[:k], b[m:] + b[:m]  # from v to u, and from u to v
+    for before, corner, after in ((a[-2], u, b[1]), (b[-2], v, a[1])):
+        if _turn(whole[before], whole[corner], whole[after]) < 0:
+            return []
+    return a + b[1:-1]
+
+
+def _triangles(whole: list[Whole]) -> list[list[int]]:
+    n = len(whole)
     twice_area = sum(whole[i - 1][0] * whole[i][1] - whole[i][0] * whole[i - 1][1] for i in range(n))
     left = list(range(n)) if twice_area > 0 else list(range(n))[::-1]
     found = []
@@ -115,7 +156,7 @@ def triangles(points: list[Point]) -> list[tuple[int, int, int]]:
         if len(left) < 3:
             break
         k = next(k for k in range(len(left)) if _is_ear(left, k, whole))
-        found.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
+        found.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
         if len(left) == 3:
             break
         del left[k]

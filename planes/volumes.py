@@ -17,7 +17,7 @@ import numpy.typing as npt
 from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
 from planes.constants import TRIG_BITS
 from planes.grid256 import unit
-from planes.rings import convex_rows, outlines, rows_of, triangles
+from planes.rings import convex_parts, convex_rows, outlines, rows_of
 
 __all__ = ["Aabbs", "BoxSets", "Capsules", "Circles", "ConcavePolygons", "Core", "Obbs", "Parts", "Polygons", "Volumes"]
 
@@ -352,7 +352,7 @@ class BoxSets(Parts):
 
 
 class ConcavePolygons(Parts):
-    """Simple polygons, cut into triangles; points on edges are welcome."""
+    """Simple polygons, cut into convex parts; points on edges are welcome."""
 
     @classmethod
     def from_concave(cls, points: object, starts: object) -> Self:
@@ -368,13 +368,12 @@ class ConcavePolygons(Parts):
         lengths = []
         for i, row in enumerate(np.split(given, first[1:]) if len(first) else []):
             with within(f"row {i}"):
-                cut = triangles([(x, y) for x, y in row.tolist()])
-            corners += [row[list(indices)] for indices in cut]
-            lengths.append(len(cut))
+                parts = convex_parts([(x, y) for x, y in row.tolist()])
+            corners += [row[part] for part in parts]
+            lengths.append(len(parts))
         joined = np.concatenate(corners) if corners else np.zeros((0, 2))
-        ends = np.cumsum(np.array(lengths, np.int64))
         made = cls.__new__(cls)
-        Parts.__init__(made, Polygons(joined, np.arange(len(corners)) * 3), ends - np.array(lengths, np.int64))
+        Parts.__init__(made, Polygons(joined, _begins([len(part) for part in corners])), _begins(lengths))
         return made
 
 
@@ -407,6 +406,12 @@ def _starts(starts: object, total: int) -> Ints:
 def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
     given = reals("points", points, (None, 2))
     return given, _starts(starts, len(given))
+
+
+def _begins(lengths: list[int]) -> Ints:
+    """First places of rows of these lengths."""
+    counts = np.array(lengths, np.int64)
+    return np.cumsum(counts) - counts
 
 
 def _even(n: int, count: int) -> tuple[Ints, Ints]:
