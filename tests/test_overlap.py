@@ -13,7 +13,7 @@ import planes.overlap
 from planes import InputError
 from planes.exact import orient2d
 from planes.overlap import TABLE, contains_point, overlap, separating_axis
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Polygons, Volumes
+from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Parts, Polygons, Volumes
 
 L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -46,35 +46,150 @@ def ordinary(kind: str, n: int, rng: np.random.Generator) -> Any:
 
 SINGLE = ["circles", "aabbs", "obbs", "polygons", "capsules"]
 KINDS = [*SINGLE, "box sets", "concave"]
-PAIRS = pytest.mark.parametrize(("one", "two"), list(product(KINDS, KINDS)))
+PAIRS = pytest.mark.parametrize(("one", "other"), list(product(KINDS, KINDS)))
 
 
 def test_the_table_has_fifteen_pairs_both_ways_round() -> None:
     assert len(TABLE) == 25 and len({frozenset(pair) for pair in TABLE}) == 15
 
 
+def two(one: str, other: str, seed: int = 7) -> tuple[Any, Any]:
+    rng = np.random.default_rng(seed)
+    return ordinary(one, 300, rng), ordinary(other, 300, rng)
+
+
 @PAIRS
-def test_symmetric_whole_moves_broadcasting_and_conservative(one: str, two: str) -> None:
-    rng = np.random.default_rng(7)
-    a, b = ordinary(one, 300, rng), ordinary(two, 300, rng)
+def test_symmetric(one: str, other: str) -> None:
+    a, b = two(one, other)
     found = overlap(a, b)
     assert found.dtype == np.bool_ and found.shape == (300,) and 0 < found.sum() < 300
-    assert (overlap(b, a) == found).all()
-    assert (overlap(a.translated([2**40, -7]), b.translated([2**40, -7])) == found).all()
-    assert (overlap(a.scaled(2.0**-60), b.scaled(2.0**-60)) == found).all()
-    assert (overlap(a.rotated(90), b.rotated(90)) == found).all()
-    assert overlap(a, b, conservative=True)[found].all()
-    assert (overlap(a.take([5]), b) == overlap(a.take([5] * 300), b)).all()
-    assert (overlap(a, b.take([5])) == overlap(a, b.take([5] * 300))).all()
-    assert overlap(a.take([]), b.take([])).shape == (0,) == overlap(a.take([]), b.take([5])).shape
-    assert overlap(a, a).all()
+    assert (overlap(b, a) == found).all() and overlap(a, a).all()
 
 
 @PAIRS
-def test_what_shares_a_point_overlaps(one: str, two: str) -> None:
+def test_moved_by_whole_numbers_turned_and_scaled_alike(one: str, other: str) -> None:
+    a, b = two(one, other)
+    for by in ([2**40, -7], [-(10**9), 10**12], [3, 5]):
+        assert (overlap(a.translated(by), b.translated(by)) == overlap(a, b)).all()
+    assert (overlap(a.rotated(90), b.rotated(90)) == overlap(a, b)).all()
+    p, q = a.take(range(60)), b.take(range(60))
+    for factor in (2.0**-60, 2.0**-1040, 2.0**600, 2.0**1015):
+        assert (overlap(p.scaled(factor), q.scaled(factor)) == overlap(p, q)).all()
+
+
+@PAIRS
+def test_conservative_never_says_no_to_what_overlaps(one: str, other: str) -> None:
+    a, b = two(one, other)
+    a, b = a.take(range(100)), b.take(range(100))
+    for factor, by in ((1.0, 0.0), (0.1, 0.0), (0.1, 1e9 + 0.1), (2.0**-1040, 0.0), (2.0**1015, 0.0)):
+        p, q = (v.scaled(factor).translated(by) for v in (a, b))
+        assert (overlap(p, q, conservative=True) | ~overlap(p, q)).all()
+
+
+@PAIRS
+def test_conservative_is_right_where_nothing_is_near(one: str, other: str) -> None:
+    a, b = two(one, other)
+    near, far = a.translated([1e-3, 2e-3]), overlap(a, b.translated([500, 300]), conservative=True)
+    assert (overlap(near, b, conservative=True) == overlap(near, b)).mean() > 0.95
+    assert not far.any()
+
+
+@PAIRS
+def test_rows_broadcast(one: str, other: str) -> None:
+    a, b = two(one, other)
+    for k in (5, 17):
+        assert (overlap(a.take([k]), b) == overlap(a.take([k] * 300), b)).all()
+        assert (overlap(a, b.take([k])) == overlap(a, b.take([k] * 300))).all()
+    assert overlap(a.take([]), b.take([])).shape == (0,) == overlap(a.take([]), b.take([5])).shape
+    assert overlap(a.take([3]), b.take([4])).shape == (1,)
+
+
+def at_origin(kind: str, s: int) -> Any:
+    """Of which the origin is the only place that lies farthest toward (3 s, 4 s), or one of a side."""
+    box: Any = [[-2, -3], [0, 0]] if s > 0 else [[0, 0], [2, 3]]
+    side = np.array([[-4, 3], [4, -3]])
+    if kind == "circles":
+        return Circles([[-3 * s, -4 * s]], 5)
+    if kind == "aabbs":
+        return Aabbs(box[:1], box[1:])
+    if kind == "obbs":
+        return Obbs.from_corners([[*side, *(side[::-1] - np.array([3, 4]) * s)]])
+    if kind == "polygons":
+        return Polygons([[0, 0], [-3 * s, -s], [-s, -5 * s]], [0])
+    if kind == "capsules":
+        return Capsules(side[:1] - np.array([3, 4]) * s, side[1:] - np.array([3, 4]) * s, 5)
+    if kind == "box sets":
+        return BoxSets([box[0], np.array(box[0]) - 9 * s], [box[1], np.array(box[1]) - 9 * s], [0])
+    return ConcavePolygons.from_concave([[0, 0], [-4 * s, s], [-s, -s], [s, -4 * s]], [0])
+
+
+@PAIRS
+def test_touching_counts(one: str, other: str) -> None:
+    """In one point, where neither side need be along an axis; apart by 2^-30, they do not touch."""
+    a, b = at_origin(one, 1), at_origin(other, -1)
+    for by in ([0, 0], [2**20, -5]):
+        p, q = a.translated(by), b.translated(by)
+        assert overlap(p, q).all() and overlap(q, p).all() and overlap(p, q, conservative=True).all()
+        away = q.translated([3 * 2.0**-30, 4 * 2.0**-30])
+        assert not overlap(p, away).any() and not overlap(away, p).any()
+        assert not overlap(p, away, conservative=True).any()
+
+
+def same_as(kind: str, a: Any) -> list[Any]:
+    """The same rows as other kinds of volumes."""
+    rows = np.arange(len(a))
+    if kind == "circles":
+        return [Capsules(a.center, a.center, a.radius)]
+    if kind == "aabbs":
+        boxes = [Obbs.from_corners(a.corners()), BoxSets(a.min, a.max, rows), a.rotated(0)]
+        solid = (a.min < a.max).all(axis=1)
+        return [*boxes, Polygons(a.corners().reshape(-1, 2), rows * 4)] if solid.all() else boxes
+    if kind == "polygons":
+        return [ConcavePolygons.from_concave(a.points, a.starts), Parts(a, rows)]
+    return [Parts(a, rows)]
+
+
+@pytest.mark.parametrize(("one", "other"), list(product(SINGLE, KINDS)))
+def test_closed_and_general_forms_agree(one: str, other: str) -> None:
+    """A circle is a capsule without length; a box is a turned box, a polygon, and a set of one."""
+    a, b = two(one, other, 8)
+    solid = np.flatnonzero((a.bounds().min < a.bounds().max).all(axis=1))
+    for rows in (np.arange(300), solid):
+        for same in same_as(one, a.take(rows)):
+            assert (overlap(same, b.take(rows)) == overlap(a, b)[rows]).all()
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), list(product(["aabbs", "obbs", "polygons", "box sets", "concave"], repeat=2))
+)
+def test_shapely_agrees_where_it_is_exact(one: str, other: str) -> None:
+    """Areas on whole numbers; it takes no box without an area."""
+    shapely = pytest.importorskip("shapely")
+
+    def areas(volume: Any) -> tuple[Any, Any]:
+        """One shape a row, and whether all parts of it have areas."""
+        parts, starts = (volume.parts, volume.starts) if isinstance(volume, Parts) else (volume, np.arange(len(volume)))
+        core = parts.core()
+        ends = core.starts + core.counts
+        rings = [
+            core.points[k:m] if m - k > 2 else core.points[[k] * 3] for k, m in zip(core.starts, ends, strict=True)
+        ]
+        shapes = np.array([shapely.Polygon(ring) for ring in rings])
+        solid = np.logical_and.reduceat(shapely.area(shapes) > 0, starts)
+        return np.array([shapely.union_all(row) for row in np.split(shapes, starts[1:])]), solid
+
+    a, b = two(one, other, 9)
+    (p, solid), (q, solid_too) = areas(a), areas(b)
+    good = solid & solid_too
+    assert good.sum() > 60
+    assert (shapely.intersects(p, q) == overlap(a, b))[good].all()
+
+
+@PAIRS
+def test_what_shares_a_point_overlaps(one: str, other: str) -> None:
     """A lattice point in both proves that they overlap."""
     rng = np.random.default_rng(9)
-    a, b = ordinary(one, 40, rng), ordinary(two, 40, rng)
+    a, b = ordinary(one, 40, rng), ordinary(other, 40, rng)
     lattice = np.array(list(product(range(-9, 10), repeat=2)), float)
     rows, points = np.repeat(np.arange(40), len(lattice)), np.tile(lattice, (40, 1))
     both = contains_point(a.take(rows), points) & contains_point(b.take(rows), points)
