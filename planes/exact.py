@@ -24,7 +24,7 @@ Numbers = npt.NDArray[Any]
 
 NO_ROWS = np.zeros(0, np.int64)
 
-WORK_ROWS = 16
+WORK_ROWS = 20
 """Arrays of a chunk that a predicate may work in."""
 
 ORIENT2D_ERROR = 3.3307e-16
@@ -179,11 +179,9 @@ def segment_segment_sign(
     InputError
         If a point does not have two coordinates.
     """
-    points = [np.asarray(v, np.float64) for v in (a, b, c, d)]
-    a, b, c, d = points
-    sign = point_segment_sign(a, c, d, r, r2, conservative)
-    for p, q, s in ((b, c, d), (c, a, b), (d, a, b)):
-        sign = np.minimum(sign, point_segment_sign(p, q, s, r, r2, conservative))
+    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 2)]
+    sign = _signs(_ENDS, [*columns, _column(r), _column(r2)], conservative)
+    a, b, c, d = (np.asarray(v, np.float64) for v in (a, b, c, d))
     grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
     crossing = _cross(a, b, c, d, sign >= 0, conservative)
     return np.asarray(np.where(crossing, np.minimum(sign, -grown.astype(np.int8)), sign), np.int8)
@@ -337,19 +335,48 @@ def _circles_exact(columns: list[Numbers]) -> Numbers:
 
 def _point_segment_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
     px, py, ax, ay, bx, by, r1, r2 = columns
-    f, (dx, dy, share, length2, other, radius, value) = work[0:2], work[2:9]
-    fx, fy = np.subtract(px, ax, out=f[0]), np.subtract(py, ay, out=f[1])
-    np.subtract(bx, ax, out=dx)
-    np.subtract(by, ay, out=dy)
-    np.add(np.multiply(fx, dx, out=share), np.multiply(fy, dy, out=other), out=share)
-    np.add(np.square(dx, out=length2), np.square(dy, out=other), out=length2)
+    f, d, (length2, radius, value, other) = work[0:2], work[2:4], work[4:8]
+    _way(ax, ay, px, py, f)
+    _squared(_way(ax, ay, bx, by, d), length2, other)
+    _distance2(f, d, length2, value, work[8:10])
+    np.square(np.add(r1, r2, out=radius), out=other)
+    return np.subtract(value, other, out=value), (f, radius, length2)
+
+
+def _ends_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    """The least of four distances: of each end of two segments to the other segment."""
+    ax, ay, bx, by, cx, cy, dx, dy, r1, r2 = columns
+    f, ab, cd, lengths2, (value, least, radius, other) = work[0:8], work[8:10], work[10:12], work[12:14], work[14:18]
+    _squared(_way(ax, ay, bx, by, ab), lengths2[0], other)
+    _squared(_way(cx, cy, dx, dy, cd), lengths2[1], other)
+    least.fill(np.inf)
+    for k, (px, py, qx, qy) in enumerate(((ax, ay, cx, cy), (ax, ay, dx, dy), (cx, cy, ax, ay), (cx, cy, bx, by))):
+        way = _way(px, py, qx, qy, f[2 * k : 2 * k + 2])
+        _distance2(way, ab if k < 2 else cd, lengths2[k // 2], value, work[18:20])
+        np.minimum(least, value, out=least)
+    np.square(np.add(r1, r2, out=radius), out=other)
+    return np.subtract(least, other, out=value), (f, radius, lengths2)
+
+
+def _way(ax: Floats, ay: Floats, bx: Floats, by: Floats, out: Floats) -> Floats:
+    np.subtract(bx, ax, out=out[0])
+    np.subtract(by, ay, out=out[1])
+    return out
+
+
+def _squared(d: Floats, out: Floats, other: Floats) -> None:
+    np.add(np.square(d[0], out=out), np.square(d[1], out=other), out=out)
+
+
+def _distance2(f: Floats, d: Floats, length2: Floats, out: Floats, work: Floats) -> None:
+    """Squared distance of what lies f from the start of a segment that goes d."""
+    share, other = work
+    np.add(np.multiply(f[0], d[0], out=share), np.multiply(f[1], d[1], out=other), out=share)
     np.divide(share, np.maximum(length2, FLOAT_TINY, out=other), out=share)
     np.minimum(np.maximum(share, 0, out=share), 1, out=share)
-    np.square(np.subtract(fx, np.multiply(share, dx, out=dx), out=dx), out=dx)
-    np.square(np.subtract(fy, np.multiply(share, dy, out=dy), out=dy), out=dy)
-    np.square(np.add(r1, r2, out=radius), out=other)
-    np.subtract(np.add(dx, dy, out=value), other, out=value)
-    return value, (f, radius, length2)
+    np.square(np.subtract(f[0], np.multiply(share, d[0], out=out), out=out), out=out)
+    np.square(np.subtract(f[1], np.multiply(share, d[1], out=other), out=other), out=other)
+    np.add(out, other, out=out)
 
 
 def _point_segment_bound(f: Any, radius: Any, length2: Any) -> Any:
@@ -372,7 +399,16 @@ def _point_segment_exact(columns: list[Numbers]) -> Numbers:
     return np.asarray(np.where(share <= 0, at_a, np.where(share >= length2, at_b, between)))
 
 
+def _ends_exact(columns: list[Numbers]) -> Numbers:
+    """The least of four signs: the values have different degrees."""
+    a, b, c, d = (columns[2 * k : 2 * k + 2] for k in range(4))
+    rows = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
+    values = [_point_segment_exact([*p, *q, *s, *columns[8:]]) for p, q, s in rows]
+    return np.asarray(np.minimum.reduce([(v > 0).astype(np.int8) - (v < 0).astype(np.int8) for v in values]))
+
+
 _ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact)
 _ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact)
 _CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact)
 _POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact)
+_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact)
