@@ -273,3 +273,22 @@ def test_by_hand() -> None:
 def test_points_have_their_coordinates(predicate: Callable[..., Any]) -> None:
     with pytest.raises(InputError, match=r"expected .* coordinates? on the last axis, got \(4,\)"):
         predicate(*[np.zeros(4)] * (3 if predicate is orient2d else 4))
+
+
+def test_squares_that_overflow_are_left_to_integers() -> None:
+    """The end is 5 from p, the middle of so long a segment 4."""
+    far = 1e200
+    assert point_segment_sign([3, 4], [0, 0], [far, 0], [3.5, 4, 4.5]).tolist() == [1, 0, -1]
+    assert segment_segment_sign([3, 4], [3, 5], [0, 0], [far, 0], [3.5, 4, 4.5]).tolist() == [1, 0, -1]
+    assert segment_segment_sign([0, 0], [far, 0], [3, 4], [3, 5], [3.5, 4, 4.5]).tolist() == [1, 0, -1]
+    assert circles_sign([far, 0], [far, 1], [-far, 0], [far, far]).tolist() == [0, 1]
+    assert orient2d([0, 0], [far, far], [[far, far], [far, 9e199]]).tolist() == [0, -1]
+
+
+def test_rows_in_doubt_find_their_place_whatever_the_memory_order() -> None:
+    """Signs of columns-first arrays that broadcast, with rows for the exact stage in every chunk."""
+    rng = np.random.default_rng(9)
+    a, b, c = (np.asfortranarray(rng.integers(-3, 4, (70, 300, 2)).astype(float)) for _ in range(3))
+    found = orient2d(a, b, c)
+    (ax, ay), (bx, by), (cx, cy) = (np.moveaxis(v, 2, 0) for v in (a, b, c))
+    assert (found == np.sign((ax - cx) * (by - cy) - (ay - cy) * (bx - cx))).all() and (found == 0).mean() > 0.05
