@@ -286,9 +286,13 @@ def test_squares_that_overflow_are_left_to_integers() -> None:
 
 
 def test_rows_in_doubt_find_their_place_whatever_the_memory_order() -> None:
-    """Signs of columns-first arrays that broadcast, with rows for the exact stage in every chunk."""
+    """Arrays with the first axis innermost, with rows in every chunk where floats have the wrong sign."""
     rng = np.random.default_rng(9)
-    a, b, c = (np.asfortranarray(rng.integers(-3, 4, (70, 300, 2)).astype(float)) for _ in range(3))
-    found = orient2d(a, b, c)
-    (ax, ay), (bx, by), (cx, cy) = (np.moveaxis(v, 2, 0) for v in (a, b, c))
-    assert (found == np.sign((ax - cx) * (by - cy) - (ay - cy) * (bx - cx))).all() and (found == 0).mean() > 0.05
+    a, b = rng.uniform(0, 9, (2, 300, 70, 2))
+    points = [a, b, a + (b - a) / 3]
+    expected = orient2d(*(v.reshape(-1, 2) for v in points)).reshape(300, 70)
+    assert (orient2d(*(np.asfortranarray(v) for v in points)) == expected).all()
+    floats = np.sign(
+        (a - points[2])[..., 0] * (b - points[2])[..., 1] - (a - points[2])[..., 1] * (b - points[2])[..., 0]
+    )
+    assert (floats != expected).mean() > 0.02
