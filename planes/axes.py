@@ -22,7 +22,8 @@ SIDE_ERROR = 64 * ROUNDING
 """Of a side of an edge, of the square of the reach of both hulls: 48 roundings, of products of two differences."""
 
 DISTANCE_ERROR = 128 * ROUNDING
-"""Of a distance to an edge, of that reach: 3 roundings of corners, and 32 of differences of up to twice the reach."""
+"""Of a distance to an edge, of that reach: 3 roundings of corners, and 32 of differences of up to twice the reach. What
+is left covers the roundings of squares: a radius that is near the distance is below 3 times the reach."""
 
 
 def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
@@ -134,7 +135,7 @@ def _distance_sign(a: Floats, b: Floats, reach: Floats, radius: Floats) -> Signs
             np.minimum(least, _distance2(corners, p, q).min(axis=0), out=least)
     value = least - radius * radius
     error = DISTANCE_ERROR * reach + LENGTH_TINY
-    bound = error * (2 * radius + error) + 10 * ROUNDING * radius * radius
+    bound = error * (2 * radius + error)
     bound[~(reach * reach < FLOAT_HUGE)] = np.inf
     return np.subtract((value > bound).view(np.int8), (value < -bound).view(np.int8))
 

@@ -324,6 +324,40 @@ def test_a_separating_axis_of_what_no_edge_parts() -> None:
     assert np.isnan(separating_axis(slanted[0], slanted[0])).all()
 
 
+def on_an_edge(n: int, rng: np.random.Generator) -> tuple[Any, Any]:
+    """Triangles, and others beyond the line of an edge but for a corner, which lies on it but for rounding."""
+    a = rng.uniform(-1, 1, (n, 3, 2))
+    along = a[:, 1] - a[:, 0]
+    out = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    out *= -np.sign((out * (a[:, 2] - a[:, 0])).sum(axis=1))[:, None]
+    place = a[:, 0] + rng.uniform(0, 1, (n, 1)) * along
+    b = [place, *(place + out * rng.uniform(0.1, 2, (n, 1)) + along * rng.uniform(-1, 1, (n, 1)) for _ in range(2))]
+    rows = np.arange(n) * 3
+    return Polygons(a.reshape(-1, 2), rows), Polygons(np.stack(b, axis=1).reshape(-1, 2), rows)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**-533, 2.0**-537])
+@pytest.mark.parametrize("grown", [False, True])
+def test_floats_are_never_sure_of_what_is_not_so(grown: bool, scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners on edges, circles that touch edges: the same with floats that are sure of nothing.
+
+    Also where products of two lengths are a few of the least floats.
+    """
+    a, b = on_an_edge(12_000 if scale == 1 else 3_000, np.random.default_rng(6))
+    if grown:
+        p, q = a.points[::3], a.points[1::3]
+        along = q - p
+        place = p + along * 0.3
+        out = np.stack([along[:, 1], -along[:, 0]], axis=1) * np.geomspace(1e-9, 1, len(p))[:, None]
+        b = Circles(place + out, np.sqrt((out * out).sum(axis=1)))
+    a, b = a.scaled(scale), b.scaled(scale)
+    found = [overlap(a, b), overlap(b, a), overlap(a, b, conservative=True)]
+    monkeypatch.setattr(planes.overlap, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
+    truth = overlap(a, b)
+    assert 0.3 < truth.mean() < 0.9
+    assert (found[0] == truth).all() and (found[1] == truth).all() and found[2][truth].all()
+
+
 def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = 0
 
