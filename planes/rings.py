@@ -34,8 +34,7 @@ def convex_rows(points: Floats, starts: Ints) -> Ints:
     place = np.arange(len(points)) - starts[row]
     after = starts[row] + (place + 1) % counts[row]
     turns = orient2d(points, points[after], points[after[after]]).astype(np.int64)
-    step_x, step_y = points[after, 0] - points[:, 0], points[after, 1] - points[:, 1]
-    rightward = (step_x > 0) | ((step_x == 0) & (step_y > 0))
+    rightward = points[after, 0] > points[:, 0]
     changes = np.add.reduceat((rightward != rightward[after]).astype(np.int64), starts)
     low, high = np.minimum.reduceat(turns, starts), np.maximum.reduceat(turns, starts)
     return np.where(changes == 2, low + high, 0).clip(-1, 1)
@@ -110,7 +109,7 @@ def convex_parts(points: list[Point]) -> list[list[int]]:
     """
     whole = _whole(points)
     _refuse_crossing(whole)
-    parts = {i: _with_points_on_edges(part, whole) for i, part in enumerate(_triangles(whole))}
+    parts = dict(enumerate(_triangles(whole)))
     owner = {edge: i for i, part in parts.items() for edge in _edges(part)}
     for u, v in list(owner):
         i, j = owner[u, v], owner.get((v, u))
@@ -125,16 +124,6 @@ def convex_parts(points: list[Point]) -> list[list[int]]:
 
 def _edges(part: list[int]) -> list[tuple[int, int]]:
     return list(zip(part, part[1:] + part[:1], strict=True))
-
-
-def _with_points_on_edges(part: list[int], whole: list[Whole]) -> list[int]:
-    """A part with all points that lie on its edges, so that it shares whole edges with its neighbours."""
-    found = []
-    for u, v in _edges(part):
-        a, b = whole[u], whole[v]
-        on = [i for i, p in enumerate(whole) if i not in (u, v) and _turn(a, b, p) == 0 and _within(a, b, p)]
-        found += [u, *sorted(on, key=lambda i: whole[i], reverse=a > b)]
-    return found
 
 
 def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> list[int]:
@@ -153,26 +142,16 @@ def _triangles(whole: list[Whole]) -> list[list[int]]:
     left = list(range(n)) if twice_area > 0 else list(range(n))[::-1]
     found = []
     while left := _without_straight(left, whole):
-        if len(left) < 3:
-            break
         k = next(k for k in range(len(left)) if _is_ear(left, k, whole))
         found.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
-        if len(left) == 3:
-            break
         del left[k]
     return found
 
 
 def _without_straight(left: list[int], whole: list[Whole]) -> list[int]:
-    kept = list(left)
-    k = 0
-    while k < len(kept) and len(kept) > 2:
-        if _turn(whole[kept[k - 1]], whole[kept[k]], whole[kept[(k + 1) % len(kept)]]) == 0:
-            del kept[k]
-            k = max(k - 1, 0)
-        else:
-            k += 1
-    return kept
+    """Corners alone: taking a point of an edge away turns no other corner."""
+    after = left[1:] + left[:1]
+    return [k for i, k in enumerate(left) if _turn(whole[left[i - 1]], whole[k], whole[after[i]]) != 0]
 
 
 def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
@@ -196,7 +175,7 @@ def _refuse_crossing(whole: list[Whole]) -> None:
             (a, b), (c, d) = edges[i], edges[j]
             if j == i + 1 or (i == 0 and j == n - 1):
                 p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
-                bad = q in (p, s) or (_turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p)))
+                bad = _turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
             else:
                 bad = _meet(a, b, c, d)
             if bad:

@@ -169,6 +169,13 @@ def test_polygons_turn_either_way_and_bear_points_on_edges() -> None:
         assert turns.min() >= 0 and turns.max() == 1
 
 
+def test_a_dent_that_rounding_makes_at_a_double_point_is_filled() -> None:
+    """Far out two corners become one, inside of the line between their neighbours."""
+    near = Polygons([[0, 0], [6.6, 0], [3.4, 3.3], [3.3, 3.4], [0, 6.6]], [0])
+    (points, _, _), *_ = cores(near.translated(2.0**52))
+    assert sorted((x - 2.0**52, y - 2.0**52) for x, y in points) == [(0, 0), (0, 7), (7, 0)]
+
+
 STAR = [[0, -20], [12, 16], [-19, -6], [19, -6], [-12, 16]]
 BAD_POLYGONS: dict[str, Any] = {
     "two points": [[0, 0], [1, 0]],
