@@ -242,6 +242,7 @@ def test_concave_polygons_are_tiled_by_their_parts(seed: int) -> None:
         (lambda: Obbs.from_center([[0, 0]], [[1, -1]], 0), "half_wh: expected numbers of 0 or more"),
         (lambda: Polygons([[0, 0], [1, 0], [0, 1]], [1]), "starts: expected 0 and then numbers that grow"),
         (lambda: Polygons([[0, 0], [1, 0], [0, 1]], []), "starts: expected 0"),
+        (lambda: BoxSets([[0, 0]] * 2, [[1, 1]] * 2, [0, 0]), "starts: expected 0 and then numbers that grow"),
         (lambda: Circles([[0, 0]], 1).scaled(0), "s: expected a number above 0"),
         (lambda: Circles([[1e308, 0]], 1).translated([1e308, 0]), "center.*expected a finite number"),
     ],
