@@ -7,6 +7,7 @@ quarter turns are exact and need no growing. A shape has no frame: its volume is
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -75,7 +76,7 @@ def _starts(counts: Sequence[Ints]) -> Ints:
 
 
 class Bounds:
-    """Volumes of one kind of the masks in use, made when they are first asked for.
+    """Volumes of one kind of the masks in use, made when they are first asked for; threads may ask.
 
     Parameters
     ----------
@@ -87,6 +88,7 @@ class Bounds:
         self.volumes = joined(kind, [])
         self._masks = np.zeros(0, np.int64)
         self._row = np.zeros(0, np.int64)
+        self._lock = threading.Lock()
 
     def rows(self, masks: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant], ids: Ints) -> Ints:
         """Find the rows in `volumes` of the masks of items.
@@ -98,18 +100,23 @@ class Bounds:
         ids : (n,) which of them
         """
         used, first, of = np.unique(masks, return_index=True, return_inverse=True)
+        with self._lock:
+            self._add(used, ids[first], sprites, variants)
+            return np.asarray(self._row[np.searchsorted(self._masks, used)][of])
+
+    def _add(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> None:
         new = ~np.isin(used, self._masks)
-        if new.any():
-            items = ids[first[new]].tolist()
-            more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
-            every = np.concatenate([self._masks, used[new]])
-            order = np.argsort(every)
-            self.volumes = joined(self.kind, [self.volumes, more])
-            self._masks, self._row = (
-                every[order],
-                np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
-            )
-        return np.asarray(self._row[np.searchsorted(self._masks, used)][of])
+        if not new.any():
+            return
+        items = ids[new].tolist()
+        more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
+        every = np.concatenate([self._masks, used[new]])
+        order = np.argsort(every)
+        self.volumes = joined(self.kind, [self.volumes, more])
+        self._masks, self._row = (
+            every[order],
+            np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
+        )
 
 
 def fitted(kind: Kind, mask: Bools) -> Volumes:

@@ -285,7 +285,7 @@ class Items:
         )
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
-        """Volumes of masks, and the row of each item's: in px about its mask's pixel [0, 0]."""
+        """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""
         bounds = self._bounds.setdefault(kind, Bounds(kind))
         rows = bounds.rows(self.offset[ids], self.sprites, self.variants, ids)
         return bounds.volumes, rows

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from planes import fit
+from planes import Scene, fit
 from planes.arrays import Bools
 from planes.bounding import KINDS, Kind, bounding, fitted, moved
 from planes.constants import CORNERS, PLACE
@@ -236,3 +236,55 @@ def test_kinds() -> None:
     assert len(rings_of(fitted(Kind("polygon"), mask))[0]) <= CORNERS
     assert len(rings_of(fitted(Kind("boxes", 6), mask))) == 6
     assert {kind.name for kind in EVERY} == set(KINDS)
+
+
+def test_the_last_bit_of_the_sine_far_from_the_pivot() -> None:
+    """A turn by rounded sines stretches a little: 46,000 px from the pivot, 256 times enlarged, by 1/128 px."""
+    pixel = Sprite.from_mask([[True]], pivot_xy=(32767, 32767))
+    check(pixel, ("none", (256.0, 256.0), 43.24125))
+
+
+def test_frames_have_volumes_of_their_own() -> None:
+    image = np.zeros((4, 16, 4), np.uint8)
+    image[:2, :2, 3] = image[:, 8:, 3] = 255
+    sprite = Sprite.from_image(image, grid_wh=(8, 4))
+    for kind in EVERY:
+        for frame in (0, 1, 0):
+            seen = variant(sprite, ("none", (1.0, 1.0), 30.0), frame)
+            assert holds(bounding(kind, [sprite], [seen]), seen.mask)
+            low, high = bounding(kind, [sprite], [seen]).bounds(), fitted(kind, seen.mask).bounds()
+            assert (low.max - low.min <= 1.5 * (high.max - high.min) + 3).all()
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=str)
+def test_masks_asked_for_one_after_another(kind: Kind) -> None:
+    """Whatever the order, a mask has its own volume, and an equal one the same row."""
+    rng = np.random.default_rng(3)
+    scene = Scene()
+    for mask in masks(rng, 20, 9):
+        sprite = Sprite.from_mask(mask)
+        for angle in (0.0, 25.0, 0.0):
+            scene.add(sprite, rng.uniform(0, 99, 2), angle=angle)
+    items, rows = scene.items, {}
+    there = np.sort(items.stack().ids)  # a mask without a pixel has no volume
+    for ids in (there[[41]], there[[3, 40, 3]], there[[0]], there[[50, 1, 2]], there[::-1], there):
+        volumes, row = items.bounding(kind, ids)
+        for item, at in zip(ids.tolist(), row.tolist(), strict=True):
+            alone = bounding(kind, [items.sprites[item]], [items.variants[item]]).bounds()
+            assert volumes.take([at]).bounds().min.tolist() == alone.min.tolist()
+            assert volumes.take([at]).bounds().max.tolist() == alone.max.tolist()
+            assert rows.setdefault(int(items.offset[item]), at) == at
+    assert len(volumes) == len(set(items.offset[there].tolist()))
+
+
+def test_masks_that_are_laid_out_anew() -> None:
+    """Numbers of masks begin again when those in use are laid out without the others."""
+    scene, kind = Scene(), Kind("circle")
+    sprites = [Sprite.from_mask(np.ones((n, 1200), np.bool_)) for n in (1000, 900, 500, 3)]
+    ids = [scene.add(sprite, (0, 0)) for sprite in sprites]
+    scene.items.bounding(kind, np.array(ids))
+    scene.remove(ids[:3])
+    stack = scene.items.stack()
+    volumes, row = scene.items.bounding(kind, stack.ids)
+    assert stack.offset.tolist() == [0]
+    assert volumes.take(row).core().radius[0] == fit.least_circle(np.ones((3, 1200), np.bool_)).radius[0]

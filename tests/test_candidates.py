@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -217,6 +218,20 @@ def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
     for weapon, aim in ((Beam(length=600, width=2), 0), (Beam(length=4, width=2), 40), (Disc(200), 0)):
         told = fire(scene, weapon, at, aim=aim if isinstance(weapon, Beam) else None, strategy="direct").plan
         assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
+
+
+def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:
+    rng = np.random.default_rng(9)
+    at = rng.uniform(0, 300, (200, 2))
+    for broadphase in BROADPHASES:
+        scene = crowd(11, 300, 300)
+        truth = fire(scene, Disc(4), at, prefilter="none", strategy="direct")
+        with ThreadPoolExecutor(8) as pool:
+            futures = [
+                pool.submit(fire, scene, Disc(4), at, prefilter=prefilter, broadphase=broadphase, strategy="direct")
+                for prefilter in VOLUMES * 4
+            ]
+            assert all(future.result() == truth for future in futures)
 
 
 # The index
