@@ -17,6 +17,10 @@ __all__ = ["STRUCTURES", "Index"]
 STRUCTURES: dict[str, type[BroadPhase]] = {"none": BruteForce, "grid": Grid, "quadtree": Quadtree, "bvh": Bvh}
 
 
+PENDING = 32
+"""Lists of changes that wait for the next answer before they are joined to one."""
+
+
 class Index:
     """Inclusive pixel boxes of the items that decide, in one structure; a change costs what it changes.
 
@@ -76,11 +80,12 @@ class Index:
                 self.boxes = None
             else:
                 self._pending.append(changed)
+            if len(self._pending) > PENDING:
+                self._pending = [np.unique(np.concatenate(self._pending))]
         self._seen = items.version
         if self.boxes is not None and len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK:
             self.boxes = None
         if self.boxes is None:
-            self._pending = []
             return len(items.stack())
         return sum(map(len, self._pending))
 

@@ -295,6 +295,27 @@ def test_a_change_owes_what_it_changes() -> None:
     assert index.owed(scene.items) == 0
 
 
+def test_changes_that_no_answer_follows_do_not_pile_up() -> None:
+    scene = crowd(2, 30)
+    index, fresh = scene.index("bvh"), Index("none")
+    index.read(scene.items)
+    for i in range(500):
+        scene.move(scene.ids()[i % 7 :], (i % 60, i % 50))
+        assert index.owed(scene.items) <= 33 * 30
+    boxes = np.array([[0, 0, 60, 60], [20, 20, 25, 25]])
+    assert [v.tolist() for v in index.query(scene.items, boxes)] == [
+        v.tolist() for v in fresh.query(scene.items, boxes)
+    ]
+
+
+def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
+    scene = crowd(2, 10)
+    index = scene.index("grid")
+    index.missed = 5.0
+    index.read(scene.items)
+    assert index.missed == 0
+
+
 def test_an_index_forgets_boxes_that_came_and_went() -> None:
     scene = crowd(2, 10)
     index = scene.index("bvh")
