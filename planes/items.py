@@ -6,12 +6,13 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, InputError, Ints
+from planes.arrays import Bools, Floats, InputError, Ints
 from planes.bounding import Bounds, Kind
 from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
@@ -65,6 +66,13 @@ class Stack:
     def width(self) -> Ints:
         """Pixels in a row of each mask."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    @cached_property
+    def sizes(self) -> tuple[Floats, Floats]:
+        """Mean width and height of the items, and width and height of the box around all of them, px."""
+        x, y, x_max, y_max = np.ascontiguousarray(self.box_xyxy.T)
+        mean = np.array([(x_max - x).mean(), (y_max - y).mean()]) + 1
+        return mean, np.array([x_max.max() - x.min(), y_max.max() - y.min()], np.float64) + 1
 
     def mask(self, rank: int) -> Bools:
         """Mask (h, w) of the item of a rank, 0 in front."""
