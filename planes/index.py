@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planes.arrays import Ints, choice
-from planes.boxes import BroadPhase, BruteForce
-from planes.broadphase import Bvh, Grid, Quadtree
 from planes.constants import INDEX_SLACK
 from planes.items import Items
 
+if TYPE_CHECKING:
+    from planes.boxes import BroadPhase
+
 __all__ = ["STRUCTURES", "Index"]
 
-STRUCTURES: dict[str, type[BroadPhase]] = {"none": BruteForce, "grid": Grid, "quadtree": Quadtree, "bvh": Bvh}
+STRUCTURES = {"none": "BruteForce", "grid": "Grid", "quadtree": "Quadtree", "bvh": "Bvh"}
+"""Names, and classes of `planes.broadphase`, which is loaded when an index is first read."""
 
 
 PENDING = 32
@@ -58,9 +61,11 @@ class Index:
         with self._lock:
             self.followed = self._owed(items)
             if self.boxes is None:
+                from planes import broadphase
+
                 self.missed = 0.0
                 ids = np.sort(items.stack().ids)
-                self.boxes = STRUCTURES[self.structure](items.boxes(ids))
+                self.boxes = getattr(broadphase, STRUCTURES[self.structure])(items.boxes(ids))
                 self._item_of, self._place_of = ids, np.full(items.count, -1)
                 self._place_of[ids] = np.arange(len(ids))
             elif self.followed:

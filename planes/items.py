@@ -8,17 +8,20 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from itertools import takewhile
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints
-from planes.bounding import Bounds, Kind
 from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
 from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
-from planes.volumes import Volumes
+
+if TYPE_CHECKING:
+    from planes.bounding import Bounds, Kind
+    from planes.volumes import Volumes
 
 __all__ = ["Items", "MaskAtlas", "Role", "Stack", "clipped", "overlapping"]
 
@@ -294,6 +297,8 @@ class Items:
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""
+        from planes.bounding import Bounds  # few scenes need them
+
         bounds = self._bounds.setdefault(kind, Bounds(kind))
         rows = bounds.rows(self.offset[ids], self.sprites, self.variants, ids)
         return bounds.volumes, rows

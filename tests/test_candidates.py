@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,7 @@ from weapons.arsenal import Plain, pattern_of
 from weapons.candidates import prefilter_of
 from weapons.plan import Stage
 
+ROOT = Path(__file__).parents[1]
 VOLUMES = ("circle", "oriented box", "1 boxes", "4 boxes", "polygon", "swept")
 BROADPHASES = ("none", "grid", "quadtree", "bvh")
 WEAPONS: list[Weapon] = [
@@ -155,7 +159,7 @@ def test_names_of_prefilters() -> None:
     assert str(prefilter_of("boxes")) == "4 boxes"
     assert str(prefilter_of("12 boxes")) == "12 boxes"
     assert str(prefilter_of("oriented box")) == "oriented box"
-    assert prefilter_of("box").kind is None
+    assert not prefilter_of("box").volume
     with pytest.raises(InputError, match="prefilter: expected 1 to 64 boxes, got 99"):
         prefilter_of("99 boxes")
 
@@ -218,6 +222,27 @@ def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
     for weapon, aim in ((Beam(length=600, width=2), 0), (Beam(length=4, width=2), 40), (Disc(200), 0)):
         told = fire(scene, weapon, at, aim=aim if isinstance(weapon, Beam) else None, strategy="direct").plan
         assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
+
+
+UNUSED = ("planes.fit", "planes.volumes", "planes.overlap", "planes.bounding", "planes.boxes", "planes.broadphase")
+LOADED = f"""
+import sys
+from planes import Scene
+from weapons import Beam, Disc, fire
+scene = Scene((99, 99))
+ids = [scene.add([[True]], (i, i)) for i in range(40)]
+fire(scene, Disc(3), [(9, 9)] * 20, strategy="direct")
+fire(scene, Beam(9, 1), (9, 9)).why_not()
+print([name for name in {UNUSED} if name in sys.modules])
+fire(scene, Disc(3), (9, 9), prefilter="box", broadphase="bvh", strategy="direct")
+fire(scene, Disc(3), (9, 9), prefilter="circle", strategy="direct")
+print([name for name in {UNUSED} if name not in sys.modules])
+"""
+
+
+def test_volumes_and_broad_phases_are_loaded_when_they_are_asked_for() -> None:
+    run = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert run.stdout == "[]\n[]\n"
 
 
 def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:

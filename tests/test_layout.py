@@ -18,11 +18,11 @@ ORDER = {
         "labels", "poses", "scenefile", "scene", "render", "sampling",
     ),
     "weapons": (
-        "draws", "pattern", "arsenal", "volley", "candidates", "plan", "resolve", "explain", "hits",
-        "firing", "orders", "heat", "sieve", "facts", "schemas", "jsondiff", "words", "marks", "world",
-        "sketch", "panel", "overlay", "inset", "cards", "picture", "differences", "versus", "goldfile",
-        "goldshow", "goldpage", "goldcheck", "goldstale", "golden", "shotlog", "part", "progress",
-        "stream", "starter", "animation", "demo", "cli", "__main__",
+        "draws", "pattern", "arsenal", "volley", "narrow", "candidates", "plan", "resolve", "explain",
+        "hits", "firing", "orders", "heat", "sieve", "facts", "schemas", "jsondiff", "words", "marks",
+        "world", "sketch", "panel", "overlay", "inset", "cards", "picture", "differences", "versus",
+        "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale", "golden", "shotlog", "part",
+        "progress", "stream", "starter", "animation", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -9,24 +9,18 @@ It may keep too much; it never drops a hit: a pixel that is shared lies, with it
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from planes import fit
 from planes.arrays import Bools, InputError, Ints, choice
-from planes.bounding import Kind
-from planes.constants import BOXES_MAX, CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
+from planes.constants import BOXES_MAX
 from planes.index import Index
 from planes.items import Items, Stack, overlapping
-from planes.overlap import overlap
 from planes.sampling import Pairs
-from planes.volumes import Capsules, Circles, Obbs, Polygons, Volumes
-from weapons.pattern import Pattern, Swept
 from weapons.volley import Shots, Volley
 
-__all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "pattern_volumes", "prefilter_of", "refused"]
+__all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "prefilter_of", "refused"]
 
 PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "boxes", "polygon", "swept")
 BOXES = 4
@@ -35,13 +29,21 @@ BOXES = 4
 
 @dataclass(frozen=True)
 class Prefilter:
-    """What goes before the pixels: a name of PREFILTERS, and the items' kind of volume beyond boxes."""
+    """What goes before the pixels.
+
+    Parameters
+    ----------
+    name : one of PREFILTERS
+    volume : the items' kind of volume, one of `planes.bounding.KINDS`; empty for boxes alone, or nothing
+    k : the most boxes of "boxes"
+    """
 
     name: str
-    kind: Kind | None = None
+    volume: str = ""
+    k: int = 1
 
     def __str__(self) -> str:
-        return f"{self.kind.k} boxes" if self.kind and self.name == "boxes" else self.name
+        return f"{self.k} boxes" if self.name == "boxes" else self.name
 
 
 BOX = Prefilter("box")
@@ -54,10 +56,11 @@ def prefilter_of(text: object) -> Prefilter:
         k = int(counted[1])
         if not 1 <= k <= BOXES_MAX:
             raise InputError(f"prefilter: expected 1 to {BOXES_MAX} boxes, got {k}")
-        return Prefilter("boxes", Kind("boxes", k))
+        return Prefilter("boxes", "boxes", k)
     name = choice("prefilter", text, PREFILTERS)
-    kinds = {"swept": Kind("circle"), "boxes": Kind("boxes", BOXES)}
-    return Prefilter(name, None if name in PREFILTERS[:3] else kinds.get(name, Kind(name)))
+    if name in PREFILTERS[:3]:
+        return Prefilter(name)
+    return Prefilter(name, "circle" if name == "swept" else name, BOXES if name == "boxes" else 1)
 
 
 def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
@@ -108,9 +111,9 @@ class Candidates:
         """
         row, rank = self._boxes(boxes_xyxy)
         placement = placements[row]
-        if self.prefilter.kind:
+        if self.prefilter.volume:
             near = volley.count[placement] > 0  # the box of an empty pattern lies within others
-            near[near] = self._near(self.prefilter.kind, volley, placement[near], rank[near])
+            near[near] = self._near(volley, placement[near], rank[near])
             placement, rank = placement[near], rank[near]
         return Pairs(placement, rank, refused(self.stack, rank, shots, volley.shot[placement]))
 
@@ -129,46 +132,10 @@ class Candidates:
         row, rank = np.divmod(np.sort(some[row] * m + rank_of[item]), m)
         return row, rank
 
-    def _near(self, kind: Kind, volley: Volley, placement: Ints, rank: Ints) -> Bools:
-        """Whether the volumes of pattern and item meet, or may: no exact stage is needed here."""
-        if not len(rank):
-            return np.zeros(0, np.bool_)
-        volumes, row = self.items.bounding(kind, self.stack.ids[rank])
-        fired, of_pattern = np.unique(volley.pattern[placement], return_inverse=True)
-        patterns = pattern_volumes(self.prefilter.name, [volley.table.patterns[i] for i in fired.tolist()])
-        found = np.zeros(len(rank), np.bool_)
-        for first in range(0, len(rank), PAIRS_AT_ONCE):
-            part = slice(first, first + PAIRS_AT_ONCE)
-            shift = self.stack.box_xyxy[rank[part], :2] - volley.xy[placement[part]]
-            items = volumes.take(row[part]).translated(shift)
-            found[part] = overlap(items, patterns.take(of_pattern[part]), conservative=True)
-        return found
+    def _near(self, volley: Volley, placement: Ints, rank: Ints) -> Bools:
+        """Whether the volumes of pattern and item meet, or may."""
+        from planes.bounding import Kind  # nothing of volumes is loaded before they are asked for
+        from weapons.narrow import near
 
-
-def pattern_volumes(name: str, patterns: Sequence[Pattern]) -> Volumes:
-    """Volumes of patterns, none empty, for a pre-filter: a row each, which contains the pixel squares."""
-    rows = [pattern.volume(name, lambda pattern: _fitted(name, pattern)) for pattern in patterns]
-    cores = [row.core() for row in rows]
-    points = np.concatenate([core.points for core in cores])
-    if name == "circle":
-        return Circles(points, np.concatenate([core.radius for core in cores]))
-    if name == "swept":
-        return Capsules(points[0::2], points[1::2], np.concatenate([core.radius for core in cores]))
-    if name == "oriented box":
-        return Obbs.from_corners(points.reshape(-1, 4, 2))
-    counts = np.concatenate([core.counts for core in cores])
-    return Polygons.around(points, np.cumsum(counts) - counts)
-
-
-def _fitted(name: str, pattern: Pattern) -> Volumes:
-    if name == "swept":
-        return fit.capsule(pattern.spans) if pattern.swept is None else _along(pattern.swept)
-    if name == "circle":
-        return fit.least_circle(pattern.spans)
-    return fit.oriented_box(pattern.spans) if name == "oriented box" else fit.convex(pattern.spans, CORNERS)
-
-
-def _along(swept: Swept) -> Capsules:
-    """Capsule around the squares whose centres are within the radius of a segment, and those that meet it."""
-    a, b, radius = swept
-    return Capsules(a[None] / SUB, b[None] / SUB, max(radius / SUB, GROWN_PX) + GROWN_PX)
+        kind = Kind(self.prefilter.volume, self.prefilter.k)
+        return near(self.prefilter.name, kind, self.items, self.stack, volley, placement, rank)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from planes.arrays import InputError, Ints
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
-from planes.volumes import Volumes
+
+if TYPE_CHECKING:
+    from planes.volumes import Volumes
 
 __all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "make_pattern"]
 

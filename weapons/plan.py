@@ -229,7 +229,7 @@ def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: Pa
     """Complete a plan with what this scene and this weapon did not need."""
     if not plan.has_run("broad phase"):
         plan.leave_out("broad phase", "few pairs: every box is compared")
-    if candidates.prefilter.kind is None:
+    if not candidates.prefilter.volume:
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     if table.prefix is None:
         plan.leave_out("weights", "the weapon has no falloff")

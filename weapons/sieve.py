@@ -13,8 +13,9 @@ from planes.index import STRUCTURES, Index
 from planes.scene import Scene
 from planes.spans import Box
 from planes.volumes import Parts, Volumes
-from weapons.candidates import Candidates, Prefilter, pattern_volumes, prefilter_of
+from weapons.candidates import Candidates, Prefilter, prefilter_of
 from weapons.hits import Hits
+from weapons.narrow import pattern_volumes
 from weapons.volley import Volley, volley_of
 
 __all__ = ["Sieve", "outline_of", "rectangle", "sieve_of"]
@@ -92,7 +93,7 @@ class Sieve:
         some = np.flatnonzero(volley.count > 0)[:PATTERNS_MAX]
         if not len(some) or self.prefilter.name == "none":
             return []
-        if self.prefilter.kind is None:
+        if not self.prefilter.volume:
             return [rectangle(box) for box in volley.boxes[some]]
         fired = [volley.table.patterns[i] for i in volley.pattern[some].tolist()]
         volumes = pattern_volumes(self.prefilter.name, fired)

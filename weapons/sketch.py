@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Floats, Ints
+from planes.bounding import Kind
 from planes.constants import MASK_SIDE_MAX
 from planes.items import overlapping
 from planes.render import blend
@@ -71,9 +72,9 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
     reach = np.array(world.view) + np.array([-1, -1, 1, 1]) * (max(world.image.shape) // world.factor)
     seen = np.flatnonzero(overlapping(reach, stack.box_xyxy))[:OUTLINES_MAX]
     ids = stack.ids[seen]
-    if wanted.kind is None:
+    if not wanted.volume:
         return {item: [rectangle(box)] for item, box in zip(ids.tolist(), stack.box_xyxy[seen], strict=True)}
-    volumes, row = scene.items.bounding(wanted.kind, ids)
+    volumes, row = scene.items.bounding(Kind(wanted.volume, wanted.k), ids)
     corner = stack.box_xyxy[seen, :2]
     return {
         item: [ring + corner[i] for ring in outline_of(volumes, int(row[i]))] for i, item in enumerate(ids.tolist())
