@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ import pytest
 
 from planes import Role, Scene, load_scene
 from planes.image import read_png
+from planes.overlap import contains_point
 from planes.sampling import Verdict
 from weapons import Hits, arsenal_of
 from weapons.arsenal import KINDS
@@ -281,3 +283,48 @@ def test_far_scene_tells_positions_of_one_step_apart() -> None:
     (x, y), (x_next, y_next) = scene.shots[0]["at"], scene.shots[1]["at"]
     assert x_next - x == 1 / 256 and y == y_next
     assert [bool(hits) for hits in fired_at(scene)[:2]] == [True, False]
+
+
+# --- the picture of volumes -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def volumes_page() -> dict[str, Any]:
+    """Names of the script that draws the volumes of one sprite."""
+    return runpy.run_path(str(FIXTURES / "volumes.py"))
+
+
+def test_volumes_are_drawn_as_in_the_folder(volumes_page: dict[str, Any]) -> None:
+    """All but the lines that have text, which OpenCV draws as its version does."""
+    sheet, texts = volumes_page["page"]()
+    drawn = read_png(FIXTURES / "volumes.png")[:, :, :3]
+    assert drawn.shape == sheet.shape and (FIXTURES / "volumes.png").stat().st_size < 150_000
+    told = np.zeros(len(sheet), np.bool_)
+    for text in texts:
+        told[text.y - 14 : text.y + 7] = True
+        assert (drawn[text.y - 9 : text.y + 1] != sheet[text.y - 9 : text.y + 1]).any(), text.text
+    assert np.array_equal(drawn[~told], sheet[~told]) and told.mean() < 0.25
+
+
+def test_panels_go_from_loose_to_tight(volumes_page: dict[str, Any]) -> None:
+    upright = [p for p in volumes_page["panels"]() if p.volume is not None and p.anew is None]
+    areas = [volumes_page["false_area"](p.volume, int(p.picture.mask.sum())) for p in upright]
+    assert areas == sorted(areas, reverse=True) and len(areas) == len(volumes_page["FITS"]) == 11
+
+
+def test_false_area_is_what_lies_in_a_volume_and_in_no_pixel(volumes_page: dict[str, Any]) -> None:
+    """Sampled at the middles of quarters of pixels; those of the sprite's pixels all lie in the volume."""
+    y, x = np.mgrid[-80:160, -80:200] / 2 - 0.25
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    for panel in volumes_page["panels"]():
+        mask = panel.picture.mask
+        column, row = np.floor(points + 0.5).astype(np.int64).T
+        within = (row >= 0) & (row < mask.shape[0]) & (column >= 0) & (column < mask.shape[1])
+        pixel = within & mask[np.where(within, row, 0), np.where(within, column, 0)]
+        assert pixel.sum() == 4 * mask.sum()
+        for volume in (panel.volume, panel.anew):
+            if volume is not None:
+                inside = contains_point(volume, points)
+                assert not (pixel & ~inside).any(), panel.name
+                told = volumes_page["false_area"](volume, int(mask.sum()))
+                assert (inside & ~pixel).sum() / pixel.sum() == pytest.approx(told, abs=0.02), panel.name
