@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -17,8 +18,10 @@ from planes import load_scene
 from planes.image import read_png
 from weapons import arsenal_of
 from weapons.arsenal import KINDS
+from weapons.candidates import PREFILTERS
 from weapons.cli import main
 from weapons.orders import fire_order, orders_of
+from weapons.plan import BROADPHASES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -116,9 +119,44 @@ def test_every_weapon_and_scene_key_is_told() -> None:
             assert f"`{field.name}`" in told, f"{kind}: {field.name}"
 
 
-def test_picture_is_there() -> None:
-    (name,) = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert (ROOT / name).stat().st_size < 400_000
+def test_pictures_are_there() -> None:
+    names = re.findall(r"!\[.*?\]\((.*?)\)", README)
+    assert len(names) == 2
+    assert all((ROOT / name).stat().st_size < 400_000 for name in names)
+
+
+def test_volumes_example_prints_what_is_shown() -> None:
+    told = section("Volumes and broad phases")
+    code, shown = (re.findall(rf"```{word}\n(.*?)```", told, flags=re.DOTALL)[0] for word in ("python", "text"))
+    words = [sys.executable, "-W", "error", "-c", code]
+    assert subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True).stdout == shown
+
+
+def test_volumes_are_as_false_as_the_table_tells() -> None:
+    bench = runpy.run_path(str(ROOT / "tests" / "bench" / "volumes.py"))
+    mask, box = bench["masks"]()["duck 1"], bench["fit"].box
+    kinds = {bench["BOXES"]: (box, box)} | {
+        name: (make, bench["fit"].least_circle) for name, make in bench["FITS"].items()
+    }
+    rows = []
+    for name, (make, of_disc) in kinds.items():
+        volume = make(mask)
+        wrong = bench["false_area"](volume, int(mask.sum())), bench["false_hits"](volume, mask, of_disc)
+        rows.append([name, f"{bench['numbers_of'](volume):,}", *(f"{100 * share:.0f} %" for share in wrong)])
+    rows.append([bench["PIXELS"], f"{mask.size:,}", "0 %", "0 %"])
+    table = [
+        line.strip("| ").split(" | ") for line in section("Volumes and broad phases").split("--- |\n")[1].splitlines()
+    ]
+    assert [row[:4] for row in table[: len(rows)]] == rows and table[0][4] == "1.0"
+
+
+def test_volumes_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = section("Volumes and broad phases")
+    report, demo = re.findall(r"^- `hitplanes (.*?)`", told, flags=re.MULTILINE)
+    monkeypatch.chdir(ROOT)
+    assert main([*report.split(), "-o", str(tmp_path / "report.png")]) == 0
+    assert demo == "demo quadtree -o demo.gif"
+    assert all(f'"{name}"' in told for name in (*BROADPHASES[1:], *PREFILTERS[1:]) if name != "boxes")
 
 
 def test_glossary_names_every_verdict() -> None:
