@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from planes.image import read_png as read_png
     from planes.image import write_png as write_png
     from planes.items import Role as Role
-    from planes.scene import Planes as Planes
+    from planes.labels import Planes as Planes
     from planes.scene import Scene as Scene
     from planes.scene import load_scene as load_scene
     from planes.spans import Spans as Spans
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _HOME = {
     "ALL": "constants",
     "InputError": "arrays",
-    "Planes": "scene",
+    "Planes": "labels",
     "Role": "items",
     "Scene": "scene",
     "Spans": "spans",

@@ -17,6 +17,7 @@ import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals
 from planes.constants import CHUNK_PAIRS
+from planes.volumes import Aabbs
 
 __all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "piled", "sorted_pairs"]
 
@@ -25,13 +26,15 @@ AXES = "xyz"
 
 
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
-    """Check boxes: finite, min <= max on every axis, (N, 4) or (N, 6). They come as a copy.
+    """Check boxes: Aabbs, or rows (N, 4) or (N, 6), finite, min <= max on every axis. They come as a copy.
 
     Raises
     ------
     InputError
         If they are not; it names the row.
     """
+    if isinstance(values, Aabbs):
+        values = np.concatenate([values.min, values.max], axis=1)
     array = array_of(field, values)
     if dim is None:
         width = array.shape[-1] if array.ndim == 2 else 0
@@ -124,8 +127,8 @@ class BroadPhase(ABC):
 
     Parameters
     ----------
-    boxes : (N, 4) or (N, 6) float, min of each axis, then max of each; their ids are 0..N-1. Ids count up and are
-        never used again.
+    boxes : Aabbs, or (N, 4) or (N, 6) float, min of each axis, then max of each; their ids are 0..N-1. Ids count up
+        and are never used again.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, bools, integer, real, reals
-from planes.constants import BOXES_MAX, MASK_SIDE_MAX, POSITION_MAX
+from planes.constants import BOXES_MAX, LENGTH_TINY, MASK_SIDE_MAX, POSITION_MAX
 from planes.cover import cover
 from planes.hull import Extents, Line, Point, edge_lines, extents, fewer_lines, hull_points, outward_corners
 from planes.outline import outline
@@ -25,6 +25,9 @@ from planes.volumes import Aabbs, BoxSets, Capsules, Circles, Obbs, Polygons
 __all__ = [
     "box", "boxes", "capsule", "concave", "convex", "hull", "least_circle", "oriented_box", "pivot_circle",
 ]  # fmt: skip
+
+AXES = 33
+"""Lengths of a capsule's axis that are tried."""
 
 
 def hull(pixels: object) -> Polygons:
@@ -59,8 +62,7 @@ def least_circle(pixels: object) -> Circles:
     until none is outside. Few rounds, each over the hull's corners.
     """
     corners = _corners(pixels)
-    x, y, d = _least_center(corners)
-    return _circle(corners, (x / (2 * d), y / (2 * d)))
+    return _circle(corners, _center_px(corners))
 
 
 def pivot_circle(pixels: object, pivot_xy: Sequence[float]) -> Circles:
@@ -76,18 +78,30 @@ def pivot_circle(pixels: object, pivot_xy: Sequence[float]) -> Circles:
 def capsule(pixels: object) -> Capsules:
     """Capsule around the pixel squares: for what is long and thin, as a beam; `pixels` as in `hull`.
 
-    Its axis is that of the least box, whole or with round ends in place of the box's: the smaller of the two.
+    Its axis is that of the least box, as much shorter at both ends as makes the area least (to 1/64 of its length); or
+    it is the least circle, where that is smaller.
     """
     corners = _corners(pixels)
     a, b, c, d = outward_corners(_least_sides(corners))
     if ((b - a) ** 2).sum() < ((c - b) ** 2).sum():
         a, b, c, d = b, c, d, a
     begin, end = (a + d) / 2, (b + c) / 2
-    length, half = (math.sqrt((v * v).sum()) for v in (end - begin, (d - a) / 2))
-    inward = (end - begin) * min(half / length, 0.5)
-    found = [(p, q, _radius_about(corners, p, q)) for p, q in ((begin, end), (begin + inward, end - inward))]
-    p, q, radius = min(found, key=lambda made: (2 * math.dist(made[0], made[1]) + math.pi * made[2]) * made[2])
-    return Capsules([p], [q], radius)
+    inward = np.linspace(0, 0.5, AXES)[:, None] * (end - begin)
+    found = min(zip(begin + inward, end - inward, strict=True), key=lambda axis: _capsule_area(corners, *axis))
+    circle = _circle(corners, _center_px(corners))
+    if math.pi * circle.radius[0] ** 2 <= _capsule_area(corners, *found):
+        return Capsules(circle.center, circle.center, circle.radius)
+    begin, end = found
+    return Capsules(begin[None], end[None], _radius_about(corners, begin, end))
+
+
+def _capsule_area(corners: list[Point], begin: Floats, end: Floats) -> float:
+    """Area in px^2 of the capsule about an axis that contains points in half pixels, to rounding."""
+    along = end - begin
+    offset = np.array(corners) / 2 - begin
+    share = np.clip((offset * along).sum(axis=1) / max(float((along**2).sum()), LENGTH_TINY), 0, 1)
+    radius = math.sqrt(((offset - share[:, None] * along) ** 2).sum(axis=1).max())
+    return (2 * math.sqrt((along**2).sum()) + math.pi * radius) * radius
 
 
 def oriented_box(pixels: object) -> Obbs:
@@ -204,6 +218,11 @@ def _least_center(points: list[Point]) -> Center:
         if _scaled_square(center, far) <= _scaled_square(center, basis[0]):
             return center
         basis = _support([far, *basis])
+
+
+def _center_px(points: list[Point]) -> tuple[float, float]:
+    x, y, d = _least_center(points)
+    return x / (2 * d), y / (2 * d)
 
 
 def _scaled_square(center: Center, point: Point) -> int:

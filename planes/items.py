@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError, Ints
+from planes.arrays import Bools, Floats, InputError, Ints, choice
 from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
 from planes.spans import Box
@@ -302,6 +302,16 @@ class Items:
         bounds = self._bounds.setdefault(kind, Bounds(kind))
         rows = bounds.rows(self.offset[ids], self.sprites, self.variants, ids)
         return bounds.volumes, rows
+
+    def volumes(self, name: str, k: int, ids: Ints) -> Volumes:
+        """Volumes of items in the world, one row each; `name` is one of `planes.bounding.KINDS`."""
+        from planes.bounding import KINDS, Kind
+
+        choice("kind", name, KINDS)
+        for item in ids[self.size_wh[ids, 0] == 0].tolist():
+            raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
+        volumes, row = self.bounding(Kind(name, k), ids)
+        return volumes.take(row).translated(pixel(self.position_256[ids] - self.pivot_256[ids]))
 
     def _use(self, item: int, variant: Variant) -> None:
         self.offset[item] = self.atlas.take(variant)

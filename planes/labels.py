@@ -1,7 +1,8 @@
-"""Whole planes in: labels, masks and images of one size, to sprites and where they lie."""
+"""Whole planes: labels, masks and images of one size to sprites and where they lie; and planes of a scene, by role."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,19 @@ from planes.arrays import Bools, InputError, bools, integers, within
 from planes.constants import ITEMS_MAX, PLANE_AREA_MAX, PLANE_SIDE_MAX
 from planes.sprite import Sprite
 
-__all__ = ["plane_objects", "plane_size"]
+__all__ = ["Planes", "plane_objects", "plane_size"]
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Whole planes of a scene, one for each role: front-most id + 1 at each pixel (h, w), 0 where there is none."""
+
+    origin_xy: tuple[int, int]
+    background: npt.NDArray[np.int32]
+    hittable: npt.NDArray[np.int32]
+    movers: npt.NDArray[np.int32]
+    occluders: npt.NDArray[np.int32]
+    hud: npt.NDArray[np.int32]
 
 
 def plane_size(field: str, array: npt.NDArray[Any]) -> tuple[int, int]:

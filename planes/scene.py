@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
-from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
+from planes.constants import ALL, BOXES_MAX, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.index import Index
 from planes.items import ROLES, Items, Role
-from planes.labels import plane_objects, plane_size
+from planes.labels import Planes, plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
 from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, scene_folder, write_scene
 from planes.schema import Text, typed
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
-__all__ = ["Planes", "Scene", "load_scene"]
+if TYPE_CHECKING:
+    from planes.volumes import Volumes
+
+__all__ = ["Scene", "load_scene"]
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")
@@ -32,18 +34,6 @@ FIELDS = ("background", "hittable", "movers", "occluders", "hud")
 
 DEFAULT_CATEGORY = "default"
 """Name of the first category bit: the one that objects have unless told otherwise."""
-
-
-@dataclass(frozen=True)
-class Planes:
-    """Whole planes of a scene, one for each role: front-most id + 1 at each pixel (h, w), 0 where there is none."""
-
-    origin_xy: tuple[int, int]
-    background: npt.NDArray[np.int32]
-    hittable: npt.NDArray[np.int32]
-    movers: npt.NDArray[np.int32]
-    occluders: npt.NDArray[np.int32]
-    hud: npt.NDArray[np.int32]
 
 
 class Scene:
@@ -274,6 +264,10 @@ class Scene:
         """Mask (h, w) of an object as it is tested, read-only, and the pixel (x, y) of the world at [0, 0]."""
         row = int(self._existing(integer("id", item, 0, self.items.count - 1))[0])
         return self.items.variants[row].mask, self.items.corner(row)
+
+    def volumes(self, ids: object, kind: str, k: int = 1) -> Volumes:
+        """Volumes of objects, one row each, px: "circle", "oriented box", "boxes" (at most k), "polygon"."""
+        return self.items.volumes(kind, integer("k", k, 1, BOXES_MAX), self._existing(ids))
 
     def extent(self) -> Box:
         """Box (x_min, y_min, x_max, y_max) of the bounds, or of all that is placed where there are none."""

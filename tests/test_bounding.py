@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planes import Scene, fit
-from planes.arrays import Bools
+from planes.arrays import Bools, InputError
 from planes.bounding import KINDS, Kind, bounding, fitted, moved
 from planes.constants import CORNERS, PLACE
 from planes.sprite import Sprite, Variant, form_of, frame_pivot, variant_of
@@ -288,3 +288,33 @@ def test_masks_that_are_laid_out_anew() -> None:
     volumes, row = scene.items.bounding(kind, stack.ids)
     assert stack.offset.tolist() == [0]
     assert volumes.take(row).core().radius[0] == fit.least_circle(np.ones((3, 1200), np.bool_)).radius[0]
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=str)
+def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
+    scene = Scene()
+    mask = np.array([[0, 1, 1, 0], [1, 1, 1, 1]], np.bool_)
+    ids = [scene.add(mask, xy, angle=angle) for xy, angle in (((1e9, -7.4), 0), ((3.2, 4), 90), ((0, 0), 31))]
+    volumes = scene.volumes(ids, kind.name, kind.k)
+    bounds = volumes.bounds()
+    for row, item in enumerate(ids):
+        seen, (x, y) = scene.mask(item)
+        assert holds(volumes.take([row]).translated((-x, -y)), seen)
+        side = max(seen.shape)
+        assert (bounds.min[row] > (x - side, y - side)).all()
+        assert (bounds.max[row] < (x + 2 * side, y + 2 * side)).all()
+    assert len(scene.volumes([], kind.name, kind.k)) == 0
+
+
+def test_volumes_that_objects_do_not_have() -> None:
+    scene = Scene()
+    item, empty = scene.add([[True]], (1, 1)), scene.add([[False]], (1, 1))
+    for ids, kind, told in (
+        ([item], "sphere", "kind: expected one of 'circle', 'oriented box', 'boxes', 'polygon', got 'sphere'"),
+        ([item, empty], "circle", f"ids: expected objects with a pixel, got {empty}, whose mask is empty"),
+        ([5], "circle", "id"),
+    ):
+        with pytest.raises(InputError, match=told):
+            scene.volumes(ids, kind)
+    with pytest.raises(InputError, match="k: expected a whole number from 1 to 64, got 0"):
+        scene.volumes([item], "boxes", 0)

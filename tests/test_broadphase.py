@@ -15,6 +15,7 @@ from planes.arrays import Floats, Ints
 from planes.boxes import meets, pieces
 from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
 from planes.constants import GRID_FRESH
+from planes.volumes import Aabbs
 
 Maker = Callable[[Floats], BroadPhase]
 MAKERS: dict[str, tuple[Maker, tuple[int, ...]]] = {
@@ -228,6 +229,16 @@ def test_bad_making_is_named(call: Callable[[], object], message: str) -> None:
     with pytest.raises(InputError) as error:
         call()
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(("make", "dim"), ALL)
+def test_boxes_may_come_as_volumes(make: Maker, dim: int) -> None:
+    rows = np.random.default_rng(1).random((30, 2 * dim)).cumsum(axis=1)
+    volumes = Aabbs(rows[:, :dim], rows[:, dim:])
+    one, other = make(rows), make(volumes)  # type: ignore[arg-type]
+    other.move(other.insert(volumes.take([0]))[:1], volumes.take([1]))
+    one.move(one.insert(rows[:1]), rows[1:2])
+    assert np.array_equal(one.query(rows), other.query(volumes))
 
 
 def test_a_grid_tells_cells_and_owners() -> None:
