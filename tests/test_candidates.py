@@ -186,6 +186,13 @@ def test_the_plan_tells_what_was_tested() -> None:
     assert row["pairs"] == [count, count]
 
 
+def test_a_broad_phase_that_no_sample_needed_is_left_out() -> None:
+    scene = crowd(3, 30)
+    told = fire(scene, Disc(3), (60, 60), broadphase="grid", strategy="composed").plan
+    assert why(told.left_out, "broad phase") == "no sample needed the stack"
+    assert scene.index("grid").boxes is None
+
+
 def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
     scene = crowd(3, 20)
     for shots in (1, 1000):

@@ -32,11 +32,11 @@ __all__ = [
 STRATEGIES = ("auto", "direct", "composed")
 BROADPHASES = ("auto", *STRUCTURES)
 
-DIRECT_PLACEMENT_NS, DIRECT_PAIR_NS, DIRECT_PIXEL_NS = 300.0, 5.3, 20.0
+DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
 COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
 REDRAW_PIXEL_NS = 0.5
 SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
-BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.3, 80_000.0, 500.0, 250.0, 850.0
+BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 """Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
 ratios only."""
 
@@ -154,7 +154,8 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
     composed += samples * COMPOSED_PIXEL_NS + plane.cost(scene.items) * REDRAW_PIXEL_NS
     x, y, x_max, y_max = plane.box_xyxy
     density = area(stack.box_xyxy) / ((x_max - x + 1) * (y_max - y + 1))
-    direct = placements * (DIRECT_PLACEMENT_NS + len(stack) * DIRECT_PAIR_NS) + samples * density * DIRECT_PIXEL_NS
+    direct = placements * DIRECT_PLACEMENT_NS + min(_box_costs(scene, len(stack), placements))
+    direct += samples * density * DIRECT_PIXEL_NS
     name = "composed" if composed < direct else "direct"
     return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
 
@@ -208,27 +209,35 @@ def _sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
     return dropped * SWEPT_DROPPED_NS > pairs * SWEPT_PAIR_NS + SWEPT_CALL_NS
 
 
+def _box_costs(scene: Scene, items: int, placements: int) -> tuple[float, float]:
+    """Nanoseconds to find the boxes that placements meet: one by one, and by a BVH that is there or must be made."""
+    one_by_one = placements * items * BOX_PAIR_NS
+    answer = placements * BVH_PLACEMENT_NS + BVH_CALL_NS
+    if answer >= one_by_one:
+        return one_by_one, answer
+    index = scene.index("bvh")
+    return one_by_one, answer + index.owed(scene.items) * (BVH_BUILT_NS if index.boxes is None else BVH_MOVED_NS)
+
+
 def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
     """Whether a BVH answers sooner than all boxes one by one, with what it costs to bring it up to date.
 
     One that is not there is made when what it would have saved so far is as much as it costs: never more than twice
     the cost of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
     """
-    saved = placements * (items * BOX_PAIR_NS - BVH_PLACEMENT_NS) - BVH_CALL_NS
-    if saved <= 0:
-        return False
+    one_by_one, by_bvh = _box_costs(scene, items, placements)
     index = scene.index("bvh")
-    owed = index.owed(scene.items)
-    if index.boxes is not None:
-        return saved > owed * BVH_MOVED_NS
-    index.missed += saved
-    return index.missed > owed * BVH_BUILT_NS
+    if one_by_one > by_bvh or index.boxes is not None:
+        return one_by_one > by_bvh
+    index.missed += max(one_by_one - placements * BVH_PLACEMENT_NS - BVH_CALL_NS, 0)
+    return index.missed > items * BVH_BUILT_NS
 
 
 def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, why_strategy: str) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
     if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", "few pairs: every box is compared")
+        few = "few pairs: every box is compared"
+        plan.leave_out("broad phase", few if candidates.index is None else "no sample needed the stack")
     if not candidates.prefilter.volume:
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     if table.prefix is None:
