@@ -6,16 +6,15 @@ python tests/bench/exact.py [share ...]
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from turns import least
 
 from planes.exact import circles_sign, orient2d, orient3d, point_segment_sign, segment_segment_sign
 
 ROWS = 1_000_000
-ROUNDS = 7
 
 
 def plain_orient2d(a: Any, b: Any, c: Any) -> Any:
@@ -89,17 +88,6 @@ PAIRS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
 }
 
 
-def least(*calls: Callable[[], object]) -> list[float]:
-    """Least nanoseconds a row of each, taken in turns."""
-    best = [float("inf")] * len(calls)
-    for _ in range(ROUNDS):
-        for k, call in enumerate(calls):
-            begin = time.perf_counter()
-            call()
-            best[k] = min(best[k], (time.perf_counter() - begin) / ROWS * 1e9)
-    return best
-
-
 def main() -> None:
     """Print the table."""
     shares = [float(word) for word in sys.argv[1:]] or [0, 1e-5, 1e-4, 1e-3]
@@ -107,10 +95,13 @@ def main() -> None:
     for name, (exact, plain) in PAIRS.items():
         for share in shares:
             rows = scene(name, share)
-            floats, exacts, quick = least(
-                lambda p=plain, v=rows: p(*v),  # type: ignore[misc]
-                lambda e=exact, v=rows: e(*v),  # type: ignore[misc]
-                lambda e=exact, v=rows: e(*v, conservative=True),  # type: ignore[misc]
+            floats, exacts, quick = (
+                1e9 / ROWS * t
+                for t in least(
+                    lambda p=plain, v=rows: p(*v),  # type: ignore[misc]
+                    lambda e=exact, v=rows: e(*v),  # type: ignore[misc]
+                    lambda e=exact, v=rows: e(*v, conservative=True),  # type: ignore[misc]
+                )
             )
             ratios = f"{exacts / floats:6.2f} {quick / floats:13.2f}"
             print(f"{name:16} {share:9.0e} {floats:9.1f} {exacts:9.1f} {ratios}")

@@ -10,18 +10,17 @@ corners. The float versions take the same volumes, work on columns, and count to
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
+from turns import least
 
 from planes.overlap import overlap
 from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons
 
 ROWS = 200_000
-ROUNDS = 5
 TOWARD = np.array([0.6, 0.8])
 WORLDS = {"near": 60.0, "sparse": 2000.0}
 KINDS = ("circles", "aabbs", "obbs", "polygons", "capsules")
@@ -181,17 +180,6 @@ def scene(one: str, two: str, world: float, share: float) -> tuple[Any, Any]:
     return a, b.translated(by)
 
 
-def least(*calls: Callable[[], object]) -> list[float]:
-    """Least nanoseconds a pair of each, taken in turns."""
-    best = [float("inf")] * len(calls)
-    for _ in range(ROUNDS):
-        for k, call in enumerate(calls):
-            begin = time.perf_counter()
-            call()
-            best[k] = min(best[k], (time.perf_counter() - begin) / ROWS * 1e9)
-    return best
-
-
 def main() -> None:
     """Print the table."""
     shares = [float(word) for word in sys.argv[1:]] or [0, 1e-5, 1e-4]
@@ -204,11 +192,14 @@ def main() -> None:
             for share in shares:
                 a, b = scene(one, two, world, share)
                 rows = (b, a) if swapped else (a, b)
-                times = least(
-                    lambda p=plain, v=rows: p(*v),  # type: ignore[misc]
-                    lambda v=(a, b): overlap(*v),  # type: ignore[misc]
-                    lambda v=(a, b): overlap(*v, conservative=True),  # type: ignore[misc]
-                )
+                times = [
+                    1e9 / ROWS * t
+                    for t in least(
+                        lambda p=plain, v=rows: p(*v),  # type: ignore[misc]
+                        lambda v=(a, b): overlap(*v),  # type: ignore[misc]
+                        lambda v=(a, b): overlap(*v, conservative=True),  # type: ignore[misc]
+                    )
+                ]
                 ratios.append(times[1] / times[0])
                 first = first or [overlap(a, b).mean() * 100, *times]
             shown = " ".join(f"{r:7.2f}" for r in ratios)

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from turns import least
 
 from planes.constants import CHUNK_ROWS
 from planes.triangles import Mesh, meeting_faces, triangles_meet
 
 ROWS = 400_000
-ROUNDS = 7
 
 
 def plain(a: Any, b: Any) -> Any:
@@ -118,17 +117,6 @@ def hardened(a: Any, b: Any, share: float, rng: Any) -> tuple[Any, Any]:
     hard = rng.choice(ROWS, round(share * ROWS), replace=False)
     b[hard, 0] = a[hard].sum(axis=1) / 3
     return a, b
-
-
-def least(*calls: Callable[[], object]) -> list[float]:
-    """Least seconds of each, taken in turns."""
-    best = [float("inf")] * len(calls)
-    for _ in range(ROUNDS):
-        for k, call in enumerate(calls):
-            begin = time.perf_counter()
-            call()
-            best[k] = min(best[k], time.perf_counter() - begin)
-    return best
 
 
 def pairs_table(shares: list[float]) -> None:
