@@ -141,6 +141,9 @@ FLOAT_TINY = 1e-290
 FLOAT_HUGE = 1e300
 """Beyond it a value of a float filter may have overflowed on the way."""
 
+BOUND_HUGE = 1e280
+"""A float filter with a smaller bound has not overflowed; or it was a distance, which then is far beyond its bound."""
+
 LENGTH_TINY = 1e-140
 """A length whose square underflows is shorter than this."""
 

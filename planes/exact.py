@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints
-from planes.constants import CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
+from planes.constants import BOUND_HUGE, CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
 
 __all__ = ["Signs", "circles_sign", "orient2d", "orient3d", "point_segment_sign", "segment_segment_sign"]
 
@@ -37,13 +37,14 @@ class Predicate:
     """One sign: by floats with a bound, and by whole numbers.
 
     `value(columns, work)` gives the determinant, in a row of work, and magnitudes (n,) or (k, n); `bound` turns the
-    largest of each magnitude into a bound on the error; `exact(columns)` takes columns of Python integers. All
-    columns are lengths in one unit, and the sign does not depend on the unit.
+    largest of each magnitude, of which the `signed` may be negative, into a bound on the error; `exact(columns)` takes
+    columns of Python integers. All columns are lengths in one unit, and the sign does not depend on the unit.
     """
 
     value: Callable[[list[Floats], Floats], tuple[Floats, tuple[Floats, ...]]]
     bound: Callable[..., Any]
     exact: Callable[[list[Numbers]], Numbers]
+    signed: tuple[bool, ...]
 
 
 def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative: bool = False) -> Signs:
@@ -240,9 +241,9 @@ def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Sig
     """Fill the signs of one chunk, and give the rows that one bound for all of them leaves in doubt."""
     value, magnitudes = predicate.value(columns, work)
     np.subtract((value > 0).view(np.int8), (value < 0).view(np.int8), out=signs)
-    bound = predicate.bound(*(max(m.max(), -m.min()) for m in magnitudes))
+    bound = predicate.bound(*(max(m.max(), -m.min() if predicate.signed[i] else 0.0) for i, m in enumerate(magnitudes)))
     size = np.abs(value, out=value)
-    if size.min() > bound and size.max() < FLOAT_HUGE:
+    if size.min() > bound and bound < BOUND_HUGE:
         return NO_ROWS
     return np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
 
@@ -407,8 +408,8 @@ def _ends_exact(columns: list[Numbers]) -> Numbers:
     return np.asarray(np.minimum.reduce([(v > 0).astype(np.int8) - (v < 0).astype(np.int8) for v in values]))
 
 
-_ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact)
-_ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact)
-_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact)
-_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact)
-_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact)
+_ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact, (True, True))
+_ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact, (True, True, True))
+_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact, (False,))
+_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact, (True, False, False))
+_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact, (True, False, False))

@@ -296,3 +296,32 @@ def test_rows_in_doubt_find_their_place_whatever_the_memory_order() -> None:
         (a - points[2])[..., 0] * (b - points[2])[..., 1] - (a - points[2])[..., 1] * (b - points[2])[..., 0]
     )
     assert (floats != expected).mean() > 0.02
+
+
+@pytest.mark.parametrize("toward", [1.0, -1.0])
+@pytest.mark.parametrize("predicate", [p for p in CASES if p is not circles_sign], ids=lambda p: p.__name__)
+def test_hard_rows_whose_magnitudes_have_one_sign(predicate: Callable[..., Any], toward: float) -> None:
+    """The bound of a chunk looks at both ends of what may be negative: each row here has all on one side."""
+    rng = np.random.default_rng(7)
+    n = 400
+    along, other, off = rng.uniform(1, 2, (n, 3)), rng.uniform(1, 2, (n, 3)), rng.uniform(0.1, 0.2, (n, 3))
+    k, m = rng.uniform(1, 3, (2, n, 1))
+    rows: Arrays
+    if predicate is orient2d:  # on one line from c; products of coordinates of one sign
+        step = np.array([1, toward]) * along[:, :2]
+        rows = [off[:, :2] + step, off[:, :2] + step * k, off[:, :2]]
+        (ax, ay), (bx, by), (cx, cy) = (v.T for v in rows)
+        floats = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
+    elif predicate is orient3d:  # in one plane with d
+        rows = [off + toward * along, off + toward * other, off + toward * (along * k + other * m), off]
+        floats = np.linalg.det(np.stack([v - off for v in rows[:3]], axis=1))
+    else:  # p as far from an end of the segment as the radius
+        p, a = off[:, :2] + toward * along[:, :2], off[:, :2]
+        radius = np.sqrt(((p - a) ** 2).sum(axis=1))
+        ends = [a, a - toward * along[:, :2] * k]
+        rows = [p, *ends] if predicate is point_segment_sign else [p, p + (p - a), *ends]
+        rows += [radius, np.zeros(n)]
+        floats = ((p - a) ** 2).sum(axis=1) - radius * radius
+    truth = [PREDICATES[predicate](*rational(row)) for row in zip(*rows, strict=True)]
+    assert (np.sign(floats) != truth).any(), "too easy"
+    assert wrong(predicate, rows) == []
