@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from planes.arrays import Bools, Floats, Ints
 from planes.constants import (
     BOUNDING_BYTES,
     BOUNDING_CACHE_BYTES,
+    BOUNDS_SLACK,
     CORNERS,
     GROWN_PX,
     PLACE,
@@ -32,7 +33,10 @@ from planes.rings import rows_of
 from planes.sprite import Form, Sprite, Variant, frame_pivot
 from planes.volumes import Circles, Core, Obbs, Parts, Polygons, Volumes
 
-__all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "joined", "moved"]
+__all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "joined", "moved", "shifted"]
+
+SHARP = 2.0**-6
+"""1 + cos of the turn at a corner: with less, at an angle below 10 degrees, growing would move it 11 times as far."""
 
 KINDS = ("circle", "oriented box", "boxes", "polygon")
 
@@ -85,24 +89,29 @@ class Bounds:
 
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
-        self.volumes = joined(kind, [])
+        self._volumes = joined(kind, [])
         self._masks = np.zeros(0, np.int64)
         self._row = np.zeros(0, np.int64)
         self._lock = threading.Lock()
 
-    def rows(self, masks: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant], ids: Ints) -> Ints:
-        """Find the rows in `volumes` of the masks of items.
+    def rows(
+        self, masks: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant], ids: Ints, items: int
+    ) -> tuple[Volumes, Ints]:
+        """Volumes of masks, and the rows of those of items.
 
         Parameters
         ----------
-        masks : (n,) a number for each item's mask: equal masks have one
+        masks : (n,) a number for each item's mask, never used for another
         sprites, variants : of all items
         ids : (n,) which of them
+        items : how many masks may be in use; many more than that are not kept
         """
         used, first, of = np.unique(masks, return_index=True, return_inverse=True)
         with self._lock:
+            if len(self._masks) + len(used) > 2 * items + BOUNDS_SLACK:
+                self._masks, self._row, self._volumes = masks[:0], masks[:0], joined(self.kind, [])
             self._add(used, ids[first], sprites, variants)
-            return np.asarray(self._row[np.searchsorted(self._masks, used)][of])
+            return self._volumes, np.asarray(self._row[np.searchsorted(self._masks, used)][of])
 
     def _add(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> None:
         new = ~np.isin(used, self._masks)
@@ -112,11 +121,23 @@ class Bounds:
         more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
         every = np.concatenate([self._masks, used[new]])
         order = np.argsort(every)
-        self.volumes = joined(self.kind, [self.volumes, more])
+        self._volumes = joined(self.kind, [self._volumes, more])
         self._masks, self._row = (
             every[order],
             np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
         )
+
+
+def shifted(volumes: Volumes, xy: Ints) -> Volumes:
+    """Move rows by whole pixels (n, 2); where that rounds the centre of a circle, the circle grows by as much.
+
+    Corners are whole multiples of PLACE: up to 2**36 px from the origin nothing is rounded.
+    """
+    there = volumes.translated(xy)
+    if not isinstance(volumes, Circles) or not isinstance(there, Circles):
+        return there
+    rounded = np.where(there.center - xy == volumes.center, 0, np.spacing(np.abs(there.center))).sum(axis=1)
+    return Circles(there.center, np.where(rounded > 0, np.nextafter(volumes.radius + rounded, np.inf), volumes.radius))
 
 
 def fitted(kind: Kind, mask: Bools) -> Volumes:
@@ -146,13 +167,13 @@ def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volu
     core = parts.core()
     offset = np.array(pivot_256) / SUB
     place = np.array([variant.pivot_x, variant.pivot_y]) / SUB
-    least, most = (pick(form.scale_x, form.scale_y) / (1 << SCALE_BITS) for pick in (min, max))
+    most = max(form.scale_x, form.scale_y) / (1 << SCALE_BITS)
     reach = float(np.abs(core.points - offset).max() + core.radius.max()) * most
     grown = 0.0 if form.plain else GROWN_PX + reach * TRIG_ERROR
     if isinstance(parts, Circles):
         return Circles(_turned(core.points - offset, form) + place, core.radius * most + grown)
-    points = core.points + _outward(core) * (grown / least)
-    rings = Polygons.around(_placed(_turned(points - offset, form) + place), core.starts)
+    points = _turned(core.points - offset, form) + place
+    rings = Polygons.around(_placed(_grown(replace(core, points=points), grown)), core.starts)
     return Parts(rings, volume.starts) if isinstance(volume, Parts) else rings
 
 
@@ -167,15 +188,34 @@ def _turned(points: Floats, form: Form) -> Floats:
     return np.stack([x * c - y * s, x * s + y * c], axis=1) / (1 << TRIG_BITS)
 
 
-def _outward(core: Core) -> Floats:
-    """How far each corner of convex rings moves when all edges move outward by 1 px."""
+def _grown(core: Core, by: float) -> Floats:
+    """Corners of convex rings of which all edges move outward; a ring with a needle's point becomes its box."""
+    if not by:
+        return core.points
+    outward, sharp = _outward(core)
+    points = core.points + outward * by
+    if not sharp.any():
+        return points
+    for first, count in zip(core.starts[sharp].tolist(), core.counts[sharp].tolist(), strict=True):
+        ring = core.points[first : first + count]
+        (x, y), (x_max, y_max) = ring.min(axis=0) - by, ring.max(axis=0) + by
+        box = np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)])
+        points[first : first + count] = box[np.minimum(np.arange(count), 3)]
+    return points
+
+
+def _outward(core: Core) -> tuple[Floats, Bools]:
+    """How far each corner of convex rings moves when all edges move outward by 1 px, and which rings have needles."""
     row = np.repeat(np.arange(len(core.starts)), core.counts)
     place = np.arange(len(core.points)) - core.starts[row]
     before = core.starts[row] + (place - 1) % core.counts[row]
     step = core.points[core.starts[row] + (place + 1) % core.counts[row]] - core.points
-    normal = np.stack([step[:, 1], -step[:, 0]], axis=1) / np.sqrt((step**2).sum(axis=1))[:, None]
-    both = normal[before] + normal
-    return np.asarray(both / (1 + (normal[before] * normal).sum(axis=1))[:, None])
+    turning = step[before, 0] * step[:, 1] - step[before, 1] * step[:, 0]
+    sense = np.where(np.add.reduceat(turning, core.starts) < 0, -1, 1)[row]  # a flip turns a ring round
+    normal = np.stack([step[:, 1], -step[:, 0]], axis=1) * (sense / np.sqrt((step**2).sum(axis=1)))[:, None]
+    open_ = 1 + (normal[before] * normal).sum(axis=1)
+    sharp = np.minimum.reduceat(open_, core.starts) < SHARP
+    return (normal[before] + normal) / np.maximum(open_, SHARP)[:, None], np.asarray(sharp)
 
 
 def _placed(points: Floats) -> Floats:
@@ -210,4 +250,4 @@ def _on_grid(volume: Volumes) -> Volumes:
     core = volume.core()
     if (_placed(core.points) == core.points).all():
         return volume
-    return Polygons.around(_placed(core.points + 2 * PLACE * _outward(core)), core.starts)
+    return Polygons.around(_placed(_grown(core, 2 * PLACE)), core.starts)

@@ -129,6 +129,9 @@ BOUNDING_BYTES = 1024
 INDEX_SLACK = 4096
 """Boxes that came and went which an index tolerates beside half of its own, before it is built anew."""
 
+BOUNDS_SLACK = 256
+"""Volumes of masks no longer in use that a scene keeps, beside as many as it has items."""
+
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""
 

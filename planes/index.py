@@ -24,6 +24,10 @@ PENDING = 32
 """Lists of changes that wait for the next answer before they are joined to one."""
 
 
+INDEX_GROWTH = 4
+"""A structure is made anew when it has so many times the boxes that it was made of: its cells were chosen for those."""
+
+
 class Index:
     """Inclusive pixel boxes of the items that decide, in one structure; a change costs what it changes.
 
@@ -47,6 +51,7 @@ class Index:
         self.missed = 0.0
         self._pending: list[Ints] = []
         self._seen = -1
+        self._made_of = 0
         self._place_of = np.zeros(0, np.int64)
         self._item_of = np.zeros(0, np.int64)
         self._lock = threading.Lock()
@@ -68,6 +73,7 @@ class Index:
                 self.boxes = getattr(broadphase, STRUCTURES[self.structure])(items.boxes(ids))
                 self._item_of, self._place_of = ids, np.full(items.count, -1)
                 self._place_of[ids] = np.arange(len(ids))
+                self._made_of = len(ids)
             elif self.followed:
                 self._follow(self.boxes, items, np.unique(np.concatenate(self._pending)))
             self._pending = []
@@ -88,7 +94,10 @@ class Index:
             if len(self._pending) > PENDING:
                 self._pending = [np.unique(np.concatenate(self._pending))]
         self._seen = items.version
-        if self.boxes is not None and len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK:
+        if self.boxes is not None and (
+            len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
+            or len(self.boxes) > INDEX_GROWTH * self._made_of + 16
+        ):
             self.boxes = None
         if self.boxes is None:
             return len(items.stack())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import threading
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, choice
-from planes.constants import ATLAS_SLACK_BYTES, ITEMS_MAX, JOURNAL_ROWS
+from planes.constants import ATLAS_SLACK_BYTES, BOXES_MAX, ITEMS_MAX, JOURNAL_ROWS
 from planes.grid256 import pixel
 from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from planes.bounding import Bounds, Kind
     from planes.volumes import Volumes
 
-__all__ = ["Items", "MaskAtlas", "Role", "Stack", "clipped", "overlapping"]
+__all__ = ["Items", "MaskAtlas", "Role", "Stack", "boxes_in", "clipped", "overlapping"]
 
 
 class Role(Enum):
@@ -39,6 +41,17 @@ class Role(Enum):
 ROLES = tuple(Role)
 HITTABLE, OCCLUDER = ROLES.index(Role.HITTABLE), ROLES.index(Role.OCCLUDER)
 NOWHERE = (0, 0, -1, -1)
+
+
+def boxes_in(field: str, name: object) -> int | None:
+    """How many boxes a name like "4 boxes" says; None for any other name."""
+    counted = re.fullmatch(r"([0-9]{1,4}) box(?:es)?", name) if isinstance(name, str) else None
+    if counted is None:
+        return None
+    k = int(counted[1])
+    if not 1 <= k <= BOXES_MAX:
+        raise InputError(f"{field}: expected 1 to {BOXES_MAX} boxes, got {k}")
+    return k
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +155,7 @@ class MaskAtlas:
 
 COLUMNS: dict[str, tuple[int, ...]] = {
     "alive": (), "role": (), "layer": (), "categories": (), "owner": (),
-    "position_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (),
+    "position_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
 
@@ -158,6 +171,7 @@ class Items:
     pivot_256: Ints
     size_wh: Ints
     offset: Ints
+    mask: Ints
 
     def __init__(self) -> None:
         self.count = 0
@@ -173,6 +187,7 @@ class Items:
         self._forgotten = 0
         self._stack: tuple[int, Stack] | None = None
         self._bounds: dict[Kind, Bounds] = {}
+        self._lock = threading.Lock()
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
 
@@ -277,11 +292,12 @@ class Items:
 
     def stack(self) -> Stack:
         """Items that decide, front to back: greater layer; occluders before objects; then the later added."""
-        if self._stack is None or self._stack[0] != self.version:
-            if self.atlas.wasteful:
-                self._compact()
-            self._stack = (self.version, self.stack_of(Role.HITTABLE, Role.OCCLUDER))
-        return self._stack[1]
+        with self._lock:
+            if self._stack is None or self._stack[0] != self.version:
+                if self.atlas.wasteful:
+                    self._compact()
+                self._stack = (self.version, self.stack_of(Role.HITTABLE, Role.OCCLUDER))
+            return self._stack[1]
 
     def stack_of(self, *roles: Role) -> Stack:
         """Items of some roles, front to back."""
@@ -300,30 +316,35 @@ class Items:
         from planes.bounding import Bounds  # few scenes need them
 
         bounds = self._bounds.setdefault(kind, Bounds(kind))
-        rows = bounds.rows(self.offset[ids], self.sprites, self.variants, ids)
-        return bounds.volumes, rows
+        return bounds.rows(self.mask[ids], self.sprites, self.variants, ids, len(self.stack()))
 
-    def volumes(self, name: str, k: int, ids: Ints) -> Volumes:
-        """Volumes of items in the world, one row each; `name` is one of `planes.bounding.KINDS`."""
-        from planes.bounding import KINDS, Kind
+    def volumes(self, name: str, ids: Ints) -> Volumes:
+        """Volumes of items in the world, one row each; see `Scene.volumes`."""
+        from planes.bounding import KINDS, Kind, shifted
+        from planes.volumes import Aabbs
 
-        choice("kind", name, KINDS)
+        k = boxes_in("kind", name)
+        choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
         for item in ids[self.size_wh[ids, 0] == 0].tolist():
             raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
-        volumes, row = self.bounding(Kind(name, k), ids)
-        return volumes.take(row).translated(pixel(self.position_256[ids] - self.pivot_256[ids]))
+        if name == "box":
+            low, high = np.split(self.boxes(ids).astype(np.float64), 2, axis=1)
+            return Aabbs(low - 0.5, high + 0.5)
+        volumes, row = self.bounding(Kind(name) if k is None else Kind(KINDS[2], k), ids)
+        return shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
 
     def _use(self, item: int, variant: Variant) -> None:
         self.offset[item] = self.atlas.take(variant)
+        self.mask[item] = variant.uid
         self.pivot_256[item] = variant.pivot_x, variant.pivot_y
         self.size_wh[item] = variant.mask.shape[::-1]
 
     def _compact(self) -> None:
         """Lay the masks in use out anew, without the others."""
-        self._bounds.clear()
-        self.atlas = MaskAtlas()
+        atlas, offset = MaskAtlas(), self.offset.copy()
         for item in np.flatnonzero(self.alive[: self.count]).tolist():
-            self.offset[item] = self.atlas.take(self.variants[item])
+            offset[item] = atlas.take(self.variants[item])
+        self.atlas, self.offset = atlas, offset
 
     def _reserve(self, count: int) -> None:
         size = len(self.alive)

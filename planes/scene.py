@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals, within
 from planes.compose import CodePlane, label_plane, plane_fits
-from planes.constants import ALL, BOXES_MAX, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
+from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.index import Index
 from planes.items import ROLES, Items, Role
@@ -265,9 +265,9 @@ class Scene:
         row = int(self._existing(integer("id", item, 0, self.items.count - 1))[0])
         return self.items.variants[row].mask, self.items.corner(row)
 
-    def volumes(self, ids: object, kind: str, k: int = 1) -> Volumes:
-        """Volumes of objects, one row each, px: "circle", "oriented box", "boxes" (at most k), "polygon"."""
-        return self.items.volumes(kind, integer("k", k, 1, BOXES_MAX), self._existing(ids))
+    def volumes(self, ids: object, kind: str) -> Volumes:
+        """Volumes of objects, one row each, px: "box", "circle", "oriented box", "4 boxes" (or others), "polygon"."""
+        return self.items.volumes(kind, self._existing(ids))
 
     def extent(self) -> Box:
         """Box (x_min, y_min, x_max, y_max) of the bounds, or of all that is placed where there are none."""

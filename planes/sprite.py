@@ -100,6 +100,7 @@ class Variant:
     pivot_x: int
     pivot_y: int
     area: int
+    uid: int = field(default_factory=itertools.count().__next__)
 
 
 @dataclass(frozen=True, eq=False)

@@ -273,12 +273,12 @@ def test_masks_asked_for_one_after_another(kind: Kind) -> None:
             alone = bounding(kind, [items.sprites[item]], [items.variants[item]]).bounds()
             assert volumes.take([at]).bounds().min.tolist() == alone.min.tolist()
             assert volumes.take([at]).bounds().max.tolist() == alone.max.tolist()
-            assert rows.setdefault(int(items.offset[item]), at) == at
-    assert len(volumes) == len(set(items.offset[there].tolist()))
+            assert rows.setdefault(int(items.mask[item]), at) == at
+    assert len(volumes) == len(set(items.mask[there].tolist()))
 
 
 def test_masks_that_are_laid_out_anew() -> None:
-    """Numbers of masks begin again when those in use are laid out without the others."""
+    """Places of masks begin again when those in use are laid out without the others."""
     scene, kind = Scene(), Kind("circle")
     sprites = [Sprite.from_mask(np.ones((n, 1200), np.bool_)) for n in (1000, 900, 500, 3)]
     ids = [scene.add(sprite, (0, 0)) for sprite in sprites]
@@ -295,7 +295,8 @@ def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
     scene = Scene()
     mask = np.array([[0, 1, 1, 0], [1, 1, 1, 1]], np.bool_)
     ids = [scene.add(mask, xy, angle=angle) for xy, angle in (((1e9, -7.4), 0), ((3.2, 4), 90), ((0, 0), 31))]
-    volumes = scene.volumes(ids, kind.name, kind.k)
+    name = f"{kind.k} boxes" if kind.name == "boxes" else kind.name
+    volumes = scene.volumes(ids, name)
     bounds = volumes.bounds()
     for row, item in enumerate(ids):
         seen, (x, y) = scene.mask(item)
@@ -303,18 +304,77 @@ def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
         side = max(seen.shape)
         assert (bounds.min[row] > (x - side, y - side)).all()
         assert (bounds.max[row] < (x + 2 * side, y + 2 * side)).all()
-    assert len(scene.volumes([], kind.name, kind.k)) == 0
+    assert len(scene.volumes([], name)) == 0
 
 
 def test_volumes_that_objects_do_not_have() -> None:
     scene = Scene()
     item, empty = scene.add([[True]], (1, 1)), scene.add([[False]], (1, 1))
     for ids, kind, told in (
-        ([item], "sphere", "kind: expected one of 'circle', 'oriented box', 'boxes', 'polygon', got 'sphere'"),
+        ([item], "sphere", "kind: expected one of 'box', 'circle', 'oriented box', '4 boxes', 'polygon', got 'sphere'"),
         ([item, empty], "circle", f"ids: expected objects with a pixel, got {empty}, whose mask is empty"),
         ([5], "circle", "id"),
     ):
         with pytest.raises(InputError, match=told):
             scene.volumes(ids, kind)
-    with pytest.raises(InputError, match="k: expected a whole number from 1 to 64, got 0"):
-        scene.volumes([item], "boxes", 0)
+    with pytest.raises(InputError, match="kind: expected 1 to 64 boxes, got 0"):
+        scene.volumes([item], "0 boxes")
+
+
+def test_boxes_of_objects_are_those_of_their_masks() -> None:
+    scene = Scene()
+    ids = [scene.add(np.ones((2, 3), np.bool_), (10, 20), angle=angle) for angle in (0, 90, 30)]
+    boxes = scene.volumes(ids, "box")
+    for row, item in enumerate(ids):
+        mask, (x, y) = scene.mask(item)
+        assert boxes.bounds().min[row].tolist() == [x - 0.5, y - 0.5]
+        assert boxes.bounds().max[row].tolist() == [x + mask.shape[1] - 0.5, y + mask.shape[0] - 0.5]
+
+
+@pytest.mark.parametrize("position", [1e6, 3e7 + 0.3, 1e9, 2.0**36])
+def test_circles_far_away_hold_what_they_hold_here(position: float) -> None:
+    rng = np.random.default_rng(5)
+    scene = Scene()
+    for mask in masks(rng, 12, 9):
+        item = scene.add(mask, (position, -position / 3), angle=float(rng.uniform(0, 360)))
+        seen, (x, y) = scene.mask(item)
+        if not seen.any():
+            continue
+        circle = scene.volumes([item], "circle")
+        assert isinstance(circle, Circles)
+        (cx, cy), r = map(Fraction, circle.center[0].tolist()), Fraction(circle.radius[0])
+        corners = (p for square in squares(seen) for p in square)
+        assert all((p + x - cx) ** 2 + (q + y - cy) ** 2 <= r * r for p, q in corners)
+        assert circle.radius[0] < np.hypot(*seen.shape) + 1
+
+
+def test_uneven_scales_grow_a_volume_by_no_more() -> None:
+    """Wide and flat: by a pixel on each side, not by a pixel of the frame, which is wide now."""
+    sprite = Sprite.from_mask(np.ones((40, 8), np.bool_))
+    for scale in ((4.0, 0.25), (8.0, 0.0625), (0.25, 4.0)):
+        seen = variant(sprite, ("none", scale, 0))
+        for kind in EVERY[1:]:
+            low, high = bounding(kind, [sprite], [seen]).bounds(), fit.box(seen.mask)
+            assert (low.min > high.min - 1.8).all()
+            assert (low.max < high.max + 1.8).all()
+
+
+def test_a_needle_has_a_box() -> None:
+    """A corner that is all but straight back would go far as its sides move out."""
+    sprite = Sprite.from_mask(np.tri(3, 300, dtype=np.bool_, k=297)[:, ::-1])
+    for scale, angle in (((1.0, 0.3), 7.0), ((3.0, 0.1), 100.0), ((1.0, 1.0), 45.0)):
+        seen = variant(sprite, ("none", scale, angle))
+        for kind in EVERY:
+            volume = bounding(kind, [sprite], [seen])
+            assert holds(volume, seen.mask)
+            assert (volume.bounds().max - volume.bounds().min < 2 * max(seen.mask.shape) + 20).all()
+
+
+def test_masks_of_the_past_are_not_kept_for_ever() -> None:
+    scene = Scene()
+    item = scene.add(np.ones((3, 5), np.bool_), (0, 0))
+    rows = []
+    for angle in range(700):
+        scene.set(item, angle=angle / 3)
+        rows.append(len(scene.items.bounding(Kind("polygon"), np.array([item]))[0]))
+    assert 100 < max(rows) < 300

@@ -8,23 +8,20 @@ It may keep too much; it never drops a hit: a pixel that is shared lies, with it
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from planes.arrays import Bools, InputError, Ints, choice
-from planes.constants import BOXES_MAX
+from planes.arrays import Bools, Ints, choice
 from planes.index import Index
-from planes.items import Items, Stack, overlapping
+from planes.items import Items, Stack, boxes_in, overlapping
 from planes.sampling import Pairs
 from weapons.volley import Shots, Volley
 
 __all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "prefilter_of", "refused"]
 
-PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "boxes", "polygon", "swept")
-BOXES = 4
-"""Boxes of the pre-filter "boxes" where no number is given."""
+PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "4 boxes", "polygon", "swept")
+"""Names of pre-filters; any number of boxes up to BOXES_MAX is one."""
 
 
 @dataclass(frozen=True)
@@ -49,18 +46,15 @@ class Prefilter:
 BOX = Prefilter("box")
 
 
-def prefilter_of(text: object) -> Prefilter:
-    """Read the name of a pre-filter: one of PREFILTERS, or "8 boxes"."""
-    counted = re.fullmatch(r"([0-9]{1,3}) boxes", text) if isinstance(text, str) else None
-    if counted:
-        k = int(counted[1])
-        if not 1 <= k <= BOXES_MAX:
-            raise InputError(f"prefilter: expected 1 to {BOXES_MAX} boxes, got {k}")
+def prefilter_of(name: object) -> Prefilter:
+    """Read the name of a pre-filter: one of PREFILTERS, with any number of boxes."""
+    k = boxes_in("prefilter", name)
+    if k is not None:
         return Prefilter("boxes", "boxes", k)
-    name = choice("prefilter", text, PREFILTERS)
-    if name in PREFILTERS[:3]:
-        return Prefilter(name)
-    return Prefilter(name, "circle" if name == "swept" else name, BOXES if name == "boxes" else 1)
+    known = choice("prefilter", name, PREFILTERS)
+    if known in PREFILTERS[:3]:
+        return Prefilter(known)
+    return Prefilter(known, "circle" if known == "swept" else known)
 
 
 def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
@@ -92,7 +86,8 @@ class Candidates:
     items, stack : what may be hit, and its order
     prefilter : what goes before the pixels
     index : the broad phase; None compares all boxes
-    why : why this pre-filter
+    why, why_unindexed : why this pre-filter, and why no broad phase
+    met : pairs of boxes that met, so far
     """
 
     items: Items
@@ -100,6 +95,8 @@ class Candidates:
     prefilter: Prefilter = BOX
     index: Index | None = None
     why: str = "boxes that share a pixel"
+    why_unindexed: str = "as asked for"
+    met: int = 0
 
     def pairs(self, volley: Volley, placements: Ints, boxes_xyxy: Ints, shots: Shots) -> Pairs:
         """Pairs of some placements and the items that they may touch, front to back.
@@ -110,6 +107,7 @@ class Candidates:
         boxes_xyxy : (P, 4) inclusive boxes of what is asked of each
         """
         row, rank = self._boxes(boxes_xyxy)
+        self.met += len(rank)
         placement = placements[row]
         if self.prefilter.volume:
             near = volley.count[placement] > 0  # the box of an empty pattern lies within others

@@ -5,6 +5,8 @@ scene -> stack -> weapon -> patterns -> placed -> pre-filter -> samples -> rows
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from planes.arrays import InputError
@@ -12,10 +14,11 @@ from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import Verdict
 from planes.scene import Scene
 from weapons.arsenal import Weapon, pierces
+from weapons.candidates import Candidates
 from weapons.hits import Hits, Rows, rows_of_met
 from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused
 from weapons.resolve import Sight, composed, direct
-from weapons.volley import Volley, checked_shots, volley_of
+from weapons.volley import Shots, Volley, checked_shots, volley_of
 
 __all__ = ["fire"]
 
@@ -51,7 +54,8 @@ def fire(
     shot : numbers of the shots, 0 .. N-1 by default: a shot of a batch fired again alone under its number is the same
     prefilter : "auto", "none", "box", "circle", "oriented box", "4 boxes" (1 to 64), "polygon", "swept": what goes
         before the pixels; it changes no row
-    broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row
+    broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row; none
+        without a pre-filter
     strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row
 
     Each of aim, toward, accept, exclude, seed and shot is one for all shots or one for each.
@@ -64,9 +68,7 @@ def fire(
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
     plan, stack = Plan(), scene.items.stack()
-    if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
-        accept = scene.category_bits(*accept)
-    shots = checked_shots(weapon, at, aim, toward, accept, exclude, seed, shot)
+    shots = checked_shots(weapon, at, aim, toward, _bits(scene, accept), exclude, seed, shot)
     first = volley_of(weapon, shots.take(0, 1))
     placements = len(first.shot) * len(shots)
     name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
@@ -78,9 +80,7 @@ def fire(
     if plane and codes is not None:
         plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * codes.itemsize)
     rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
-    step = _shots_per_part(first, len(stack) if candidates.index is None else len(stack) // INDEXED)
-    for begin in range(0, len(shots), step):
-        part = shots.take(begin, min(begin + step, len(shots)))
+    for begin, part in _parts(shots, first, candidates):
         volley = first if len(shots) == 1 else volley_of(weapon, part)
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.table.nbytes)
         if plane and codes is not None:
@@ -93,15 +93,25 @@ def fire(
     return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
 
 
-INDEXED = 16
-"""Of the items, a broad phase is taken to give one in so many for a placement."""
+def _bits(scene: Scene, accept: object) -> object:
+    """Category bits of names; anything else as it is."""
+    if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
+        return scene.category_bits(*accept)
+    return accept
 
 
-def _shots_per_part(first: Volley, items: int) -> int:
-    """Shots worked on at a time, so that samples and pairs of a part stay within their chunks.
+def _parts(shots: Shots, first: Volley, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
+    """Cut a batch so that the samples and pairs of a part stay within their chunks.
 
-    All shots of a call have the weapon of the first, and patterns of about its size.
+    All shots of a call have the weapon of the first, and patterns of about its size. With a broad phase parts grow as
+    long as placements meet few items.
     """
     placements = max(len(first.shot), 1)
-    samples = max(int(first.count.sum()), placements)
-    return max(1, min(CHUNK_SAMPLES // samples, CHUNK_PAIRS // (placements * max(items, 1))))
+    most = max(1, CHUNK_SAMPLES // max(int(first.count.sum()), placements))
+    step = max(1, min(most, CHUNK_PAIRS // (placements * max(len(candidates.stack), 1))))
+    begin = 0
+    while begin < len(shots):
+        yield begin, shots.take(begin, min(begin + step, len(shots)))
+        begin += step
+        if candidates.index is not None:
+            step = max(1, min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1)))

@@ -126,8 +126,8 @@ def plan_lines(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) 
             often = "" if calls == 1 else f", {stage['calls']} of {calls} calls"
             made = f", {stage['bytes']:,} bytes" if stage.get("bytes") else ""
             kept, of = stage.get("pairs", (0, 0))
-            tested = f", tested {kept:,} of {of:,}" if of else ""
-            lines.append(f"{verb:8} {stage['stage']}{often}{tested}{made}: {stage['why']}")
+            left = f", {kept:,} of {of:,} pairs left" if of else ""
+            lines.append(f"{verb:8} {stage['stage']}{often}{left}{made}: {stage['why']}")
     return lines
 
 
@@ -180,14 +180,16 @@ def chosen_candidates(
     if wanted.name == "none":
         if structure not in ("auto", "none"):
             raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
-        return Candidates(scene.items, stack, wanted, None, "none: every item")
+        return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
     if wanted.name == "auto":
         wanted = prefilter_of("swept") if _sweep_pays(stack, table, asked) else BOX
     told = "box" if wanted == BOX else f"box, then {wanted}"
-    if structure == "auto":
-        structure = "bvh" if _bvh_pays(scene, len(stack), asked) else "none"
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, told)
+    if structure == "auto":
+        if not _bvh_pays(scene, len(stack), asked):
+            return Candidates(scene.items, stack, wanted, None, told, "few pairs: every box is compared")
+        structure = "bvh"
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
 
 
@@ -235,11 +237,13 @@ def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
 
 def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, why_strategy: str) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
+    idle = "no sample needed the stack"
     if not plan.has_run("broad phase"):
-        few = "few pairs: every box is compared"
-        plan.leave_out("broad phase", few if candidates.index is None else "no sample needed the stack")
+        plan.leave_out("broad phase", candidates.why_unindexed if candidates.index is None else idle)
     if not candidates.prefilter.volume:
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
+    elif not plan.has_run("pre-filter"):
+        plan.leave_out("volumes", idle)
     if table.prefix is None:
         plan.leave_out("weights", "the weapon has no falloff")
     if scene.bounds is None:
@@ -249,7 +253,7 @@ def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: Pa
     if not plan.has_run("code plane"):
         plan.leave_out("code plane", f"direct: {why_strategy}")
     if not plan.has_run("pre-filter"):
-        plan.leave_out("pre-filter", "no sample needed the stack")
+        plan.leave_out("pre-filter", idle)
     if not plan.has_run("walk"):
         plan.leave_out("walk", "no sample lay where it needed one")
     for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
