@@ -96,7 +96,7 @@ class Index:
         self._seen = items.version
         if self.boxes is not None and (
             len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
-            or len(self.boxes) > INDEX_GROWTH * self._made_of + 16
+            or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
         ):
             self.boxes = None
         if self.boxes is None:

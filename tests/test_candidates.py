@@ -14,14 +14,16 @@ import numpy as np
 import pytest
 
 import planes.items
+import weapons.firing
 from planes import InputError, Scene, Sprite
 from planes.arrays import Bools
+from planes.broadphase import Grid
 from planes.constants import INDEX_SLACK
 from planes.index import STRUCTURES, Index
 from planes.items import overlapping
 from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, fire, plan
 from weapons.arsenal import Plain, pattern_of
-from weapons.candidates import prefilter_of
+from weapons.candidates import Candidates, prefilter_of
 from weapons.plan import Stage
 
 ROOT = Path(__file__).parents[1]
@@ -156,7 +158,8 @@ def test_a_pattern_lies_in_its_volume(weapon: Plain, name: str) -> None:
 
 
 def test_names_of_prefilters() -> None:
-    assert str(prefilter_of("boxes")) == "4 boxes"
+    assert str(prefilter_of("4 boxes")) == "4 boxes"
+    assert prefilter_of("1 box") == prefilter_of("1 boxes")
     assert str(prefilter_of("12 boxes")) == "12 boxes"
     assert str(prefilter_of("oriented box")) == "oriented box"
     assert not prefilter_of("box").volume
@@ -181,15 +184,19 @@ def test_the_plan_tells_what_was_tested() -> None:
     assert why(told.left_out, "volumes") == "boxes are the pre-filter"
     told = fire(scene, Disc(3), (60, 60), prefilter="none", strategy="direct").plan
     assert why(told.left_out, "volumes") == "no pre-filter"
-    assert why(told.left_out, "broad phase") == "few pairs: every box is compared"
+    assert why(told.left_out, "broad phase") == "no box is compared"
+    auto, asked = (fire(scene, Disc(3), (60, 60), broadphase=b, strategy="direct").plan for b in ("auto", "none"))
+    assert why(auto.left_out, "broad phase") == "few pairs: every box is compared"
+    assert why(asked.left_out, "broad phase") == "as asked for"
     (row,) = (stage for stage in told.to_dict()["ran"] if stage["stage"] == "pre-filter")
     assert row["pairs"] == [count, count]
 
 
 def test_a_broad_phase_that_no_sample_needed_is_left_out() -> None:
     scene = crowd(3, 30)
-    told = fire(scene, Disc(3), (60, 60), broadphase="grid", strategy="composed").plan
-    assert why(told.left_out, "broad phase") == "no sample needed the stack"
+    told = fire(scene, Disc(3), (60, 60), prefilter="circle", broadphase="grid", strategy="composed").plan
+    for stage in ("broad phase", "volumes", "pre-filter"):
+        assert why(told.left_out, stage) == "no sample needed the stack"
     assert scene.index("grid").boxes is None
 
 
@@ -240,6 +247,8 @@ scene = Scene((99, 99))
 ids = [scene.add([[True]], (i, i)) for i in range(40)]
 fire(scene, Disc(3), [(9, 9)] * 20, strategy="direct")
 fire(scene, Beam(9, 1), (9, 9)).why_not()
+import weapons.cli, weapons.facts, weapons.picture
+weapons.picture.picture_of_report(weapons.facts.report_of(scene, [fire(scene, Disc(3), (9, 9))]), scene)
 print([name for name in {UNUSED} if name in sys.modules])
 fire(scene, Disc(3), (9, 9), prefilter="box", broadphase="bvh", strategy="direct")
 fire(scene, Disc(3), (9, 9), prefilter="circle", strategy="direct")
@@ -258,6 +267,10 @@ def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:
     for broadphase in BROADPHASES:
         scene = crowd(11, 300, 300)
         truth = fire(scene, Disc(4), at, prefilter="none", strategy="direct")
+        large = scene.add(np.ones((1500, 1500), np.bool_), (0, 0))
+        scene.items.stack()
+        scene.remove(large)
+        assert scene.items.atlas.wasteful  # the first who fires lays the masks out anew
         with ThreadPoolExecutor(8) as pool:
             futures = [
                 pool.submit(fire, scene, Disc(4), at, prefilter=prefilter, broadphase=broadphase, strategy="direct")
@@ -340,6 +353,42 @@ def test_changes_that_no_answer_follows_do_not_pile_up() -> None:
     ]
 
 
+def test_an_index_that_has_grown_is_made_anew() -> None:
+    """A grid chosen for one pixel is no grid for what came later."""
+    scene = Scene()
+    scene.add([[True]], (0, 0))
+    index = scene.index("grid")
+    first = index.read(scene.items)
+    for i in range(200):
+        scene.add(np.ones((20, 20), np.bool_), (30 * (i % 20), 30 * (i // 20)))
+    second = index.read(scene.items)
+    assert second is not first
+    assert isinstance(second, Grid)
+    assert second.cell > 10
+
+
+def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every placement meets every item: a broad phase helps nothing, and must not take more memory either."""
+    scene = Scene()
+    for i in range(300):
+        scene.add(np.ones((9, 9), np.bool_), (i % 3, i // 3 % 3))
+    monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", 6000)
+    most = []
+    monkeypatch.setattr(
+        Candidates, "pairs", lambda self, *a, pairs=Candidates.pairs: most.append(p := pairs(self, *a)) or p
+    )
+    at = np.zeros((500, 2))
+    hits = fire(scene, Point(), at, strategy="direct", broadphase="bvh")
+    assert max(len(pairs.rank) for pairs in most) <= 2 * 6000
+    assert hits == fire(scene, Point(), at, strategy="direct", broadphase="none")
+    spread = Scene()
+    for i in range(300):
+        spread.add([[True]], (9 * i, 0))
+    most.clear()
+    fire(spread, Point(), at, strategy="direct", broadphase="bvh")
+    assert len(most) < 10  # few are met: parts grow
+
+
 def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
     scene = crowd(2, 10)
     index = scene.index("grid")
@@ -349,7 +398,7 @@ def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
 
 
 def test_an_index_forgets_boxes_that_came_and_went() -> None:
-    scene = crowd(2, 10)
+    scene = crowd(2, 300)
     index = scene.index("bvh")
     first = index.read(scene.items)
     rounds = 0

@@ -12,12 +12,12 @@ import pytest
 from planes import InputError, Scene, Sprite, load_scene
 from weapons import Beam, Disc, Point, Spread, Weapon, fire
 from weapons.cli import main
+from weapons.differences import differences
 from weapons.facts import SHOTS_MAX, report_of
-from weapons.marks import MARKS
+from weapons.marks import LET_THROUGH, MARKS, PASSED_OVER, SKETCH
 from weapons.picture import picture_of_report
 from weapons.schemas import REPORT
 from weapons.sieve import CELLS_MAX, PATTERNS_MAX
-from weapons.sketch import SKETCH
 from weapons.world import factor_of
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
@@ -71,7 +71,7 @@ def test_without_a_word_nothing_is_told_or_drawn() -> None:
     told = report(scene, Disc(20), (90, 60))
     assert "filter" not in told
     assert "tested" not in told["shots"][0]
-    assert not colors(picture_of_report(told, scene, text=False)) & {SKETCH["volume tested"], SKETCH["cell"]}
+    assert not colors(picture_of_report(told, scene, text=False)) & {SKETCH[LET_THROUGH], SKETCH["cell"]}
 
 
 @pytest.mark.parametrize(("prefilter", "broadphase"), WAYS)
@@ -80,9 +80,9 @@ def test_volumes_and_cells_are_drawn_and_in_the_legend(prefilter: str | None, br
     told = report(scene, Disc(20), (90, 60), prefilter=prefilter, broadphase=broadphase)
     seen = colors(picture_of_report(told, scene, text=False))
     drawn = {name for name, color in SKETCH.items() if color in seen and color not in (c for c, _ in MARKS.values())}
-    volumes = set() if prefilter == "none" else {"volume tested", "volume passed over"}
+    volumes = set() if prefilter == "none" else {LET_THROUGH, PASSED_OVER}
     assert drawn >= volumes
-    assert ("volume tested" in drawn) == (prefilter != "none")
+    assert (LET_THROUGH in drawn) == (prefilter != "none")
     assert ("cell" in drawn) <= (broadphase in ("grid", "quadtree", "bvh"))
     if broadphase == "grid":
         assert "cell" in drawn
@@ -95,7 +95,7 @@ def test_a_volume_is_drawn_around_its_object() -> None:
     told = report(scene, Point(), (40, 30), prefilter="box")
     factor = factor_of(tuple(told["view_xyxy"]))
     picture = picture_of_report(told, scene, text=False)
-    y, x = np.nonzero((picture == SKETCH["volume tested"]).all(axis=2))
+    y, x = np.nonzero((picture == SKETCH[LET_THROUGH]).all(axis=2))
     keep = y < 44 + 60 * factor  # not the legend
     left, top = min(x[keep]), min(y[keep])
     width, height = np.ptp(x[keep]), np.ptp(y[keep])
@@ -113,10 +113,10 @@ def test_pellets_have_volumes_of_their_own_and_not_too_many() -> None:
 
 def test_a_batch_tells_cells_but_no_volumes() -> None:
     scene = yard()
-    many = [(i, 60) for i in range(SHOTS_MAX + 1)]
+    many = [(20 + i, 40) for i in range(SHOTS_MAX + 1)]
     told = report(scene, Point(), many, prefilter="circle", broadphase="grid")
     assert not told["shots"]
-    assert told["filter"]["cells"]
+    assert {cell["opened"] for cell in told["filter"]["cells"]} == {True, False}
     REPORT.check("report", json.loads(json.dumps(told)))
     picture_of_report(told, scene)
 
@@ -148,7 +148,7 @@ def test_cells_are_cut_to_the_view() -> None:
 @pytest.mark.parametrize(
     ("how", "told"),
     [
-        ({"prefilter": "auto"}, "prefilter: expected one to be shown, got 'auto'"),
+        ({"prefilter": "auto"}, "prefilter: expected one to be shown, of none, box, .*, swept, got 'auto'"),
         ({"prefilter": "cirle"}, r"prefilter: .*did you mean 'circle'"),
         ({"broadphase": "tree"}, "broadphase: expected one of"),
         ({"prefilter": "none", "broadphase": "grid"}, "broadphase: expected 'none' without a pre-filter, got 'grid'"),
@@ -163,7 +163,7 @@ def test_the_command_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[st
     words = ["report", str(GALLERY), "-o", str(tmp_path / "r.png"), "--json", str(tmp_path / "r.json"), "--plan"]
     assert main([*words, "--prefilter", "4 boxes", "--broadphase", "grid"]) == 0
     out = capsys.readouterr().out
-    assert "pre-filter, tested 1 of 26" in out
+    assert "pre-filter, 1 of 26 pairs left" in out
     assert "box, then 4 boxes, by grid" in out
     found = json.loads((tmp_path / "r.json").read_text())
     assert found["filter"]["prefilter"] == "4 boxes"
@@ -182,3 +182,49 @@ def test_a_sketch_leaves_the_rest_to_be_seen() -> None:
     )
     changed = (plain != drawn).any(axis=2).mean()
     assert 0 < changed < 0.03
+
+
+def test_a_long_volume_is_drawn_where_it_is() -> None:
+    """Its ends lie far beyond the picture; in the picture it follows the beam."""
+    scene = Scene((120, 90))
+    scene.add(Sprite.circle(5), (60, 34))
+    told = report_of(scene, [fire(scene, Beam(500_000, 6), (0, 0), aim=30)], prefilter="swept")
+    picture = picture_of_report(told, scene, text=False)
+    factor = factor_of(tuple(told["view_xyxy"]))
+    x0, y0 = told["view_xyxy"][:2]
+    left = (picture.shape[1] - (told["view_xyxy"][2] - x0 + 1) * factor) // 2
+    y, x = np.nonzero((picture[44 : 44 + (told["view_xyxy"][3] - y0 + 1) * factor] == (255, 255, 255)).all(axis=2))
+    world = np.stack([(x - left) / factor + x0 - 0.5, y / factor + y0 - 0.5], axis=1)
+    across = np.abs(world @ [-np.sin(np.pi / 6), np.cos(np.pi / 6)])
+    on_edge = (across > 3) & (across < 6) & (world[:, 0] > 20)
+    assert on_edge.sum() > 100 * factor
+    assert world[on_edge].max(axis=0)[0] > 110
+
+
+def test_a_filter_without_what_was_tested_is_refused() -> None:
+    scene = yard()
+    told = report(scene, Disc(20), (90, 60), prefilter="circle")
+    del told["shots"][0]["tested"]
+    with pytest.raises(InputError, match="shots: expected 'tested' in each, as the report has a filter"):
+        picture_of_report(told, scene)
+
+
+def test_reports_that_differ_in_the_filter_only_are_the_same() -> None:
+    scene = yard()
+    plain, *shown = (
+        report(scene, Disc(20), (90, 60), **how) for how in ({}, {"prefilter": "circle"}, {"broadphase": "bvh"})
+    )
+    assert all(differences(plain, other) == [] for other in shown)
+    assert differences(shown[0], shown[1]) == []
+
+
+def test_each_cell_told_as_opened_meets_a_shot() -> None:
+    scene = Scene((600, 600))
+    rng = np.random.default_rng(2)
+    for xy in rng.uniform(0, 600, (300, 2)):
+        scene.add(Sprite.circle(4), xy)
+    for broadphase in ("grid", "quadtree", "bvh"):
+        told = report(scene, Disc(20), (300, 200), broadphase=broadphase)
+        opened = [cell["box_xyxy"] for cell in told["filter"]["cells"] if cell["opened"]]
+        assert opened
+        assert all(x <= 320 and x_max >= 280 and y <= 220 and y_max >= 180 for x, y, x_max, y_max in opened), broadphase

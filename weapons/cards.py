@@ -144,15 +144,18 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
         )
     lines += _rest(batch["objects"], HIT_LINES, " hit")
     lines.append([f"{never} of {report['scene']['hittable']} objects never hit" if never else "every object was hit"])
+    if "filter" in report:
+        lines.append(["volumes are drawn for a few shots only; cells for all"])
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
     return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
 
 
 def _tested(tested: Mapping[str, Any]) -> str:
-    """How many objects and occluders a shot's pixels were tested with, of how many."""
-    cells = f", {tested['opened']} cells opened" if tested["opened"] else ""
-    return f"tested {len(tested['objects'])} of {tested['of']} objects and occluders{cells}"
+    """With how many objects and occluders a shot's pixels were compared, of how many."""
+    opened = tested["opened"]
+    cells = f", {opened} cell{'s' if opened > 1 else ''} opened" if opened else ""
+    return f"tested {len(tested['objects'])} of {tested['of']} objects and occluders by pixels{cells}"
 
 
 def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:

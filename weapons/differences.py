@@ -31,7 +31,12 @@ __all__ = ["decisive", "differences"]
 PIXELS_NAMED = 2
 """Pixels that a line names of those gained or lost."""
 
-ABOUT = {"report": ("version", "times"), "scene": ("version", "hash"), "shot": ("plan",), "batch": ("plan", "times")}
+ABOUT = {
+    "report": ("version", "times", "filter"),
+    "scene": ("version", "hash"),
+    "shot": ("plan", "tested"),
+    "batch": ("plan", "times"),
+}
 """What says how a report was made, and decides nothing."""
 
 SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (

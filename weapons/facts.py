@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from planes.spans import Box, Spans
 from weapons.arsenal import parts_of
 from weapons.heat import heat_of
 from weapons.hits import HitRow, Hits
-from weapons.sieve import Sieve, sieve_of
-from weapons.volley import volley_of
+from weapons.volley import Volley, volley_of
+
+if TYPE_CHECKING:
+    from weapons.sieve import Sieve
 
 __all__ = ["FORMAT", "SHOTS_MAX", "report_of"]
 
@@ -69,7 +71,11 @@ def report_of(
     each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
     told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
     view = view_of(scene, fired)
-    sieve = sieve_of(scene, view, prefilter, broadphase)
+    sieve = None
+    if prefilter is not None or broadphase is not None:
+        from weapons.sieve import sieve_of  # few reports need it
+
+        sieve = sieve_of(scene, view, prefilter, broadphase)
     return {
         "format": FORMAT,
         "version": version("hitplanes"),
@@ -85,16 +91,17 @@ def report_of(
         "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
         "shots": told,
         "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
-        **({} if sieve is None else {"filter": _sifted(sieve, each if told else [], told)}),
+        **({} if sieve is None else {"filter": _sifted(sieve, fired, each if told else [], told)}),
     }
 
 
-def _sifted(sieve: Sieve, each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Tell what each shot was tested with, and what the pre-filter is."""
-    opened = [np.zeros(0, np.int64)]
+def _sifted(
+    sieve: Sieve, fired: Sequence[Hits], each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """Tell what each shot was compared with, and what the pre-filter is."""
     for (hits, _, row), shot in zip(each, told, strict=True):
-        shot["tested"], cells = sieve.told(hits, row)
-        opened.append(cells)
+        shot["tested"] = sieve.told(hits, row)
+    opened = [np.zeros(0, np.int64), *(sieve.opened(volley) for hits in fired for volley in _volleys(hits))]
     return sieve.to_dict(np.unique(np.concatenate(opened)))
 
 
@@ -142,14 +149,20 @@ def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int
 def _boxes(hits: Hits) -> Ints:
     """Box (n, 4) around the samples of each part of a batch that has any."""
     found = []
-    burst, spread, _ = parts_of(hits.weapon)
-    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
-    for first in range(0, len(hits.shots), step):
-        boxes = volley_of(hits.weapon, hits.shots.take(first, first + step)).boxes
+    for volley in _volleys(hits):
+        boxes = volley.boxes
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
         if len(boxes):
             found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
     return np.array(found, np.int64).reshape(-1, 4)
+
+
+def _volleys(hits: Hits) -> Iterator[Volley]:
+    """A batch as volleys of not too many placements."""
+    burst, spread, _ = parts_of(hits.weapon)
+    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
+    for first in range(0, len(hits.shots), step):
+        yield volley_of(hits.weapon, hits.shots.take(first, first + step))
 
 
 def _checked(scene: Scene, fired: object) -> list[Hits]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from planes.arrays import Bools
 
-__all__ = ["HEAT", "MARKS", "TINT", "glyph", "tiled_glyph"]
+__all__ = ["HEAT", "LET_THROUGH", "MARKS", "PASSED_OVER", "SKETCH", "TINT", "glyph", "tiled_glyph"]
 
 MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
     "empty": ((255, 255, 255), 190),
@@ -22,6 +22,16 @@ HEAT = (
     (246, 215, 70), (252, 255, 164),
 )  # fmt: skip
 """Colours of heat, from the least to the most: after inferno (Smith, van der Walt 2015), rising in lightness."""
+
+LET_THROUGH, PASSED_OVER = "let through to the pixels", "passed over, by box or volume"
+SKETCH = {
+    LET_THROUGH: (96, 226, 150),
+    PASSED_OVER: (150, 156, 168),
+    "volume of the shot": (255, 255, 255),
+    "cell opened": (86, 180, 233),
+    "cell": (96, 102, 114),
+}
+"""Colours of what may be drawn of a pre-filter: volumes of items, volumes of shots, cells."""
 
 TINT = 40
 """Opacity of a mark's ground: where samples are too small for a shape each, it shows all of them."""

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 
 from planes.arrays import Image
-from weapons.marks import HEAT, MARKS, glyph
-from weapons.sketch import SKETCH
+from weapons.marks import HEAT, LET_THROUGH, MARKS, SKETCH, glyph
 from weapons.world import HATCH, OUTLINES, World
 
 __all__ = [
@@ -161,7 +160,7 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
             entries.append(Entry(word, _outlined(kind)))
     for name, color in SKETCH.items():
         if name in painted:
-            entries.append(Entry(name, _boxed(color, name)))
+            entries.append(Entry(name, _sketched(color, name)))
     if "occluder" in painted:
         rows, columns = np.mgrid[:14, :14]
         mark = _blank(14)
@@ -198,15 +197,17 @@ def _outlined(kind: str) -> Image:
     return mark
 
 
-def _boxed(color: Color, name: str) -> Image:
-    """Border of a volume, or of a cell with its ground."""
+def _sketched(color: Color, name: str) -> Image:
+    """Outline of a volume, a rhombus to be told from an object's; or a cell, with its ground where it was opened."""
     mark = _blank(14)
-    thick = 2 if name == "volume tested" else 1
-    if name == "cell opened":
-        mark[:] = (np.array(color) + 2 * mark.astype(np.int64)) // 3
-    border = np.ones((14, 14), np.bool_)
-    border[thick:-thick, thick:-thick] = False
-    mark[border] = color
+    if name.startswith("cell"):
+        if name == "cell opened":
+            mark[:] = (np.array(color) + 2 * mark.astype(np.int64)) // 3
+        mark[[0, -1]] = mark[:, [0, -1]] = color
+        return mark
+    rows, columns = np.mgrid[:14, :14]
+    away = abs(2 * rows - 13) + abs(2 * columns - 13)
+    mark[(away <= 13) & (away > (7 if name == LET_THROUGH else 9))] = color
     return mark
 
 

@@ -15,7 +15,6 @@ from weapons.cards import batch_cards, shot_card
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import Text, draw_texts, page_of
-from weapons.sketch import draw_cells, draw_volumes
 from weapons.world import World, factor_of
 
 __all__ = ["picture_of_report"]
@@ -44,6 +43,8 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     view = tuple(report["view_xyxy"])
     world = World(scene, report["scene"]["bounds_xyxy"], view, factor_of(view))
     if "filter" in report:
+        from weapons.sketch import draw_cells  # few reports need it
+
         draw_cells(world, report)
     if report["batch"]:
         texts, cards = _heat(world, report, scene), batch_cards(report)
@@ -68,6 +69,8 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
         for item in sorted(items):
             world.outline(item, kind)
     if "filter" in report:
+        from weapons.sketch import draw_volumes
+
         draw_volumes(world, report, scene)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)

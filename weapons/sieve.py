@@ -13,7 +13,7 @@ from planes.index import STRUCTURES, Index
 from planes.scene import Scene
 from planes.spans import Box
 from planes.volumes import Parts, Volumes
-from weapons.candidates import Candidates, Prefilter, prefilter_of
+from weapons.candidates import PREFILTERS, Candidates, Prefilter, prefilter_of
 from weapons.hits import Hits
 from weapons.narrow import pattern_volumes
 from weapons.volley import Volley, volley_of
@@ -26,7 +26,7 @@ CELLS_MAX = 4096
 PATTERNS_MAX = 64
 """Volumes told of one shot: of its first pellets."""
 
-CORNERS = 72
+ROUND_CORNERS = 72
 """Corners of a circle that is drawn."""
 
 
@@ -57,21 +57,20 @@ class Sieve:
             "cells": cells,
         }
 
-    def told(self, hits: Hits, row: int) -> tuple[dict[str, Any], Ints]:
-        """What a shot was tested with, as JSON, and the numbers of the cells that were opened for it."""
+    def told(self, hits: Hits, row: int) -> dict[str, Any]:
+        """What the pixels of a shot were compared with, of how many, as JSON; and how many cells were opened for it."""
         shot, stack = hits.shots.take(row, row + 1), self.scene.items.stack()
         volley = volley_of(hits.weapon, shot)
         candidates = Candidates(self.scene.items, stack, self.prefilter, self.index)
         pairs = candidates.pairs(volley, np.arange(len(volley.shot)), volley.boxes, shot)
-        opened = self._opened(volley)
         return {
             "objects": np.unique(stack.ids[pairs.rank]).tolist(),
             "of": len(stack),
-            "opened": len(opened),
+            "opened": len(self.opened(volley)),
             "patterns": [{"points": points.tolist()} for points in self._patterns(volley)],
-        }, opened
+        }
 
-    def _opened(self, volley: Volley) -> Ints:
+    def opened(self, volley: Volley) -> Ints:
         """Numbers of the cells or nodes that are looked into for the boxes of a volley."""
         if self.index is None:
             return np.zeros(0, np.int64)
@@ -117,7 +116,7 @@ def sieve_of(scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: st
         return None
     wanted = prefilter_of("box" if prefilter is None else prefilter)
     if wanted.name == "auto":
-        raise InputError("prefilter: expected one to be shown, got 'auto'")
+        raise InputError(f"prefilter: expected one to be shown, of {', '.join(PREFILTERS[1:])}, got 'auto'")
     structure = choice("broadphase", "none" if broadphase is None else broadphase, tuple(STRUCTURES))
     if wanted.name == "none" and structure != "none":
         raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
@@ -144,6 +143,6 @@ def _round(points: Floats, radius: float) -> Floats:
     """Outline of a point, or of a segment, grown by a radius: half a circle about each end."""
     a, b = points[0], points[-1]
     along = np.arctan2(*(b - a)[::-1]) if (a != b).any() else 0.0
-    turn = along + np.pi / 2 + np.linspace(0, np.pi, CORNERS // 2)
+    turn = along + np.pi / 2 + np.linspace(0, np.pi, ROUND_CORNERS // 2)
     half = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return np.concatenate([a + half, b - half])

@@ -7,27 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Floats, Ints
+from planes.arrays import Floats, InputError
 from planes.bounding import Kind
-from planes.constants import MASK_SIDE_MAX
 from planes.items import overlapping
 from planes.render import blend
 from planes.scene import Scene
 from planes.spans import ragged
 from weapons.candidates import prefilter_of
+from weapons.marks import LET_THROUGH, PASSED_OVER, SKETCH
 from weapons.sieve import outline_of, rectangle
 from weapons.world import OUTLINES_MAX, World
 
-__all__ = ["SKETCH", "draw_cells", "draw_volumes"]
+__all__ = ["draw_cells", "draw_volumes"]
 
-SKETCH = {
-    "volume tested": (96, 226, 150),
-    "volume passed over": (150, 156, 168),
-    "volume of the shot": (255, 255, 255),
-    "cell opened": (86, 180, 233),
-    "cell": (96, 102, 114),
-}
-"""Colours of what may be drawn of a pre-filter."""
+BEYOND = 4.0
+"""How far lines are drawn beyond the picture, px: it cuts off what rounding may bend."""
 
 BRUSH = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
 """Pixels that a thick line sets for each of its own."""
@@ -46,17 +40,21 @@ def draw_cells(world: World, report: Mapping[str, Any]) -> None:
             x, y, x_max, y_max = cell["box_xyxy"]
             ring = _placed(world, np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)]))
             if opened:
-                (left, top), (right, low) = (np.clip(v, -1, max(world.image.shape)) for v in (ring[0], ring[2]))
-                ground = np.full((max(low - top, 0), max(right - left, 0)), OPENED, np.uint8)
+                (left, top), (right, low) = (
+                    np.rint(np.clip(v, -1, max(world.image.shape))) for v in (ring[0], ring[2])
+                )
+                ground = np.full((max(int(low - top), 0), max(int(right - left), 0)), OPENED, np.uint8)
                 blend(world.image, SKETCH[name], ground, int(left), int(top))
             _trace(world, ring, name)
 
 
 def draw_volumes(world: World, report: Mapping[str, Any], scene: Scene) -> None:
     """Draw the volumes of what lies in view: of items that were passed over, of those tested, and of the shots."""
+    if any("tested" not in shot for shot in report["shots"]):
+        raise InputError("shots: expected 'tested' in each, as the report has a filter, got one without")
     tested = {item for shot in report["shots"] for item in shot["tested"]["objects"]}
     found = _item_outlines(world, report, scene)
-    for name, wanted in (("volume passed over", False), ("volume tested", True)):
+    for name, wanted in ((PASSED_OVER, False), (LET_THROUGH, True)):
         for item, rings in found.items():
             if (item in tested) is wanted:
                 _draw(world, rings, name)
@@ -86,25 +84,44 @@ def _draw(world: World, rings: list[Floats], name: str) -> None:
         _trace(world, _placed(world, ring), name)
 
 
-def _trace(world: World, ring: Ints, name: str) -> None:
-    """Draw a closed line through points of the picture, twice as thick where a volume was tested.
+def _trace(world: World, ring: Floats, name: str) -> None:
+    """Draw a closed line through points of the picture, twice as thick around what was let through.
 
     Not by OpenCV: where a line leaves the picture its pixels depend on the version.
     """
-    step = np.roll(ring, -1, axis=0) - ring
-    edge, place = ragged(np.maximum(np.abs(step).max(axis=1), 1))
-    count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True), 1)
-    at = ring[edge] + (2 * step[edge] * place[:, None] + count) // (2 * count)
-    if name == "volume tested":
-        at = (at[:, None] + BRUSH).reshape(-1, 2)
     height, width = world.image.shape[:2]
+    begin, end = (np.rint(v) for v in _within(ring, np.roll(ring, -1, axis=0), np.array([width, height])))
+    step = (end - begin).astype(np.int64)
+    edge, place = ragged(np.maximum(np.abs(step).max(axis=1, initial=0), 1))
+    count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True, initial=0), 1)
+    at = begin[edge].astype(np.int64) + (2 * step[edge] * place[:, None] + count) // (2 * count)
+    if name == LET_THROUGH:
+        at = (at[:, None] + BRUSH).reshape(-1, 2)
     x, y = at[((at >= 0) & (at < (width, height))).all(axis=1)].T
     world.image[y, x] = SKETCH[name]
     if len(x):
         world.painted.add(name)
 
 
-def _placed(world: World, points: Floats) -> Ints:
-    """Points of the world in the picture, whole pixels: those far off are brought nearer."""
-    near = np.clip(points - world.view[:2] + 0.5, -MASK_SIDE_MAX, MASK_SIDE_MAX)
-    return np.rint(near * world.factor).astype(np.int64)
+def _within(begin: Floats, end: Floats, size: Floats) -> tuple[Floats, Floats]:
+    """Cut segments to a little more than the picture.
+
+    References
+    ----------
+    Liang and Barsky, "A new concept and method for line clipping" (1984).
+    """
+    step = end - begin
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_low, to_high = (-BEYOND - begin) / step, (size + BEYOND - begin) / step
+    level = step == 0
+    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
+    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
+    beside = (level & ((begin < -BEYOND) | (begin > size + BEYOND))).any(axis=1)
+    first, last = np.maximum(first, 0), np.minimum(last, 1)
+    some = (first <= last) & ~beside
+    return (begin + first[:, None] * step)[some], (begin + last[:, None] * step)[some]
+
+
+def _placed(world: World, points: Floats) -> Floats:
+    """Points of the world in the picture."""
+    return np.asarray((points - world.view[:2] + 0.5) * world.factor)
