@@ -75,18 +75,15 @@ def fire(
     asked = placements if name == "direct" or pierces(weapon) or shots.choosy else 0
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, first.table, asked)
     sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
-    plane = scene.code_plane() if name == "composed" else None
-    codes = plane.read(scene.items) if plane else None
-    if plane and codes is not None:
-        plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * codes.itemsize)
+    drawn = None
+    if name == "composed" and (plane := scene.code_plane()):
+        drawn = plane.read(scene.items), plane.box_xyxy
+        plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * drawn[0].itemsize)
     rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
     for begin, part in _parts(shots, first, candidates):
         volley = first if len(shots) == 1 else volley_of(weapon, part)
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.table.nbytes)
-        if plane and codes is not None:
-            met = composed(volley, part, sight, codes, plane.box_xyxy)
-        else:
-            met = direct(volley, part, sight)
+        met = composed(volley, part, sight, *drawn) if drawn else direct(volley, part, sight)
         rows.append(rows_of_met(met, volley, stack.ids, begin))
         verdicts.append(met.counts.reshape(len(part), -1, len(Verdict)).sum(axis=1))
     leave_out_unused(plan, scene, candidates, first.table, why)
