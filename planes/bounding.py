@@ -29,11 +29,10 @@ from planes.constants import (
     TRIG_ERROR,
 )
 from planes.kept import Kept
-from planes.rings import rows_of
 from planes.sprite import Form, Sprite, Variant, frame_pivot
-from planes.volumes import Circles, Core, Obbs, Parts, Polygons, Volumes
+from planes.volumes import Circles, Core, Parts, Polygons, Volumes, joined
 
-__all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "joined", "moved", "shifted"]
+__all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "moved", "shifted"]
 
 SHARP = 2.0**-6
 """1 + cos of the turn at a corner: with less, at an angle below 10 degrees, growing would move it 11 times as far."""
@@ -50,33 +49,12 @@ class Kind:
 
 
 def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
-    """Volumes of variants of sprites, one row each: they contain the pixel squares of the variants' masks.
+    """Volumes of variants of sprites, one or more, one row each: they contain the pixel squares of the variants' masks.
 
     Coordinates are px, with pixel [0, 0] of each mask about the origin, and whole multiples of PLACE but for circles:
     a shift by whole pixels rounds nothing.
     """
-    return joined(
-        kind, [_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)]
-    )
-
-
-def joined(kind: Kind, volumes: Sequence[Volumes]) -> Volumes:
-    """All rows of volumes of one kind."""
-    cores = [volume.parts.core() if isinstance(volume, Parts) else volume.core() for volume in volumes]
-    points = np.concatenate([np.zeros((0, 2)), *(core.points for core in cores)])
-    if kind.name == "circle":
-        return Circles(points, np.concatenate([np.zeros(0), *(core.radius for core in cores)]))
-    if kind.name == "oriented box":
-        return Obbs.from_corners(points.reshape(-1, 4, 2))
-    rings = Polygons.around(points, _starts([core.counts for core in cores]))
-    if kind.name == "polygon":
-        return rings
-    return Parts(rings, _starts([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)]))
-
-
-def _starts(counts: Sequence[Ints]) -> Ints:
-    every = np.concatenate([np.zeros(0, np.int64), *counts])
-    return np.asarray(np.cumsum(every) - every)
+    return joined([_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)])
 
 
 class Bounds:
@@ -89,7 +67,7 @@ class Bounds:
 
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
-        self._volumes = joined(kind, [])
+        self._volumes: Volumes | None = None
         self._masks = np.zeros(0, np.int64)
         self._row = np.zeros(0, np.int64)
         self._lock = threading.Lock()
@@ -109,23 +87,24 @@ class Bounds:
         used, first, of = np.unique(masks, return_index=True, return_inverse=True)
         with self._lock:
             if len(self._masks) + len(used) > 2 * items + BOUNDS_SLACK:
-                self._masks, self._row, self._volumes = masks[:0], masks[:0], joined(self.kind, [])
-            self._add(used, ids[first], sprites, variants)
-            return self._volumes, np.asarray(self._row[np.searchsorted(self._masks, used)][of])
+                self._masks, self._row, self._volumes = masks[:0], masks[:0], None
+            volumes = self._volumes = self._with(used, ids[first], sprites, variants)
+            return volumes, np.asarray(self._row[np.searchsorted(self._masks, used)][of])
 
-    def _add(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> None:
+    def _with(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
+        """The volumes, with those of masks that are new."""
         new = ~np.isin(used, self._masks)
-        if not new.any():
-            return
+        if self._volumes is not None and not new.any():
+            return self._volumes
         items = ids[new].tolist()
         more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
         every = np.concatenate([self._masks, used[new]])
         order = np.argsort(every)
-        self._volumes = joined(self.kind, [self._volumes, more])
         self._masks, self._row = (
             every[order],
             np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
         )
+        return more if self._volumes is None else joined([self._volumes, more])
 
 
 def shifted(volumes: Volumes, xy: Ints) -> Volumes:
@@ -244,10 +223,12 @@ def _make_bounding(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
 
 
 def _on_grid(volume: Volumes) -> Volumes:
-    """Corners on whole multiples of PLACE, outward where they are moved."""
-    if isinstance(volume, Circles | Parts):
+    """Circles as they are; of others polygons, corners on whole multiples of PLACE, outward where they are moved."""
+    if isinstance(volume, Parts):
+        return Parts(_on_grid(volume.parts), volume.starts)
+    if isinstance(volume, Circles):
         return volume
     core = volume.core()
     if (_placed(core.points) == core.points).all():
-        return volume
+        return Polygons.around(core.points, core.starts)
     return Polygons.around(_placed(_grown(core, 2 * PLACE)), core.starts)

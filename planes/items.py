@@ -321,7 +321,7 @@ class Items:
     def volumes(self, name: str, ids: Ints) -> Volumes:
         """Volumes of items in the world, one row each; see `Scene.volumes`."""
         from planes.bounding import KINDS, Kind, shifted
-        from planes.volumes import Aabbs
+        from planes.volumes import Aabbs, Circles
 
         k = boxes_in("kind", name)
         choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
@@ -330,6 +330,8 @@ class Items:
         if name == "box":
             low, high = np.split(self.boxes(ids).astype(np.float64), 2, axis=1)
             return Aabbs(low - 0.5, high + 0.5)
+        if not len(ids):
+            return Circles(np.zeros((0, 2)), 0.0)
         volumes, row = self.bounding(Kind(name) if k is None else Kind(KINDS[2], k), ids)
         return shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
 

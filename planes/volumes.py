@@ -7,7 +7,7 @@ made of (`original`): turning from there again and again adds no rounding.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -19,7 +19,19 @@ from planes.constants import TRIG_BITS
 from planes.grid256 import unit
 from planes.rings import convex_parts, convex_rows, outlines, rows_of
 
-__all__ = ["Aabbs", "BoxSets", "Capsules", "Circles", "ConcavePolygons", "Core", "Obbs", "Parts", "Polygons", "Volumes"]
+__all__ = [
+    "Aabbs",
+    "BoxSets",
+    "Capsules",
+    "Circles",
+    "ConcavePolygons",
+    "Core",
+    "Obbs",
+    "Parts",
+    "Polygons",
+    "Volumes",
+    "joined",
+]
 
 Numbers = npt.NDArray[Any]
 Move = Callable[[Floats, Ints], Floats]
@@ -377,6 +389,31 @@ class ConcavePolygons(Parts):
         return made
 
 
+def joined(volumes: Sequence[Volumes]) -> Volumes:
+    """All rows of volumes of one kind, in order.
+
+    Raises
+    ------
+    InputError
+        If there are none, or they differ in kind.
+    """
+    if not volumes or any(type(v) is not type(volumes[0]) for v in volumes):
+        raise InputError(f"volumes: expected some, of one kind, got {sorted({type(v).__name__ for v in volumes})}")
+    first = volumes[0]
+    if isinstance(first, Parts):
+        counts = np.concatenate([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)])
+        return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), np.cumsum(counts) - counts)
+    names = _COLUMNS[type(first)]
+    columns = [np.concatenate([getattr(v, name) for v in volumes]) for name in names]
+    if not isinstance(first, _Hulls):
+        return type(first)(*columns)
+    made = type(first).__new__(type(first))
+    ends = np.cumsum([len(v.points) for v in volumes if isinstance(v, _Hulls)])
+    before = np.concatenate([[0], ends[:-1]])
+    made.points, made.starts = columns[0], columns[1] + np.repeat(before, [len(v) for v in volumes])
+    return made
+
+
 def _points(field: str, values: object) -> Floats:
     shape = array_of(field, values).shape
     return reals(field, values, (None, 3 if len(shape) == 2 and shape[1] == 3 else 2))
@@ -438,3 +475,12 @@ def _sum_outward(a: Floats, b: Floats, toward: float) -> Floats:
         rest = (a - (total - part)) + (b - part)
         inside = rest <= 0 if toward > 0 else rest >= 0
         return np.where(inside, total, np.nextafter(total, toward))
+
+
+_COLUMNS: dict[type[Volumes], tuple[str, ...]] = {
+    Circles: ("center", "radius"),
+    Aabbs: ("min", "max"),
+    Capsules: ("a_xy", "b_xy", "radius"),
+    Obbs: ("points", "starts"),
+    Polygons: ("points", "starts"),
+}

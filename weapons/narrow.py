@@ -15,7 +15,7 @@ from planes.bounding import Kind
 from planes.constants import CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from planes.items import Items, Stack
 from planes.overlap import overlap
-from planes.volumes import Capsules, Circles, Obbs, Polygons, Volumes
+from planes.volumes import Capsules, Volumes, joined
 from weapons.pattern import Pattern, Swept
 from weapons.volley import Volley
 
@@ -46,18 +46,8 @@ def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Volley, plac
 
 
 def pattern_volumes(name: str, patterns: Sequence[Pattern]) -> Volumes:
-    """Volumes of patterns, none empty, for a pre-filter: a row each, which contains the pixel squares."""
-    rows = [pattern.volume(name, lambda pattern: _fitted(name, pattern)) for pattern in patterns]
-    cores = [row.core() for row in rows]
-    points = np.concatenate([core.points for core in cores])
-    if name == "circle":
-        return Circles(points, np.concatenate([core.radius for core in cores]))
-    if name == "swept":
-        return Capsules(points[0::2], points[1::2], np.concatenate([core.radius for core in cores]))
-    if name == "oriented box":
-        return Obbs.from_corners(points.reshape(-1, 4, 2))
-    counts = np.concatenate([core.counts for core in cores])
-    return Polygons.around(points, np.cumsum(counts) - counts)
+    """Volumes of patterns, one or more, none empty, for a pre-filter: rows that contain the pixel squares."""
+    return joined([pattern.volume(name, lambda pattern: _fitted(name, pattern)) for pattern in patterns])
 
 
 def _fitted(name: str, pattern: Pattern) -> Volumes:
