@@ -62,6 +62,8 @@ class Quadtree(BroadPhase):
             raise InputError(f"boxes: expected shape (any, 4), got {self._rows.shape}")
         self.capacity = integer("capacity", capacity, 1, 2**31)
         self.depth = integer("depth", depth, 0, 1000)
+        self._outside = self._least = 0
+        """Boxes that reach out of the root cell, and the fewest that did so at any time since it was made."""
         self._build()
 
     @property
@@ -96,7 +98,7 @@ class Quadtree(BroadPhase):
         listed = sorted_pairs(*self._entries(self._leaf_numbers()), self._count)
         assert np.array_equal(due, listed), "leaves do not list the boxes that reach into them"
         assert nodes["length"].sum() == self._live, "the pool is miscounted"
-        assert np.count_nonzero(self._out(self._rows[ids])) == self._outside, "boxes outside are miscounted"
+        assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
 
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
         every = np.arange(len(queries))
@@ -145,20 +147,22 @@ class Quadtree(BroadPhase):
         return int(np.count_nonzero(self._nodes["depth"] >= 0))
 
     def _enter(self, ids: Ints) -> None:
-        self._outside += int(np.count_nonzero(self._out(self._rows[ids])))
+        self._outside += self._count_out(self._rows[ids])
         if not self._rebuilt():
             nothing = ids[:0]
             self._change(nothing, self._paths(self._rows[nothing]), ids, self._paths(self._rows[ids]))
 
     def _leave(self, ids: Ints) -> None:
-        self._outside -= int(np.count_nonzero(self._out(self._rows[ids])))
+        self._outside -= self._count_out(self._rows[ids])
+        self._least = min(self._least, self._outside)
         nothing = ids[:0]
         self._change(ids, self._paths(self._rows[ids]), nothing, self._paths(self._rows[nothing]))
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         old = self._rows[ids]
         self._rows[ids] = rows
-        self._outside += int(np.count_nonzero(self._out(rows))) - int(np.count_nonzero(self._out(old)))
+        self._outside += self._count_out(rows) - self._count_out(old)
+        self._least = min(self._least, self._outside)
         if self._rebuilt():
             return
         goes = self._rerouted(old, rows)
@@ -178,21 +182,26 @@ class Quadtree(BroadPhase):
         self._free = np.empty(0, np.int64)
         self._pool = np.empty(0, np.int64)
         self._used = self._live = 0
-        self._outside = int(np.count_nonzero(self._out(rows)))
+        self._outside = self._least = self._count_out(rows)
         nodes["total"][0] = len(ids)
         nodes["straddle"][0] = np.count_nonzero(_straddling(_quarters(rows, nodes["mid"])))
         self._settle(np.zeros_like(ids), ids, np.zeros(1, np.int64))
 
     def _rebuilt(self) -> bool:
-        """Begin anew when more than a quarter of the boxes lie outside the root cell."""
-        if 4 * self._outside <= len(self):
+        """Begin anew when boxes have left the root cell, or come outside it: more than a quarter of all.
+
+        Boxes that are larger than any root cell would be outside a new one as well, and do not count.
+        """
+        if 4 * (self._outside - self._least) <= len(self):
             return False
         self._build()
         return True
 
-    def _out(self, rows: Floats) -> Bools:
+    def _count_out(self, rows: Floats) -> int:
+        """How many boxes reach out of the root cell."""
         x, y, x_max, y_max = self._nodes["cell"][0].tolist()
-        return np.asarray((rows[:, 0] < x) | (rows[:, 1] < y) | (rows[:, 2] > x_max) | (rows[:, 3] > y_max))
+        out = (rows[:, 0] < x) | (rows[:, 1] < y) | (rows[:, 2] > x_max) | (rows[:, 3] > y_max)
+        return int(np.count_nonzero(out))
 
     def _overfull(self, node: Ints) -> Bools:
         """Whether cells must be split."""

@@ -354,6 +354,35 @@ def test_a_small_move_costs_little_in_any_world(make: Maker, d: int, n: int) -> 
     structure.check()
 
 
+def test_boxes_larger_than_any_root_cell_cost_no_rebuild(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    n = 4000
+    rows = boxes_from(rng.uniform(0, 1000, (n, 2)), rng.uniform(1, 4, (n, 2)))
+    rows[::3] += (-4000, -4000, 4000, 4000)
+    tree, ids = Quadtree(rows), np.arange(n)
+    build = tree.written
+    for k in range(20):
+        assert written(tree, lambda k=k: tree.move([k], tree.boxes[[k]] + 0.5)) < n / 4
+    assert written(tree, lambda: tree.move(ids, tree.boxes + 1e-9)) < build / 10
+    tree.check()
+    builds, build_of = [0], Quadtree._build
+
+    def counted(self: Quadtree) -> None:
+        builds[0] += 1
+        build_of(self)
+
+    monkeypatch.setattr(Quadtree, "_build", counted)
+    tree.move(ids[::3], np.full((len(ids[::3]), 4), 500.0))
+    assert not builds[0], "they have come in"
+    tree.move(ids[::3], rows[::3] + 20_000)
+    assert builds[0] == 1, "they have left"
+    other = Quadtree(rows[:0])
+    for k in range(0, 1000, 2):
+        other.insert(rows[k : k + 2])
+    other.check()
+    assert builds[0] < 40
+
+
 def test_a_grid_keeps_little_that_is_stale_or_fresh() -> None:
     rng = np.random.default_rng(3)
     rows = uniform(rng, 2000, 2)
