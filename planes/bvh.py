@@ -192,8 +192,11 @@ class Bvh(BroadPhase):
             tree.gone += len(places)
             tree.outer[places] = nowhere
             self._follow(number, places)
-        while self._trees and not len(self._trees[-1].living):
-            self._trees.pop()
+        kept = [tree for tree in self._trees if len(tree.living)]
+        if len(kept) < len(self._trees):
+            self._trees = kept
+            for number, tree in enumerate(kept):
+                self._home[tree.living] = number
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         self._rows[ids] = rows

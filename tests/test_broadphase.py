@@ -627,6 +627,12 @@ class Changing(RuleBasedStateMachine):
         self.change(lambda structure: structure.move(ids, rows))
 
     @precondition(lambda self: len(self.plain))
+    @rule(data=st.data())
+    def remove_oldest(self, data: st.DataObject) -> None:
+        ids = self.plain.ids[: data.draw(st.integers(1, len(self.plain)))]
+        self.change(lambda structure: structure.remove(ids))
+
+    @precondition(lambda self: len(self.plain))
     @rule(data=st.data(), step=st.sampled_from([0.25, -0.5, 1.0]))
     def nudge(self, data: st.DataObject, step: float) -> None:
         ids = data.draw(st.lists(st.sampled_from(self.plain.ids.tolist()), unique=True, min_size=1))
@@ -644,15 +650,25 @@ class ChangingIn3D(Changing):
     dim = 3
 
 
+@pytest.fixture
+def few_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dozen boxes make several trees of several levels, and settle in a grid."""
+    monkeypatch.setattr("planes.bvh.BVH_SMALL", 4)
+    monkeypatch.setattr("planes.bvh.BVH_LEAF", 2)
+    monkeypatch.setattr("planes.grids.GRID_FRESH", 6)
+
+
+@pytest.mark.usefixtures("few_are_many")
 @pytest.mark.parametrize("machine", [Changing, ChangingIn3D])
 def test_any_sequence_of_changes(machine: type[Changing]) -> None:
     run_state_machine_as_test(machine, settings=settings(max_examples=25, stateful_step_count=15, deadline=None))
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_are_many")
 @pytest.mark.parametrize("machine", [Changing, ChangingIn3D])
 def test_any_long_sequence_of_changes(machine: type[Changing]) -> None:
-    run_state_machine_as_test(machine, settings=settings(max_examples=200, stateful_step_count=40, deadline=None))
+    run_state_machine_as_test(machine, settings=settings(max_examples=120, stateful_step_count=30, deadline=None))
 
 
 MILLION = pytest.mark.parametrize(("make", "d"), [(Grid, 2), (Grid, 3), (Quadtree, 2), (Bvh, 2), (Bvh, 3)])
