@@ -88,7 +88,7 @@ class Bvh(BroadPhase):
     ----------
     boxes : (N, 4) or (N, 6) float
     slack : how far a box that has moved may go on, on each side, before the tree must follow; by default a quarter of
-        the median of the boxes' longest sides
+        the median of the boxes' longest sides, measured again whenever most of them get a new tree
 
     Raises
     ------
@@ -98,7 +98,8 @@ class Bvh(BroadPhase):
 
     def __init__(self, boxes: object, slack: float | None = None) -> None:
         super().__init__(boxes)
-        self.slack = _quarter_side(self._rows) if slack is None else real("slack", slack, 0, LARGEST)
+        self._measures = slack is None
+        self.slack = 0.0 if slack is None else real("slack", slack, 0, LARGEST)
         self._trees: list[Tree] = []
         self._home = np.empty(0, np.int64)
         self._place = np.empty(0, np.int64)
@@ -222,7 +223,10 @@ class Bvh(BroadPhase):
             self._plant(number, np.sort(tree.living))
 
     def _plant(self, number: int, ids: Ints) -> None:
-        tree = Tree(ids, self._rows[ids], self.slack)
+        rows = self._rows[ids]
+        if self._measures and 4 * len(ids) >= 3 * len(self):
+            self.slack = _quarter_side(rows)
+        tree = Tree(ids, rows, self.slack)
         self._trees[number : number + 1] = [tree]
         self.written += len(ids) + sum(map(len, tree.levels))
         self._home[tree.ids] = number
@@ -375,7 +379,5 @@ def _once(pairs: Ints) -> Ints:
 
 def _quarter_side(rows: Floats) -> float:
     dim = rows.shape[1] // 2
-    if not len(rows):
-        return 0.0
     longest = (rows[:, dim:] / 4 - rows[:, :dim] / 4).max(axis=1)
     return float(np.partition(longest, len(rows) // 2)[len(rows) // 2])

@@ -65,7 +65,8 @@ class Grid(BroadPhase):
     Parameters
     ----------
     boxes : (N, 4) or (N, 6) float
-    cell : side of a cell; by default the median of the boxes' longest sides
+    cell : side of a cell; by default the median of the boxes' longest sides, measured again, and all listed anew, when
+        at least three of four boxes are new or have left their cells since
 
     Raises
     ------
@@ -75,17 +76,33 @@ class Grid(BroadPhase):
 
     def __init__(self, boxes: object, cell: float | None = None) -> None:
         super().__init__(boxes)
-        self.cell = _side_of(self._rows) if cell is None else real("cell", cell, SMALLEST, LARGEST)
+        self._measures = cell is None
+        self.cell = 1.0 if cell is None else real("cell", cell, SMALLEST, LARGEST)
         self.origin = _middle(self._rows[:, : self.dim])
         self._bits = KEY_BITS[self.dim]
         self._reach = 2 ** (self._bits - 1) - 1
+        self._kept = 0
+        self._clear()
+        self._enter(self.ids)
+
+    def _clear(self) -> None:
+        """Forget all cells."""
         self._low = np.empty((0, self.dim), np.int32)
         self._high = np.empty((0, self.dim), np.int32)
         self._home = np.empty(0, np.int8)
         self._listings = [Listing.of(np.empty(0, np.int64), np.empty(0, np.int64))] * 2
         self._beside = np.empty(0, np.int64)
         self._stale = 0
-        self._enter(self.ids)
+
+    def _measured(self, ids: Ints) -> Ints:
+        """Measure the cell again when few boxes are as they were; give the boxes to enter, which are then all."""
+        self._kept = min(self._kept, len(self) - len(ids))
+        if not self._measures or 4 * self._kept > len(self):
+            return ids
+        rows = self.boxes
+        self.cell, self.origin, self._kept = _side_of(rows), _middle(rows[:, : self.dim]), len(rows)
+        self._clear()
+        return self.ids
 
     def owners(self, cell: object) -> Ints:
         """List the boxes that reach into a cell, (d,) whole numbers: their ids, sorted."""
@@ -194,6 +211,7 @@ class Grid(BroadPhase):
         return sum(len(listing.key) for listing in self._listings)
 
     def _enter(self, ids: Ints) -> None:
+        ids = self._measured(ids)
         short = len(self._rows) - len(self._home)
         self._home = np.concatenate((self._home, np.zeros(short, np.int8)))
         self._low, self._high = (

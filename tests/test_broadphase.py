@@ -459,6 +459,61 @@ def test_nodes_of_several_trees_have_numbers_of_their_own() -> None:
         assert meets(box[np.isin(number, visited) & leaf], query).any()
 
 
+def test_a_tree_that_is_emptied_goes() -> None:
+    rows = uniform(np.random.default_rng(2), 1370, 2)
+    tree, plain = Bvh(rows[:1000]), BruteForce(rows[:1000])
+    for each in (tree, plain):
+        each.insert(rows[1000:1300])
+        each.insert(rows[1300:])
+    assert [len(each.ids) for each in tree._trees] == [1000, 300, 70]
+    for each in (tree, plain):
+        each.remove(np.arange(1000))
+    tree.check()
+    assert [len(each.ids) for each in tree._trees] == [300, 70]
+    for each in (tree, plain):
+        each.move(plain.ids[::3], plain.boxes[::3] + 0.5)
+    assert_same(plain, tree, rows[:40])
+    tree.remove(plain.ids)
+    tree.check()
+    assert not tree._trees
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_nobody_told_is_measured_when_boxes_come(d: int) -> None:
+    rows = uniform(np.random.default_rng(3), 2000, d)
+    grid, tree = Grid(rows[:0]), Bvh(rows[:0])
+    for structure in (grid, tree):
+        structure.insert(rows)
+    assert grid.cell == Grid(rows).cell and tree.slack == Bvh(rows).slack > 0
+    for structure in (grid, tree):
+        structure.remove(structure.ids)
+        structure.insert(100 * rows)
+        structure.check()
+    assert grid.cell == Grid(100 * rows).cell and tree.slack == Bvh(100 * rows).slack
+    grid, tree = Grid(rows[:10] / 100), Bvh(rows[:10] / 100)
+    for structure in (grid, tree):
+        for k in range(0, 2000, 20):
+            structure.insert(rows[k : k + 20])
+        structure.check()
+        assert structure.written < 200 * 2000
+        assert np.array_equal(structure.pairs(), BruteForce(structure.boxes).pairs())
+    assert 0.8 < grid.cell / Grid(rows).cell < 1.25 and 0.8 < tree.slack / Bvh(rows).slack < 1.25
+    grid, tree = Grid(rows[:10] / 100, cell=0.5), Bvh(rows[:10] / 100, slack=0.5)
+    for structure in (grid, tree):
+        structure.insert(rows)
+    assert grid.cell == tree.slack == 0.5
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_boxes_that_change_their_size_are_measured_again(d: int) -> None:
+    rows = uniform(np.random.default_rng(3), 500, d)
+    grid, tree = Grid(rows), Bvh(rows)
+    for structure in (grid, tree):
+        structure.move(np.arange(500), 100 * rows)
+        structure.check()
+    assert 50 < grid.cell / Grid(rows).cell < 200 and tree.slack == Bvh(100 * rows).slack
+
+
 def test_boxes_that_come_one_by_one_make_few_trees() -> None:
     rows = uniform(np.random.default_rng(4), 600, 2)
     tree = Bvh(rows[:0])
