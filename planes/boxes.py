@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals, shown
 from planes.constants import CHUNK_PAIRS
-from planes.volumes import Aabbs
+from planes.volumes import Aabbs, Volumes
 
 __all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "piled", "sorted_pairs"]
 
@@ -35,7 +35,11 @@ def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
     """
     if isinstance(values, Aabbs):
         values = np.concatenate([values.min, values.max], axis=1)
-    array = array_of(field, values)
+    array = None if isinstance(values, Volumes) else array_of(field, values)
+    if array is None or not array.ndim:
+        shapes = " or ".join(f"(N, {2 * d})" for d in (2, 3) if dim in (None, d))
+        got = shown(values) if array is not None else f"{type(values).__name__} (their .bounds() are boxes)"
+        raise InputError(f"{field}: expected Aabbs or rows {shapes}, got {got}")
     if dim is None:
         width = array.shape[-1] if array.ndim == 2 else 0
         if width not in (4, 6):

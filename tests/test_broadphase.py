@@ -15,7 +15,7 @@ from planes.arrays import Floats, Ints
 from planes.boxes import meets, pieces
 from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
 from planes.constants import GRID_FRESH
-from planes.volumes import Aabbs
+from planes.volumes import Aabbs, Circles
 
 Maker = Callable[[Floats], BroadPhase]
 MAKERS: dict[str, tuple[Maker, tuple[int, ...]]] = {
@@ -221,6 +221,16 @@ def test_bad_input_is_named_and_changes_nothing(make: Maker, d: int, message: st
         (lambda: Grid(np.zeros((2, 4))).cells(5), "ids[0]: expected the id of a box that is there, got 5"),
         (lambda: Grid([[0, 0, 1, 1], [0, 0, 99, 99]], cell=1).cells(1), "box: expected one over at most 64 cells"),
         (lambda: Grid(np.zeros((2, 4))).owners([0]), "cell: expected shape (2,), got (1,)"),
+        (
+            lambda: Grid(Circles([[0, 0]], [1])),
+            "boxes: expected Aabbs or rows (N, 4) or (N, 6), got Circles (their .bounds() are boxes)",
+        ),
+        (lambda: Bvh("x"), "boxes: expected Aabbs or rows (N, 4) or (N, 6), got 'x'"),
+        (lambda: Bvh(3), "boxes: expected Aabbs or rows (N, 4) or (N, 6), got 3"),
+        (
+            lambda: Quadtree(np.zeros((2, 4))).query(Circles([[0, 0]], [1])),
+            "boxes: expected Aabbs or rows (N, 4), got Circles (their .bounds() are boxes)",
+        ),
         (lambda: PartsBvh(np.zeros((2, 4)), [0, 1]), "starts: expected whole numbers from 0 to 2"),
         (lambda: PartsBvh(np.zeros((2, 4)), [0, 2, 2]), "starts[2]: expected more than 2, got 2"),
     ],
