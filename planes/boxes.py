@@ -108,16 +108,18 @@ class Work:
     Parameters
     ----------
     nodes : how many the structure has in all
+    compared : how often a node was compared with a query, or looked up, to learn whether to look into it
     visits, tests : pieces of both, in the order of the search
     """
 
     nodes: int
+    compared: int = 0
     visits: list[Pairs] = field(default_factory=list)
     tests: list[Pairs] = field(default_factory=list)
 
     @property
     def visited(self) -> Ints:
-        """Nodes that were looked into: (2, K) int64 [query, node], in the order of the search."""
+        """Nodes that meet the query and were looked into: (2, K) int64 [query, node], in the order of the search."""
         return piled(self.visits)
 
     @property

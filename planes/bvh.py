@@ -149,9 +149,10 @@ class Bvh(BroadPhase):
                 half = len(query) // 2
                 stack += [(level, query[half:], node[half:]), (level, query[:half], node[:half])]
                 continue
-            if work is not None:
-                work.visits.append((query, offsets[level] + node))
             good = np.flatnonzero(meets(tree.levels[level].take(node, axis=0), queries.take(query, axis=0)))
+            if work is not None:
+                work.compared += len(query)
+                work.visits.append((query.take(good), offsets[level] + node.take(good)))
             query, node = query.take(good), node.take(good)
             if not len(query):
                 continue

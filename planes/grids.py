@@ -186,6 +186,8 @@ class Grid(BroadPhase):
         On each axis that is the first one of either.
         """
         start, length = self._listings[home - MAIN].runs(self._keys(at))
+        if work is not None and len(self._listings[home - MAIN].key):
+            work.compared += len(at)
         some = np.flatnonzero(length)
         if not len(some):
             return []

@@ -115,6 +115,8 @@ class Quadtree(BroadPhase):
             child = self._nodes["child"].take(node)
             leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
             leaves.append((query.take(leaf), node.take(leaf)))
+            if work is not None:
+                work.compared += 4 * len(inner)
             query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
             row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
             if len(row):

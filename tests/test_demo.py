@@ -35,9 +35,10 @@ def test_both_steps_are_what_the_structure_does(kind: str, monkeypatch: pytest.M
         work = told[-1]
         assert set(moment.cells.number[moment.visited]) == set(work.visited[1])
         assert set(np.flatnonzero(moment.tested)) == set(work.tested[1])
+        assert moment.nodes == work.compared >= moment.visited.sum() - 1, "the root of a quadtree is always looked into"
         assert moment.tests == work.tested.shape[1] >= moment.tested.sum()
         assert np.array_equal(np.flatnonzero(moment.found), BruteForce(moment.boxes).query(moment.query[None])[1])
-        opened = moment.cells.box[moment.entered]
+        opened = demo._distinct(moment.cells.box[moment.entered])
         assert moment.cells.leaf[moment.entered].all() and meets(opened, moment.query).all()
         assert meets(moment.boxes[moment.tested][:, None], opened).any(axis=1).all(), "compared out of any open leaf"
     assert len(told) == 20
@@ -53,7 +54,7 @@ def test_cells_split_and_merge_as_boxes_move() -> None:
 @EACH
 def test_most_tests_are_saved(kind: str) -> None:
     all_moments = list(moments(kind, 20))
-    assert sum(m.tests for m in all_moments) < 0.2 * sum(len(m.boxes) for m in all_moments)
+    assert sum(m.cost for m in all_moments) < 0.3 * sum(len(m.boxes) for m in all_moments)
     assert any(m.found.any() for m in all_moments)
 
 
@@ -127,13 +128,27 @@ def test_the_counters_add_up(kind: str, monkeypatch: pytest.MonkeyPatch) -> None
     all_moments = list(moments(kind, 5))
     demo.picture_of(kind, all_moments, 5)
     now = all_moments[-1]
-    opened = {tuple(box) for box in now.cells.box[now.entered].tolist()}
+    opened = {tuple(box) for box in now.cells.box[now.entered].tolist() if box[0] <= box[2]}
     living = {tuple(box) for box in now.cells.box[now.cells.leaf].tolist() if box[0] <= box[2]}
-    assert f"{now.tests} tests" in texts and "300 tests" in texts
+    word = "cells" if kind == "grid" else "nodes"
+    assert f"{now.tests} boxes + {now.nodes} {word}" in texts and "300 boxes" in texts
+    assert "tests saved so far" in texts
     word = "cells" if kind == "grid" else "leaves"
     assert f"1  find the {word}: {len(opened)} of {len(living)}" in texts
     assert f"2  compare within them: {now.found.sum()} found" in texts
-    assert f"{100 - sum(m.tests for m in all_moments) / 15:.1f} %" in texts
+    assert f"{100 - sum(m.nodes + m.tests for m in all_moments) / 15:.1f} %" in texts
+
+
+@EACH
+def test_the_bar_has_a_part_for_what_is_found_for_boxes_and_for_nodes(kind: str) -> None:
+    all_moments = list(moments(kind, 16))
+    now, page = all_moments[-1], demo.picture_of(kind, all_moments, 16)
+    top, left = demo.TOP + demo.HEIGHT + 72, demo.MARGIN + demo.NAME
+    bar = page[top, left : left + demo.BAR]
+    ends = [round(demo.BAR * count / 300) for count in (0, now.found.sum(), now.tests, now.tests + now.nodes)]
+    for color, first, last in zip((demo.FOUND, demo.TESTED, demo.VISITED), ends, ends[1:], strict=False):
+        assert (bar[first:last] == color).all()
+    assert ends[3] > ends[2] > 0 and (bar[ends[3]] == demo.GROUND).all()
 
 
 @pytest.mark.skipif(not animation.can_write_gif(), reason="this OpenCV writes no GIF")
@@ -186,6 +201,7 @@ def test_an_interrupt_leaves_nothing(
     [
         ("no/such/a.gif", "output: cannot write" if animation.can_write_gif() else "folder: cannot make"),
         ("no/such", "cannot make"),
+        ("a.mp4", "--output: expected a name that ends in .gif, or of a folder, without an ending, got 'a.mp4'"),
         ("full", "expected a new or empty folder"),
         ("file", "expected a new folder, got the file"),
     ],
@@ -211,6 +227,17 @@ def test_the_command_says_where_it_is(
     assert main(["demo", kind, "-o", str(tmp_path / "x")]) == 0
     name = {"bvh": "BVH"}.get(kind, kind)
     assert capsys.readouterr().out == f"a {name} in motion is in {tmp_path / 'x'}\n"
+
+
+@pytest.mark.parametrize("frames", [0, -1, 1.5])
+def test_no_frames_are_refused(frames: int) -> None:
+    with pytest.raises(InputError, match="frames: expected a whole number from 1"):
+        next(demo_frames("grid", frames))
+
+
+def test_a_folder_that_is_there_may_have_a_dot_in_its_name(tmp_path: Path) -> None:
+    (tmp_path / "a.frames").mkdir()
+    assert write_demo("grid", tmp_path / "a.frames", 1) == tmp_path / "a.frames"
 
 
 def test_an_unknown_structure_is_named() -> None:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from planes.arrays import Bools, Floats, Image, InputError, Ints
-from planes.boxes import BroadPhase, Cells, meets
+from planes.arrays import Bools, Floats, Image, InputError, Ints, integer
+from planes.boxes import BroadPhase, Cells
 from planes.bvh import Bvh
 from planes.constants import SUB, TRIG_BITS
 from planes.grid256 import unit
@@ -98,6 +98,7 @@ class Moment:
     ----------
     cells : nodes of the structure
     visited : (C,) bool, nodes that the query looked into
+    nodes : how often a node was compared with the query, or looked up
     boxes : (N, 4) float, px
     tests : how often a box was compared with the query; one that reaches into several leaves counts in each
     tested, found : (N,) bool
@@ -106,6 +107,7 @@ class Moment:
 
     cells: Cells
     visited: Bools
+    nodes: int
     boxes: Floats
     tests: int
     tested: Bools
@@ -115,7 +117,12 @@ class Moment:
     @property
     def entered(self) -> Bools:
         """Leaves that the query opened: (C,) bool."""
-        return np.asarray(self.visited & self.cells.leaf & meets(self.cells.box, self.query))
+        return np.asarray(self.visited & self.cells.leaf)
+
+    @property
+    def cost(self) -> int:
+        """Comparisons in all, of nodes and of boxes."""
+        return self.nodes + self.tests
 
 
 def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
@@ -124,15 +131,16 @@ def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
     Parameters
     ----------
     kind : one of KINDS
-    frames : steps of one round
+    frames : steps of one round, 1 or more
 
     Raises
     ------
     InputError
-        If there is no such structure.
+        If there is no such structure, or no frame.
     """
     if kind not in KINDS:
         raise InputError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    frames = integer("frames", frames, 1, 2**31)
     places, half = _orbits(frames)
     track = _on_ellipse(frames, MIDDLE[None], QUERY_REACH, QUERY_TURNS, np.random.default_rng(SEED))[:, 0]
     structure = KINDS[kind].make(_around(places[0], half))
@@ -153,7 +161,7 @@ def _moment(structure: BroadPhase, boxes: Floats, query: Floats) -> Moment:
     tested[work.tested[1]] = True
     found[structure.query(query[None])[1]] = True
     visited = np.isin(cells.number, work.visited[1])
-    return Moment(cells, visited, boxes, work.tested.shape[1], tested, found, query)
+    return Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _orbits(frames: int) -> tuple[Floats, Floats]:
@@ -201,8 +209,11 @@ def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
     Raises
     ------
     InputError
-        If there is no such structure, or the output cannot be written.
+        If there is no such structure, or the output has another ending or cannot be written.
     """
+    if output.suffix.lower() not in ("", ".gif") and not output.is_dir():
+        told = "expected a name that ends in .gif, or of a folder, without an ending"
+        raise InputError(f"--output: {told}, got {output.name!r}")
     pictures = demo_frames(kind, frames)
     if output.suffix.lower() == ".gif" and can_write_gif():
         write_gif(output, pictures, MILLISECONDS)
@@ -334,30 +345,35 @@ def _legend(now: Moment, width: int) -> Legend:
 
 
 def _counters(page: Image, name: str, history: Sequence[Moment], frames: int) -> list[Text]:
-    """Tests of this frame against those of brute force, as bars of one scale; and of all frames so far, as a chart."""
+    """Tests of this frame against those of brute force, as bars of one scale; and of all frames so far, as a chart.
+
+    A node that was compared with the query counts as much as a box.
+    """
     now, top = history[-1], TOP + HEIGHT + 44
     left, n = MARGIN + NAME, len(now.boxes)
     texts = []
-    rows = (("brute force", n, REST, f"{n} tests"), (name, now.tests, TESTED, f"{now.tests} tests"))
-    for row, (word, tests, color, told) in enumerate(rows):
+    told = f"{now.tests} boxes + {now.nodes} {'cells' if now.cells.leaf.all() else 'nodes'}"
+    rows = (("brute force", n, REST, f"{n} boxes"), (name, now.cost, VISITED, told))
+    for row, (word, tests, color, said) in enumerate(rows):
         y, wide = top + 22 * row, round(BAR * tests / n)
         page[y : y + 13, left : left + wide] = color
         texts.append(Text(left - 8, y + 11, word, FAINT, right=True))
-        texts.append(Text(left + wide + 8, y + 11, told, INK if row else FAINT))
-    page[top + 22 : top + 35, left : left + round(BAR * now.found.sum() / n)] = FOUND
+        texts.append(Text(left + wide + 8, y + 11, said, INK if row else FAINT))
+    for count, color in ((now.tests, TESTED), (now.found.sum(), FOUND)):
+        page[top + 22 : top + 35, left : left + round(BAR * count / n)] = color
     _chart(page[top : top + 35, page.shape[1] - MARGIN - CHART : page.shape[1] - MARGIN], history, frames)
-    saved = 1 - sum(moment.tests for moment in history) / (n * len(history))
+    saved = 1 - sum(moment.cost for moment in history) / (n * len(history))
     middle = page.shape[1] - MARGIN - CHART - 10
-    texts.append(Text(middle, top + 11, "tests saved", FAINT, right=True))
+    texts.append(Text(middle, top + 11, "tests saved so far", FAINT, right=True))
     texts.append(Text(middle, top + 33, percent(saved), INK, bold=True, right=True))
     return texts
 
 
 def _chart(part: Image, history: Sequence[Moment], frames: int) -> None:
-    """A column for each frame so far: tests of brute force, of the structure, and boxes that were found."""
+    """A column for each frame so far: tests of brute force, of nodes and boxes, and boxes that were found."""
     high, wide = part.shape[:2]
     for frame, moment in enumerate(history):
         column = part[:, frame * wide // frames : (frame + 1) * wide // frames]
         column[:] = CELL
-        for count, color in ((moment.tests, TESTED), (int(moment.found.sum()), FOUND)):
+        for count, color in ((moment.cost, VISITED), (moment.tests, TESTED), (int(moment.found.sum()), FOUND)):
             column[high - round(high * count / len(moment.boxes)) :] = color
