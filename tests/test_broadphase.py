@@ -391,6 +391,12 @@ def test_boxes_larger_than_any_root_cell_cost_no_rebuild(monkeypatch: pytest.Mon
         other.insert(rows[k : k + 2])
     other.check()
     assert builds[0] < 40
+    other = Quadtree(rows)
+    other.remove(ids[::3])
+    builds[0] = 0
+    few = other.ids[:1000]
+    other.move(few, rows[few] + 20_000)
+    assert builds[0] == 1, "those that have gone do not count"
 
 
 def test_a_grid_keeps_little_that_is_stale_or_fresh() -> None:
