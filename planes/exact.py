@@ -2,7 +2,8 @@
 
 Each predicate is one polynomial, or its float stand-in, with a bound on the error. The chunk's largest magnitudes give
 one bound for all of its rows; a row that this does not settle gets a bound of its own; one that is still in doubt is
-computed in Python's integers. A comparison with NaN is false, so "certain" is asked for and NaN is in doubt.
+computed in Python's integers. A comparison with NaN is false, so "certain" is asked for and NaN is in doubt. What is
+not finite is never certain, and refused there.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError, Ints
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, shown
 from planes.constants import BOUND_HUGE, CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
 
 __all__ = ["Signs", "circles_sign", "orient2d", "orient3d", "point_segment_sign", "segment_segment_sign"]
 
 Signs = npt.NDArray[np.int8]
 Numbers = npt.NDArray[Any]
+Given = list[tuple[str, Floats]]
+"""Columns, each with the name of the argument that it belongs to."""
 
 NO_ROWS = np.zeros(0, np.int64)
 
@@ -62,7 +65,7 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative:
     Raises
     ------
     InputError
-        If a point does not have two coordinates.
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
 
     References
     ----------
@@ -88,7 +91,7 @@ def orient3d(
     Raises
     ------
     InputError
-        If a point does not have three coordinates.
+        If a point has not three coordinates, an argument is not finite, or leading axes do not broadcast.
     """
     columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 3)]
     return _signs(_ORIENT3D, columns, conservative)
@@ -112,12 +115,13 @@ def circles_sign(
     Raises
     ------
     InputError
-        If a point does not have two or three coordinates, or the centres differ in it.
+        If a point has not two or three coordinates, or not as many; or as in `orient2d`.
     """
-    d = np.shape(c1)[-1] if np.ndim(c1) else 0
-    if d not in (2, 3):
-        raise InputError(f"c1: expected 2 or 3 coordinates on the last axis, got {np.shape(c1)}")
-    columns = [*_columns("c1", c1, d), *_columns("c2", c2, d), _column(r1), _column(r2)]
+    shape = _numbers("c1", c1).shape
+    if not shape or shape[-1] not in (2, 3):
+        raise InputError(f"c1: expected 2 or 3 coordinates on the last axis, got {shape}")
+    centers = [*_columns("c1", c1, shape[-1]), *_columns("c2", c2, shape[-1])]
+    columns = [*centers, ("r1", _numbers("r1", r1)), ("r2", _numbers("r2", r2))]
     return _signs(_CIRCLES, columns, conservative)
 
 
@@ -144,14 +148,14 @@ def point_segment_sign(
     Raises
     ------
     InputError
-        If a point does not have two coordinates.
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
 
     References
     ----------
     Ericson, *Real-Time Collision Detection* (2005), 5.1.2.
     """
-    columns = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2), _column(r), _column(r2)]
-    return _signs(_POINT_SEGMENT, columns, conservative)
+    points = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2)]
+    return _signs(_POINT_SEGMENT, [*points, ("r", _numbers("r", r)), ("r2", _numbers("r2", r2))], conservative)
 
 
 def segment_segment_sign(
@@ -178,10 +182,11 @@ def segment_segment_sign(
     Raises
     ------
     InputError
-        If a point does not have two coordinates.
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
     """
     columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 2)]
-    sign = _signs(_ENDS, [*columns, _column(r), _column(r2)], conservative)
+    columns += [("r", _numbers("r", r)), ("r2", _numbers("r2", r2))]
+    sign = _signs(_ENDS, columns, conservative)
     a, b, c, d = (np.asarray(v, np.float64) for v in (a, b, c, d))
     grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
     crossing = _cross(a, b, c, d, sign >= 0, conservative)
@@ -205,25 +210,31 @@ def _cross(a: Floats, b: Floats, c: Floats, d: Floats, asked: Bools, conservativ
     return crossing
 
 
-def _column(values: npt.ArrayLike) -> Floats:
-    return np.asarray(values, np.float64)
+def _numbers(field: str, values: npt.ArrayLike) -> Floats:
+    array = array_of(field, values)
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{field}: expected numbers, got {shown(values)}")
+    return array.astype(np.float64, copy=False)
 
 
-def _columns(field: str, points: npt.ArrayLike, d: int) -> list[Floats]:
-    array = np.asarray(points, np.float64)
+def _columns(field: str, points: npt.ArrayLike, d: int) -> Given:
+    array = _numbers(field, points)
     if not array.ndim or array.shape[-1] != d:
         raise InputError(f"{field}: expected {d} coordinates on the last axis, got {array.shape}")
-    return [array[..., k] for k in range(d)]
+    return [(field, array[..., k]) for k in range(d)]
 
 
-def _signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> Signs:
+def _signs(predicate: Predicate, given: Given, conservative: bool) -> Signs:
     """Run over the rows of all columns, broadcast, a chunk at a time in the same memory; then over those in doubt."""
+    quick = flag("conservative", conservative)
+    _refuse_axes(given)
     work = np.empty((WORK_ROWS, CHUNK_ROWS))
     flags: Any = ["external_loop", "buffered", "zerosize_ok"]
-    modes: Any = [["readonly"]] * len(columns) + [["writeonly", "allocate"]]
-    types: Any = [np.float64] * len(columns) + [np.int8]
+    modes: Any = [["readonly"]] * len(given) + [["writeonly", "allocate"]]
+    types: Any = [np.float64] * len(given) + [np.int8]
     doubts, kept, done = [], [], 0
-    chunks = np.nditer([*columns, None], flags, modes, types, order="C", buffersize=CHUNK_ROWS)
+    operands = [*(column for _, column in given), None]
+    chunks = np.nditer(operands, flags, modes, types, order="C", buffersize=CHUNK_ROWS)
     with chunks, np.errstate(all="ignore"):
         for *rows, signs in chunks:
             if len(signs) and len(doubt := _chunk(predicate, rows, work[:, : len(signs)], signs)):
@@ -232,9 +243,32 @@ def _signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> S
             done += len(signs)
         found = np.asarray(chunks.operands[-1])
         if doubts:
-            rows = [np.concatenate(column) for column in zip(*kept, strict=True)]
-            found.reshape(-1)[np.concatenate(doubts)] = _row_signs(predicate, rows, conservative)
+            places, hard = np.concatenate(doubts), np.concatenate(kept, axis=1)
+            signs, left = _row_signs(predicate, list(hard))
+            if len(left):
+                hard = hard[:, left]
+                _refuse_infinite([name for name, _ in given], hard, places[left])
+                signs[left] = 0 if quick else _exact(predicate, hard)
+            found.reshape(-1)[places] = signs
     return found
+
+
+def _refuse_axes(given: Given) -> None:
+    """Refuse columns whose axes do not broadcast, by the name of the first that does not go with those before."""
+    shape: tuple[int, ...] = ()
+    for name, column in given:
+        if column.shape != shape:
+            try:
+                shape = np.broadcast_shapes(shape, column.shape)
+            except ValueError:
+                raise InputError(f"{name}: expected axes that broadcast with {shape}, got {column.shape}") from None
+
+
+def _refuse_infinite(names: list[str], columns: Floats, rows: Ints) -> None:
+    bad = np.argwhere(~np.isfinite(columns.T))
+    if len(bad):
+        i, k = bad[0].tolist()
+        raise InputError(f"{names[k]}: expected finite numbers, got {columns[k, i]} in row {rows[i]}")
 
 
 def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs) -> Ints:
@@ -248,22 +282,19 @@ def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Sig
     return np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
 
 
-def _row_signs(predicate: Predicate, columns: list[Floats], conservative: bool) -> Signs:
-    """Signs by a bound for each row, and where that leaves a doubt by whole numbers."""
+def _row_signs(predicate: Predicate, columns: list[Floats]) -> tuple[Signs, Ints]:
+    """Signs by a bound for each row, and the rows that this leaves in doubt."""
     n = len(columns[0])
     value, magnitudes = predicate.value(columns, np.empty((WORK_ROWS, n)))
     bounds = predicate.bound(*(np.abs(m).reshape(-1, n).max(axis=0) for m in magnitudes))
     size = np.abs(value)
     signs = (value > 0).view(np.int8) - (value < 0).view(np.int8)
-    left = np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
-    if len(left):
-        signs[left] = 0 if conservative else _exact(predicate, [column[left] for column in columns])
-    return signs
+    return signs, np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
 
 
-def _exact(predicate: Predicate, columns: list[Floats]) -> Signs:
+def _exact(predicate: Predicate, columns: Floats) -> Signs:
     """Signs by whole numbers: each row's lengths in units of its smallest power of two."""
-    mantissas, exponents = np.frexp(np.stack(columns))
+    mantissas, exponents = np.frexp(columns)
     shifts = exponents - exponents.min(axis=0)
     numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
     value = predicate.exact(list(numbers))
@@ -314,18 +345,18 @@ def _orient3d_exact(columns: list[Numbers]) -> Numbers:
 def _circles_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
     *coordinates, r1, r2 = columns
     d = len(coordinates) // 2
-    total, other, radius = work[0], work[1], work[2]
+    total, other = work[0], work[1]
     np.square(np.subtract(coordinates[0], coordinates[d], out=total), out=total)
     for k in range(1, d):
         np.square(np.subtract(coordinates[k], coordinates[d + k], out=other), out=other)
         np.add(total, other, out=total)
-    np.square(np.add(r1, r2, out=radius), out=other)
-    return np.subtract(total, other, out=total), (radius,)
+    np.square(np.add(r1, r2, out=other), out=other)
+    return np.subtract(total, other, out=total), (other, total)
 
 
-def _circles_bound(radius: Any) -> Any:
-    """Where it matters, both squares are about the same: 5 roundings in one, 3 in the other, one in the difference."""
-    return 10 * ROUNDING * radius * radius + FLOAT_TINY
+def _circles_bound(radius2: Any, value: Any) -> Any:
+    """Where it matters, both squares are about the same: 9 roundings. The value tells of centres not finite."""
+    return np.where(value < FLOAT_HUGE, 10 * ROUNDING * radius2 + FLOAT_TINY, np.inf)
 
 
 def _circles_exact(columns: list[Numbers]) -> Numbers:
@@ -410,6 +441,6 @@ def _ends_exact(columns: list[Numbers]) -> Numbers:
 
 _ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact, (True, True))
 _ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact, (True, True, True))
-_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact, (False,))
-_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact, (True, False, False))
-_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact, (True, False, False))
+_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact, (False, False))
+_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact, (True, True, False))
+_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact, (True, True, False))

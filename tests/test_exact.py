@@ -325,3 +325,45 @@ def test_hard_rows_whose_magnitudes_have_one_sign(predicate: Callable[..., Any],
     truth = [PREDICATES[predicate](*rational(row)) for row in zip(*rows, strict=True)]
     assert (np.sign(floats) != truth).any(), "too easy"
     assert wrong(predicate, rows) == []
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("conservative", [False, True])
+@pytest.mark.parametrize("predicate", CASES, ids=lambda p: p.__name__)
+def test_what_is_not_finite_is_refused_wherever_it_is(
+    predicate: Callable[..., Any], conservative: bool, bad: float
+) -> None:
+    """In every place of every argument, in a row alone, and in one of a chunk that is settled otherwise."""
+    rng = np.random.default_rng(3)
+    names = {
+        orient2d: "a b c", orient3d: "a b c d", circles_sign: "c1 r1 c2 r2",
+        point_segment_sign: "p a b r r2", segment_segment_sign: "a b c d r r2",
+    }[predicate].split()  # fmt: skip
+    rows = [rng.uniform(1, 9, v.shape) for v in touching(rng, predicate, 50, 1.0)]
+    for k, name in enumerate(names):
+        for place in range(rows[k].shape[1] if rows[k].ndim == 2 else 1):
+            arrays = [v.copy() for v in rows]
+            arrays[k].reshape(50, -1)[31, place] = bad
+            with pytest.raises(InputError, match=f"^{name}: expected finite numbers, got {bad} in row 31$"):
+                predicate(*arrays, conservative=conservative)
+            with pytest.raises(InputError, match=f"^{name}: expected finite numbers, got {bad} in row 0$"):
+                predicate(*(v[31] for v in arrays), conservative=conservative)
+
+
+def test_arguments_that_are_no_numbers_or_do_not_broadcast_are_named() -> None:
+    p, many = [0.0, 0.0], np.zeros((3, 2))
+    bad: Any = ["x", "y"]
+    calls: list[tuple[Callable[[], Any], str]] = [
+        (lambda: orient2d(p, many, np.zeros((4, 2))), r"^c: expected axes that broadcast with \(3,\), got \(4,\)$"),
+        (lambda: circles_sign(many, [1, 2], many, 1), r"^r1: expected axes that broadcast with \(3,\), got \(2,\)$"),
+        (lambda: orient2d(p, bad, p), r"^b: expected numbers, got \['x', 'y'\]$"),
+        (lambda: orient2d(p, ["1", "2"], p), "^b: expected numbers"),
+        (lambda: orient2d(p, [[1, 2], [3]], p), "^b: expected an array"),
+        (lambda: circles_sign([[1, 2], [3]], 1, p, 1), "^c1: expected an array"),
+        (lambda: point_segment_sign(p, p, p, None), "^r: expected numbers, got None$"),
+        (lambda: segment_segment_sign(p, p, p, p, 1, "2"), "^r2: expected numbers, got '2'$"),
+        (lambda: orient3d([0] * 3, [1] * 3, [2] * 3, [3] * 3, "no"), "^conservative: expected true or false"),
+    ]
+    for call, message in calls:
+        with pytest.raises(InputError, match=message):
+            call()
