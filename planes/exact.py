@@ -355,8 +355,8 @@ def _circles_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[F
 
 
 def _circles_bound(radius2: Any, value: Any) -> Any:
-    """Where it matters, both squares are about the same: 9 roundings. The value tells of centres not finite."""
-    return np.where(value < FLOAT_HUGE, 10 * ROUNDING * radius2 + FLOAT_TINY, np.inf)
+    """Where it matters, both squares are about the same: 9 roundings. NaN for an infinite value."""
+    return 10 * ROUNDING * radius2 + FLOAT_TINY + 0 * value
 
 
 def _circles_exact(columns: list[Numbers]) -> Numbers:
