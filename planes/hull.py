@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from planes.arrays import Bools, Floats, Ints
+from planes.rings import chain, turn
 
 __all__ = ["Extents", "edge_lines", "extents", "fewer_lines", "hull_points", "outward_corners", "turn"]
 
@@ -19,11 +20,6 @@ Point = tuple[int, int]
 Line = tuple[int, int, int]
 Extents = tuple[Ints, Ints, Ints]
 """Rows that have pixels, rising, and the first and last column of each."""
-
-
-def turn(a: Point, b: Point, c: Point) -> int:
-    """Twice the signed area of a triangle; positive when it turns from +x toward +y."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def extents(mask: Bools) -> Extents:
@@ -53,16 +49,7 @@ def hull_points(extents: Extents) -> list[Point]:
     y = 2 * (borders + rows[0]) - 1
     down = zip((2 * right[borders] + 1).tolist(), y.tolist(), strict=True)
     up = zip((2 * left[borders] - 1)[::-1].tolist(), y[::-1].tolist(), strict=True)
-    return _chain(list(down)) + _chain(list(up))
-
-
-def _chain(points: list[Point]) -> list[Point]:
-    kept: list[Point] = []
-    for point in points:
-        while len(kept) > 1 and turn(kept[-2], kept[-1], point) <= 0:
-            kept.pop()
-        kept.append(point)
-    return kept
+    return chain(list(down)) + chain(list(up))
 
 
 def edge_lines(ring: list[Point]) -> list[Line]:

@@ -5,13 +5,17 @@ Orientation as in the frame: an outline turns from +x towards +y.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.exact import orient2d
 
-__all__ = ["convex_parts", "convex_rows", "hull", "outlines", "rows_of"]
+__all__ = ["chain", "convex_parts", "convex_rows", "hull", "outlines", "rows_of", "rows_taken", "starts_of", "turn"]
 
+Numbers = npt.NDArray[Any]
 Point = tuple[float, float]
 Whole = tuple[int, int]
 
@@ -20,6 +24,19 @@ def rows_of(starts: Ints, total: int) -> tuple[Ints, Ints]:
     """Counts of ragged rows (N,), and the row of each point (total,)."""
     counts = np.diff(np.append(starts, total))
     return counts, np.repeat(np.arange(len(starts)), counts)
+
+
+def starts_of(lengths: list[int]) -> Ints:
+    """First places of ragged rows of these lengths."""
+    counts = np.array(lengths, np.int64)
+    return np.cumsum(counts) - counts
+
+
+def rows_taken(values: Numbers, starts: Ints, rows: Ints) -> tuple[Numbers, Ints]:
+    """Some ragged rows of values, and their starts."""
+    counts = rows_of(starts, len(values))[0][rows]
+    first = np.cumsum(counts) - counts
+    return values[np.repeat(starts[rows] - first, counts) + np.arange(counts.sum())], first
 
 
 def convex_rows(points: Floats, starts: Ints) -> Ints:
@@ -80,16 +97,19 @@ def hull(points: list[Point]) -> list[Point]:
     distinct = sorted(set(points))
     if len(distinct) < 3:
         return distinct
-    whole = dict(zip(distinct, _whole(distinct), strict=True))
-    found: list[Point] = []
-    for run in (distinct, distinct[::-1]):
-        chain: list[Point] = []
-        for p in run:
-            while len(chain) > 1 and _turn(whole[chain[-2]], whole[chain[-1]], whole[p]) <= 0:
-                chain.pop()
-            chain.append(p)
-        found += chain[:-1]
-    return found
+    whole = _whole(distinct)
+    given = dict(zip(whole, distinct, strict=True))
+    return [given[p] for run in (whole, whole[::-1]) for p in chain(run)[:-1]]
+
+
+def chain(points: list[Whole]) -> list[Whole]:
+    """Corners of one side of a hull, of points that go along it: Andrew's monotone chain."""
+    kept: list[Whole] = []
+    for point in points:
+        while len(kept) > 1 and turn(kept[-2], kept[-1], point) <= 0:
+            kept.pop()
+        kept.append(point)
+    return kept
 
 
 def convex_parts(points: list[Point]) -> list[list[int]]:
@@ -131,7 +151,7 @@ def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> l
     k, m = a.index(v), b.index(u)
     a, b = a[k:] + a[:k], b[m:] + b[:m]  # from v to u, and from u to v
     for before, corner, after in ((a[-2], u, b[1]), (b[-2], v, a[1])):
-        if _turn(whole[before], whole[corner], whole[after]) < 0:
+        if turn(whole[before], whole[corner], whole[after]) < 0:
             return []
     return a + b[1:-1]
 
@@ -151,17 +171,17 @@ def _triangles(whole: list[Whole]) -> list[list[int]]:
 def _without_straight(left: list[int], whole: list[Whole]) -> list[int]:
     """Corners alone: taking a point of an edge away turns no other corner."""
     after = left[1:] + left[:1]
-    return [k for i, k in enumerate(left) if _turn(whole[left[i - 1]], whole[k], whole[after[i]]) != 0]
+    return [k for i, k in enumerate(left) if turn(whole[left[i - 1]], whole[k], whole[after[i]]) != 0]
 
 
 def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
     """Whether a corner turns inward and no other point lies in its closed triangle."""
     corner = (left[k - 1], left[k], left[(k + 1) % len(left)])
     a, b, c = (whole[i] for i in corner)
-    if _turn(a, b, c) <= 0:
+    if turn(a, b, c) <= 0:
         return False
     others = (whole[i] for i in left if i not in corner)
-    return not any(_turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0 for p in others)
+    return not any(turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in others)
 
 
 def _refuse_crossing(whole: list[Whole]) -> None:
@@ -175,7 +195,7 @@ def _refuse_crossing(whole: list[Whole]) -> None:
             (a, b), (c, d) = edges[i], edges[j]
             if j == i + 1 or (i == 0 and j == n - 1):
                 p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
-                bad = _turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
+                bad = turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
             else:
                 bad = _meet(a, b, c, d)
             if bad:
@@ -183,7 +203,7 @@ def _refuse_crossing(whole: list[Whole]) -> None:
 
 
 def _meet(a: Whole, b: Whole, c: Whole, d: Whole) -> bool:
-    turns = _turn(a, b, c), _turn(a, b, d), _turn(c, d, a), _turn(c, d, b)
+    turns = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
     if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
         return True
     ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
@@ -195,7 +215,8 @@ def _within(a: Whole, b: Whole, p: Whole) -> bool:
     return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in range(2))
 
 
-def _turn(a: Whole, b: Whole, c: Whole) -> int:
+def turn(a: Whole, b: Whole, c: Whole) -> int:
+    """Twice the signed area of a triangle; positive when it turns from +x towards +y."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 

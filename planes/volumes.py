@@ -9,15 +9,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
 from planes.constants import TRIG_BITS
 from planes.grid256 import unit
-from planes.rings import convex_parts, convex_rows, outlines, rows_of
+from planes.rings import convex_parts, convex_rows, outlines, rows_of, rows_taken, starts_of
 
 __all__ = [
     "Aabbs",
@@ -33,7 +32,6 @@ __all__ = [
     "joined",
 ]
 
-Numbers = npt.NDArray[Any]
 Move = Callable[[Floats, Ints], Floats]
 """Points (n, d) and the row that each belongs to, to points."""
 
@@ -74,6 +72,9 @@ class Volumes:
     def __len__(self) -> int:
         raise NotImplementedError
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self)} rows in {self.d}-D>"
+
     def core(self) -> Core:
         """Points and a radius."""
         raise NotImplementedError
@@ -89,7 +90,7 @@ class Volumes:
         return self if self._original is None else self._original
 
     def bounds(self) -> Aabbs:
-        """Boxes that contain the volumes: rounded outward."""
+        """Boxes that contain the volumes: rounded outward; infinite where a volume reaches beyond the floats."""
         core = self.core()
         if not len(self):
             return Aabbs(np.zeros((0, self.d)), np.zeros((0, self.d)))
@@ -98,6 +99,10 @@ class Volumes:
             return Aabbs._made(low, high)
         radius = core.radius[:, None]
         return Aabbs._made(_sum_outward(low, -radius, -np.inf), _sum_outward(high, radius, np.inf))
+
+    def beyond(self) -> Ints:
+        """Rows that reach beyond the floats, as bounds may: no volumes to move, or to test for overlap."""
+        return np.zeros(0, np.int64)
 
     def translated(self, xy: object) -> Self:
         """Move by a vector (d,), or one for each row (N, d)."""
@@ -165,6 +170,8 @@ class Circles(Volumes):
 class Aabbs(Volumes):
     """Boxes along the axes: min and max (N, d) with d 2 or 3, min <= max; flat ones and single points are boxes."""
 
+    _finite = True
+
     def __init__(self, min: object, max: object) -> None:  # noqa: A002
         self.min = _points("min", min)
         self.d = self.min.shape[1]
@@ -178,8 +185,14 @@ class Aabbs(Volumes):
     def _made(cls, low: Floats, high: Floats) -> Self:
         """Bounds, which may reach beyond the floats."""
         made = cls.__new__(cls)
-        made.min, made.max, made.d = low, high, low.shape[1]
+        made.min, made.max, made.d, made._finite = low, high, low.shape[1], False
         return made
+
+    def beyond(self) -> Ints:
+        """Rows of bounds that are infinite."""
+        if self._finite:
+            return super().beyond()
+        return np.flatnonzero(~(np.isfinite(self.min) & np.isfinite(self.max)).all(axis=1))
 
     def __len__(self) -> int:
         return len(self.min)
@@ -249,12 +262,15 @@ class _Hulls(Volumes):
 
     def _chosen(self, rows: Ints) -> Self:
         made = type(self).__new__(type(self))
-        made.points, made.starts = _ragged(self.points, self.starts, rows)
+        made.points, made.starts = rows_taken(self.points, self.starts, rows)
         return made
 
 
 class Obbs(_Hulls):
     """Turned boxes: each is the hull of its four stored corners, whatever rounding made of them."""
+
+    def __init__(self, *_: object, **__: object) -> None:
+        raise InputError("Obbs: expected Obbs.from_center(center, half_wh, angle_deg) or Obbs.from_corners(corners)")
 
     @classmethod
     def from_corners(cls, corners: object) -> Self:
@@ -285,7 +301,7 @@ class Polygons(_Hulls):
         kept = (given != given[after]).any(axis=1)
         counts = np.bincount(row[kept], minlength=len(first))
         for i in np.flatnonzero(counts < 3).tolist():
-            raise InputError(f"points: expected three distinct points or more in row {i}, got {counts[i]}")
+            raise InputError(f"points: expected three distinct points or more in row {i}, got {max(counts[i], 1)}")
         given, first = given[kept], np.cumsum(counts) - counts
         for i in np.flatnonzero(convex_rows(given, first) == 0).tolist():
             raise InputError(
@@ -321,6 +337,8 @@ class Parts(Volumes):
     """Rows of several parts: volumes of one kind (M), and the first part of each row (N,); a row has one or more."""
 
     def __init__(self, parts: Volumes, starts: object) -> None:
+        if not isinstance(parts, Volumes):
+            raise InputError(f"parts: expected volumes of one kind, got {type(parts).__name__}")
         self.parts, self.d = parts, parts.d
         self.starts = _starts(starts, len(parts))
 
@@ -338,6 +356,10 @@ class Parts(Volumes):
             return inner
         return Aabbs._made(np.minimum.reduceat(inner.min, self.starts), np.maximum.reduceat(inner.max, self.starts))
 
+    def beyond(self) -> Ints:
+        """Rows of which a part is beyond the floats."""
+        return np.unique(rows_of(self.starts, len(self.parts))[1][self.parts.beyond()])
+
     def _moved(self, move: Move, factor: Floats) -> Self:
         row = rows_of(self.starts, len(self.parts))[1]
         return self._same(self.parts._moved(lambda p, part: move(p, row[part]), factor[row]), self.starts)
@@ -347,7 +369,7 @@ class Parts(Volumes):
         return Parts(self.parts._turned(lambda p, part: move(p, row[part])), self.starts)
 
     def _chosen(self, rows: Ints) -> Self:
-        chosen, starts = _ragged(np.arange(len(self.parts)), self.starts, rows)
+        chosen, starts = rows_taken(np.arange(len(self.parts)), self.starts, rows)
         return self._same(self.parts._chosen(chosen), starts)
 
     def _same(self, parts: Volumes, starts: Ints) -> Self:
@@ -364,17 +386,13 @@ class BoxSets(Parts):
 
 
 class ConcavePolygons(Parts):
-    """Simple polygons, cut into convex parts; points on edges are welcome."""
+    """Simple polygons, cut into convex parts: points (M, 2), and the first point of each row (N,).
 
-    @classmethod
-    def from_concave(cls, points: object, starts: object) -> Self:
-        """From points (M, 2) and the first point of each row (N,), in either turning sense.
+    Either turning sense; points on edges are welcome. A row that crosses or touches itself, or has fewer than three
+    points or no area, is an InputError.
+    """
 
-        Raises
-        ------
-        InputError
-            If a row crosses or touches itself, or has fewer than three points or no area.
-        """
+    def __init__(self, points: object, starts: object) -> None:
         given, first = _ragged_points(points, starts)
         corners: list[Floats] = []
         lengths = []
@@ -384,9 +402,12 @@ class ConcavePolygons(Parts):
             corners += [row[part] for part in parts]
             lengths.append(len(parts))
         joined = np.concatenate(corners) if corners else np.zeros((0, 2))
-        made = cls.__new__(cls)
-        Parts.__init__(made, Polygons(joined, _begins([len(part) for part in corners])), _begins(lengths))
-        return made
+        super().__init__(Polygons(joined, starts_of([len(part) for part in corners])), starts_of(lengths))
+
+    @classmethod
+    def from_concave(cls, points: object, starts: object) -> Self:
+        """Make them of points and starts, as the constructor does."""
+        return cls(points, starts)
 
 
 def joined(volumes: Sequence[Volumes]) -> Volumes:
@@ -445,12 +466,6 @@ def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
     return given, _starts(starts, len(given))
 
 
-def _begins(lengths: list[int]) -> Ints:
-    """First places of rows of these lengths."""
-    counts = np.array(lengths, np.int64)
-    return np.cumsum(counts) - counts
-
-
 def _even(n: int, count: int) -> tuple[Ints, Ints]:
     return np.arange(n) * count, np.full(n, count)
 
@@ -458,13 +473,6 @@ def _even(n: int, count: int) -> tuple[Ints, Ints]:
 def _row(points: Floats, starts: Ints, i: int) -> list[list[float]]:
     rows: list[list[float]] = np.split(points, starts[1:])[i].tolist()
     return rows
-
-
-def _ragged(values: Numbers, starts: Ints, rows: Ints) -> tuple[Numbers, Ints]:
-    """Some ragged rows of values, and their starts."""
-    counts = rows_of(starts, len(values))[0][rows]
-    first = np.cumsum(counts) - counts
-    return values[np.repeat(starts[rows] - first, counts) + np.arange(counts.sum())], first
 
 
 def _sum_outward(a: Floats, b: Floats, toward: float) -> Floats:

@@ -245,8 +245,36 @@ def test_concave_polygons_are_tiled_by_their_parts(seed: int) -> None:
         (lambda: BoxSets([[0, 0]] * 2, [[1, 1]] * 2, [0, 0]), "starts: expected 0 and then numbers that grow"),
         (lambda: Circles([[0, 0]], 1).scaled(0), "s: expected a number above 0"),
         (lambda: Circles([[1e308, 0]], 1).translated([1e308, 0]), "center.*expected a finite number"),
+        (lambda: Obbs([(0, 0)]), r"Obbs: expected Obbs.from_center\(.*\) or Obbs.from_corners\(corners\)"),
+        (lambda: Obbs(center=[(0, 0)]), "Obbs: expected Obbs.from_center"),
+        (lambda: Polygons([(0, 0)], [0]), "three distinct points or more in row 0, got 1$"),
+        (lambda: ConcavePolygons([(0, 0), (2, 2)], [0]), "row 0: points: expected three or more, got 2"),
+        (lambda: Parts([Circles([[0, 0]], 1)], [0]), "parts: expected volumes of one kind, got list"),  # type: ignore[arg-type]
     ],
 )
 def test_bad_volumes_are_named(make: Any, message: str) -> None:
     with pytest.raises(InputError, match=message), np.errstate(over="ignore"):
         make()
+
+
+def test_concave_polygons_are_made_as_polygons_are() -> None:
+    made, same = ConcavePolygons(L_SHAPE, [0]), ConcavePolygons.from_concave(L_SHAPE, [0])
+    assert isinstance(made, ConcavePolygons) and cores(made) == cores(same) and len(made.parts) > 1
+    assert len(ConcavePolygons(np.zeros((0, 2)), [])) == 0
+
+
+def test_they_say_what_they_are_in_a_few_words() -> None:
+    assert repr(Circles(np.zeros((5, 3)), 1)) == "<Circles: 5 rows in 3-D>"
+    assert [repr(v) for v in samples().values()][-2:] == [
+        "<BoxSets: 3 rows in 2-D>",
+        "<ConcavePolygons: 3 rows in 2-D>",
+    ]
+
+
+def test_bounds_beyond_the_floats_are_known_by_their_rows() -> None:
+    box = Circles([[0, 0], [1.7e308, 0]], [1, 1.7e308]).bounds()
+    assert box.beyond().tolist() == [1] == box.bounds().beyond().tolist()
+    assert Parts(box.take([0]), [0]).beyond().tolist() == [] == Circles([[1.7e308, 0]], [1.7e308]).beyond().tolist()
+    assert BoxSets([[0, 0]], [[1, 1]], [0]).bounds().beyond().tolist() == []
+    sets = Parts(Circles([[0, 0], [1.7e308, 0], [0, 0]], [1, 1.7e308, 2]).bounds(), [0, 1])
+    assert sets.beyond().tolist() == [1] == sets.bounds().beyond().tolist()
