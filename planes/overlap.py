@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Bools, Floats, InputError, Ints, array_of
+from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, reals
 from planes.axes import edge_parts, hulls_sign
 from planes.exact import circles_sign, orient2d, point_segment_sign, segment_segment_sign
 from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons, Volumes
@@ -41,26 +41,29 @@ def overlap(a: Volumes, b: Volumes, conservative: bool = False) -> Bools:
     Raises
     ------
     InputError
-        If one is no volume, or they differ in length or in dimensions.
+        If one is no volume, or bounds that reach beyond the floats; or they differ in length or in dimensions.
 
     References
     ----------
     Ericson, *Real-Time Collision Detection* (2005), 4.2 to 5.2.
     """
-    for name, volume in (("a", a), ("b", b)):
-        if not isinstance(volume, Volumes):
-            raise InputError(f"{name}: expected volumes, got {type(volume).__name__}")
+    _checked("a", a)
+    _checked("b", b)
+    quick = flag("conservative", conservative)
     if a.d != b.d:
         raise InputError(f"b: expected volumes in {a.d}-D, got {b.d}-D")
     n = _rows(len(a), len(b))
     i, j = (None if len(v) == n else np.zeros(n, np.int64) for v in (a, b))
-    return _pairs(a, b, i, j, conservative)
+    return _pairs(a, b, i, j, quick)
 
 
 def contains_point(volume: Volumes, xy: object, conservative: bool = False) -> Bools:
-    """Tell which rows contain a point (2,), or each its own (N, 2); a point on the edge is inside."""
+    """Tell which rows contain a point (d,), or each its own (N, d); a point on the edge is inside."""
+    d = _checked("volume", volume).d
     points = array_of("xy", xy)
-    return overlap(volume, Circles(points[None] if points.ndim == 1 else points, 0.0), conservative)
+    points = reals("xy", points, (d,) if points.ndim == 1 else (None, d)).reshape(-1, d)
+    _rows(len(volume), len(points), "xy")
+    return overlap(volume, Circles(points, 0.0), conservative)
 
 
 def separating_axis(a: Volumes, b: Volumes) -> Floats:
@@ -77,8 +80,10 @@ def separating_axis(a: Volumes, b: Volumes) -> Floats:
     InputError
         If one has a radius, is a set of parts, or is not in 2-D.
     """
-    if any(type(v) not in (Aabbs, Obbs, Polygons) or v.d != 2 for v in (a, b)):
-        raise InputError("separating_axis: expected boxes or polygons in 2-D")
+    for name, volume in (("a", a), ("b", b)):
+        if type(_checked(name, volume)) not in (Aabbs, Obbs, Polygons) or volume.d != 2:
+            kind = type(volume).__name__
+            raise InputError(f"{name}: expected boxes or polygons in 2-D, got {kind} in {volume.d}-D")
     n = _rows(len(a), len(b))
     hulls = tuple(v if len(v) == n else v.take(np.zeros(n, np.int64)) for v in (a, b))
     one, two = (v.core() for v in hulls)
@@ -108,9 +113,18 @@ def _line_between(a: Aabbs, b: Aabbs) -> Floats:
     return found
 
 
-def _rows(n: int, m: int) -> int:
+def _checked(name: str, volume: Volumes) -> Volumes:
+    if not isinstance(volume, Volumes):
+        raise InputError(f"{name}: expected volumes, got {type(volume).__name__}")
+    beyond = volume.beyond()
+    if len(beyond):
+        raise InputError(f"{name}: expected finite volumes, got bounds beyond the floats in row {beyond[0]}")
+    return volume
+
+
+def _rows(n: int, m: int, name: str = "b") -> int:
     if n != m and 1 not in (n, m):
-        raise InputError(f"b: expected {n} rows or 1, got {m}")
+        raise InputError(f"{name}: expected {n} rows or 1, got {m}")
     return n if m == 1 else m
 
 

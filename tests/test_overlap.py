@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import planes.axes
 import planes.overlap
 from planes import InputError
 from planes.exact import orient2d
@@ -359,6 +360,7 @@ def test_floats_are_never_sure_of_what_is_not_so(grown: bool, scale: float, monk
 
 
 def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of three edges one corner of the other says that they do not part, of the fourth four say that it does."""
     rows = 0
 
     def counted(*points: Any) -> Any:
@@ -366,19 +368,38 @@ def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPa
         rows += len(points[0])
         return orient2d(*points)
 
-    monkeypatch.setattr(planes.overlap, "orient2d", counted)
+    monkeypatch.setattr(planes.overlap, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
+    monkeypatch.setattr(planes.axes, "orient2d", counted)
     a = Obbs.from_corners(np.tile(CORNERS * 1.0, (1000, 1, 1)))
     slanted = np.array([[0, -3], [3, 0], [0, 3], [-3, 0]]) + 3.5
     b = Obbs.from_corners(np.tile(slanted, (1000, 1, 1)))
     assert not overlap(b, a).any()
-    assert rows <= 1000 * 16
+    assert rows == 1000 * (3 + 4)
 
+
+ONE_BOX = Aabbs([[0, 0]], [[1, 1]])
+BEYOND = Circles([[0, 0], [1.7e308, 0]], [1, 1.7e308]).bounds()
 
 BAD: list[tuple[Callable[[], Any], str]] = [
     (lambda: overlap(Circles([[0, 0]] * 2, 1), Circles([[0, 0]] * 3, 1)), "b: expected 2 rows or 1, got 3"),
     (lambda: overlap(Circles([[0, 0]], 1), Circles([[0, 0, 0]], 1)), "b: expected volumes in 2-D, got 3-D"),
     (lambda: overlap([1, 2], Circles([[0, 0]], 1)), "a: expected volumes, got list"),  # type: ignore[arg-type]
-    (lambda: separating_axis(Circles([[0, 0]], 1), Circles([[0, 0]], 1)), "separating_axis: expected boxes"),
+    (lambda: separating_axis(ONE_BOX, Circles([[0, 0]], 1)), "^b: expected boxes or polygons in 2-D, got Circles"),
+    (lambda: separating_axis(Circles([[0, 0]], 1), ONE_BOX), "^a: expected boxes or polygons in 2-D, got Circles"),
+    (lambda: separating_axis(ONE_BOX, Aabbs([[0] * 3], [[1] * 3])), "^b: .* in 2-D, got Aabbs in 3-D"),
+    (lambda: separating_axis(ONE_BOX, 5), "^b: expected volumes, got int"),  # type: ignore[arg-type]
+    (lambda: contains_point(ONE_BOX, [np.nan, 0]), r"^xy\[0\]: expected a finite number, got nan"),
+    (lambda: contains_point(ONE_BOX, [[0, 0], [0, np.inf]]), r"^xy\[1\]\[1\]: expected a finite number, got inf"),
+    (lambda: contains_point(ONE_BOX, [1, 2, 3]), r"^xy: expected shape \(2,\), got \(3,\)"),
+    (lambda: contains_point(ONE_BOX.take([0, 0]), [[1, 2]] * 3), "^xy: expected 2 rows or 1, got 3"),
+    (lambda: contains_point([1], [1, 2]), "^volume: expected volumes, got list"),  # type: ignore[arg-type]
+    (lambda: contains_point(ONE_BOX, [1, 2], "no"), "^conservative: expected true"),  # type: ignore[arg-type]
+    (lambda: overlap(ONE_BOX, ONE_BOX, "no"), "^conservative: expected true or false"),  # type: ignore[arg-type]
+    (lambda: overlap(BEYOND, ONE_BOX), "^a: expected finite volumes, got bounds beyond the floats in row 1"),
+    (lambda: overlap(Obbs.from_corners(ONE_BOX.corners()), BEYOND), "^b: expected finite volumes"),
+    (lambda: overlap(Parts(BEYOND, [0]), ONE_BOX), "^a: expected finite volumes"),
+    (lambda: contains_point(BEYOND, [1, 2]), "^volume: expected finite volumes"),
+    (lambda: separating_axis(ONE_BOX, BEYOND), "^b: expected finite volumes"),
 ]
 
 
