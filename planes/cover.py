@@ -27,6 +27,9 @@ def cover(mask: Bools, k: int) -> Ints:
     -------
     (n, 4) boxes, n <= k
     """
+    if k == 1:
+        rows, first, last = extents(mask)
+        return np.array([[first.min(), rows[0], last.max() + 1, rows[-1] + 1]])
     few, many = _cut(mask, k)
     return min((few, _area(few)), _join(many, k), key=lambda found: found[1])[0]
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from planes.arrays import Bools, Floats, InputError, bools, integer, real, reals
+from planes.arrays import Bools, Floats, InputError, array_of, bools, integer, real, reals
 from planes.constants import BOXES_MAX, LENGTH_TINY, MASK_SIDE_MAX, POSITION_MAX
 from planes.cover import cover
 from planes.hull import Extents, Line, Point, edge_lines, extents, fewer_lines, hull_points, outward_corners
@@ -121,7 +121,8 @@ def oriented_box(pixels: object) -> Obbs:
 def boxes(mask: object, k: int) -> BoxSets:
     """Cover the pixel squares of a mask (h, w) by at most k boxes (1 to 64) with few false pixels.
 
-    Never more of them for a greater k. Fewer than k boxes come where they cover the mask as well. They may overlap.
+    A greater k never brings more false pixels. Fewer than k boxes come where they cover the mask as well. They may
+    overlap.
     """
     rows = cover(_checked(mask), integer("k", k, 1, BOXES_MAX)) - 0.5
     return BoxSets(rows[:, :2], rows[:, 2:], [0])
@@ -144,13 +145,15 @@ def concave(mask: object, tolerance: float) -> Floats:
 
     Returns
     -------
-    (n, 2) float, px: a simple polygon; `ConcavePolygons.from_concave(points, [0])` makes a volume of it
+    (n, 2) float, px: a simple polygon; `ConcavePolygons(points, [0])` makes a volume of it
     """
     checked = _checked(mask)
     return outline(checked, real("tolerance", tolerance, 0, MASK_SIDE_MAX))
 
 
-def _checked(mask: object) -> Bools:
+def _checked(mask: object, field: str = "mask", expected: str = "a mask (h, w)") -> Bools:
+    if array_of("mask", mask).ndim == 0:
+        raise InputError(f"{field}: expected {expected}, got {type(mask).__name__}")
     checked = bools("mask", mask, (None, None))
     if max(checked.shape) > MASK_SIDE_MAX:
         raise InputError(f"mask: expected sides up to {MASK_SIDE_MAX} px, got shape {checked.shape}")
@@ -161,7 +164,7 @@ def _checked(mask: object) -> Bools:
 
 def _extents(pixels: object) -> Extents:
     if not isinstance(pixels, Spans):
-        return extents(_checked(pixels))
+        return extents(_checked(pixels, "pixels", "a mask (h, w) or Spans"))
     if not len(pixels):
         raise InputError("pixels: expected a pixel or more, got none")
     begins = np.flatnonzero(np.diff(pixels.y, prepend=pixels.y[0] - 1))

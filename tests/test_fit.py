@@ -2,16 +2,18 @@
 
 import itertools
 import math
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from planes import fit, outline
+from planes import cover, fit, outline
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.constants import BOXES_MAX, MASK_SIDE_MAX
 from planes.spans import Spans
+from planes.sprite import Sprite
 from planes.volumes import Aabbs, BoxSets, Capsules, Circles
 
 Point = tuple[Fraction, Fraction]
@@ -317,6 +319,13 @@ def test_one_box_more_never_covers_more() -> None:
         assert row.tolist() == [*whole.min[0], *whole.max[0]]
 
 
+def test_one_box_is_found_without_cutting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cover, "_cut", None)
+    for mask in random_masks(30, 20, 31):
+        (row,), whole = rows_of(fit.boxes(mask, 1)), fit.box(mask)
+        assert row.tolist() == [*whole.min[0], *whole.max[0]]
+
+
 def least_false(mask: Bools, k: int) -> int:
     """Fewest false pixels of k boxes, by trying all."""
     h, w = mask.shape
@@ -557,6 +566,17 @@ def test_what_is_no_mask_is_refused(name: str) -> None:
         FITS[name](np.ones((1, MASK_SIDE_MAX + 1), bool))
     with pytest.raises(InputError, match=r"mask\[0\]\[0\]: expected 0 or 1"):
         FITS[name]([[2, 3]])
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_what_has_no_pixels_is_named_by_its_kind(name: str) -> None:
+    field = (
+        "mask: expected a mask (h, w)" if name in ("boxes", "concave") else "pixels: expected a mask (h, w) or Spans"
+    )
+    sprite = Sprite.from_mask(np.ones((2, 3), np.bool_))
+    for thing, kind in ((sprite, "Sprite"), (None, "NoneType"), ("mask.png", "str"), (5, "int")):
+        with pytest.raises(InputError, match=f"^{re.escape(field)}, got {kind}$"):
+            FITS[name](thing)
 
 
 def test_bad_settings_are_refused() -> None:
