@@ -252,7 +252,7 @@ def minkowski(kind_a: str, a: Shape, kind_b: str, b: Shape) -> bool:
     return nearest <= (radius_a + radius_b) ** 2
 
 
-@pytest.mark.parametrize("count", [48, pytest.param(1200, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [48, pytest.param(600, marks=pytest.mark.long)])
 @planar_pair
 def test_against_the_minkowski_difference(kind_a: str, kind_b: str, count: int) -> None:
     for name, a, b in adversarial.cases(kind_a, kind_b, count, 4):
@@ -295,7 +295,7 @@ def cut_by(ring: list[Shape], planes: Sequence[tuple[Shape, Fraction]]) -> bool:
     return bool(ring)
 
 
-@pytest.mark.parametrize("count", [440, pytest.param(11_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [440, pytest.param(5_500, marks=pytest.mark.long)])
 def test_triangles_against_clipping(count: int) -> None:
     for name, a, b in adversarial.triangle_cases(count, 6):
         p, q = fractions(a, b)
