@@ -29,8 +29,9 @@ from planes.constants import (
     TRIG_ERROR,
 )
 from planes.kept import Kept
+from planes.parts import Parts, joined
 from planes.sprite import Form, Sprite, Variant, frame_pivot
-from planes.volumes import Circles, Core, Parts, Polygons, Volumes, joined
+from planes.volumes import Circles, Core, Polygons, Volumes
 
 __all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "moved", "shifted"]
 

@@ -19,8 +19,9 @@ from planes.constants import BOXES_MAX, LENGTH_TINY, MASK_SIDE_MAX, POSITION_MAX
 from planes.cover import cover
 from planes.hull import Extents, Line, Point, edge_lines, extents, fewer_lines, hull_points, outward_corners
 from planes.outline import outline
+from planes.parts import BoxSets
 from planes.spans import Spans
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles, Obbs, Polygons
+from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons
 
 __all__ = [
     "box", "boxes", "capsule", "concave", "convex", "hull", "least_circle", "oriented_box", "pivot_circle",

@@ -15,7 +15,8 @@ import numpy as np
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, reals
 from planes.axes import edge_parts, hulls_sign
 from planes.exact import circles_sign, orient2d, point_segment_sign, segment_segment_sign
-from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons, Volumes
+from planes.parts import Parts
+from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Polygons, Volumes
 
 __all__ = ["contains_point", "overlap", "separating_axis"]
 

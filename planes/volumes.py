@@ -1,4 +1,4 @@
-"""Volumes as rows of float64 columns: circles, boxes, turned boxes, convex polygons, capsules, and sets of parts.
+"""Volumes as rows of float64 columns: circles, boxes, turned boxes, convex polygons, and capsules.
 
 All are closed sets. Each is the hull of a few points, grown by a radius (`core`). A moved volume keeps the one it was
 made of (`original`): turning from there again and again adds no rounding.
@@ -7,29 +7,29 @@ made of (`original`): turning from there again and again adds no rounding.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown, within
+from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown
 from planes.constants import TRIG_BITS
 from planes.grid256 import unit
-from planes.rings import convex_parts, convex_rows, outlines, rows_of, rows_taken, starts_of
+from planes.rings import convex_rows, outlines, rows_of, rows_taken
 
 __all__ = [
     "Aabbs",
-    "BoxSets",
     "Capsules",
     "Circles",
-    "ConcavePolygons",
     "Core",
+    "Hulls",
+    "Move",
     "Obbs",
-    "Parts",
     "Polygons",
     "Volumes",
-    "joined",
+    "checked_starts",
+    "ragged_points",
 ]
 
 Move = Callable[[Floats, Ints], Floats]
@@ -226,7 +226,7 @@ class Aabbs(Volumes):
         return type(self)(self.min[rows], self.max[rows])
 
 
-class _Hulls(Volumes):
+class Hulls(Volumes):
     """Hulls of ragged rows of points."""
 
     points: Floats
@@ -266,7 +266,7 @@ class _Hulls(Volumes):
         return made
 
 
-class Obbs(_Hulls):
+class Obbs(Hulls):
     """Turned boxes: each is the hull of its four stored corners, whatever rounding made of them."""
 
     def __init__(self, *_: object, **__: object) -> None:
@@ -291,11 +291,11 @@ class Obbs(_Hulls):
         return cls.from_corners(middle[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=2))
 
 
-class Polygons(_Hulls):
+class Polygons(Hulls):
     """Convex polygons: points (M, 2), and the first point of each row (N,); either turning sense."""
 
     def __init__(self, points: object, starts: object) -> None:
-        given, first = _ragged_points(points, starts)
+        given, first = ragged_points(points, starts)
         counts, row = rows_of(first, len(given))
         after = first[row] + (np.arange(len(given)) - first[row] + 1) % counts[row]
         kept = (given != given[after]).any(axis=1)
@@ -333,108 +333,6 @@ class Capsules(Volumes):
         return type(self)(self.a_xy[rows], self.b_xy[rows], self.radius[rows])
 
 
-class Parts(Volumes):
-    """Rows of several parts: volumes of one kind (M), and the first part of each row (N,); a row has one or more."""
-
-    def __init__(self, parts: Volumes, starts: object) -> None:
-        if not isinstance(parts, Volumes):
-            raise InputError(f"parts: expected volumes of one kind, got {type(parts).__name__}")
-        self.parts, self.d = parts, parts.d
-        self.starts = _starts(starts, len(parts))
-
-    def __len__(self) -> int:
-        return len(self.starts)
-
-    def core(self) -> Core:
-        """A row of parts has no hull of its own."""
-        raise InputError("core: expected a volume of one part, got a set of parts")
-
-    def bounds(self) -> Aabbs:
-        """Boxes around all parts of each row."""
-        inner = self.parts.bounds()
-        if not len(self):
-            return inner
-        return Aabbs._made(np.minimum.reduceat(inner.min, self.starts), np.maximum.reduceat(inner.max, self.starts))
-
-    def beyond(self) -> Ints:
-        """Rows of which a part is beyond the floats."""
-        return np.unique(rows_of(self.starts, len(self.parts))[1][self.parts.beyond()])
-
-    def _moved(self, move: Move, factor: Floats) -> Self:
-        row = rows_of(self.starts, len(self.parts))[1]
-        return self._same(self.parts._moved(lambda p, part: move(p, row[part]), factor[row]), self.starts)
-
-    def _turned(self, move: Move) -> Volumes:
-        row = rows_of(self.starts, len(self.parts))[1]
-        return Parts(self.parts._turned(lambda p, part: move(p, row[part])), self.starts)
-
-    def _chosen(self, rows: Ints) -> Self:
-        chosen, starts = rows_taken(np.arange(len(self.parts)), self.starts, rows)
-        return self._same(self.parts._chosen(chosen), starts)
-
-    def _same(self, parts: Volumes, starts: Ints) -> Self:
-        made = type(self).__new__(type(self))
-        made.parts, made.starts, made.d = parts, starts, parts.d
-        return made
-
-
-class BoxSets(Parts):
-    """Sets of boxes: min and max (M, d), and the first box of each row (N,)."""
-
-    def __init__(self, min: object, max: object, starts: object) -> None:  # noqa: A002
-        super().__init__(Aabbs(min, max), starts)
-
-
-class ConcavePolygons(Parts):
-    """Simple polygons, cut into convex parts: points (M, 2), and the first point of each row (N,).
-
-    Either turning sense; points on edges are welcome. A row that crosses or touches itself, or has fewer than three
-    points or no area, is an InputError.
-    """
-
-    def __init__(self, points: object, starts: object) -> None:
-        given, first = _ragged_points(points, starts)
-        corners: list[Floats] = []
-        lengths = []
-        for i, row in enumerate(np.split(given, first[1:]) if len(first) else []):
-            with within(f"row {i}"):
-                parts = convex_parts([(x, y) for x, y in row.tolist()])
-            corners += [row[part] for part in parts]
-            lengths.append(len(parts))
-        joined = np.concatenate(corners) if corners else np.zeros((0, 2))
-        super().__init__(Polygons(joined, starts_of([len(part) for part in corners])), starts_of(lengths))
-
-    @classmethod
-    def from_concave(cls, points: object, starts: object) -> Self:
-        """Make them of points and starts, as the constructor does."""
-        return cls(points, starts)
-
-
-def joined(volumes: Sequence[Volumes]) -> Volumes:
-    """All rows of volumes of one kind, in order.
-
-    Raises
-    ------
-    InputError
-        If there are none, or they differ in kind.
-    """
-    if not volumes or any(type(v) is not type(volumes[0]) for v in volumes):
-        raise InputError(f"volumes: expected some, of one kind, got {sorted({type(v).__name__ for v in volumes})}")
-    first = volumes[0]
-    if isinstance(first, Parts):
-        counts = np.concatenate([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)])
-        return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), np.cumsum(counts) - counts)
-    names = _COLUMNS[type(first)]
-    columns = [np.concatenate([getattr(v, name) for v in volumes]) for name in names]
-    if not isinstance(first, _Hulls):
-        return type(first)(*columns)
-    made = type(first).__new__(type(first))
-    ends = np.cumsum([len(v.points) for v in volumes if isinstance(v, _Hulls)])
-    before = np.concatenate([[0], ends[:-1]])
-    made.points, made.starts = columns[0], columns[1] + np.repeat(before, [len(v) for v in volumes])
-    return made
-
-
 def _points(field: str, values: object) -> Floats:
     shape = array_of(field, values).shape
     return reals(field, values, (None, 3 if len(shape) == 2 and shape[1] == 3 else 2))
@@ -454,16 +352,18 @@ def _vectors(field: str, values: object, n: int, d: int) -> Floats:
     return reals(field, array, (n, d))
 
 
-def _starts(starts: object, total: int) -> Ints:
+def checked_starts(starts: object, total: int) -> Ints:
+    """First of the points or parts of each row: 0, and then numbers that grow."""
     first = integers("starts", starts, (None,), 0, max(total - 1, 0))
     if (len(first) and first[0] != 0) or (np.diff(first) < 1).any() or (total and not len(first)):
         raise InputError(f"starts: expected 0 and then numbers that grow, got {first[:9].tolist()}")
     return first
 
 
-def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
+def ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
+    """Points (M, 2) of ragged rows, and the first of each."""
     given = reals("points", points, (None, 2))
-    return given, _starts(starts, len(given))
+    return given, checked_starts(starts, len(given))
 
 
 def _even(n: int, count: int) -> tuple[Ints, Ints]:
@@ -483,12 +383,3 @@ def _sum_outward(a: Floats, b: Floats, toward: float) -> Floats:
         rest = (a - (total - part)) + (b - part)
         inside = rest <= 0 if toward > 0 else rest >= 0
         return np.where(inside, total, np.nextafter(total, toward))
-
-
-_COLUMNS: dict[type[Volumes], tuple[str, ...]] = {
-    Circles: ("center", "radius"),
-    Aabbs: ("min", "max"),
-    Capsules: ("a_xy", "b_xy", "radius"),
-    Obbs: ("points", "starts"),
-    Polygons: ("points", "starts"),
-}

@@ -10,8 +10,9 @@ from planes import Scene, fit
 from planes.arrays import Bools, InputError
 from planes.bounding import KINDS, Kind, bounding, fitted, moved
 from planes.constants import CORNERS, PLACE
+from planes.parts import Parts
 from planes.sprite import Sprite, Variant, form_of, frame_pivot, variant_of
-from planes.volumes import Aabbs, Circles, Parts, Polygons, Volumes
+from planes.volumes import Aabbs, Circles, Polygons, Volumes
 
 Point = tuple[Fraction, Fraction]
 HALF = Fraction(1, 2)

@@ -223,7 +223,7 @@ def test_a_bad_output_is_one_line(
 def test_the_command_says_where_it_is(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("weapons.cli.write_demo", partial(write_demo, frames=1))
+    monkeypatch.setattr("weapons.demo.write_demo", partial(write_demo, frames=1))
     assert main(["demo", kind, "-o", str(tmp_path / "x")]) == 0
     name = {"bvh": "BVH"}.get(kind, kind)
     assert capsys.readouterr().out == f"a {name} in motion is in {tmp_path / 'x'}\n"

@@ -12,9 +12,10 @@ import pytest
 from planes import cover, fit, outline
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.constants import BOXES_MAX, MASK_SIDE_MAX
+from planes.parts import BoxSets
 from planes.spans import Spans
 from planes.sprite import Sprite
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles
+from planes.volumes import Aabbs, Capsules, Circles
 
 Point = tuple[Fraction, Fraction]
 HALF = Fraction(1, 2)

@@ -13,9 +13,9 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
-        "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles", "image",
-        "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "items", "index", "compose",
-        "labels", "poses", "scenefile", "scene", "render", "sampling",
+        "parts", "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles",
+        "image", "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "items", "index",
+        "compose", "labels", "poses", "scenefile", "scene", "render", "sampling",
     ),
     "weapons": (
         "draws", "pattern", "arsenal", "volley", "narrow", "candidates", "plan", "resolve", "explain",

@@ -14,7 +14,8 @@ import planes.overlap
 from planes import InputError
 from planes.exact import orient2d
 from planes.overlap import TABLE, contains_point, overlap, separating_axis
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Parts, Polygons, Volumes
+from planes.parts import BoxSets, ConcavePolygons, Parts
+from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
 
 L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])

@@ -17,7 +17,8 @@ import touching
 from oracle_volumes import KINDS, PAIRS
 
 from planes.overlap import contains_point, overlap, separating_axis
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Polygons, Volumes
+from planes.parts import BoxSets, ConcavePolygons
+from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
 
 SPACE_PAIRS = [("circle", "circle"), ("circle", "aabb"), ("aabb", "aabb")]
 ALL_PAIRS = [*((*pair, 2) for pair in PAIRS), *((*pair, 3) for pair in SPACE_PAIRS)]

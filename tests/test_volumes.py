@@ -10,7 +10,8 @@ import pytest
 
 from planes import InputError
 from planes.exact import orient2d
-from planes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Parts, Polygons, Volumes
+from planes.parts import BoxSets, ConcavePolygons, Parts
+from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
 
 F = Fraction
 L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]

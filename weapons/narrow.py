@@ -15,7 +15,8 @@ from planes.bounding import Kind
 from planes.constants import CORNERS, GROWN_PX, PAIRS_AT_ONCE, SUB
 from planes.items import Items, Stack
 from planes.overlap import overlap
-from planes.volumes import Capsules, Volumes, joined
+from planes.parts import joined
+from planes.volumes import Capsules, Volumes
 from weapons.pattern import Pattern, Swept
 from weapons.volley import Volley
 

@@ -10,9 +10,10 @@ import numpy as np
 from planes.arrays import Floats, InputError, Ints, choice
 from planes.boxes import meets
 from planes.index import STRUCTURES, Index
+from planes.parts import Parts
 from planes.scene import Scene
 from planes.spans import Box
-from planes.volumes import Parts, Volumes
+from planes.volumes import Volumes
 from weapons.candidates import PREFILTERS, Candidates, Prefilter, prefilter_of
 from weapons.hits import Hits
 from weapons.narrow import pattern_volumes
