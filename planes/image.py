@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
+import stat
 import struct
 import zlib
 from collections.abc import Iterator
@@ -124,10 +126,22 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
+def _is_no_file(path: Path) -> bool:
+    """Whether something is there that is not a regular file; one look, for others may be writing it now."""
+    try:
+        return not stat.S_ISREG(path.stat().st_mode)
+    except ValueError:  # a zero byte
+        return False
+    except OSError as error:
+        if error.errno not in (errno.ENOENT, errno.ENOTDIR, errno.ELOOP):
+            raise
+        return path.is_symlink()
+
+
 def check_output(path: Path) -> None:
     """Refuse, before any work is done, a place where no file can be written."""
     try:
-        is_other = not path.is_file() and (path.exists() or path.is_symlink())
+        is_other = _is_no_file(path)
         has_folder = path.parent.is_dir()
     except OSError as error:
         raise InputError(f"output: cannot write {path}: {error.strerror}") from error

@@ -632,3 +632,22 @@ def test_a_name_cannot_speak_to_the_terminal(tmp_path: Path, capfd: pytest.Captu
     (tmp_path / "scene.json").write_text(json.dumps(changed(f"{DUCK}.name", "a\nb\x1b[31m")))
     assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
     assert "\x1b" not in (out := capfd.readouterr().out) and out.count("\n") == 1
+
+
+def test_an_output_that_another_writer_makes_meanwhile_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is looked at once: what was not there a moment ago and is there now is still the name of a file."""
+    place, look = tmp_path / "r.png", Path.stat
+
+    def stat(path: Path, **how: bool) -> os.stat_result:
+        try:
+            return look(path, **how)
+        finally:
+            if path == place:
+                place.write_bytes(b"by another")
+
+    monkeypatch.setattr(Path, "stat", stat)
+    write_png(place, np.zeros((3, 3, 3), np.uint8))
+    monkeypatch.undo()
+    assert read_png(place).shape == (3, 3, 4)
