@@ -116,9 +116,8 @@ def _within(begin: Floats, end: Floats, size: Floats) -> tuple[Floats, Floats]:
     level = step == 0
     first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
     last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
-    beside = (level & ((begin < -BEYOND) | (begin > size + BEYOND))).any(axis=1)
     first, last = np.maximum(first, 0), np.minimum(last, 1)
-    some = (first <= last) & ~beside
+    some = first <= last
     return (begin + first[:, None] * step)[some], (begin + last[:, None] * step)[some]
 
 
