@@ -510,7 +510,9 @@ def test_a_run_cut_short_goes_on_to_the_same_bytes(
     output, part = tmp_path / "hits.jsonl", tmp_path / "hits.jsonl.part"
     output.write_bytes(b"an older result\n")
     words = [*COMMAND, str(GALLERY), str(log), "-o", str(output)]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it would be ignored
     process = subprocess.Popen(words, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGINT, before)
     until(lambda: part.exists() and part.stat().st_size > 50_000)
     process.send_signal(sign)
     told = process.communicate(timeout=20)
