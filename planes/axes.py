@@ -15,7 +15,7 @@ from planes.volumes import Core
 
 __all__ = ["edge_parts", "hulls_sign"]
 
-CHUNK_POINTS = 4 * CHUNK_ROWS
+CHUNK_POINTS = CHUNK_ROWS
 """Corners of a hull that are worked on at a time, of all rows of a chunk."""
 
 SIDE_ERROR = 64 * ROUNDING

@@ -150,8 +150,8 @@ BOUND_HUGE = 1e280
 LENGTH_TINY = 1e-140
 """A length whose square underflows is shorter than this."""
 
-CHUNK_ROWS = 8192
-"""Rows of a float filter worked on at a time: 64 KB for each of its arrays."""
+CHUNK_ROWS = 32_768
+"""Rows of a float filter worked on at a time: 256 KB for each of its arrays; with fewer the calls cost more."""
 OVERSIZED_CELLS = 64
 """A box over more cells of a grid is kept in a list beside it: one huge box among tiny ones would fill memory."""
 
