@@ -30,6 +30,7 @@ from planes.constants import (
 )
 from planes.kept import Kept
 from planes.parts import Parts, joined
+from planes.rings import neighbours
 from planes.sprite import Form, Sprite, Variant, frame_pivot
 from planes.volumes import Circles, Core, Polygons, Volumes
 
@@ -186,12 +187,10 @@ def _grown(core: Core, by: float) -> Floats:
 
 def _outward(core: Core) -> tuple[Floats, Bools]:
     """How far each corner of convex rings moves when all edges move outward by 1 px, and which rings have needles."""
-    row = np.repeat(np.arange(len(core.starts)), core.counts)
-    place = np.arange(len(core.points)) - core.starts[row]
-    before = core.starts[row] + (place - 1) % core.counts[row]
-    step = core.points[core.starts[row] + (place + 1) % core.counts[row]] - core.points
+    before, after = neighbours(core.starts, len(core.points))
+    step = core.points[after] - core.points
     turning = step[before, 0] * step[:, 1] - step[before, 1] * step[:, 0]
-    sense = np.where(np.add.reduceat(turning, core.starts) < 0, -1, 1)[row]  # a flip turns a ring round
+    sense = np.where(np.add.reduceat(turning, core.starts) < 0, -1, 1).repeat(core.counts)  # a flip turns a ring round
     normal = np.stack([step[:, 1], -step[:, 0]], axis=1) * (sense / np.sqrt((step**2).sum(axis=1)))[:, None]
     open_ = 1 + (normal[before] * normal).sum(axis=1)
     sharp = np.minimum.reduceat(open_, core.starts) < SHARP

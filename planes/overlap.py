@@ -16,6 +16,8 @@ from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, reals
 from planes.axes import edge_parts, hulls_sign
 from planes.exact import circles_sign, orient2d, point_segment_sign, segment_segment_sign
 from planes.parts import Parts
+from planes.rings import rows_of, starts_of
+from planes.spans import ragged
 from planes.volumes import Aabbs, Capsules, Circles, Core, Obbs, Polygons, Volumes
 
 __all__ = ["contains_point", "overlap", "separating_axis"]
@@ -144,14 +146,13 @@ def _pairs(a: Volumes, b: Volumes, i: Rows, j: Rows, conservative: bool) -> Bool
 
 def _any_part(sets: Parts, rows: Rows, test: Callable[[Ints, Ints], Bools]) -> Bools:
     """Test all parts of rows at once; `test` takes places in rows and numbers of parts."""
-    starts, counts = sets.starts, np.diff(np.append(sets.starts, len(sets.parts)))
+    starts, (counts, _) = sets.starts, rows_of(sets.starts, len(sets.parts))
     if rows is not None:
         starts, counts = starts[rows], counts[rows]
     if not len(starts):
         return np.zeros(0, np.bool_)
-    first = np.cumsum(counts) - counts
-    of = np.repeat(np.arange(len(starts)), counts)
-    return np.logical_or.reduceat(test(of, starts[of] + np.arange(len(of)) - first[of]), first)
+    of, place = ragged(counts)
+    return np.logical_or.reduceat(test(of, starts[of] + place), starts_of(counts))
 
 
 def _circles_circles(a: Circles, b: Circles, conservative: bool) -> Bools:

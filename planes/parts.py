@@ -116,14 +116,13 @@ def joined(volumes: Sequence[Volumes]) -> Volumes:
     first = volumes[0]
     if isinstance(first, Parts):
         counts = np.concatenate([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)])
-        return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), np.cumsum(counts) - counts)
+        return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), starts_of(counts))
     names = _COLUMNS[type(first)]
     columns = [np.concatenate([getattr(v, name) for v in volumes]) for name in names]
     if not isinstance(first, Hulls):
         return type(first)(*columns)
     made = type(first).__new__(type(first))
-    ends = np.cumsum([len(v.points) for v in volumes if isinstance(v, Hulls)])
-    before = np.concatenate([[0], ends[:-1]])
+    before = starts_of([len(v.points) for v in volumes if isinstance(v, Hulls)])
     made.points, made.starts = columns[0], columns[1] + np.repeat(before, [len(v) for v in volumes])
     return made
 

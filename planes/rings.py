@@ -12,8 +12,20 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints
 from planes.exact import orient2d
+from planes.spans import ragged
 
-__all__ = ["chain", "convex_parts", "convex_rows", "hull", "outlines", "rows_of", "rows_taken", "starts_of", "turn"]
+__all__ = [
+    "chain",
+    "convex_parts",
+    "convex_rows",
+    "hull",
+    "neighbours",
+    "outlines",
+    "rows_of",
+    "rows_taken",
+    "starts_of",
+    "turn",
+]
 
 Numbers = npt.NDArray[Any]
 Point = tuple[float, float]
@@ -26,17 +38,25 @@ def rows_of(starts: Ints, total: int) -> tuple[Ints, Ints]:
     return counts, np.repeat(np.arange(len(starts)), counts)
 
 
-def starts_of(lengths: list[int]) -> Ints:
+def starts_of(lengths: Ints | list[int]) -> Ints:
     """First places of ragged rows of these lengths."""
-    counts = np.array(lengths, np.int64)
-    return np.cumsum(counts) - counts
+    counts = np.asarray(lengths, np.int64)
+    return np.asarray(np.cumsum(counts) - counts)
+
+
+def neighbours(starts: Ints, total: int) -> tuple[Ints, Ints]:
+    """Places before and after each point (total,), going round its ragged row."""
+    counts, row = rows_of(starts, total)
+    first, last = starts[row], (starts + counts - 1)[row]
+    place = np.arange(total)
+    return np.where(place == first, last, place - 1), np.where(place == last, first, place + 1)
 
 
 def rows_taken(values: Numbers, starts: Ints, rows: Ints) -> tuple[Numbers, Ints]:
     """Some ragged rows of values, and their starts."""
     counts = rows_of(starts, len(values))[0][rows]
-    first = np.cumsum(counts) - counts
-    return values[np.repeat(starts[rows] - first, counts) + np.arange(counts.sum())], first
+    row, place = ragged(counts)
+    return values[starts[rows][row] + place], starts_of(counts)
 
 
 def convex_rows(points: Floats, starts: Ints) -> Ints:
@@ -47,9 +67,7 @@ def convex_rows(points: Floats, starts: Ints) -> Ints:
     """
     if not len(starts):
         return np.zeros(0, np.int64)
-    counts, row = rows_of(starts, len(points))
-    place = np.arange(len(points)) - starts[row]
-    after = starts[row] + (place + 1) % counts[row]
+    _, after = neighbours(starts, len(points))
     turns = orient2d(points, points[after], points[after[after]]).astype(np.int64)
     rightward = points[after, 0] > points[:, 0]
     changes = np.add.reduceat((rightward != rightward[after]).astype(np.int64), starts)
@@ -75,14 +93,12 @@ def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
     parts = np.split(points, starts[1:])
     for i in np.flatnonzero(sense == 0).tolist():
         parts[i] = np.array(hull([(x, y) for x, y in parts[i].tolist()]))
-    lengths = np.array([len(part) for part in parts])
-    return np.concatenate(parts), np.cumsum(lengths) - lengths
+    return np.concatenate(parts), starts_of([len(part) for part in parts])
 
 
 def _checked_sense(points: Floats, starts: Ints) -> Ints:
     """Sense of convex rows; 0 also for rows with equal neighbours, whose turns would not be seen."""
-    counts, row = rows_of(starts, len(points))
-    after = starts[row] + (np.arange(len(points)) - starts[row] + 1) % counts[row]
+    _, after = neighbours(starts, len(points))
     same: Bools = (points == points[after]).all(axis=1)
     return np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
 

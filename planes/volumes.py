@@ -16,7 +16,7 @@ import numpy as np
 from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, shown
 from planes.constants import TRIG_BITS
 from planes.grid256 import unit
-from planes.rings import convex_rows, outlines, rows_of, rows_taken
+from planes.rings import convex_rows, neighbours, outlines, rows_of, rows_taken, starts_of
 
 __all__ = [
     "Aabbs",
@@ -296,13 +296,12 @@ class Polygons(Hulls):
 
     def __init__(self, points: object, starts: object) -> None:
         given, first = ragged_points(points, starts)
-        counts, row = rows_of(first, len(given))
-        after = first[row] + (np.arange(len(given)) - first[row] + 1) % counts[row]
+        row, (_, after) = rows_of(first, len(given))[1], neighbours(first, len(given))
         kept = (given != given[after]).any(axis=1)
         counts = np.bincount(row[kept], minlength=len(first))
         for i in np.flatnonzero(counts < 3).tolist():
             raise InputError(f"points: expected three distinct points or more in row {i}, got {max(counts[i], 1)}")
-        given, first = given[kept], np.cumsum(counts) - counts
+        given, first = given[kept], starts_of(counts)
         for i in np.flatnonzero(convex_rows(given, first) == 0).tolist():
             raise InputError(
                 f"points: expected a convex polygon with an area in row {i}, got {shown(_row(given, first, i))}"
