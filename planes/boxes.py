@@ -7,7 +7,6 @@ Searches read rows by `take` and `flatnonzero`: by brackets numpy takes up to te
 
 from __future__ import annotations
 
-import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,9 +16,10 @@ import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, integers, reals, shown
 from planes.constants import CHUNK_PAIRS
+from planes.spans import meets
 from planes.volumes import Aabbs, Volumes
 
-__all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "meets", "pieces", "piled", "sorted_pairs"]
+__all__ = ["BroadPhase", "BruteForce", "Cells", "Work", "box_rows", "piled", "sorted_pairs"]
 
 Pairs = tuple[Ints, Ints]
 AXES = "xyz"
@@ -54,16 +54,6 @@ def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
     return rows
 
 
-def meets(a: Floats, b: Floats) -> Bools:
-    """Whether boxes overlap, touching counts: (..., 2d) against (..., 2d), broadcast."""
-    dim = a.shape[-1] // 2
-    good = (a[..., 0] <= b[..., dim]) & (b[..., 0] <= a[..., dim])
-    for axis in range(1, dim):
-        good &= a[..., axis] <= b[..., dim + axis]
-        good &= b[..., axis] <= a[..., dim + axis]
-    return good
-
-
 def sorted_pairs(first: Ints, second: Ints, n: int) -> Ints:
     """Pairs as (2, K), sorted by (first, second); every second is below n."""
     key = np.sort(first * n + second) if n else first
@@ -73,16 +63,6 @@ def sorted_pairs(first: Ints, second: Ints, n: int) -> Ints:
 def piled(found: Sequence[Pairs]) -> Ints:
     """Join pairs that were found in pieces: (2, K) int64."""
     return np.concatenate([np.empty((2, 0), np.int64), *(np.stack(piece) for piece in found)], axis=1)
-
-
-def pieces(lengths: Ints, limit: int) -> list[slice]:
-    """Cut groups into runs of about so many elements; a larger group is a run of its own."""
-    total = np.cumsum(lengths)
-    if not len(lengths) or total[-1] <= limit:
-        return [slice(0, len(lengths))]
-    cuts = np.flatnonzero(np.diff(total // limit)) + 1
-    edges = [0, *cuts.tolist(), len(lengths)]
-    return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
 class Cells(NamedTuple):

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, InputError, Ints, integers, real
-from planes.boxes import BroadPhase, Cells, Pairs, Work, box_rows, meets, pieces, piled
+from planes.boxes import BroadPhase, Cells, Pairs, Work, box_rows, piled
 from planes.constants import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
-from planes.spans import ragged
+from planes.spans import meets, pieces, ragged
 
 __all__ = ["Bvh", "PartsBvh"]
 

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from planes.arrays import InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
-from planes.items import Items, Stack, clipped, overlapping
-from planes.spans import Box
+from planes.items import Items, Stack, clipped
+from planes.spans import Box, meets
 
 __all__ = ["CodePlane", "area", "label_plane", "plane_fits"]
 
@@ -107,7 +107,7 @@ def _paint(codes: Codes, plane_xyxy: Box, stack: Stack, box_xyxy: Box) -> None:
     x, y = plane_xyxy[:2]
     left, top, right, low = box_xyxy
     codes[top - y : low - y + 1, left - x : right - x + 1] = 0
-    for rank in np.flatnonzero(overlapping(np.array(box_xyxy), stack.box_xyxy))[::-1].tolist():
+    for rank in np.flatnonzero(meets(np.array(box_xyxy), stack.box_xyxy))[::-1].tolist():
         ix, iy, ix_max, iy_max = stack.box_xyxy[rank].tolist()
         x0, y0, x1, y1 = max(left, ix), max(top, iy), min(right, ix_max), min(low, iy_max)
         mask = stack.mask(rank)[y0 - iy : y1 - iy + 1, x0 - ix : x1 - ix + 1]

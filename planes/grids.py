@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, integer, integers, real
-from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, piled
+from planes.boxes import BroadPhase, Cells, Pairs, Work, piled
 from planes.constants import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
-from planes.spans import ragged
+from planes.spans import pieces, ragged
 
 __all__ = ["Grid"]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from planes.bounding import Bounds, Kind
     from planes.volumes import Volumes
 
-__all__ = ["Items", "MaskAtlas", "Role", "Stack", "boxes_in", "clipped", "overlapping"]
+__all__ = ["Items", "MaskAtlas", "Role", "Stack", "boxes_in", "clipped"]
 
 
 class Role(Enum):
@@ -95,14 +95,6 @@ class Stack:
         x, y, x_max, y_max = self.box_xyxy[rank].tolist()
         size = (x_max - x + 1) * (y_max - y + 1)
         return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
-
-
-def overlapping(box_xyxy: Ints, boxes_xyxy: Ints) -> Bools:
-    """Which inclusive boxes (..., 4) share a pixel with a box (..., 4)."""
-    a, b = box_xyxy, boxes_xyxy
-    return np.asarray(
-        (a[..., 0] <= b[..., 2]) & (b[..., 0] <= a[..., 2]) & (a[..., 1] <= b[..., 3]) & (b[..., 1] <= a[..., 3])
-    )
 
 
 def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:

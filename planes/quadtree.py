@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, integer
-from planes.boxes import BroadPhase, Cells, Pairs, Work, pieces, piled, sorted_pairs
+from planes.boxes import BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
 from planes.constants import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
-from planes.spans import ragged
+from planes.spans import pieces, ragged
 
 __all__ = ["Quadtree"]
 

@@ -19,7 +19,7 @@ from planes.compose import Codes
 from planes.items import Stack
 from planes.spans import Box, each_pixel, ragged
 
-__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "split", "walk"]
+__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "walk"]
 
 HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
 """What happened to a sample: an object was hit, an occluder ended its walk, an item was skipped; it still walks."""
@@ -168,16 +168,6 @@ def read_codes(runs: Runs, codes: Codes, plane_xyxy: Box) -> tuple[Ints, Ints, I
     run, column, found = run[some], column[some], found[some]
     first, last = _stretches(run, column, found)
     return run[first], column[first], column[last], found[first].astype(np.int64)
-
-
-def split(lengths: Ints, samples: int) -> list[slice]:
-    """Cut a list of runs into stretches of about so many samples."""
-    total = np.cumsum(lengths)
-    if not len(total):
-        return []
-    cuts = np.searchsorted(total, np.arange(samples, int(total[-1]), samples)) + 1
-    edges = np.unique(np.concatenate([[0], cuts, [len(total)]])).tolist()
-    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:

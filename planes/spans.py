@@ -7,12 +7,15 @@ y = 1   # # # # #      (1, 0, 4)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
 
-__all__ = ["Spans", "each_pixel", "merged_runs", "ragged"]
+__all__ = ["Spans", "each_pixel", "meets", "merged_runs", "pieces", "ragged"]
 
 Box = tuple[int, int, int, int]
 
@@ -27,6 +30,29 @@ def each_pixel(x_first: Ints, x_last: Ints) -> tuple[Ints, Ints]:
     """Write runs out pixel by pixel, as (run number, x)."""
     run, place = ragged(x_last - x_first + 1)
     return run, x_first[run] + place
+
+
+def pieces(lengths: Ints, limit: int) -> list[slice]:
+    """Cut groups into runs of about so many elements; a larger group is a run of its own."""
+    total = np.cumsum(lengths)
+    if not len(lengths) or total[-1] <= limit:
+        return [slice(0, len(lengths))]
+    cuts = np.flatnonzero(np.diff(total // limit)) + 1
+    edges = [0, *cuts.tolist(), len(lengths)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def meets(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Bools:
+    """Whether boxes, least and then greatest of each axis, overlap: (..., 2d) against (..., 2d), broadcast.
+
+    Touching counts: inclusive boxes of pixels that meet share one.
+    """
+    dim = a.shape[-1] // 2
+    good = (a[..., 0] <= b[..., dim]) & (b[..., 0] <= a[..., dim])
+    for axis in range(1, dim):
+        good &= a[..., axis] <= b[..., dim + axis]
+        good &= b[..., axis] <= a[..., dim + axis]
+    return np.asarray(good)
 
 
 def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:

@@ -12,9 +12,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from planes import InputError
 from planes.arrays import Floats, Ints
-from planes.boxes import meets, pieces
 from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
 from planes.constants import GRID_FRESH
+from planes.spans import meets, pieces
 from planes.volumes import Aabbs, Circles
 
 Maker = Callable[[Floats], BroadPhase]

@@ -20,7 +20,7 @@ from planes.arrays import Bools
 from planes.broadphase import Grid
 from planes.constants import INDEX_SLACK
 from planes.index import STRUCTURES, Index
-from planes.items import overlapping
+from planes.spans import meets
 from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, fire, plan
 from weapons.arsenal import Plain, pattern_of
 from weapons.candidates import Candidates, prefilter_of
@@ -284,7 +284,7 @@ def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:
 
 def expected(scene: Scene, boxes: np.ndarray) -> list[tuple[int, int]]:
     stack = scene.items.stack()
-    row, rank = np.nonzero(overlapping(boxes[:, None], stack.box_xyxy[None]))
+    row, rank = np.nonzero(meets(boxes[:, None], stack.box_xyxy[None]))
     return sorted(zip(row.tolist(), stack.ids[rank].tolist(), strict=True))
 
 

@@ -12,8 +12,9 @@ import pytest
 
 from planes import InputError
 from planes.arrays import Image
-from planes.boxes import BroadPhase, BruteForce, Work, meets
+from planes.boxes import BroadPhase, BruteForce, Work
 from planes.image import read_png
+from planes.spans import meets
 from weapons import animation, demo
 from weapons.cli import main
 from weapons.demo import KINDS, demo_frames, moments, write_demo

@@ -14,8 +14,9 @@ import numpy as np
 
 from planes.arrays import Bools, Ints, choice
 from planes.index import Index
-from planes.items import Items, Stack, boxes_in, overlapping
+from planes.items import Items, Stack, boxes_in
 from planes.sampling import Pairs
+from planes.spans import meets
 from weapons.volley import Shots, Volley
 
 __all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "prefilter_of", "refused"]
@@ -65,7 +66,7 @@ def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
     boxes_xyxy : (P, 4) inclusive boxes of the placements
     shot : (P,) whose they are
     """
-    placement, rank = np.nonzero(overlapping(boxes_xyxy[:, None], stack.box_xyxy[None]))
+    placement, rank = np.nonzero(meets(boxes_xyxy[:, None], stack.box_xyxy[None]))
     return Pairs(placement, rank, refused(stack, rank, shots, shot[placement]))
 
 
@@ -121,7 +122,7 @@ class Candidates:
         if self.prefilter.name == "none":
             return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
         if self.index is None:
-            row, rank = np.nonzero(overlapping(boxes_xyxy[:, None], self.stack.box_xyxy[None]))
+            row, rank = np.nonzero(meets(boxes_xyxy[:, None], self.stack.box_xyxy[None]))
             return row, rank
         some = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
         row, item = self.index.query(self.items, boxes_xyxy[some])

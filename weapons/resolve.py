@@ -10,8 +10,8 @@ from planes.arrays import Ints
 from planes.compose import Codes, area
 from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack, clipped
-from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, split, walk
-from planes.spans import Box, merged_runs
+from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, walk
+from planes.spans import Box, merged_runs, pieces
 from weapons.candidates import Candidates, refused
 from weapons.plan import Plan
 from weapons.volley import Shots, Volley
@@ -72,7 +72,7 @@ def composed(volley: Volley, shots: Shots, sight: Sight, codes: Codes, plane_xyx
     rank_of = np.zeros(int(sight.stack.ids.max(initial=-1)) + 2, np.int64)
     rank_of[sight.stack.ids + 1] = np.arange(len(sight.stack))
     events, behind = [], []
-    for strip in split(runs.lengths, CHUNK_SAMPLES):
+    for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         run, x_first, x_last, code = read_codes(part, codes, plane_xyxy)
         rank = rank_of[code >> 1]
@@ -131,7 +131,7 @@ def _candidates(volley: Volley, placements: Ints, boxes: Ints, shots: Shots, sig
 def _walked(runs: Runs, pairs: Pairs, sight: Sight, counts: Ints) -> list[Events]:
     """Walk runs strip by strip; add to the counts."""
     found = []
-    for strip in split(runs.lengths, CHUNK_SAMPLES):
+    for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         near = slice(*np.searchsorted(pairs.placement, [part.placement[0], part.placement[-1] + 1]).tolist())
         here = Pairs(pairs.placement[near], pairs.rank[near], pairs.refused[near])

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, choice
-from planes.boxes import meets
 from planes.index import STRUCTURES, Index
 from planes.parts import Parts
 from planes.scene import Scene
-from planes.spans import Box
+from planes.spans import Box, meets
 from planes.volumes import Volumes
 from weapons.candidates import PREFILTERS, Candidates, Prefilter, prefilter_of
 from weapons.hits import Hits

@@ -9,10 +9,9 @@ import numpy as np
 
 from planes.arrays import Floats, InputError
 from planes.bounding import Kind
-from planes.items import overlapping
 from planes.render import blend
 from planes.scene import Scene
-from planes.spans import ragged
+from planes.spans import meets, ragged
 from weapons.candidates import prefilter_of
 from weapons.marks import LET_THROUGH, PASSED_OVER, SKETCH
 from weapons.sieve import outline_of, rectangle
@@ -68,7 +67,7 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
     if wanted.name == "none":
         return {}
     reach = np.array(world.view) + np.array([-1, -1, 1, 1]) * (max(world.image.shape) // world.factor)
-    seen = np.flatnonzero(overlapping(reach, stack.box_xyxy))[:OUTLINES_MAX]
+    seen = np.flatnonzero(meets(reach, stack.box_xyxy))[:OUTLINES_MAX]
     ids = stack.ids[seen]
     if not wanted.volume:
         return {item: [rectangle(box)] for item, box in zip(ids.tolist(), stack.box_xyxy[seen], strict=True)}
