@@ -9,21 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, Ints
-from planes.constants import CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
+from planes.constants import CHUNK_ROWS, DISTANCE_ERROR, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, SIDE_ERROR
 from planes.exact import Signs, orient2d
 from planes.volumes import Core
 
 __all__ = ["edge_parts", "hulls_sign"]
-
-CHUNK_POINTS = CHUNK_ROWS
-"""Corners of a hull that are worked on at a time, of all rows of a chunk."""
-
-SIDE_ERROR = 64 * ROUNDING
-"""Of a side of an edge, of the square of the reach of both hulls: 48 roundings, of products of two differences."""
-
-DISTANCE_ERROR = 128 * ROUNDING
-"""Of a distance to an edge, of that reach: 3 roundings of corners, and 32 of differences of up to twice the reach. What
-is left covers the roundings of squares: a radius that is near the distance is below 3 times the reach."""
 
 
 def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
@@ -43,7 +33,7 @@ def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
     with np.errstate(all="ignore"):
         while done < len(rows):
             most = int(max(v.counts[rows[order[done]]] for v in (one, two)))
-            chunk = order[done : done + max(CHUNK_POINTS // most, 1)]
+            chunk = order[done : done + max(CHUNK_ROWS // most, 1)]
             signs[chunk] = _chunk_sign(one, two, rows[chunk])
             done += len(chunk)
     return signs

@@ -24,6 +24,7 @@ from planes.constants import (
     GROWN_PX,
     PLACE,
     SCALE_BITS,
+    SHARP,
     SUB,
     TRIG_BITS,
     TRIG_ERROR,
@@ -35,9 +36,6 @@ from planes.sprite import Form, Sprite, Variant, frame_pivot
 from planes.volumes import Circles, Core, Polygons, Volumes
 
 __all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "moved", "shifted"]
-
-SHARP = 2.0**-6
-"""1 + cos of the turn at a corner: with less, at an angle below 10 degrees, growing would move it 11 times as far."""
 
 KINDS = ("circle", "oriented box", "boxes", "polygon")
 
@@ -207,18 +205,15 @@ def _bytes(row: Volumes) -> int:
 
 
 _fitted: Kept[tuple[Any, ...], Volumes] = Kept(BOUNDING_CACHE_BYTES, _bytes)
-_bounding: Kept[tuple[Any, ...], Volumes] = Kept(BOUNDING_CACHE_BYTES, _bytes)
 
 
 def _bounding_of(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
-    return _bounding.get((kind, *variant.key), lambda: _make_bounding(kind, sprite, variant))
-
-
-def _make_bounding(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
+    """The volume of a shape's mask as it is; or that of the frame, moved."""
     if sprite.outline is not None:
-        return _on_grid(fitted(kind, variant.mask))
-    frame = sprite.frames[variant.key[1].frame]
-    volume = _fitted.get((kind, sprite.uid, variant.key[1].frame), lambda: _on_grid(fitted(kind, frame.mask)))
+        return _fitted.get((kind, *variant.key), lambda: _on_grid(fitted(kind, variant.mask)))
+    number = variant.key[1].frame
+    frame = sprite.frames[number]
+    volume = _fitted.get((kind, sprite.uid, number), lambda: _on_grid(fitted(kind, frame.mask)))
     return moved(volume, frame_pivot(sprite, frame), variant)
 
 

@@ -111,6 +111,9 @@ GROWN_PX = 0.5**0.5 + 1 / 256
 TRIG_ERROR = 2.0**-29
 """Relative length that a turn by a sine and cosine of 30 bits may gain or lose."""
 
+SHARP = 2.0**-6
+"""1 + cos of the turn at a corner: with less, at an angle below 10 degrees, growing would move it 11 times as far."""
+
 PLACE = 2.0**-16
 """Corners of bounding volumes are multiples of it, px: far below 1/256, and whole shifts are exact."""
 
@@ -137,6 +140,17 @@ JOURNAL_ROWS = 2**16
 
 ROUNDING = 2.0**-53
 """Largest relative error of one float64 operation."""
+
+ORIENT2D_ERROR = 3.3307e-16
+ORIENT3D_ERROR = 7.7716e-16
+"""Relative error of the determinants, of the sum of their terms' magnitudes: Shewchuk (1997), table 1."""
+
+SIDE_ERROR = 64 * ROUNDING
+"""Of a side of an edge, of the square of the reach of both hulls: 48 roundings, of products of two differences."""
+
+DISTANCE_ERROR = 128 * ROUNDING
+"""Of a distance to an edge, of that reach: 3 roundings of corners, and 32 of differences of up to twice the reach. What
+is left covers the roundings of squares: a radius that is near the distance is below 3 times the reach."""
 
 FLOAT_TINY = 1e-290
 """Below it a value of a float filter may have lost digits to underflow, far above the least float."""

@@ -16,7 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, shown
-from planes.constants import BOUND_HUGE, CHUNK_ROWS, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, ROUNDING
+from planes.constants import (
+    BOUND_HUGE,
+    CHUNK_ROWS,
+    FLOAT_HUGE,
+    FLOAT_TINY,
+    LENGTH_TINY,
+    ORIENT2D_ERROR,
+    ORIENT3D_ERROR,
+    ROUNDING,
+)
 
 __all__ = ["Signs", "circles_sign", "orient2d", "orient3d", "point_segment_sign", "segment_segment_sign"]
 
@@ -29,10 +38,6 @@ NO_ROWS = np.zeros(0, np.int64)
 
 WORK_ROWS = 20
 """Arrays of a chunk that a predicate may work in."""
-
-ORIENT2D_ERROR = 3.3307e-16
-ORIENT3D_ERROR = 7.7716e-16
-"""Relative error of the determinants, of the sum of their terms' magnitudes: Shewchuk (1997), table 1."""
 
 
 @dataclass(frozen=True)
@@ -288,8 +293,7 @@ def _row_signs(predicate: Predicate, columns: list[Floats]) -> tuple[Signs, Ints
     value, magnitudes = predicate.value(columns, np.empty((WORK_ROWS, n)))
     bounds = predicate.bound(*(np.abs(m).reshape(-1, n).max(axis=0) for m in magnitudes))
     size = np.abs(value)
-    signs = (value > 0).view(np.int8) - (value < 0).view(np.int8)
-    return signs, np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
+    return _sign(value), np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
 
 
 def _exact(predicate: Predicate, columns: Floats) -> Signs:
@@ -297,7 +301,10 @@ def _exact(predicate: Predicate, columns: Floats) -> Signs:
     mantissas, exponents = np.frexp(columns)
     shifts = exponents - exponents.min(axis=0)
     numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
-    value = predicate.exact(list(numbers))
+    return _sign(predicate.exact(list(numbers)))
+
+
+def _sign(value: Numbers) -> Signs:
     return np.asarray((value > 0).astype(np.int8) - (value < 0).astype(np.int8))
 
 
@@ -436,7 +443,7 @@ def _ends_exact(columns: list[Numbers]) -> Numbers:
     a, b, c, d = (columns[2 * k : 2 * k + 2] for k in range(4))
     rows = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
     values = [_point_segment_exact([*p, *q, *s, *columns[8:]]) for p, q, s in rows]
-    return np.asarray(np.minimum.reduce([(v > 0).astype(np.int8) - (v < 0).astype(np.int8) for v in values]))
+    return np.asarray(np.minimum.reduce([_sign(v) for v in values]))
 
 
 _ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact, (True, True))

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
 from planes.broadphase import Bvh
-from planes.constants import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY
-from planes.exact import ORIENT3D_ERROR, Signs, orient2d, orient3d
+from planes.constants import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
+from planes.exact import Signs, orient2d, orient3d
 
 __all__ = ["Mesh", "meeting_faces", "triangles_meet"]
 

@@ -7,6 +7,7 @@ made of (`original`): turning from there again and again adds no rounding.
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
@@ -63,21 +64,22 @@ class Core:
         return low, high
 
 
-class Volumes:
+class Volumes(ABC):
     """What all kinds have: length, bounds, a choice of rows, and moves that keep the original."""
 
     _original: Volumes | None = None
     d = 2
 
+    @abstractmethod
     def __len__(self) -> int:
-        raise NotImplementedError
+        """How many rows."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {len(self)} rows in {self.d}-D>"
 
+    @abstractmethod
     def core(self) -> Core:
         """Points and a radius."""
-        raise NotImplementedError
 
     def take(self, rows: object) -> Self:
         """Some rows, by number."""
@@ -134,11 +136,13 @@ class Volumes:
     def _turned(self, move: Move) -> Volumes:
         return self._moved(move, np.ones(len(self)))
 
+    @abstractmethod
     def _moved(self, move: Move, factor: Floats) -> Self:
-        raise NotImplementedError
+        """The same kind, of moved points; radii by a factor for each row."""
 
+    @abstractmethod
     def _chosen(self, rows: Ints) -> Self:
-        raise NotImplementedError
+        """Some rows."""
 
     def _of(self, original: Volumes | None) -> Self:
         self._original = original
