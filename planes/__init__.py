@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from planes.image import write_png as write_png
     from planes.items import Role as Role
     from planes.labels import Planes as Planes
+    from planes.loading import load_scene as load_scene
     from planes.scene import Scene as Scene
-    from planes.scene import load_scene as load_scene
     from planes.spans import Spans as Spans
     from planes.sprite import Sprite as Sprite
 
@@ -25,7 +25,7 @@ _HOME = {
     "Scene": "scene",
     "Spans": "spans",
     "Sprite": "sprite",
-    "load_scene": "scene",
+    "load_scene": "loading",
     "read_png": "image",
     "write_png": "image",
 }

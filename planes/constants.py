@@ -46,6 +46,9 @@ ITEMS_MAX = 2**22
 ITEMS_UINT16 = 32_767
 """Item numbers that fit a uint16 code plane, whose lowest bit says "more behind"."""
 
+COST_MAX = 255
+"""Largest cost of a px of an object to a bullet: times the length of a ray it leaves room in int64."""
+
 LAYER_MAX = 2**31 - 1
 """Largest layer, either way: it fits 32 bits."""
 

@@ -146,8 +146,8 @@ class MaskAtlas:
 
 
 COLUMNS: dict[str, tuple[int, ...]] = {
-    "alive": (), "role": (), "layer": (), "categories": (), "owner": (),
-    "position_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
+    "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
+    "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
 
@@ -159,7 +159,9 @@ class Items:
     layer: Ints
     categories: Ints
     owner: Ints
+    cost: Ints
     position_256: Ints
+    velocity_256: Ints
     pivot_256: Ints
     size_wh: Ints
     offset: Ints

@@ -14,11 +14,11 @@ __all__ = ["changed_forms", "points", "scale_pair"]
 ONE = 1 << SCALE_BITS
 
 
-def points(field: str, values: object, n: int) -> Floats:
-    """Positions (n, 2), or one (2,) for all, px."""
+def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> Floats:
+    """Positions or velocities (n, 2), or one (2,) for all, px."""
     if array_of(field, values).shape == (2,):
-        return np.broadcast_to(reals(field, values, (2,), POSITION_MAX), (n, 2))
-    return reals(field, values, (n, 2), POSITION_MAX)
+        return np.broadcast_to(reals(field, values, (2,), limit), (n, 2))
+    return reals(field, values, (n, 2), limit)
 
 
 def scale_pair(scale: object) -> tuple[float, float]:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals, within
+from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals
 from planes.compose import CodePlane, label_plane, plane_fits
-from planes.constants import ALL, CATEGORY_BITS, LAYER_MAX, POSITION_MAX, SCALE_BITS, SUB
+from planes.constants import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.index import Index
 from planes.items import ROLES, Items, Role
 from planes.labels import Planes, plane_objects, plane_size
 from planes.poses import changed_forms, points, scale_pair
-from planes.scenefile import FILE_NAME, FileObject, SceneFile, folder_of, read_scene, scene_folder, write_scene
+from planes.scenefile import FileObject, SceneFile, folder_of, write_scene
 from planes.schema import Text, typed
 from planes.spans import Box
 from planes.sprite import as_sprite, form_of
@@ -26,7 +26,7 @@ from planes.sprite import as_sprite, form_of
 if TYPE_CHECKING:
     from planes.volumes import Volumes
 
-__all__ = ["Scene", "load_scene"]
+__all__ = ["Scene"]
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")
@@ -136,6 +136,8 @@ class Scene:
         layer: int = 0,
         categories: int | Sequence[str] | None = None,
         owner: int | None = None,
+        cost: int = 1,
+        velocity_xy: Sequence[float] = (0.0, 0.0),
         name: str | None = None,
     ) -> int:
         """Place an object and return its id.
@@ -152,6 +154,8 @@ class Scene:
         layer : greater is nearer the viewer
         categories : names, or bits; by default bit 0 for objects, all bits for occluders
         owner : id of the object that this one is a part of; by default itself
+        cost : what a px of it takes from the budget of a bullet that goes through it, 0 to 255
+        velocity_xy : where it moves while a projectile flies, px a frame
         name : by default "role id"
 
         Raises
@@ -169,7 +173,9 @@ class Scene:
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
             "categories": self._bits(categories, _default_bits(kind)),
             "owner": number if owner is None else integer("owner", owner, 0, number),
+            "cost": integer("cost", cost, 0, COST_MAX),
             "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
+            "velocity_256": snap(reals("velocity_xy", velocity_xy, (2,), REACH_MAX)),
         }
         unnamed = name is None or (isinstance(name, str) and not name)
         called = f"{kind.value} {number}" if unnamed else Text().check("name", name)
@@ -195,6 +201,8 @@ class Scene:
         layer: object = None,
         categories: object = None,
         owner: object = None,
+        cost: object = None,
+        velocity_xy: object = None,
         role: Role | str | None = None,
     ) -> None:
         """Change objects, all at once or not at all; each value is one for all, or one per object.
@@ -206,6 +214,10 @@ class Scene:
         columns: dict[str, Any] = {}
         if position_xy is not None:
             columns["position_256"] = snap(points("position_xy", position_xy, n))
+        if velocity_xy is not None:
+            columns["velocity_256"] = snap(points("velocity_xy", velocity_xy, n, REACH_MAX))
+        if cost is not None:
+            columns["cost"] = integers("cost", each("cost", cost, n), (n,), 0, COST_MAX)
         if layer is not None:
             columns["layer"] = integers("layer", each("layer", layer, n), (n,), -LAYER_MAX, LAYER_MAX)
         if categories is not None:
@@ -312,6 +324,9 @@ class Scene:
             digest.update(np.ascontiguousarray(column).tobytes())
         for rank in range(len(stack)):
             digest.update(np.packbits(stack.mask(rank)).tobytes())
+        cost, velocity = self.items.cost[stack.ids], self.items.velocity_256[stack.ids]
+        if (cost != 1).any() or velocity.any():
+            digest.update(np.concatenate([cost[:, None], velocity], axis=1).tobytes())
         return digest.hexdigest()[:16]
 
     def save(self, folder: str | Path) -> None:
@@ -351,6 +366,10 @@ class Scene:
             pose["frame"] = form.frame
         if items.layer[item]:
             pose["layer"] = int(items.layer[item])
+        if items.cost[item] != 1:
+            pose["cost"] = int(items.cost[item])
+        if items.velocity_256[item].any():
+            pose["velocity_xy"] = (items.velocity_256[item] / SUB).tolist()
         role = ROLES[int(items.role[item])]
         bits, owner = int(items.categories[item]), int(items.owner[item])
         x, y = (items.position_256[item] / SUB).tolist()
@@ -385,58 +404,6 @@ class Scene:
         if values.dtype.kind in "iu" and values.ndim:
             return integers("categories", values, (n,), 0, ALL)
         return np.full(n, self._bits(categories, 0))
-
-
-def load_scene(folder: str | Path) -> Scene:
-    """Read a scene folder: scene.json and the PNGs that it names. The path of scene.json will do, too.
-
-    Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the section, the row and the field.
-    """
-    path = scene_folder(folder_of(folder))
-    file = read_scene(path)
-    with within(str(path / FILE_NAME)):
-        x, y = file.origin_xy
-        scene = Scene(file.size_wh, (x, y), categories=file.categories, name=file.name)
-        scene.weapons, scene.shots = file.weapons, file.shots
-        numbered = [entry.id is not None for entry in file.objects]
-        if any(numbered) and not all(numbered):
-            raise InputError("objects: expected an id for each object or for none, got some")
-        entries = sorted(file.objects, key=lambda entry: entry.id) if any(numbered) else file.objects  # type: ignore[arg-type,return-value]
-        for entry in entries:
-            _add_entry(scene, entry)
-        _set_owners(scene, entries)
-        return scene
-
-
-def _add_entry(scene: Scene, entry: FileObject) -> None:
-    with within(entry.place):
-        if entry.id is not None:
-            if entry.id < scene.items.count:
-                raise InputError(f"id: expected each id once, got {entry.id} again")
-            scene.items.skip_to(entry.id)
-        scene.add(
-            entry.sprite,
-            entry.position_xy,
-            role=entry.role,
-            name=entry.name,
-            categories=entry.categories,
-            **entry.pose,
-        )
-
-
-def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
-    for item, entry in zip(scene.ids().tolist(), entries, strict=True):
-        if entry.owner is not None:
-            with within(f"{entry.place}: owner"):
-                owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
-                if entry.id is not None and owner >= scene.items.count:
-                    scene.items.skip_to(owner + 1)  # the owner was removed before the scene was saved
-                scene.set(item, owner=owner)
 
 
 def _role(role: object) -> Role:

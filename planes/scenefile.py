@@ -13,7 +13,18 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Image, InputError, shown, within
-from planes.constants import ITEMS_MAX, LAYER_MAX, MASK_AREA_MAX, MASK_SIDE_MAX, POSITION_MAX, SCALE_MAX, SCALE_MIN, SUB
+from planes.constants import (
+    COST_MAX,
+    ITEMS_MAX,
+    LAYER_MAX,
+    MASK_AREA_MAX,
+    MASK_SIDE_MAX,
+    POSITION_MAX,
+    REACH_MAX,
+    SCALE_MAX,
+    SCALE_MIN,
+    SUB,
+)
 from planes.image import read_png, read_text, write_png, write_text
 from planes.items import Role
 from planes.schema import (
@@ -89,6 +100,8 @@ POSE: dict[str, Value] = {
     "flip": Word(FLIPS),
     "frame": Whole(0, 2**31 - 1),
     "layer": Whole(-LAYER_MAX, LAYER_MAX),
+    "cost": Whole(0, COST_MAX),
+    "velocity_xy": Numbers((2,), REACH_MAX),
 }
 PLACED: dict[str, Value] = {
     "id": ID,

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from planes.arrays import InputError
 from planes.constants import ALL
 from planes.items import Role
-from planes.scene import Planes, Scene, load_scene
+from planes.loading import load_scene
+from planes.scene import Planes, Scene
 from planes.sprite import Sprite
 from weapons import Point, fire
 

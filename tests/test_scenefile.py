@@ -12,7 +12,8 @@ from planes import scenefile
 from planes.arrays import InputError
 from planes.image import read_png, write_png
 from planes.items import Items, Role
-from planes.scene import Scene, load_scene
+from planes.loading import load_scene
+from planes.scene import Scene
 from planes.scenefile import read_scene
 from planes.schema import Mask
 from planes.sprite import Sprite

@@ -16,7 +16,8 @@ from typing import Any, NoReturn
 from planes.arrays import InputError, within
 from planes.image import check_output, write_png, write_text
 from planes.items import Role
-from planes.scene import Scene, load_scene
+from planes.loading import load_scene
+from planes.scene import Scene
 from planes.scenefile import FILE_NAME, scene_folder
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
