@@ -70,6 +70,9 @@ SEED_MAX = 2**64 - 1
 PELLETS_MAX = 65_536
 """Pellets of one shot, over all its rounds: beyond it a loop was forgotten."""
 
+STEPS_MAX = 65_536
+"""Tests of a projectile in one frame: beyond it sweeping was forgotten."""
+
 DETAIL_SAMPLES_MAX = 2**25
 """Samples of a shot that are told one by one: each takes about 160 bytes on the way."""
 

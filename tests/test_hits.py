@@ -140,7 +140,7 @@ def test_equality_leaves_out_plan_and_version() -> None:
     assert again == direct and again.version != direct.version
     assert direct != fire(scene, Disc(2), (3, 4))
     assert direct != fire(scene, Disc(2), [(3, 3), (8, 8)])
-    for name in ("samples", "first_xy", "weight", "verdicts", "object"):
+    for name in ("samples", "first_xy", "weight", "_verdicts", "object"):
         other = copy.copy(direct)
         setattr(other, name, getattr(direct, name) + 1)
         assert other != direct, name

@@ -18,11 +18,12 @@ ORDER = {
         "compose", "labels", "poses", "scenefile", "scene", "loading", "render", "sampling",
     ),
     "weapons": (
-        "draws", "pattern", "arsenal", "volley", "narrow", "candidates", "plan", "resolve", "explain",
-        "hits", "firing", "orders", "heat", "sieve", "facts", "schemas", "jsondiff", "words", "marks",
-        "world", "sketch", "panel", "overlay", "inset", "cards", "picture", "differences", "versus",
-        "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale", "golden", "shotlog", "part",
-        "progress", "stream", "starter", "animation", "demo", "cli", "__main__",
+        "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "narrow", "candidates",
+        "plan", "resolve", "explain", "hits", "trace", "meetings", "ends", "passes", "tracing",
+        "rayhits", "rayfire", "firing", "orders", "heat", "sieve", "facts", "schemas", "jsondiff",
+        "words", "marks", "world", "sketch", "panel", "overlay", "inset", "cards", "picture",
+        "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale", "golden",
+        "shotlog", "part", "progress", "stream", "starter", "animation", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

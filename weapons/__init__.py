@@ -17,19 +17,30 @@ if TYPE_CHECKING:
     from weapons.arsenal import Rounds as Rounds
     from weapons.arsenal import Spread as Spread
     from weapons.arsenal import Stencil as Stencil
-    from weapons.arsenal import Weapon as Weapon
     from weapons.arsenal import arsenal_of as arsenal_of
     from weapons.arsenal import weapon_from_json as weapon_from_json
     from weapons.facts import report_of as report_of
     from weapons.firing import fire as fire
+    from weapons.guns import Laser as Laser
+    from weapons.guns import Pistol as Pistol
+    from weapons.guns import Projectile as Projectile
+    from weapons.guns import Rifle as Rifle
+    from weapons.guns import Sweep as Sweep
     from weapons.hits import Hits as Hits
     from weapons.picture import picture_of_report as picture_of_report
+    from weapons.rayhits import RayHits as RayHits
+    from weapons.rayhits import Reason as Reason
+    from weapons.weapon import Weapon as Weapon
 
 _HOME = {
     **dict.fromkeys(
-        ("Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon"),
+        ("Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil"),
         "weapons.arsenal",
     ),
+    **dict.fromkeys(("Laser", "Pistol", "Projectile", "Rifle", "Sweep"), "weapons.guns"),
+    "RayHits": "weapons.rayhits",
+    "Reason": "weapons.rayhits",
+    "Weapon": "weapons.weapon",
     "arsenal_of": "weapons.arsenal",
     "weapon_from_json": "weapons.arsenal",
     "fire": "weapons.firing",
@@ -41,8 +52,8 @@ _HOME = {
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
-    "arsenal_of", "weapon_from_json", "fire", "Hits", "Verdict", "report_of",
-    "picture_of_report",
+    "Laser", "Pistol", "Projectile", "Rifle", "Sweep", "arsenal_of", "weapon_from_json", "fire", "Hits", "RayHits",
+    "Reason", "Verdict", "report_of", "picture_of_report",
 ]  # fmt: skip
 
 

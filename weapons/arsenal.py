@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
@@ -17,68 +16,20 @@ from planes.grid256 import pixel, snap, turned, unit
 from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
 from planes.scene import Scene
-from planes.schema import Flag, Mask, Number, Numbers, Optional, Ref, Rows, Value, Whole, Word
+from planes.schema import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word
 from planes.spans import Spans
 from planes.sprite import Form, Sprite, rows_of, variant_of
+from weapons.guns import Laser, Pistol, Projectile, Rifle, Sweep, Traced
 from weapons.pattern import FALLOFFS, Pattern, Swept, make_pattern
+from weapons.weapon import LENGTH, Part, Weapon
 
 __all__ = [
-    "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
-    "arsenal_of", "parts_of", "pattern_of", "pierces", "weapon_from_json",
+    "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil",
+    "arsenal_of", "parts_of", "pattern_of", "pierces", "ray_parts_of", "weapon_from_json",
 ]  # fmt: skip
 
 ORIGIN = np.zeros(2, np.int64)
-LENGTH = Number(0, REACH_MAX)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
-
-
-@dataclass(frozen=True)
-class Part(Ref):
-    """A weapon within a weapon; its JSON is made a weapon before it comes here."""
-
-    kinds: tuple[type, ...]
-    told: str
-
-    def check(self, name: str, value: object) -> object:
-        """Check that it is of a kind that may be a part."""
-        if not isinstance(value, self.kinds):
-            raise InputError(f"{name}: expected {self.told}, got {shown(value)}")
-        return value
-
-
-@dataclass(frozen=True, eq=False)
-class Weapon:
-    """What is fired; two are equal when their JSON is."""
-
-    kind: ClassVar[str]
-    table: ClassVar[dict[str, Value]]
-
-    def __post_init__(self) -> None:
-        """Check every field by the table, and keep plain Python values."""
-        for name, value in self.table.items():
-            self._keep(name, value.check(name, getattr(self, name)))
-
-    @cached_property
-    def _text(self) -> str:
-        return json.dumps(self.to_json(), sort_keys=True)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Weapon) and self._text == other._text
-
-    def __hash__(self) -> int:
-        return hash(self._text)
-
-    def _keep(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
-
-    def to_json(self) -> dict[str, Any]:
-        """The weapon as a scene file has it; fields at their defaults are left out."""
-        shown: dict[str, Any] = {"kind": self.kind}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.default is MISSING or value != f.default:
-                shown[f.name] = _plain_json(value)
-        return shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,15 +262,18 @@ class Stencil(Plain):
 
 @dataclass(frozen=True, eq=False)
 class Spread(Weapon):
-    """A shotgun: `count` pellets of another pattern, their offsets uniform over a disc of `radius` px."""
+    """A shotgun: `count` pellets of a weapon, their offsets uniform over a disc of `radius` px.
+
+    Of a ray the far end is offset: all pellets start at the muzzle.
+    """
 
     kind: ClassVar[str] = "spread"
     table: ClassVar[dict[str, Value]] = {
-        "pellet": Part("plain", (Plain,), "a weapon of one pattern"),
+        "pellet": Part("pellet", (Plain, Traced), "a weapon of one pattern or ray"),
         "count": Whole(1, PELLETS_MAX),
         "radius": LENGTH,
     }
-    pellet: Plain
+    pellet: Plain | Traced
     count: int
     radius: float
 
@@ -336,12 +290,12 @@ class Rounds(Weapon):
 
     kind: ClassVar[str] = "rounds"
     table: ClassVar[dict[str, Value]] = {
-        "weapon": Part("single", (Plain, Spread), "a weapon other than rounds"),
+        "weapon": Part("single", (Plain, Traced, Spread, Sweep), "a weapon other than rounds"),
         "count": Whole(1, PELLETS_MAX),
         "recoil_xy": Numbers((2,), REACH_MAX),
         "recoil_deg": Number(-360, 360),
     }
-    weapon: Plain | Spread
+    weapon: Plain | Traced | Spread | Sweep
     count: int
     recoil_xy: Sequence[float] = (0.0, 0.0)
     recoil_deg: float = 0.0
@@ -349,24 +303,38 @@ class Rounds(Weapon):
     def __post_init__(self) -> None:
         """Check that all rounds together do not have too many pellets."""
         super().__post_init__()
-        if isinstance(self.weapon, Spread):
+        if isinstance(self.weapon, Spread | Sweep):
             integer("count", self.count, 1, PELLETS_MAX // self.weapon.count)
 
 
 KINDS: dict[str, type[Weapon]] = {
-    kind.kind: kind for kind in (Point, Disc, Ring, Box, Polygon, Cone, Beam, Stencil, Spread, Rounds)
-}
+    kind.kind: kind
+    for kind in (
+        Point, Disc, Ring, Box, Polygon, Cone, Beam, Stencil, Pistol, Rifle, Laser, Projectile, Spread, Sweep, Rounds,
+    )
+}  # fmt: skip
 
 
 def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, Plain]:
-    """Take a weapon apart: its burst, its spread and its one pattern."""
+    """Take a weapon of patterns apart: its burst, its spread and its one pattern."""
+    burst, spread, one = _apart(weapon)
+    if type(one) not in KINDS.values() or not isinstance(one, Plain) or isinstance(spread, Sweep):
+        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    return burst, spread, one
+
+
+def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, Traced] | None:
+    """Take a weapon of rays apart: its burst, its spread or sweep and its one ray; None for any other."""
+    burst, spread, one = _apart(weapon)
+    return (burst, spread, one) if isinstance(one, Traced) and type(one) in KINDS.values() else None
+
+
+def _apart(weapon: object) -> tuple[Rounds | None, Spread | Sweep | None, object]:
     burst = weapon if isinstance(weapon, Rounds) else None
     inner = burst.weapon if burst else weapon
-    spread = inner if isinstance(inner, Spread) else None
-    plain = spread.pellet if spread else inner
-    if type(plain) not in KINDS.values() or not isinstance(plain, Plain):
-        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
-    return burst, spread, plain
+    if isinstance(inner, Spread):
+        return burst, inner, inner.pellet
+    return (burst, inner, inner.ray) if isinstance(inner, Sweep) else (burst, None, inner)
 
 
 def pierces(weapon: Weapon) -> bool:
@@ -433,11 +401,3 @@ def _farthest(points_256: Ints) -> int:
     if not len(points_256):
         return 0
     return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())
-
-
-def _plain_json(value: object) -> Any:
-    if isinstance(value, Weapon):
-        return value.to_json()
-    if isinstance(value, tuple | list):
-        return [_plain_json(v) for v in value]
-    return value

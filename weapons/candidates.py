@@ -107,8 +107,7 @@ class Candidates:
         placements : (P,) rising numbers of placements of the volley
         boxes_xyxy : (P, 4) inclusive boxes of what is asked of each
         """
-        row, rank = self._boxes(boxes_xyxy)
-        self.met += len(rank)
+        row, rank = self.meeting(boxes_xyxy)
         placement = placements[row]
         if self.prefilter.volume:
             near = volley.count[placement] > 0  # the box of an empty pattern lies within others
@@ -116,8 +115,13 @@ class Candidates:
             placement, rank = placement[near], rank[near]
         return Pairs(placement, rank, refused(self.stack, rank, shots, volley.shot[placement]))
 
-    def _boxes(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-        """Rows and ranks of boxes that share a pixel; of all, without a pre-filter."""
+    def meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """Rows and ranks of boxes (P, 4) and items that share a pixel; of all, without a pre-filter."""
+        row, rank = self._meeting(boxes_xyxy)
+        self.met += len(rank)
+        return row, rank
+
+    def _meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         n, m = len(boxes_xyxy), len(self.stack)
         if self.prefilter.name == "none":
             return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)

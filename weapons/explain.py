@@ -17,11 +17,12 @@ from planes.items import Stack
 from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from planes.scene import Scene
 from planes.spans import Box, Spans, each_pixel
-from weapons.arsenal import Weapon, pierces
+from weapons.arsenal import pierces
 from weapons.candidates import Candidates, pairs_of, refused
 from weapons.plan import Plan
 from weapons.resolve import Sight, direct
 from weapons.volley import Shots, Volley, volley_of
+from weapons.weapon import Weapon
 
 __all__ = [
     "REASONS", "Behind", "Blocked", "Detail", "Samples", "Share", "WhyNot", "blockers_of", "detail_of", "hit_spans",

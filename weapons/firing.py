@@ -9,16 +9,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from planes.arrays import InputError
+from planes.arrays import InputError, choice
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import Verdict
 from planes.scene import Scene
-from weapons.arsenal import Weapon, pierces
+from weapons.arsenal import pierces, ray_parts_of
 from weapons.candidates import Candidates
 from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused
+from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, sweep_pays
+from weapons.rayfire import fired_rays
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Shots, Volley, checked_shots, volley_of
+from weapons.weapon import Weapon
 
 __all__ = ["fire"]
 
@@ -56,7 +58,7 @@ def fire(
         before the pixels; it changes no row
     broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row; none
         without a pre-filter
-    strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row
+    strategy : "auto", "direct", "composed" (not of rays): how pixels are looked up; it changes no row
 
     Each of aim, toward, accept, exclude, seed and shot is one for all shots or one for each.
 
@@ -67,13 +69,18 @@ def fire(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    plan, stack = Plan(), scene.items.stack()
     shots = checked_shots(weapon, at, aim, toward, _bits(scene, accept), exclude, seed, shot)
+    parts = ray_parts_of(weapon)
+    if parts is not None:
+        choice("strategy", strategy, ("auto", "direct"))
+        return fired_rays(scene, weapon, parts, shots, prefilter, broadphase)
+    plan, stack = Plan(), scene.items.stack()
     first = volley_of(weapon, shots.take(0, 1))
     placements = len(first.shot) * len(shots)
     name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
     asked = placements if name == "direct" or pierces(weapon) or shots.choosy else 0
-    candidates = chosen_candidates(prefilter, broadphase, scene, stack, first.table, asked)
+    swept = sweep_pays(stack, first.table, asked)
+    candidates = chosen_candidates(prefilter, broadphase, scene, stack, swept, asked)
     sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
     drawn = None
     if name == "composed" and (plane := scene.code_plane()):

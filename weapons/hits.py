@@ -12,7 +12,6 @@ from planes.arrays import InputError, Ints, integer
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Spans, merged_runs
-from weapons.arsenal import Weapon
 from weapons.explain import (
     Blocked,
     Detail,
@@ -30,6 +29,7 @@ from weapons.explain import (
 from weapons.plan import Plan
 from weapons.resolve import Met
 from weapons.volley import Shots, Volley
+from weapons.weapon import Weapon
 
 __all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
 
@@ -106,17 +106,36 @@ class Hits:
     """
 
     def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
+        self._keep(rows, scene, weapon, shots, plan)
+        self._verdicts: Ints | None = verdicts
+
+    def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self.shot, self.round, self.object = rows.shot, rows.round, rows.object
         self.samples, self.pixels, self.weight = rows.samples, rows.pixels, rows.weight
         self.pellets, self.first_xy, self.distance2 = rows.pellets, rows.first_xy, rows.distance2
-        self.verdicts = verdicts
-        self.fired = verdicts.sum(axis=1)
         self.starts = np.searchsorted(rows.shot, np.arange(len(shots) + 1))
         self.weapon, self.shots, self.plan = weapon, shots, plan
         self.scene, self.version = scene, scene.version
-        self._walked: tuple[int, Detail] | None = None
-        for name in (*HitRow._fields, "verdicts", "fired", "starts"):
+        self._walked: tuple[int, Any] | None = None
+        for name in (*HitRow._fields, "starts"):
             getattr(self, name).flags.writeable = False
+
+    @property
+    def verdicts(self) -> Ints:
+        """Samples of each shot by verdict."""
+        if self._verdicts is None:
+            self._verdicts = self._counted()
+        self._verdicts.flags.writeable = False
+        return self._verdicts
+
+    @property
+    def fired(self) -> Ints:
+        """Samples of each shot."""
+        return np.asarray(self.verdicts.sum(axis=1))
+
+    def _counted(self) -> Ints:
+        """Verdicts that were not counted when it was fired."""
+        raise NotImplementedError
 
     def __len__(self) -> int:
         return len(self.shot)

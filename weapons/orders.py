@@ -10,9 +10,9 @@ from planes.constants import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
 from planes.grid256 import snap
 from planes.scene import Scene
 from planes.schema import Either, Keys, Names, Number, Numbers, Optional, Rows, Text, Whole
-from weapons.arsenal import Weapon
 from weapons.firing import fire
 from weapons.hits import Hits
+from weapons.weapon import Weapon
 
 __all__ = ["AIM_MAX", "SHOT", "Order", "fire_order", "order_from_json", "orders_of"]
 

@@ -16,7 +16,7 @@ from planes.spans import Spans, ragged
 if TYPE_CHECKING:
     from planes.volumes import Volumes
 
-__all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "make_pattern"]
+__all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "make_pattern", "smoothed"]
 
 Swept = tuple[Ints, Ints, int]
 """Ends (2,) of a segment and a radius, in 1/256 px."""
@@ -78,10 +78,14 @@ def falloff_weights(distance2: Ints, falloff: str, reach_256: int) -> Ints:
         near = round(float(lost[i]))
         reached = (near * reach_256) ** 2 <= int(distance2[i]) * (WEIGHT_FULL * SUB) ** 2
         whole[i] = near if reached else near - 1
-    left = np.maximum(WEIGHT_FULL - whole, 0)
+    return smoothed(np.maximum(WEIGHT_FULL - whole, 0), falloff)
+
+
+def smoothed(linear: Ints, falloff: str) -> Ints:
+    """Weights of a falloff, of those of the linear one."""
     if falloff == "smooth":
-        left = left * left * (3 * WEIGHT_FULL - 2 * left) // WEIGHT_FULL**2
-    return left
+        return linear * linear * (3 * WEIGHT_FULL - 2 * linear) // WEIGHT_FULL**2
+    return linear
 
 
 class PatternTable:

@@ -27,6 +27,7 @@ __all__ = [
     "chosen_strategy",
     "leave_out_unused",
     "plan_lines",
+    "sweep_pays",
 ]
 
 STRATEGIES = ("auto", "direct", "composed")
@@ -161,13 +162,13 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
 
 
 def chosen_candidates(
-    prefilter: object, broadphase: object, scene: Scene, stack: Stack, table: PatternTable, asked: int
+    prefilter: object, broadphase: object, scene: Scene, stack: Stack, swept: bool, asked: int
 ) -> Candidates:
     """Pre-filter and broad phase of a call, and why: those asked for, or the cheaper ones by the cost model.
 
     Parameters
     ----------
-    table : patterns of the first shot; the others' are about alike
+    swept : whether capsules pay, as `sweep_pays` tells
     asked : placements that will be asked for
 
     Raises
@@ -182,7 +183,7 @@ def chosen_candidates(
             raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
         return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
     if wanted.name == "auto":
-        wanted = prefilter_of("swept") if _sweep_pays(stack, table, asked) else BOX
+        wanted = prefilter_of("swept") if swept else BOX
     told = "box" if wanted == BOX else f"box, then {wanted}"
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, told)
@@ -193,10 +194,15 @@ def chosen_candidates(
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
 
 
-def _sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
+def sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
     """Whether capsules around long, slanting patterns drop enough of what their boxes meet.
 
     Expected pairs are those of items of the mean size, spread evenly over the box around all.
+
+    Parameters
+    ----------
+    table : patterns of the first shot; the others' are about alike
+    asked : placements that will be asked for
     """
     pattern = table.patterns[0] if table.patterns else None
     if pattern is None or pattern.swept is None or asked * len(stack) * SWEPT_DROPPED_NS < SWEPT_CALL_NS:

@@ -35,10 +35,12 @@ from planes.schema import (
     Word,
     json_of,
 )
-from weapons.arsenal import KINDS, Plain, Weapon, weapon_from_json
+from weapons.arsenal import KINDS, Plain, weapon_from_json
 from weapons.explain import REASONS
 from weapons.facts import FORMAT
+from weapons.guns import Traced
 from weapons.orders import SHOT
+from weapons.weapon import Weapon
 
 __all__ = ["REPORT", "read_report", "schemas", "write_schemas"]
 
@@ -197,8 +199,9 @@ def schemas() -> dict[str, dict[str, Any]]:
     """JSON Schemas by name: of scene.json, of a shot, and of a report."""
     weapons = {
         "weapon": {"anyOf": [Ref("single").schema(), _kind("rounds")]},
-        "single": {"anyOf": [Ref("plain").schema(), _kind("spread")]},
-        "plain": {"anyOf": [_kind(name) for name, kind in KINDS.items() if issubclass(kind, Plain)]},
+        "single": {"anyOf": [Ref("pellet").schema(), _kind("spread"), _kind("sweep")]},
+        "pellet": {"anyOf": [Ref("ray").schema(), *_kinds(Plain)]},
+        "ray": {"anyOf": _kinds(Traced)},
     }
     shot, objects = SHOT.schema(), {"anyOf": [keys.schema() for keys in OBJECT.values()]}
     return {
@@ -217,6 +220,10 @@ def write_schemas(folder: Path = FOLDER) -> None:
 def _document(title: str, table: Keys, definitions: dict[str, Any]) -> dict[str, Any]:
     dialect = "https://json-schema.org/draft/2020-12/schema"
     return {"$schema": dialect, "title": title, **table.schema(), **({"$defs": definitions} if definitions else {})}
+
+
+def _kinds(base: type[Weapon]) -> list[dict[str, Any]]:
+    return [_kind(name) for name, kind in KINDS.items() if issubclass(kind, base)]
 
 
 def _kind(name: str) -> dict[str, Any]:

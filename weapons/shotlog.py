@@ -15,9 +15,9 @@ from planes.arrays import Floats, InputError, Ints, within
 from planes.constants import ALL, POSITION_MAX
 from planes.scene import Scene
 from planes.schema import distinct_keys
-from weapons.arsenal import Weapon
 from weapons.draws import Words
 from weapons.orders import AIM_MAX, SHOT, Order, order_from_json
+from weapons.weapon import Weapon
 
 __all__ = ["LINE_MAX", "Salvo", "ShotReader", "body_of", "read_lines"]
 

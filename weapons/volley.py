@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
-from planes.constants import ALL, POSITION_MAX, SEED_MAX
+from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
 from planes.poses import points
-from weapons.arsenal import Weapon, parts_of, pattern_of
+from weapons.arsenal import parts_of, pattern_of, ray_parts_of
 from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
+from weapons.weapon import Weapon
 
-__all__ = ["Shots", "Volley", "checked_shots", "volley_of"]
+__all__ = ["Shots", "Volley", "checked_shots", "recoiled", "volley_of"]
 
 OWNER_MAX = 2**31
 
@@ -27,6 +28,7 @@ class Shots:
     ----------
     at_256 : (N, 2) positions in 1/256 px
     direction : (N, 2) cos and sin of the aim times 2**30
+    toward_256 : (N, 2) from there to the points that they are aimed at, in 1/256 px; None if they have an angle
     accept : (N,) category bits
     exclude : (N, K) owners, -1 for none
     number : (N,) shot numbers, for the draws
@@ -35,6 +37,7 @@ class Shots:
 
     at_256: Ints
     direction: Ints
+    toward_256: Ints | None
     accept: Ints
     exclude: Ints
     number: Ints
@@ -55,6 +58,7 @@ class Shots:
             self,
             at_256=self.at_256[part],
             direction=self.direction[part],
+            toward_256=None if self.toward_256 is None else self.toward_256[part],
             accept=self.accept[part],
             exclude=self.exclude[part],
             number=self.number[part],
@@ -109,9 +113,12 @@ def checked_shots(
     at_256 = snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2)
     n = len(at_256)
     numbers = np.arange(n) if shot is None else shot
+    offset = None if toward is None else _offsets(at_256, aim, toward)
+    _check_aimed(weapon, offset)
     return Shots(
         at_256,
-        _directions(weapon, at_256, aim, toward),
+        _directions(n, aim, offset),
+        offset,
         integers("accept", each("accept", accept, n), (n,), 0, ALL),
         _owners(exclude, n, single),
         integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
@@ -130,7 +137,7 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     direction = shots.direction[shot]
     if burst:
         origin = origin + round_[:, None] * snap(burst.recoil_xy)
-        direction = _recoiled(direction, round_, burst.recoil_deg)
+        direction = recoiled(direction, round_, burst.recoil_deg)
     origin_xy = pixel(origin)
     xy = origin_xy
     if spread:
@@ -144,22 +151,42 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     return Volley(table, which.reshape(-1), xy, origin_xy, shot, round_, pellet)
 
 
-def _directions(weapon: Weapon, at_256: Ints, aim: object, toward: object) -> Ints:
-    n = len(at_256)
-    if toward is None:
+def _directions(n: int, aim: object, offset: Ints | None) -> Ints:
+    if offset is None:
         return np.stack(unit(reals("aim", each("aim", 0.0 if aim is None else aim, n), (n,))), axis=1)
+    return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
+
+
+def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
+    """From shots to the points that they are aimed at."""
     if aim is not None:
         raise InputError("aim: expected aim or toward, got both")
-    targets = points("toward", toward, n)
+    targets = points("toward", toward, len(at_256))
     offset = snap(targets) - at_256
     same = np.flatnonzero((offset == 0).all(axis=1))
     if len(same):
         got = targets[same[0]].tolist()
         raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
-    return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
+    return offset
 
 
-def _recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
+def _check_aimed(weapon: Weapon, offset: Ints | None) -> None:
+    """Check that a ray without a range has an end, and within reach."""
+    parts = ray_parts_of(weapon)
+    if parts is None or parts[2].length_256 is not None:
+        return
+    if offset is None:
+        raise InputError("toward: expected a point, as the weapon has no range, got none")
+    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
+    if len(far):
+        got = (offset[far[0]] / SUB).tolist()
+        raise InputError(
+            f"toward[{far[0]}]: expected a point within {REACH_MAX} px of the shot, got one at {got} of it"
+        )
+
+
+def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
+    """Directions, or other vectors, turned by the recoil of the rounds before theirs."""
     if not degrees:
         return direction
     c, s = unit(degrees * np.arange(int(round_.max(initial=0)) + 1))

@@ -1,0 +1,245 @@
+"""Rays to cells, in order: the closed supercover of segments on the 1/256-px grid, for many at once.
+
+A cell is met when its closed square is: nothing slips through a corner, and both ends see the same cells. The times at
+which a ray enters and leaves a cell are whole numbers over a scale of the ray's own, so they have a total order:
+
+    thin ray     max(1, |dx|) * max(1, |dy|)        thick ray     dx^2 + dy^2
+
+All coordinates are relative to a whole pixel near the start of the ray.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Ints
+from planes.constants import HALF, SUB
+from planes.grid256 import isqrt
+from planes.spans import each_pixel, ragged
+
+__all__ = ["Lines", "cells", "in_order"]
+
+DIAGONAL = 182
+"""Half the diagonal of a pixel in 1/256 px, rounded up: a disc so large has the centre of every square it touches."""
+
+ROOM = 2**62
+"""Products below it leave room for a sum in int64; larger ones are worked out in Python integers."""
+
+Bounds = tuple[Ints, Ints, Ints, Ints]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Segments of one width, as columns.
+
+    Parameters
+    ----------
+    start, step : (n, 2) where they begin and how far they go, 1/256 px
+    radius : half of their width, 1/256 px; 0 for thin rays
+    """
+
+    start: Ints
+    step: Ints
+    radius: int
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, rows: Ints) -> Lines:
+        """Some of the segments."""
+        return Lines(self.start[rows], self.step[rows], self.radius)
+
+    @cached_property
+    def steep(self) -> Bools:
+        """Which go farther along y than along x."""
+        return np.asarray(np.abs(self.step[:, 1]) > np.abs(self.step[:, 0]))
+
+    @cached_property
+    def length2(self) -> Ints:
+        """Squared lengths, (1/256 px)^2."""
+        return np.asarray((self.step**2).sum(axis=1))
+
+    @cached_property
+    def scale(self) -> Ints:
+        """What times are counted over: the end of the segment."""
+        if self.radius:
+            return np.maximum(self.length2, 1)
+        return np.asarray(np.maximum(np.abs(self.step), 1).prod(axis=1))
+
+    @cached_property
+    def sides(self) -> Ints:
+        """Products of the radius and the length, rounded down: how far centres lie from the axis, times the length."""
+        reach = max(self.radius, DIAGONAL)
+        return np.array([math.isqrt(reach * reach * n) for n in self.length2.tolist()], np.int64)
+
+    def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
+        """Cells of each segment in an inclusive box of its own (n, 4), as (segment, x, y).
+
+        Of thick segments some more: those whose times then are none.
+        """
+        steep = self.steep
+        if steep.any() and not steep.all():
+            flat, upright = np.flatnonzero(~steep), np.flatnonzero(steep)
+            parts = [(rows, self.take(rows).candidates(boxes_xyxy[rows])) for rows in (flat, upright)]
+            return (
+                np.concatenate([rows[line] for rows, (line, _, _) in parts]),
+                np.concatenate([x for _, (_, x, _) in parts]),
+                np.concatenate([y for _, (_, _, y) in parts]),
+            )
+        if len(steep) and steep[0]:
+            line, y, x = self._along(1, boxes_xyxy)
+        else:
+            line, x, y = self._along(0, boxes_xyxy)
+        return line, x, y
+
+    def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """When segments enter and leave cells; one that is not met is left before it is entered."""
+        if not self.radius:
+            return self._thin_times(line, x, y)
+        entry, exit_ = self._thick_times(line, x, y)
+        if self.radius >= DIAGONAL:
+            return entry, exit_
+        first, last = self._thin_times(line, x, y)
+        axis = np.maximum(np.abs(self.step), 1).prod(axis=1)[line].astype(object)
+        length2 = self.length2[line]
+        beside = np.abs(SUB * np.stack([x, y], axis=1) - self.start[line]) > HALF
+        thin = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
+        first = np.asarray(-(-first * length2 // axis), np.int64)
+        last = np.asarray(last * length2 // axis, np.int64)
+        thick = entry <= exit_
+        return (
+            np.where(thin & (~thick | (first < entry)), first, entry),
+            np.where(thin & (~thick | (last > exit_)), last, exit_),
+        )
+
+    def entered_by(self, line: Ints, x: Ints, y: Ints) -> Ints:
+        """Outward side (n, 2) by which cells are entered; (0, 0) if the segment begins strictly inside."""
+        step = self.step[line]
+        sign = np.sign(step)
+        ahead = (SUB * np.stack([x, y], axis=1) - self.start[line]) * sign
+        if self.radius:
+            larger = np.stack([~self.steep[line], self.steep[line]], axis=1)
+            return np.asarray(np.where(larger & (ahead > 0), -sign, 0))
+        entry, _ = self._thin_times(line, x, y)
+        across = np.maximum(np.abs(step), 1)[:, ::-1]
+        return np.asarray(np.where((sign != 0) & ((ahead - HALF) * across == entry[:, None]), -sign, 0))
+
+    def _along(self, major: int, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
+        """Cells as (segment, place along the axis on which they go farther, place along the other)."""
+        minor = 1 - major
+        start, step = self.start[:, minor], self.step[:, minor]
+        reach = self.radius + HALF
+        low, high = np.minimum(start, start + step) - reach, np.maximum(start, start + step) + reach
+        first = np.maximum(-(-low // SUB), boxes_xyxy[:, minor])
+        last = np.minimum(high // SUB, boxes_xyxy[:, minor + 2])
+        line, place = ragged(np.maximum(last - first + 1, 0))
+        v = first[line] + place
+        u_first, u_last = (self._thick_runs if self.radius else self._thin_runs)(major, line, v)
+        u_first = np.maximum(u_first, boxes_xyxy[line, major])
+        u_last = np.minimum(u_last, boxes_xyxy[line, major + 2])
+        run, u = each_pixel(u_first, np.maximum(u_last, u_first - 1))
+        return line[run], u, v[run]
+
+    def _thin_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
+        """First and last cell of segments in rows v of the minor axis."""
+        minor = 1 - major
+        begin, step = self.start[line, minor], self.step[line, minor]
+        u, along = self.start[line, major], self.step[line, major]
+        low, high = np.minimum(begin, begin + step), np.maximum(begin, begin + step)
+        per, slope = np.maximum(np.abs(step), 1), along * np.sign(step)
+        enter = u * per + (np.maximum(low, SUB * v - HALF) - begin) * slope
+        leave = u * per + (np.minimum(high, SUB * v + HALF) - begin) * slope
+        level = step == 0
+        enter, leave = np.where(level, u, enter), np.where(level, u + along, leave)
+        low, high = np.minimum(enter, leave), np.maximum(enter, leave)
+        return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+    def _thick_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
+        """Cells around thick segments in rows v: no fewer than there are."""
+        minor = 1 - major
+        reach = max(self.radius, DIAGONAL)
+        begin, along = self.start[line, major], self.step[line, major]
+        low, high = np.minimum(begin, begin + along) - reach, np.maximum(begin, begin + along) + reach
+        # |(p - start) x step| <= reach * length bounds p along the major axis, unless the segment is level.
+        cross, side = (SUB * v - self.start[line, minor]) * along, self.sides[line]
+        step = self.step[line, minor]
+        per, sign = np.maximum(np.abs(step), 1), np.where(step < 0, -1, 1)
+        cross = cross * sign
+        sloping = step != 0
+        low = np.where(sloping, np.maximum(low, begin - ((side - cross) // per)), low)
+        high = np.where(sloping, np.minimum(high, begin + ((cross + side) // per)), high)
+        return -(-low // SUB), high // SUB
+
+    def _thin_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        step = self.step[line]
+        sign, length = np.sign(step), np.abs(step)
+        across = np.maximum(length, 1)
+        ahead_x = (SUB * x - self.start[line, 0]) * sign[:, 0]
+        ahead_y = (SUB * y - self.start[line, 1]) * sign[:, 1]
+        # Without a step along an axis the square is never entered or left by it: its times lie beyond the ends.
+        entry = np.maximum((ahead_x - HALF) * across[:, 1], (ahead_y - HALF) * across[:, 0])
+        leave = np.minimum((ahead_x + HALF) * across[:, 1], (ahead_y + HALF) * across[:, 0])
+        end = np.where((length == 0).all(axis=1), 0, across.prod(axis=1))
+        return np.maximum(entry, 0), np.minimum(leave, end)
+
+    def _thick_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """When a disc that moves along the segment covers centres: u -+ sqrt(q), rounded inward."""
+        dx, dy = self.step[line].T
+        px, py = SUB * x - self.start[line, 0], SUB * y - self.start[line, 1]
+        u, v = px * dx + py * dy, px * dy - py * dx
+        length2 = self.length2[line]
+        still = length2 == 0
+        near = np.where(still, px * px + py * py <= self.radius**2, np.abs(v) <= self._true_sides[line])
+        root = np.zeros_like(u)
+        root[near] = self._roots(v[near], length2[near])
+        entry, leave = np.maximum(u - root, 0), np.minimum(u + root, length2)
+        entry[~near], leave[~near] = 1, 0
+        return entry, leave
+
+    @cached_property
+    def _true_sides(self) -> Ints:
+        return np.array([math.isqrt(self.radius**2 * n) for n in self.length2.tolist()], np.int64)
+
+    def _roots(self, v: Ints, length2: Ints) -> Ints:
+        """Roots of radius^2 length^2 - v^2, rounded down."""
+        if self.radius**2 * int(length2.max(initial=0)) < ROOM:
+            return isqrt(self.radius**2 * length2 - v * v)
+        squares: npt.NDArray[np.object_] = self.radius**2 * length2.astype(object) - v.astype(object) ** 2
+        return np.array([math.isqrt(square) for square in squares.tolist()], np.int64)
+
+
+def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
+    """Cells of segments in the order in which they are entered.
+
+    Parameters
+    ----------
+    start_256, end_256 : (n, 2) 1/256 px, up to 2**48
+    radius_256 : half of their width
+
+    Returns
+    -------
+    segment (k,), pixel (k, 2), entry (k,) and exit (k,), sorted by (segment, entry, y, x); and the scale (n,) of the
+    times, which is that of the segment's end
+    """
+    origin = (start_256 + HALF) // SUB
+    lines = Lines(start_256 - SUB * origin, end_256 - start_256, radius_256)
+    reach = (lines.step // SUB, -(-lines.step // SUB))
+    wide = radius_256 // SUB + 2
+    low, high = np.minimum(reach[0], 0) - wide, np.maximum(reach[1], 0) + wide
+    line, x, y = lines.candidates(np.concatenate([low, high], axis=1))
+    entry, leave = lines.times(line, x, y)
+    order = in_order(line, entry, y, x)
+    order = order[entry[order] <= leave[order]]
+    line = line[order]
+    xy = np.stack([x, y], axis=1)[order] + origin[line]
+    return line, xy, entry[order], leave[order], lines.scale
+
+
+def in_order(ray: Ints, entry: Ints, y: Ints, x: Ints) -> Ints:
+    """Order of cells on their rays: by (ray, entry, y, x)."""
+    return np.lexsort((x, y, entry, ray))

@@ -1,0 +1,226 @@
+"""Rays through the scene: what each touches, and where it ends.
+
+Only cells inside the boxes of items are looked at; what lies between them costs nothing. A ray that may end early is
+followed stretch by stretch, each longer than the one before, until its end is known: in a crowd it meets few items.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from planes.arrays import Floats, InputError, Ints
+from planes.constants import HALF, SUB
+from planes.items import Items, Stack
+from planes.spans import Box
+from weapons.candidates import Candidates, refused
+from weapons.ends import Ends, ends_of
+from weapons.guns import Projectile, Traced
+from weapons.meetings import COMMON, Meetings, meet, stretches
+from weapons.plan import Plan
+from weapons.rays import Rays
+from weapons.trace import Lines
+from weapons.volley import Shots
+
+__all__ = ["Range", "trace"]
+
+BOXES_FIRST, GROWTH = 8, 4
+"""Boxes that a ray is expected to meet in its first stretch, and how much longer each next stretch is."""
+
+SLACK = 2.0**-20
+"""Floats tell in which stretch a ray meets a box, to this part of its length and this part of a px."""
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """What rays go through, and where what was done is recorded."""
+
+    items: Items
+    stack: Stack
+    bounds: Box | None
+    candidates: Candidates
+    plan: Plan
+
+
+def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetings, Ends, Lines, Lines]:
+    """Follow rays to their ends.
+
+    Returns
+    -------
+    the cells in which they touch accepted items, some of those beyond the end, too; the ends; the rays (R,); and for
+    each pair the ray as the item sees it
+
+    Raises
+    ------
+    InputError
+        Naming the shot and the item in which a ray starts, if that is an error for the weapon.
+    """
+    lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
+    cost = through.items.cost[through.stack.ids]
+    edges = _edges(lines, ray, through)
+    length = _lengths(lines)
+    live = np.arange(len(rays))
+    found = []
+    for near, far in pairwise(edges):
+        pairs = _pairs(rays, ray, lines, live, (near, far), through)
+        found.append(_touched(rays, ray, lines, shots, pairs, through))
+        if far == np.inf:
+            break
+        so_far = np.zeros(len(rays), np.bool_)
+        so_far[live] = True
+        ends = ends_of(Meetings.joined([met.of_rays(so_far) for met in found]), lines, through.stack, cost, ray)
+        live = live[(ends.fraction[live] + SLACK) * length[live] >= far]
+        if not len(live):
+            break
+    met = Meetings.joined(found)
+    relative = _relative(lines, ray, met.ray, met.rank, through)
+    if _moving(ray, through):
+        lines = _shared(lines)
+    return met, ends_of(met, lines, through.stack, cost, ray), lines, relative
+
+
+def _relative(lines: Lines, ray: Traced, row: Ints, rank: Ints, through: Range) -> Lines:
+    """Lines of pairs: a projectile flies by its velocity relative to the item."""
+    own = lines.take(row)
+    if not isinstance(ray, Projectile):
+        return own
+    return Lines(own.start, own.step - through.items.velocity_256[through.stack.ids[rank]], ray.radius_256)
+
+
+def _moving(ray: Traced, through: Range) -> bool:
+    return isinstance(ray, Projectile) and bool(through.items.velocity_256[through.stack.ids].any())
+
+
+def _lengths(lines: Lines) -> Floats:
+    """Lengths of lines, px."""
+    return np.asarray(np.sqrt(lines.length2) / SUB)
+
+
+def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
+    """Distances at which rays are cut into stretches, px."""
+    stack = through.stack
+    endless = ray.hits_most is None and ray.budget_256 is None and not stack.occluder.any()
+    if endless or not len(stack) or through.candidates.prefilter.name == "none" or _moving(ray, through):
+        return [-np.inf, np.inf]
+    mean_wh, world_wh = stack.sizes
+    per_px = len(stack) * float((mean_wh + 2 * lines.radius / SUB).sum() / world_wh.prod())
+    first = BOXES_FIRST / per_px
+    longest = float(np.sqrt(lines.length2.max(initial=0))) / SUB
+    if longest <= GROWTH * first:
+        return [-np.inf, np.inf]
+    edges = [-np.inf]
+    while first < longest:
+        edges.append(first)
+        first *= GROWTH
+    return [*edges, np.inf]
+
+
+def _pairs(
+    rays: Rays, ray: Traced, lines: Lines, live: Ints, edges: tuple[float, float], through: Range
+) -> tuple[Ints, Ints]:
+    """Rays and ranks whose boxes a ray enters farther than `near` and not farther than `far`, px."""
+    stack = through.stack
+    if not len(live) or not len(stack):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    if _moving(ray, through):
+        return np.repeat(live, len(stack)), np.tile(np.arange(len(stack)), len(live))
+    if through.candidates.prefilter.name == "none":
+        row, rank = through.candidates.meeting(np.zeros((len(live), 4), np.int64))
+        return live[row], rank
+    row, rank = through.candidates.meeting(_stretch_boxes(rays, lines, live, *edges))
+    enters = _enters(rays, lines, live[row], stack.box_xyxy[rank])
+    some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
+    return live[row[some]], rank[some]
+
+
+def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float) -> Ints:
+    """Inclusive boxes (n, 4) around what rays touch between two distances, or a little more."""
+    safe = np.maximum(_lengths(lines)[live], SLACK)[:, None]
+    start, step = lines.start[live] / SUB, lines.step[live] / SUB
+    ends = [start + np.clip(edge / safe, 0, 1) * step for edge in (near, far)]
+    wide = lines.radius / SUB + 1
+    low, high = np.floor(np.minimum(*ends) - wide), np.ceil(np.maximum(*ends) + wide)
+    origin = rays.origin_xy[live]
+    return np.concatenate([low.astype(np.int64) + origin, high.astype(np.int64) + origin], axis=1)
+
+
+def _enters(rays: Rays, lines: Lines, ray: Ints, boxes_xyxy: Ints) -> Floats:
+    """How far along rays boxes are entered, px, or a little less; NaN where they are passed by.
+
+    References
+    ----------
+    Kay and Kajiya, "Ray tracing complex scenes" (1986): slabs.
+    """
+    origin = rays.origin_xy[ray]
+    grown = (lines.radius + HALF) / SUB + SLACK
+    start, step = lines.start[ray] / SUB, lines.step[ray] / SUB
+    low, high = boxes_xyxy[:, :2] - origin - grown - start, boxes_xyxy[:, 2:] - origin + grown - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_low, to_high = low / step, high / step
+    level = step == 0
+    beside = (level & ((low > 0) | (high < 0))).any(axis=1)
+    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
+    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
+    missed = beside | (first > last + SLACK) | (first > 1 + SLACK) | (last < -SLACK)
+    return np.where(missed, np.nan, np.maximum(first, 0) * _lengths(lines)[ray] - SLACK)
+
+
+def _touched(rays: Rays, ray: Traced, lines: Lines, shots: Shots, pairs: tuple[Ints, Ints], through: Range) -> Meetings:
+    """Cells in which rays touch accepted items, by the weapon's rules for what they start in and for steps."""
+    stack, plan = through.stack, through.plan
+    row, rank = pairs
+    accepted = np.flatnonzero(~refused(stack, rank, shots, rays.shot[row]))
+    plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(accepted), len(rays) * len(stack)))
+    row, rank = row[accepted], rank[accepted]
+    own = _relative(lines, ray, row, rank, through)
+    origin = rays.origin_xy[row]
+    boxes = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
+    met = meet(own, row, rank, boxes, stack, through.bounds, origin)
+    plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
+    if _moving(ray, through):
+        key = row * len(stack) + rank
+        scale = own.scale[np.searchsorted(key, met.ray * len(stack) + met.rank)]
+        met = _in_common(met, scale[met.pair])
+    if isinstance(ray, Projectile) and ray.steps is not None:
+        scale = np.full(len(met.x), COMMON) if _moving(ray, through) else lines.scale[met.ray][met.pair]
+        met = _at_steps(met, scale, ray.steps)
+    return _started(met, rays, ray, stack)
+
+
+def _in_common(met: Meetings, scale: Ints) -> Meetings:
+    """Times over the scales of their cells as times over one scale for all."""
+    entry, leave = (np.asarray(time.astype(object) * COMMON // scale, np.int64) for time in (met.entry, met.leave))
+    return Meetings(met.ray, met.rank, met.count, met.x, met.y, entry, leave)
+
+
+def _at_steps(met: Meetings, scale: Ints, steps: int) -> Meetings:
+    """Cells that are touched at one of the moments k / steps, and the first of those."""
+    k = np.maximum(-(-met.entry.astype(object) * steps // scale), 1)
+    keep = np.asarray(k * scale <= met.leave.astype(object) * steps, np.bool_)
+    entry = np.asarray(k * scale // steps, np.int64)
+    return Meetings(met.ray, met.rank, met.count, met.x, met.y, entry, met.leave).only(keep)
+
+
+def _shared(lines: Lines) -> Lines:
+    """The same lines, with times over the scale that all have in common."""
+    shared = Lines(lines.start, lines.step, lines.radius)
+    shared.__dict__["scale"] = np.full(len(lines), COMMON)
+    return shared
+
+
+def _started(met: Meetings, rays: Rays, ray: Traced, stack: Stack) -> Meetings:
+    """Apply the weapon's rule to items in which rays start."""
+    if ray.inside == "hit" or not len(met):
+        return met
+    inside = np.flatnonzero(met.entry[met.first] == 0)
+    if ray.inside == "error" and len(inside):
+        pair = inside[np.lexsort((met.rank[inside], met.ray[inside]))[0]]
+        shot, item = int(rays.shot[met.ray[pair]]), int(stack.ids[met.rank[pair]])
+        raise InputError(f"at[{shot}]: expected a start outside of every item, got one inside of id {item}")
+    out = np.full(len(met), -1)
+    if len(inside):
+        pair, first, last = stretches(met.pair, met.entry, met.leave)
+        out[pair[first == 0]] = last[first == 0]
+    return met.only(met.entry > out[met.pair])
