@@ -191,10 +191,10 @@ def test_bad_weapons_are_refused_by_name(data: Any, told: str) -> None:
 
 def test_a_spread_holds_one_pattern_and_rounds_no_rounds() -> None:
     spread = {"kind": "spread", "pellet": DISC, "count": 2, "radius": 3}
-    with pytest.raises(InputError, match=r"pellet: kind: expected one of .*'stencil', got 'spread'"):
+    with pytest.raises(InputError, match=r"pellet: kind: expected one of .*'projectile', got 'spread'"):
         weapon_from_json({**spread, "pellet": spread})
     rounds = {"kind": "rounds", "weapon": DISC, "count": 2}
-    with pytest.raises(InputError, match=r"weapon: kind: expected one of .*'spread', got 'rounds'"):
+    with pytest.raises(InputError, match=r"weapon: kind: expected one of .*'sweep', got 'rounds'"):
         weapon_from_json({**rounds, "weapon": rounds})
     with pytest.raises(InputError, match="pellet: expected a weapon of one pattern"):
         Spread(Rounds(Disc(1), 2), 2, 3)  # type: ignore[arg-type]

@@ -108,6 +108,7 @@ class Hits:
     def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self._keep(rows, scene, weapon, shots, plan)
         self._verdicts: Ints | None = verdicts
+        verdicts.flags.writeable = False
 
     def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self.shot, self.round, self.object = rows.shot, rows.round, rows.object
@@ -125,13 +126,15 @@ class Hits:
         """Samples of each shot by verdict."""
         if self._verdicts is None:
             self._verdicts = self._counted()
-        self._verdicts.flags.writeable = False
+            self._verdicts.flags.writeable = False
         return self._verdicts
 
     @property
     def fired(self) -> Ints:
         """Samples of each shot."""
-        return np.asarray(self.verdicts.sum(axis=1))
+        fired = np.asarray(self.verdicts.sum(axis=1))
+        fired.flags.writeable = False
+        return fired
 
     def _counted(self) -> Ints:
         """Verdicts that were not counted when it was fired."""
