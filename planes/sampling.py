@@ -19,7 +19,7 @@ from planes.compose import Codes
 from planes.items import Stack
 from planes.spans import Box, each_pixel, ragged
 
-__all__ = ["BLOCK", "HIT", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "walk"]
+__all__ = ["BLOCK", "HIT", "OF_PATTERNS", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "walk"]
 
 HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
 """What happened to a sample: an object was hit, an occluder ended its walk, an item was skipped; it still walks."""
@@ -33,7 +33,11 @@ class Verdict(IntEnum):
     OCCLUDED = 2
     FILTERED = 3
     OUTSIDE = 4
+    BEYOND = 5
 
+
+OF_PATTERNS = tuple(Verdict)[: Verdict.BEYOND]
+"""Verdicts of the samples of patterns; of rays, cells after the end are BEYOND."""
 
 VERDICT_OF = np.array(
     [

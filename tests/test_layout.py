@@ -18,12 +18,13 @@ ORDER = {
         "compose", "labels", "poses", "scenefile", "scene", "loading", "render", "sampling",
     ),
     "weapons": (
-        "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "narrow", "candidates",
-        "plan", "resolve", "explain", "hits", "trace", "meetings", "ends", "passes", "tracing",
-        "rayhits", "rayfire", "firing", "orders", "heat", "sieve", "facts", "schemas", "jsondiff",
-        "words", "marks", "world", "sketch", "panel", "overlay", "inset", "cards", "picture",
-        "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale", "golden",
-        "shotlog", "part", "progress", "stream", "starter", "animation", "demo", "cli", "__main__",
+        "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
+        "candidates", "plan", "resolve", "explain", "hits", "meetings", "ends", "passes", "tracing",
+        "rayexplain", "rayhits", "rayfire", "firing", "orders", "heat", "sieve", "facts", "schemas",
+        "jsondiff", "words", "marks", "world", "sketch", "panel", "overlay", "inset", "cards",
+        "picture", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
+        "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter", "animation", "demo",
+        "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

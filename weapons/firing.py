@@ -11,7 +11,7 @@ import numpy as np
 
 from planes.arrays import InputError, choice
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
-from planes.sampling import Verdict
+from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import pierces, ray_parts_of
 from weapons.candidates import Candidates
@@ -86,13 +86,13 @@ def fire(
     if name == "composed" and (plane := scene.code_plane()):
         drawn = plane.read(scene.items), plane.box_xyxy
         plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * drawn[0].itemsize)
-    rows, verdicts = [], [np.zeros((0, len(Verdict)), np.int64)]
+    rows, verdicts = [], [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for begin, part in _parts(shots, first, candidates):
         volley = first if len(shots) == 1 else volley_of(weapon, part)
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.table.nbytes)
         met = composed(volley, part, sight, *drawn) if drawn else direct(volley, part, sight)
         rows.append(rows_of_met(met, volley, stack.ids, begin))
-        verdicts.append(met.counts.reshape(len(part), -1, len(Verdict)).sum(axis=1))
+        verdicts.append(met.counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     leave_out_unused(plan, scene, candidates, first.table, why)
     return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import CHUNK_SAMPLES
-from planes.sampling import Verdict
+from planes.sampling import OF_PATTERNS
 from planes.spans import Box
 from weapons.explain import detail_of
 from weapons.hits import Hits
@@ -33,7 +33,7 @@ def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
     while -(-(x_max - x + 1) // cell) * -(-(y_max - y + 1) // cell) > CELLS_MAX:
         cell *= 2
     width, height = (x_max - x) // cell + 1, (y_max - y) // cell + 1
-    counts, beyond = np.zeros((len(Verdict), height * width), np.int64), 0
+    counts, beyond = np.zeros((len(OF_PATTERNS), height * width), np.int64), 0
     for xy, verdict in _parts(fired):
         seen = (xy >= (x, y)).all(axis=1) & (xy <= (x_max, y_max)).all(axis=1)
         column, row = ((xy[seen] - (x, y)) // cell).T
@@ -42,7 +42,7 @@ def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
             cells, samples = np.unique(row[own] * width + column[own], return_counts=True)
             counts[kind, cells] += samples
         beyond += int((~seen).sum())
-    runs = {v.name.lower(): _runs(counts[v].reshape(height, width)) for v in Verdict if counts[v].any()}
+    runs = {v.name.lower(): _runs(counts[v].reshape(height, width)) for v in OF_PATTERNS if counts[v].any()}
     return {"cell": cell, "origin_xy": [x, y], "beyond": beyond, "counts": runs}
 
 

@@ -98,7 +98,7 @@ class Hits:
     Parameters
     ----------
     starts : (N + 1,) the rows of shot i are starts[i] .. starts[i + 1] - 1
-    verdicts : (N, 5) samples of each shot by verdict, in the order of `Verdict`
+    verdicts : (N, 5), of rays (N, 6): samples of each shot by verdict, in the order of `Verdict`
     fired : (N,) samples of each shot
     plan : what ran and what was left out
     scene, version : what was fired on, and its version then
@@ -172,7 +172,7 @@ class Hits:
     def verdict_counts(self, shot: int | None = None) -> dict[str, int]:
         """Samples by verdict, of one shot or of all; they add up to the samples fired."""
         counts = self.verdicts.sum(axis=0) if shot is None else self.verdicts[self._checked(shot)]
-        return {verdict.name.lower(): int(counts[verdict]) for verdict in Verdict}
+        return {verdict.name.lower(): n for verdict, n in zip(Verdict, counts.tolist(), strict=False)}
 
     def by_owner(self) -> list[OwnerRow]:
         """Rows added up by body: one event for one shot and owner, ordered by (shot, first row of the owner)."""

@@ -18,9 +18,10 @@ from planes.overlap import overlap
 from planes.parts import joined
 from planes.volumes import Capsules, Volumes
 from weapons.pattern import Pattern, Swept
+from weapons.trace import Lines
 from weapons.volley import Volley
 
-__all__ = ["near", "pattern_volumes"]
+__all__ = ["near", "near_rays", "pattern_volumes"]
 
 
 def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Volley, placement: Ints, rank: Ints) -> Bools:
@@ -34,15 +35,33 @@ def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Volley, plac
     """
     if not len(rank):
         return np.zeros(0, np.bool_)
-    volumes, row = items.bounding(kind, stack.ids[rank])
     fired, of_pattern = np.unique(volley.pattern[placement], return_inverse=True)
     patterns = pattern_volumes(name, [volley.table.patterns[i] for i in fired.tolist()])
-    found = np.zeros(len(rank), np.bool_)
-    for first in range(0, len(rank), PAIRS_AT_ONCE):
+    shift = stack.box_xyxy[rank, :2] - volley.xy[placement]
+    return _meet(kind, items, stack.ids[rank], shift, patterns, of_pattern)
+
+
+def near_rays(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, lines: Lines) -> Bools:
+    """Tell which rays may touch items, one for each: whether the capsule around a ray meets the item's volume.
+
+    Parameters
+    ----------
+    corner_xy : (P, 2) of the items' masks, about the origin of the ray
+    """
+    if not len(ids):
+        return np.zeros(0, np.bool_)
+    capsules = Capsules(lines.start / SUB, (lines.start + lines.step) / SUB, lines.radius / SUB)
+    return _meet(kind, items, ids, corner_xy, capsules, np.arange(len(ids)))
+
+
+def _meet(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
+    """Tell which volumes of items, placed by the corners of their masks, meet other volumes."""
+    volumes, row = items.bounding(kind, ids)
+    found = np.zeros(len(ids), np.bool_)
+    for first in range(0, len(ids), PAIRS_AT_ONCE):
         part = slice(first, first + PAIRS_AT_ONCE)
-        shift = stack.box_xyxy[rank[part], :2] - volley.xy[placement[part]]
-        here = volumes.take(row[part]).translated(shift)
-        found[part] = overlap(here, patterns.take(of_pattern[part]), conservative=True)
+        here = volumes.take(row[part]).translated(corner_xy[part])
+        found[part] = overlap(here, others.take(of_other[part]), conservative=True)
     return found
 
 

@@ -45,6 +45,12 @@ class Columns:
         """Some of the rows."""
         return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
 
+    def to_rows(self) -> list[dict[str, Any]]:
+        """Rows as JSON."""
+        names = [f.name for f in fields(self)]
+        columns = [getattr(self, name).tolist() for name in names]
+        return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
     @classmethod
     def joined(cls, parts: Sequence[Any]) -> Any:
         """All rows of one or more."""

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from planes.arrays import Ints
+from planes.arrays import InputError, Ints
+from planes.sampling import Verdict
 from planes.scene import Scene
+from planes.spans import Spans
+from weapons.arsenal import ray_parts_of
 from weapons.ends import Reason
-from weapons.hits import Hits, Rows
+from weapons.explain import Blocked, Samples, Share, WhyNot
+from weapons.hits import HitRow, Hits, Rows
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
-from weapons.rays import Rays
+from weapons.rayexplain import Miss, RayDetail, blocked_rays, nearest_miss, pixels_of, ray_detail, ray_why_not
+from weapons.rays import Parts, Rays
 from weapons.volley import Shots
 from weapons.weapon import Weapon
 
@@ -34,7 +41,84 @@ class RayHits(Hits):
         self, rows: Rows, passes: Passes, stop: Stops, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
+        self._verdicts = None
         self.passes, self.stop = passes, stop
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Hits):
+            return NotImplemented
+        if not isinstance(other, RayHits):
+            return False
+        same_rows = all(np.array_equal(getattr(self, n), getattr(other, n)) for n in HitRow._fields)
+        return same_rows and self.passes == other.passes and self.stop == other.stop
+
+    __hash__ = None
+
+    def __repr__(self) -> str:
+        return f"<RayHits: {len(self)} rows, {len(self.passes)} passes of {len(self.stop)} rays>"
+
+    def passes_at(self, shot: int) -> Passes:
+        """Passes of the rays of one shot."""
+        row = self._checked(shot)
+        found: Passes = self.passes.take(slice(*np.searchsorted(self.passes.shot, [row, row + 1]).tolist()))
+        return found
+
+    def stops_at(self, shot: int) -> Stops:
+        """Ends of the rays of one shot."""
+        row = self._checked(shot)
+        found: Stops = self.stop.take(slice(*np.searchsorted(self.stop.shot, [row, row + 1]).tolist()))
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows, passes and stops as JSON; verdicts are counted when they are asked for."""
+        told = {"rows": [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]}
+        return {**told, "passes": self.passes.to_rows(), "stops": self.stop.to_rows(), "plan": self.plan.to_dict()}
+
+    def samples_at(self, shot: int = 0) -> Samples:
+        """Every cell of the rays of one shot in the order of the walk: pixel, pellet, verdict, what decided it."""
+        return self._rays(shot).samples()
+
+    def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
+        """Pixels that each round of one shot hit of each object, as {(round, object): pixels}."""
+        return pixels_of(self._rays(shot))
+
+    def why_not(self, shot: int = 0) -> list[WhyNot]:
+        """Objects within 32 px of the whole length of the rays of one shot that were not hit, and why."""
+        return ray_why_not(self._rays(shot), {row.object for row in self.of(shot)})
+
+    def blockers(self, shot: int = 0) -> list[Blocked]:
+        """Occluders that ended rays of one shot, and the objects on their way behind them."""
+        return blocked_rays(self._rays(shot))
+
+    def nearest_miss(self, shot: int = 0) -> Miss | None:
+        """The accepted object that one shot did not hit and came nearest to, how near, and where."""
+        return nearest_miss(self._rays(shot), {row.object for row in self.of(shot)})
+
+    def shares(self, shot: int | None = None) -> list[Share]:
+        """Rays have no shares."""
+        raise InputError("hits: expected those of a weapon with a pattern, got those of rays: their passes tell more")
+
+    def margins(self, shot: int = 0) -> dict[int, float]:
+        """Rays have no margins."""
+        raise InputError("hits: expected those of a weapon with a pattern, got those of rays: see nearest_miss")
+
+    def _rays(self, shot: int) -> RayDetail:
+        scene, row = self._fresh(), self._checked(shot)
+        if self._walked is None or self._walked[0] != row:
+            self._walked = row, ray_detail(scene, self._parts, self.shots.take(row, row + 1))
+        found: RayDetail = self._walked[1]
+        return found
+
+    @property
+    def _parts(self) -> Parts:
+        parts = ray_parts_of(self.weapon)
+        assert parts is not None  # it was fired as one
+        return parts
+
+    def _counted(self) -> Ints:
+        scene, none = self._fresh(), np.zeros((0, len(Verdict)), np.int64)
+        each = (ray_detail(scene, self._parts, self.shots.take(i, i + 1)).counts() for i in range(len(self.shots)))
+        return np.concatenate([none, *each])
 
 
 def rows_of_passes(passes: Passes, cells: Meetings, rays: Rays) -> Rows:

@@ -10,7 +10,20 @@ from planes.arrays import Ints
 from planes.compose import Codes, area
 from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack, clipped
-from planes.sampling import BLOCK, HIT, LIVE, SKIP, VERDICT_OF, Events, Pairs, Runs, Verdict, read_codes, walk
+from planes.sampling import (
+    BLOCK,
+    HIT,
+    LIVE,
+    OF_PATTERNS,
+    SKIP,
+    VERDICT_OF,
+    Events,
+    Pairs,
+    Runs,
+    Verdict,
+    read_codes,
+    walk,
+)
 from planes.spans import Box, merged_runs, pieces
 from weapons.candidates import Candidates, refused
 from weapons.plan import Plan
@@ -145,7 +158,7 @@ def _walked(runs: Runs, pairs: Pairs, sight: Sight, counts: Ints) -> list[Events
 
 def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> None:
     """Move samples from EMPTY to the verdicts of their states."""
-    column = placement * len(Verdict) + VERDICT_OF[state]
+    column = placement * len(OF_PATTERNS) + VERDICT_OF[state]
     added = np.bincount(column, samples, counts.size).astype(np.int64).reshape(counts.shape)
     counts += added
     counts[:, Verdict.EMPTY] -= added.sum(axis=1)
@@ -153,7 +166,7 @@ def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> 
 
 def _inside(volley: Volley, boxes: Ints, bounds: Box | None) -> Ints:
     """Counts (P, 5) before anything is met: all samples inside the bounds are EMPTY, the others OUTSIDE."""
-    counts = np.zeros((len(boxes), len(Verdict)), np.int64)
+    counts = np.zeros((len(boxes), len(OF_PATTERNS)), np.int64)
     counts[:, Verdict.EMPTY] = volley.count
     if bounds is None:
         return counts

@@ -25,7 +25,7 @@ import numpy as np
 
 from planes.arrays import InputError, within
 from planes.items import Role
-from planes.sampling import Verdict
+from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import arsenal_of
 from weapons.firing import fire
@@ -142,7 +142,7 @@ def _header(scene: Scene, reader: ShotReader) -> bytes:
         "names": _hash([scene.categories, words]),
         "weapons": _hash({name: weapon.to_json() for name, weapon in reader.arsenal.items()}),
         "columns": COLUMNS,
-        "verdicts": [verdict.name.lower() for verdict in Verdict],
+        "verdicts": [verdict.name.lower() for verdict in OF_PATTERNS],
         "objects": {item: scene.name_of(item) for item in scene.ids(Role.HITTABLE).tolist()},
     }
     return json.dumps(data, separators=(",", ":")).encode() + b"\n"

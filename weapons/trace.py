@@ -50,7 +50,7 @@ class Lines:
     def __len__(self) -> int:
         return len(self.start)
 
-    def take(self, rows: Ints) -> Lines:
+    def take(self, rows: Ints | Bools) -> Lines:
         """Some of the segments."""
         return Lines(self.start[rows], self.step[rows], self.radius)
 

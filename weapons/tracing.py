@@ -65,7 +65,8 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     found = []
     for near, far in pairwise(edges):
         pairs = _pairs(rays, ray, lines, live, (near, far), through)
-        found.append(_touched(rays, ray, lines, shots, pairs, through))
+        possible = len(rays) * len(through.stack) if near == -np.inf else 0
+        found.append(_touched(rays, ray, lines, shots, pairs, possible, through))
         if far == np.inf:
             break
         so_far = np.zeros(len(rays), np.bool_)
@@ -167,16 +168,25 @@ def _enters(rays: Rays, lines: Lines, ray: Ints, boxes_xyxy: Ints) -> Floats:
     return np.where(missed, np.nan, np.maximum(first, 0) * _lengths(lines)[ray] - SLACK)
 
 
-def _touched(rays: Rays, ray: Traced, lines: Lines, shots: Shots, pairs: tuple[Ints, Ints], through: Range) -> Meetings:
+def _touched(
+    rays: Rays, ray: Traced, lines: Lines, shots: Shots, pairs: tuple[Ints, Ints], possible: int, through: Range
+) -> Meetings:
     """Cells in which rays touch accepted items, by the weapon's rules for what they start in and for steps."""
     stack, plan = through.stack, through.plan
     row, rank = pairs
     accepted = np.flatnonzero(~refused(stack, rank, shots, rays.shot[row]))
-    plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(accepted), len(rays) * len(stack)))
     row, rank = row[accepted], rank[accepted]
     own = _relative(lines, ray, row, rank, through)
     origin = rays.origin_xy[row]
     boxes = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
+    wanted = through.candidates.prefilter
+    if wanted.volume:
+        from planes.bounding import Kind  # few calls need them
+        from weapons.narrow import near_rays
+
+        kept = near_rays(Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], boxes[:, :2], own)
+        row, rank, own, origin, boxes = row[kept], rank[kept], own.take(kept), origin[kept], boxes[kept]
+    plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
     met = meet(own, row, rank, boxes, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
     if _moving(ray, through):

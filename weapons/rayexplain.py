@@ -1,0 +1,319 @@
+"""What is derived from rays when it is asked for: each cell in the order of the walk, what blocked, what was missed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Set
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, InputError, Ints
+from planes.constants import DETAIL_SAMPLES_MAX, NEAR_PX, SUB
+from planes.items import Stack
+from planes.sampling import Verdict
+from planes.scene import Scene
+from planes.spans import Box, Spans
+from weapons.candidates import Candidates, refused
+from weapons.ends import Ends, Reason
+from weapons.explain import Behind, Blocked, Samples, WhyNot
+from weapons.meetings import Meetings, meet
+from weapons.plan import Plan
+from weapons.rays import Parts, Rays, rays_of
+from weapons.trace import Lines, cells
+from weapons.tracing import Range, trace
+from weapons.volley import Shots
+
+__all__ = ["Miss", "RayDetail", "blocked_rays", "nearest_miss", "pixels_of", "ray_detail", "ray_why_not"]
+
+REACH_BITS = 23
+"""Cells lie within 2**22 px of the origin of their ray: two such numbers and that of the ray fit int64."""
+
+
+class Miss(NamedTuple):
+    """The object that rays came nearest to without a hit.
+
+    `distance` is that from what the rays walked, of their width, to its pixel squares, px; `ray_xy` and `object_xy`
+    are the points that are so near: from one to the other is the direction.
+    """
+
+    object: int
+    round: int
+    pellet: int
+    distance: float
+    ray_xy: tuple[float, float]
+    object_xy: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RayDetail:
+    """Rays cell by cell.
+
+    Parameters
+    ----------
+    stack, bounds, shots, rays, lines, ends : what was walked, by whom
+    met : cells in which they touch accepted items, up to their ends and some beyond
+    every : cells in which their whole length touches any item, also outside of the bounds
+    """
+
+    stack: Stack
+    bounds: Box | None
+    shots: Shots
+    rays: Rays
+    lines: Lines
+    ends: Ends
+    met: Meetings
+    every: Meetings
+
+    @cached_property
+    def walked(self) -> Meetings:
+        """Cells in which they hit objects."""
+        objects = self.met.take(np.flatnonzero(~self.stack.occluder[self.met.rank]))
+        return objects.only(self.ends.walked(objects))
+
+    @cached_property
+    def refuses(self) -> Bools:
+        """Whether the pairs of `every` are refused."""
+        return refused(self.stack, self.every.rank, self.shots, self.rays.shot[self.every.ray])
+
+    @cached_property
+    def cells(self) -> tuple[Ints, Ints, Ints, Ints]:
+        """Every cell as (ray, pixel (K, 2), verdict, rank of what decided it), in the order of the walk."""
+        rays, ends = self.rays, self.ends
+        ray, xy, entry, _, scale = cells(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
+        at = xy - rays.origin_xy[ray]
+        keys = _keys(ray, at[:, 0], at[:, 1])
+        place = np.argsort(keys)
+        verdict, rank = np.full(len(ray), Verdict.EMPTY, np.int64), np.full(len(ray), -1)
+        stopped = np.flatnonzero(ends.reason == Reason.OCCLUDER)
+        for met, told in ((self.every, Verdict.FILTERED), (self.walked, Verdict.HIT)):
+            order = np.argsort(-met.rank[met.pair], kind="stable")  # of several in one cell the front-most counts
+            pair = met.pair[order]
+            _mark(verdict, rank, keys, place, met.ray[pair], met.x[order], met.y[order], told, met.rank[pair])
+            if told == Verdict.FILTERED:
+                where = stopped, ends.x[stopped], ends.y[stopped]
+                _mark(verdict, rank, keys, place, *where, Verdict.OCCLUDED, ends.rank[stopped])
+        if (scale == self.lines.scale).all():
+            here = (at[:, 1] == ends.y[ray]) & (at[:, 0] == ends.x[ray])
+            before = (at[:, 1] < ends.y[ray]) | ((at[:, 1] == ends.y[ray]) & (at[:, 0] < ends.x[ray]))
+            time = ends.time[ray]
+            beyond = (entry > time) | ((entry == time) & ~here & (ends.alone[ray] | ~before))
+        else:
+            beyond = entry / scale[ray] > ends.fraction[ray]
+        verdict[beyond], rank[beyond] = Verdict.BEYOND, -1
+        if self.bounds is not None:
+            outside = ((xy < self.bounds[:2]) | (xy > self.bounds[2:])).any(axis=1)
+            verdict[outside], rank[outside] = Verdict.OUTSIDE, -1
+        order = np.lexsort((np.arange(len(ray)), beyond, ray))  # of cells entered at once, those walked come first
+        return ray[order], xy[order], verdict[order], rank[order]
+
+    def samples(self) -> Samples:
+        """Cells as samples."""
+        ray, xy, verdict, rank = self.cells
+        return Samples(xy, self.rays.round[ray], self.rays.pellet[ray], verdict, np.append(self.stack.ids, -1)[rank])
+
+    def counts(self) -> Ints:
+        """Cells of each shot by verdict (N, 6)."""
+        ray, _, verdict, _ = self.cells
+        n = len(Verdict)
+        column = self.rays.shot[ray] * n + verdict
+        return np.bincount(column, minlength=len(self.shots) * n).reshape(-1, n)
+
+
+def _keys(ray: Ints, x: Ints, y: Ints) -> Ints:
+    half = 1 << (REACH_BITS - 1)
+    return (((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half
+
+
+def _mark(
+    verdict: Ints, rank: Ints, keys: Ints, place: Ints, ray: Ints, x: Ints, y: Ints, told: Verdict, ranks: Ints
+) -> None:
+    """Give cells a verdict and what decided it; of a projectile some lie beside its own path."""
+    wanted = _keys(ray, x, y)
+    at = np.minimum(np.searchsorted(keys, wanted, sorter=place), max(len(keys) - 1, 0))
+    found = np.flatnonzero(keys[place[at]] == wanted) if len(keys) else at[:0]
+    verdict[place[at[found]]], rank[place[at[found]]] = told, ranks[found]
+
+
+def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
+    """Walk shots cell by cell."""
+    stack, rays = scene.items.stack(), rays_of(parts, shots)
+    wide = 2 * (parts[2].radius_256 // SUB) + 3
+    samples = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
+    if samples > DETAIL_SAMPLES_MAX:
+        raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {samples}")
+    through = Range(scene.items, stack, scene.bounds, Candidates(scene.items, stack), Plan())
+    met, ends, lines, _ = trace(rays, parts[2], shots, through)
+    own = Lines(lines.start, lines.step, lines.radius)
+    boxes = np.concatenate([rays.start_256, rays.start_256], axis=1)
+    boxes[:, :2] = np.minimum(rays.start_256, rays.start_256 + rays.step_256) // SUB - wide
+    boxes[:, 2:] = np.maximum(rays.start_256, rays.start_256 + rays.step_256) // SUB + wide
+    row, rank = through.candidates.meeting(boxes)
+    origin = rays.origin_xy[row]
+    item = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
+    every = meet(own.take(row), row, rank, item, stack, None, origin)
+    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every)
+
+
+def pixels_of(detail: RayDetail) -> dict[tuple[int, int], Spans]:
+    """Pixels that each round hit of each object, as {(round, object): pixels}, each pixel once."""
+    met, found = detail.walked, {}
+    xy = np.stack([met.x, met.y], axis=1) + detail.rays.origin_xy[met.ray[met.pair]]
+    round_, item = detail.rays.round[met.ray], detail.stack.ids[met.rank]
+    for key in dict.fromkeys(zip(round_.tolist(), item.tolist(), strict=True)):
+        x, y = xy[((round_ == key[0]) & (item == key[1]))[met.pair]].T
+        found[key] = Spans.from_runs(y, x, x)
+    return found
+
+
+def blocked_rays(detail: RayDetail) -> list[Blocked]:
+    """Occluders that ended rays, those of most rays first, then by id, and the objects that lie behind them."""
+    stack, ends = detail.stack, detail.ends
+    by = np.where(ends.reason == Reason.OCCLUDER, ends.rank, -1)
+    met = detail.every
+    walked = set(zip(detail.walked.ray.tolist(), detail.walked.rank.tolist(), strict=True))
+    behind: dict[int, dict[int, list[int]]] = {}
+    for pair in np.flatnonzero(~stack.occluder[met.rank] & ~detail.refuses & (by[met.ray] >= 0)).tolist():
+        ray, rank = int(met.ray[pair]), int(met.rank[pair])
+        if (ray, rank) not in walked:
+            behind.setdefault(int(by[ray]), {}).setdefault(rank, []).append(pair)
+    found = [
+        Blocked(
+            int(stack.ids[rank]), count,
+            tuple(sorted((_behind(detail, *one) for one in behind.get(rank, {}).items()), key=lambda b: b.object)),
+        )
+        for rank, count in zip(*(v.tolist() for v in np.unique(by[by >= 0], return_counts=True)), strict=True)
+    ]  # fmt: skip
+    return sorted(found, key=lambda b: (-b.samples, b.occluder))
+
+
+def _behind(detail: RayDetail, rank: int, pairs: list[int]) -> Behind:
+    met = detail.every
+    first = met.first[pairs[0]]
+    x, y = (np.array([met.x[first], met.y[first]]) + detail.rays.origin_xy[met.ray[pairs[0]]]).tolist()
+    return Behind(int(detail.stack.ids[rank]), int(met.count[pairs].sum()), (x, y))
+
+
+def ray_why_not(detail: RayDetail, hit: Set[int]) -> list[WhyNot]:
+    """Objects within NEAR_PX of the whole length of rays that were not hit, nearest first, then by id."""
+    stack, rays, met = detail.stack, detail.rays, detail.every
+    objects = [r for r in np.flatnonzero(~stack.occluder).tolist() if int(stack.ids[r]) not in hit]
+    touched = np.bincount(met.rank, met.count, len(stack)).astype(np.int64)
+    found = []
+    for rank, (distance, _, _, _) in _gaps(detail, objects, np.ones(len(rays)), NEAR_PX).items():
+        found.append(_why(detail, rank, int(touched[rank]), 0.0 if touched[rank] else distance))
+    return sorted(found, key=lambda w: (w.distance, w.object))
+
+
+def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
+    stack, shot, ends = detail.stack, detail.shots, detail.ends
+    item = int(stack.ids[rank])
+    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
+        foreign = not int(stack.categories[rank]) & int(shot.accept[0])
+        return WhyNot(item, "category" if foreign else "excluded", samples, {}, distance)
+    if not samples:
+        return WhyNot(item, "missed", 0, {}, distance)
+    rays = detail.every.ray[detail.every.rank == rank]
+    enders = stack.ids[ends.rank[rays[ends.rank[rays] >= 0]]]
+    by = {int(i): int(n) for i, n in zip(*np.unique(enders, return_counts=True), strict=True)}
+    if by:
+        return WhyNot(item, "behind", samples, by, distance)
+    inside = rank in detail.met.rank or detail.bounds is None
+    return WhyNot(item, "inside" if inside or _starts_inside(detail, rank) else "outside", samples, {}, distance)
+
+
+def _starts_inside(detail: RayDetail, rank: int) -> bool:
+    pairs = np.flatnonzero(detail.every.rank == rank)
+    return bool((detail.every.entry[detail.every.first[pairs]] == 0).any())
+
+
+def nearest_miss(detail: RayDetail, hit: Set[int]) -> Miss | None:
+    """The accepted object that was not hit and is nearest to what the rays walked; the least id of several."""
+    stack, rays = detail.stack, detail.rays
+    every = np.arange(len(stack))
+    accepted = ~stack.occluder & ~refused(stack, every, detail.shots, np.zeros(len(stack), np.int64))
+    objects = [rank for rank in np.flatnonzero(accepted).tolist() if int(stack.ids[rank]) not in hit]
+    found = _gaps(detail, objects, detail.ends.fraction, None)
+    if not found:
+        return None
+    rank = min(found, key=lambda rank: (found[rank][0], int(stack.ids[rank])))
+    distance, ray, from_xy, to_xy = found[rank]
+    return Miss(int(stack.ids[rank]), int(rays.round[ray]), int(rays.pellet[ray]), distance, from_xy, to_xy)
+
+
+Gap = tuple[float, int, tuple[float, float], tuple[float, float]]
+
+
+def _gaps(detail: RayDetail, objects: list[int], part: Floats, most: float | None) -> dict[int, Gap]:
+    """Distance of objects from a part of each ray: all within `most` px, or the nearest of all.
+
+    Returns
+    -------
+    by rank: distance, ray, the point of the ray, the point of the object
+    """
+    rays, stack = detail.rays, detail.stack
+    origin = rays.origin_xy[0]
+    begin = (rays.start_256 - SUB * origin) / SUB
+    end = begin + part[:, None] * (rays.step_256 / SUB)
+    wide = detail.lines.radius / SUB
+    boxes = _squares(stack.box_xyxy[objects], origin)
+    least = np.full(len(objects), np.inf)
+    for ray in range(len(rays)):
+        least = np.minimum(least, gap(begin[ray], end[ray], boxes)[0])
+    found: dict[int, Gap] = {}
+    limit = math.inf if most is None else most + wide
+    for place in np.argsort(least, kind="stable").tolist():
+        if least[place] > limit:
+            break
+        spans = Spans.from_mask(stack.mask(objects[place]), tuple(stack.box_xyxy[objects[place], :2].tolist()))
+        runs = _squares(np.stack([spans.x_first, spans.y, spans.x_last, spans.y], axis=1), origin)
+        near = [(*_nearest(*gap(begin[ray], end[ray], runs)), ray) for ray in range(len(rays))]
+        distance, from_xy, to_xy, ray = min(near, key=lambda one: (one[0], one[3]))
+        if distance <= limit:
+            at, to = ((point + origin).tolist() for point in (from_xy, to_xy))
+            found[objects[place]] = max(distance - wide, 0.0), ray, (at[0], at[1]), (to[0], to[1])
+            limit = distance if most is None else limit
+    return found
+
+
+def _squares(boxes_xyxy: Ints, origin: Ints) -> Floats:
+    """Boxes of whole pixels as closed boxes about an origin."""
+    return np.asarray(boxes_xyxy - np.concatenate([origin, origin]) + np.array([-0.5, -0.5, 0.5, 0.5]))
+
+
+def _nearest(distance: Floats, from_xy: Floats, to_xy: Floats) -> tuple[float, Floats, Floats]:
+    row = int(np.argmin(distance))
+    return float(distance[row]), from_xy[row], to_xy[row]
+
+
+def gap(begin: Floats, end: Floats, boxes_xyxy: Floats) -> tuple[Floats, Floats, Floats]:
+    """Distance of a segment from closed boxes (n, 4), and the points (n, 2) of both that are so near.
+
+    Where they do not cross, one of the points is an end of the segment or a corner of the box.
+    """
+    low, high = boxes_xyxy[:, :2], boxes_xyxy[:, 2:]
+    step = end - begin
+    corners = np.stack([low, high, boxes_xyxy[:, [0, 3]], boxes_xyxy[:, [2, 1]]], axis=1)
+    along = ((corners - begin) * step).sum(axis=2) / max(float((step**2).sum()), np.finfo(np.float64).tiny)
+    on_ray = begin + np.clip(along, 0, 1)[:, :, None] * step
+    ends = np.broadcast_to(np.stack([begin, end]), (len(low), 2, 2))
+    on_ray = np.concatenate([on_ray, ends, _crossing(begin, step, low, high)[:, None]], axis=1)
+    on_box = np.clip(on_ray, low[:, None], high[:, None])
+    on_box[:, :4] = corners
+    distance = np.sqrt(((on_ray - on_box) ** 2).sum(axis=2))
+    best = np.argmin(distance, axis=1)
+    row = np.arange(len(low))
+    return distance[row, best], on_ray[row, best], on_box[row, best]
+
+
+def _crossing(begin: Floats, step: Floats, low: Floats, high: Floats) -> Floats:
+    """Point of the segment in the middle of where it crosses each box; any point where it does not."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_low, to_high = (low - begin) / step, (high - begin) / step
+    level = step == 0
+    first = np.where(level, 0, np.minimum(to_low, to_high)).max(axis=1)
+    last = np.where(level, 1, np.maximum(to_low, to_high)).min(axis=1)
+    middle = np.clip((np.clip(first, 0, 1) + np.clip(last, 0, 1)) / 2, 0, 1)
+    return np.asarray(begin + middle[:, None] * step)
