@@ -20,9 +20,9 @@ ORDER = {
     "weapons": (
         "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
         "candidates", "plan", "resolve", "explain", "hits", "meetings", "ends", "passes", "tracing",
-        "rayexplain", "rayhits", "rayfire", "firing", "orders", "heat", "sieve", "facts", "schemas",
-        "jsondiff", "words", "marks", "world", "sketch", "panel", "overlay", "inset", "cards",
-        "picture", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
+        "rayexplain", "rayhits", "rayfire", "firing", "orders", "heat", "rayfacts", "sieve", "facts",
+        "schemas", "jsondiff", "words", "marks", "world", "sketch", "panel", "overlay", "inset",
+        "cards", "picture", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
         "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter", "animation", "demo",
         "cli", "__main__",
     ),

@@ -40,7 +40,7 @@ ABOUT = {
 """What says how a report was made, and decides nothing."""
 
 SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (
-    ("at_xy", "samples"),
+    ("at_xy", "samples", "nearest_miss"),
     ("distance2", "shares"),
     ("shots_that_hit", "objects", "heat"),
 )

@@ -14,13 +14,15 @@ from planes.arrays import InputError, Ints, listed
 from planes.constants import ALL, SUB, VIEW_MAX
 from planes.grid256 import pixel
 from planes.items import Role
-from planes.sampling import Verdict
+from planes.sampling import OF_PATTERNS, Verdict
 from planes.scene import Scene
 from planes.schema import Text
 from planes.spans import Box, Spans
 from weapons.arsenal import parts_of
 from weapons.heat import heat_of
 from weapons.hits import HitRow, Hits
+from weapons.rayfacts import ray_boxes, rays_told
+from weapons.rayhits import RayHits
 from weapons.volley import Volley, volley_of
 
 if TYPE_CHECKING:
@@ -148,6 +150,9 @@ def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int
 
 def _boxes(hits: Hits) -> Ints:
     """Box (n, 4) around the samples of each part of a batch that has any."""
+    if isinstance(hits, RayHits):
+        around = ray_boxes(hits)
+        return np.array([] if around is None else [around], np.int64).reshape(-1, 4)
     found = []
     for volley in _volleys(hits):
         boxes = volley.boxes
@@ -236,11 +241,14 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         ],
         "samples": _sample_runs(hits, row),
         "plan": hits.plan.to_dict(),
+        **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
 
 
 def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
-    pixels = hits.pixels_at(shot)
+    """Rows of a shot; those of rays have no shares."""
+    pixels, rows = hits.pixels_at(shot), hits.of(shot)
+    shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
     return [
         {
             **_item(scene, row.object),
@@ -251,10 +259,10 @@ def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
             "pellets": row.pellets,
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
-            "shares": {name: round(value, 6) for name, value in share._asdict().items()},
+            **({} if share is None else {"shares": {k: round(value, 6) for k, value in share._asdict().items()}}),
             "runs": pixels[row.round, row.object].runs().tolist(),
         }
-        for row, share in zip(hits.of(shot), hits.shares(shot), strict=True)
+        for row, share in zip(rows, shares, strict=True)
     ]
 
 
@@ -273,11 +281,14 @@ def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
     """Many shots: totals, each object's share of them, every row, and the heat of each pixel of the view."""
     first = np.cumsum([0, *(len(hits.shots) for hits in fired)]).tolist()
     rows = [[row.shot + begin, *_flat(row)] for begin, hits in zip(first, fired, strict=False) for row in hits]
-    verdicts = sum((hits.verdicts.sum(axis=0) for hits in fired), np.zeros(len(Verdict), np.int64))
+    verdicts = np.zeros(len(Verdict), np.int64)
+    for hits in fired:
+        verdicts[: hits.verdicts.shape[1]] += hits.verdicts.sum(axis=0)
+    known = Verdict if any(isinstance(hits, RayHits) for hits in fired) else OF_PATTERNS
     return {
         "shots": first[-1],
         "shots_that_hit": len({row[0] for row in rows}),
-        "verdicts": {verdict.name.lower(): int(verdicts[verdict]) for verdict in Verdict},
+        "verdicts": {verdict.name.lower(): int(verdicts[verdict]) for verdict in known},
         "objects": _objects(scene, rows),
         "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
         "rows": rows,
@@ -322,7 +333,7 @@ def _name(scene: Scene, item: int) -> str:
 
 def _degrees(hits: Hits, row: int) -> float | None:
     """Aim of a shot whose weapon has one, to a millionth of a degree."""
-    if not parts_of(hits.weapon)[2].directed:
+    if not isinstance(hits, RayHits) and not parts_of(hits.weapon)[2].directed:
         return None
     c, s = hits.shots.direction[row].tolist()
     return round(math.degrees(math.atan2(s, c)), 6) + 0.0

@@ -9,10 +9,11 @@ import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import CHUNK_SAMPLES
-from planes.sampling import OF_PATTERNS
+from planes.sampling import OF_PATTERNS, Verdict
 from planes.spans import Box
 from weapons.explain import detail_of
 from weapons.hits import Hits
+from weapons.rayhits import RayHits
 
 __all__ = ["heat_of"]
 
@@ -49,6 +50,12 @@ def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
 def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
     """Pixels (n, 2) and verdicts of all samples, some shots at a time."""
     for hits in fired:
+        if isinstance(hits, RayHits):
+            for shot in range(len(hits.shots)):
+                cells = hits.samples_at(shot)
+                walked = cells.verdict != Verdict.BEYOND
+                yield cells.xy[walked], cells.verdict[walked]
+            continue
         step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
         for first in range(0, len(hits.shots), step):
             detail = detail_of(hits.scene, hits.weapon, hits.shots.take(first, first + step))

@@ -14,7 +14,7 @@ from planes.arrays import InputError, within
 from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, VIEW_MAX
 from planes.image import read_text, write_text
 from planes.index import STRUCTURES
-from planes.sampling import Verdict
+from planes.sampling import OF_PATTERNS, Verdict
 from planes.scenefile import OBJECT, SCENE
 from planes.schema import (
     Const,
@@ -40,6 +40,7 @@ from weapons.explain import REASONS
 from weapons.facts import FORMAT
 from weapons.guns import Traced
 from weapons.orders import SHOT
+from weapons.rayhits import Reason
 from weapons.weapon import Weapon
 
 __all__ = ["REPORT", "read_report", "schemas", "write_schemas"]
@@ -56,6 +57,7 @@ RUNS = Wholes((None, 3), -FARTHEST, FARTHEST)
 SHARE = Number(0, 1)
 ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
 VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
+COUNTS = Within(Keys(dict(VERDICTS), tuple(verdict.name.lower() for verdict in OF_PATTERNS)))
 STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
 
 
@@ -75,20 +77,50 @@ def _all(keys: dict[str, Value]) -> Within:
 
 RAN = Keys({**STAGE, "bytes": COUNT, "pairs": Wholes((2,), 0, 2**62)}, ("stage", "why", "bytes"))
 PLAN = _all({"ran": Rows(Within(RAN)), "left_out": Rows(_all(STAGE))})
-ROW = _all(
+ROW_TOLD: dict[str, Value] = {
+    **ITEM,
+    "round": COUNT,
+    "samples": COUNT,
+    "pixels": COUNT,
+    "weight": COUNT,
+    "pellets": COUNT,
+    "first_xy": PIXEL,
+    "distance2": COUNT,
+    "runs": RUNS,
+}
+SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE})
+ROW = Within(Keys({**ROW_TOLD, "shares": SHARES}, tuple(ROW_TOLD)))
+POINT = Numbers((2,), FARTHEST)
+NORMAL = Wholes((2,), -(2**10), 2**10)
+PASS = _all(
     {
         **ITEM,
-        "round": COUNT,
-        "samples": COUNT,
-        "pixels": COUNT,
+        "order": COUNT,
+        "entry_xy": PIXEL,
+        "exit_xy": PIXEL,
+        **dict.fromkeys(("entry_px", "exit_px", "material"), Number(0)),
+        **dict.fromkeys(("entry", "exit"), Number(0, 1)),
+        "point": POINT,
+        "normal": NORMAL,
         "weight": COUNT,
-        "pellets": COUNT,
-        "first_xy": PIXEL,
-        "distance2": COUNT,
-        "shares": _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE}),
-        "runs": RUNS,
     }
 )
+STOP = _all(
+    {
+        "reason": Word(tuple(reason.name.lower() for reason in Reason)),
+        "item": Optional(_all(dict(ITEM))),
+        "cell_xy": PIXEL,
+        "point": POINT,
+        "distance": Number(0),
+        "fraction": Number(0, 1),
+        "normal": NORMAL,
+    }
+)
+RAY = _all({"round": COUNT, "pellet": COUNT, "start": POINT, "end": POINT, "stop": STOP, "passes": Rows(PASS)})
+MISS = _all({**ITEM, "distance": Number(0), "ray_xy": POINT, "object_xy": POINT})
+RAYS: dict[str, Value] = {"radius": Number(0, REACH_MAX), "rays": Rows(RAY), "nearest_miss": Optional(MISS)}
+"""What a shot of rays tells beside."""
+
 TESTED = _all(
     {
         "objects": Wholes((None,), 0, ITEMS_MAX - 1),
@@ -106,7 +138,7 @@ SHOT_TOLD: dict[str, Value] = {
     "seed": Whole(0, SEED_MAX),
     "accept": Optional(Names()),
     "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
-    "verdicts": _all(dict(VERDICTS)),
+    "verdicts": COUNTS,
     "rows": Rows(ROW),
     "why_not": Rows(
         _all(
@@ -125,7 +157,7 @@ SHOT_TOLD: dict[str, Value] = {
     "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))),
     "plan": PLAN,
 }
-TOLD = Within(Keys({**SHOT_TOLD, "tested": TESTED}, tuple(SHOT_TOLD)))
+TOLD = Within(Keys({**SHOT_TOLD, **RAYS, "tested": TESTED}, tuple(SHOT_TOLD)))
 FILTER = _all(
     {
         "prefilter": Text(),
@@ -145,7 +177,7 @@ BATCH = _all(
     {
         "shots": COUNT,
         "shots_that_hit": COUNT,
-        "verdicts": _all(dict(VERDICTS)),
+        "verdicts": COUNTS,
         "objects": Rows(_all({**ITEM, "shots": COUNT, "pixels": COUNT, "weight": COUNT})),
         "columns": Names(),
         "rows": Wholes((None, 10), -FARTHEST, 2**62),
