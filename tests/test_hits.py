@@ -21,7 +21,7 @@ from weapons.arsenal import Plain
 
 SEEDS = range(0, 600, 6)
 MARGIN_SEEDS = range(0, 600, 12)
-VERDICT_OF = {verdict.name.lower(): verdict for verdict in Verdict}
+VERDICT_OF = {verdict.name.lower(): verdict for verdict in Verdict if verdict is not Verdict.BEYOND}
 
 
 def fired(seed: int) -> tuple[Battle, Scene, Hits]:

@@ -39,9 +39,7 @@ def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
         for i in range(len(rays))
     ]
     miss = hits.nearest_miss(row)
-    near = (
-        None if miss is None else {**_item(scene, miss.object), **_plain(miss._asdict(), "object", "round", "pellet")}
-    )
+    near = None if miss is None else {**_item(scene, miss.object), **_near(miss)}
     return {"radius": parts[2].radius_256 / SUB, "rays": told, "nearest_miss": near}
 
 
