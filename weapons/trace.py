@@ -109,6 +109,7 @@ class Lines:
         length2 = self.length2[line]
         beside = np.abs(SUB * np.stack([x, y], axis=1) - self.start[line]) > HALF
         thin = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
+        first, last = (np.where(thin, time, 0).astype(object) for time in (first, last))  # products leave int64
         first = np.asarray(-(-first * length2 // axis), np.int64)
         last = np.asarray(last * length2 // axis, np.int64)
         thick = entry <= exit_
