@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planes.arrays import InputError as InputError
     from planes.constants import ALL as ALL
+    from planes.history import History as History
+    from planes.history import PastScene as PastScene
     from planes.image import read_png as read_png
     from planes.image import write_png as write_png
     from planes.items import Role as Role
@@ -19,7 +21,9 @@ if TYPE_CHECKING:
 
 _HOME = {
     "ALL": "constants",
+    "History": "history",
     "InputError": "arrays",
+    "PastScene": "history",
     "Planes": "labels",
     "Role": "items",
     "Scene": "scene",
@@ -30,7 +34,10 @@ _HOME = {
     "write_png": "image",
 }
 
-__all__ = ["ALL", "InputError", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene", "read_png", "write_png"]
+__all__ = [
+    "ALL", "History", "InputError", "PastScene", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene",
+    "read_png", "write_png",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -144,6 +144,12 @@ BOUNDS_SLACK = 256
 JOURNAL_ROWS = 2**16
 """Changes that a scene remembers; a plane that lags behind by more is drawn anew."""
 
+HISTORY_TICKS_MAX = 2**16
+"""Ticks that a history holds at most: 18 minutes of 60 a second; beyond it a scene is better saved."""
+
+TICK_MAX = 2**45
+"""Largest tick, either way: a float64 holds it to 1/256."""
+
 ROUNDING = 2.0**-53
 """Largest relative error of one float64 operation."""
 

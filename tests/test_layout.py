@@ -15,7 +15,7 @@ ORDER = {
         "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
         "parts", "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles",
         "image", "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "items", "index",
-        "compose", "labels", "poses", "scenefile", "scene", "loading", "render", "sampling",
+        "compose", "labels", "poses", "scenefile", "scene", "loading", "history", "render", "sampling",
     ),
     "weapons": (
         "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
