@@ -74,14 +74,15 @@ class PastItems(Items):
         if after is self:
             return self
         out = PastItems(self, self)
-        both = np.flatnonzero((self.alive == 1) & (after.alive[: self.count] == 1))
+        both = np.flatnonzero(after.alive[: self.count])  # what is gone does not come back
         step = after.position_256[both] - self.position_256[both]
         if step.any():
             position = self.position_256.copy()
             position[both] += _part_of(step, part, parts)
             out.position_256 = _sealed(position)
         if self.angles is not after.angles:
-            turns = {i: _short_turn(self.angles[i], after.angles[i]) for i in both.tolist()}
+            differ = [i for i in both.tolist() if self.angles[i] != after.angles[i]]
+            turns = {i: _short_turn(self.angles[i], after.angles[i]) for i in differ}
             out._turn({i: self.angles[i] + turn * (part / parts) for i, turn in turns.items() if turn})
         return out
 

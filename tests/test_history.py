@@ -24,6 +24,7 @@ import planes.items
 from planes import History, InputError, PastScene, Scene, Sprite, load_scene
 from planes.grid256 import snap
 from planes.items import COLUMNS
+from planes.render import draw_view
 from planes.volumes import Circles
 from weapons import Beam, Disc, Point, Rounds, Spread, fire, picture_of_report, report_of
 
@@ -56,6 +57,11 @@ def answers(scene: Scene) -> list[Any]:
 def masks(scene: Scene) -> list[Any]:
     """Each object's mask and its place."""
     return [(i, scene.mask(i)[0].tolist(), scene.mask(i)[1]) for i in scene.ids().tolist()]
+
+
+def names(scene: Scene) -> list[str]:
+    """Each object's name."""
+    return [scene.name_of(i) for i in scene.ids().tolist()]
 
 
 # Ticks
@@ -145,12 +151,13 @@ def test_a_moment_is_what_it_was() -> None:
     ]
     for change in changes:
         history.record()
-        told.append((len(scene), scene.ids().tolist(), scene.version, masks(scene), answers(scene)))
+        told.append((len(scene), scene.ids().tolist(), scene.version, names(scene), masks(scene), answers(scene)))
         change()
     hash_now, version_now = scene.content_hash(), scene.version
     for tick, truth in zip(history.ticks, told, strict=True):
         past = history.at(tick)
-        assert (len(past), past.ids().tolist(), past.version, masks(past), answers(past)) == truth
+        assert (len(past), past.ids().tolist(), past.version, names(past), masks(past), answers(past)) == truth
+        assert {len(getattr(past.items, name)) for name in (*LISTS, *COLUMNS)} == {past.items.count}
     assert len({str(truth[-1]) for truth in told}) == len(told)
     assert (scene.content_hash(), scene.version) == (hash_now, version_now)
 
@@ -163,7 +170,7 @@ def test_the_past_has_the_face_of_a_scene(tmp_path: Path) -> None:
     assert isinstance(past, PastScene) and isinstance(past, Scene)
     assert (past.name, past.categories, past.bounds) == (scene.name, scene.categories, scene.bounds)
     assert (past.weapons, past.shots) == (scene.weapons, scene.shots) and past.weapons and past.shots
-    assert [past.name_of(i) for i in past.ids().tolist()] == [scene.name_of(i) for i in scene.ids().tolist()]
+    assert names(past) == names(scene)
     assert past.find("duck 1") == scene.find("duck 1")
     assert past.ids("occluder").tolist() == scene.ids("occluder").tolist()
     assert past.category_bits("target") == scene.category_bits("target")
@@ -255,7 +262,7 @@ def test_an_answer_of_the_past_is_never_stale() -> None:
     history.record()
     assert history.ticks == [1]
     assert hits.shares() == shares and len(shares) > 1
-    assert hits.scene.version == hits.version
+    assert hits.scene.items.changed_ids(hits.version - 1) is None  # it does not know what was before
 
 
 def test_a_scene_that_is_kept_outlives_its_tick() -> None:
@@ -308,7 +315,8 @@ def test_masks_that_are_laid_out_anew(fired: bool, monkeypatch: pytest.MonkeyPat
     for tick, (masks_then, hash_then) in truth.items():
         past = history.at(tick)
         assert masks(past) == masks_then
-        stack = past.items.stack()
+        offset, stack = past.items.offset, past.items.stack()
+        assert past.items.offset is offset, "what is past was laid out anew"
         for rank, item in enumerate(stack.ids.tolist()):
             np.testing.assert_array_equal(stack.mask(rank), past.mask(item)[0])
         assert hash_then in (None, past.content_hash())
@@ -346,6 +354,7 @@ def test_recording_waits_for_a_thread_that_lays_masks_out(monkeypatch: pytest.Mo
     second = threading.Thread(target=history.record)
     first.start()
     assert half.wait(10)
+    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 2**20)
     second.start()
     second.join(0.05)
     go_on.set()
@@ -364,7 +373,7 @@ def test_what_did_not_change_is_kept_once() -> None:
     history.record()
     history.record()
     first, second = history.at(0), history.at(1)
-    assert first is not second and first.items is second.items
+    assert first is not second and first.items is second.items and first.items.atlas is not scene.items.atlas
     scene.move([3], (50, 50))
     history.record()
     third = history.at(2).items
@@ -545,6 +554,8 @@ def test_angles_go_the_short_way(begin: float, end: float, half: float) -> None:
     fresh.add(Sprite.from_mask(np.ones((3, 8), bool)), angle=half)
     assert masks(past) == masks(fresh)
     assert fire(past, Disc(9), (3, 1)) == fire(fresh, Disc(9), (3, 1))
+    view = (-9, -9, 9, 9)
+    np.testing.assert_array_equal(draw_view(past.items, view), draw_view(fresh.items, view))
 
 
 def test_all_else_is_as_at_the_earlier_tick() -> None:
@@ -599,6 +610,7 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     scene.set([4, 5], angle=[20, 393])
     history.record()
     before, made = history.at(0).items, []
+    flat = before.atlas.flat
     variant_of = planes.history.variant_of
     monkeypatch.setattr(
         planes.history, "variant_of", lambda sprite, form: made.append(form) or variant_of(sprite, form)
@@ -608,13 +620,12 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     assert len(made) == 1
     assert [i for i in range(40) if past.variants[i] is not before.variants[i]] == [4]
     assert not any(getattr(past, name).flags.writeable for name in COLUMNS)
-    assert all(getattr(before, name).base is None for name in COLUMNS)
+    assert before.atlas.flat is flat is not past.atlas.flat
     scene.move(range(40), (60, 60))
     history.record()
-    moved = history.at(1.5).items
-    assert {name for name in COLUMNS if getattr(moved, name) is not getattr(history.at(1).items, name)} == {
-        "position_256"
-    }
+    moved, begin = history.at(1.5).items, history.at(1).items
+    assert {name for name in COLUMNS if getattr(moved, name) is not getattr(begin, name)} == {"position_256"}
+    assert not moved.position_256.flags.writeable
 
 
 def test_a_moment_that_lasts_is_its_own_middle() -> None:
