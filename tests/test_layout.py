@@ -18,7 +18,7 @@ ORDER = {
         "compose", "labels", "poses", "scenefile", "scene", "loading", "history", "render", "sampling",
     ),
     "weapons": (
-        "draws", "weapon", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
+        "draws", "weapon", "columns", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
         "candidates", "plan", "resolve", "explain", "hits", "meetings", "ends", "passes", "tracing",
         "rayexplain", "rayhits", "rayfire", "firing", "orders", "heat", "rayfacts", "sieve", "facts",
         "schemas", "jsondiff", "words", "marks", "world", "sketch", "panel", "overlay", "inset",

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from planes.arrays import InputError, choice
+from planes.arrays import InputError, Ints, choice, each, reals, shown
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
+from planes.history import History
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import pierces, ray_parts_of
@@ -26,7 +27,7 @@ __all__ = ["fire"]
 
 
 def fire(
-    scene: Scene,
+    scene: Scene | History,
     weapon: Weapon,
     at: object,
     *,
@@ -36,6 +37,7 @@ def fire(
     exclude: object = None,
     seed: object = 0,
     shot: object = None,
+    tick: object = None,
     prefilter: str = "auto",
     broadphase: str = "auto",
     strategy: str = "auto",
@@ -44,7 +46,7 @@ def fire(
 
     Parameters
     ----------
-    scene : what is fired at
+    scene : what is fired at; or a History of it, at the ticks that are given
     weapon : one weapon for all shots
     at : (2,) position of one shot, or (N, 2) of a batch, px
     aim : degrees, 0 along +x, clockwise on the screen; or
@@ -54,22 +56,46 @@ def fire(
         for each shot (N,), or several for each (N, K) or for all (1, K), padded with -1
     seed : of the pellets, 0 .. 2**64 - 1
     shot : numbers of the shots, 0 .. N-1 by default: a shot of a batch fired again alone under its number is the same
+    tick : of a History: when each shot was fired
     prefilter : "auto", "none", "box", "circle", "oriented box", "4 boxes" (1 to 64), "polygon", "swept": what goes
         before the pixels; it changes no row
     broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row; none
         without a pre-filter
     strategy : "auto", "direct", "composed" (not of rays): how pixels are looked up; it changes no row
 
-    Each of aim, toward, accept, exclude, seed and shot is one for all shots or one for each.
+    Each of aim, toward, accept, exclude, seed, shot and tick is one for all shots or one for each.
 
     Raises
     ------
     InputError
         Naming the argument and the row.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    shots = checked_shots(weapon, at, aim, toward, _bits(scene, accept), exclude, seed, shot)
+    present = scene.scene if isinstance(scene, History) else scene
+    if not isinstance(present, Scene):
+        raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
+    shots = checked_shots(weapon, at, aim, toward, _bits(present, accept), exclude, seed, shot)
+    if isinstance(scene, History):
+        moments = moments_of(scene, tick, len(shots))
+        parts = [fired(past, weapon, shots.pick(rows), prefilter, broadphase, strategy) for past, rows in moments]
+        return parts[0] if len(parts) == 1 else parts[0].gathered(parts, [rows for _, rows in moments], shots)
+    if tick is not None:
+        raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
+    return fired(scene, weapon, shots, prefilter, broadphase, strategy)
+
+
+def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
+    """Scenes of the past that shots are fired at, and the rows of the shots at each."""
+    if tick is None:
+        raise InputError("tick: expected one, or one for each shot, as it is a History that is fired at, got none")
+    ticks = reals("tick", each("tick", tick, n), (n,))
+    if not n:
+        return [(history.at(history.ticks[-1]) if history.ticks else history.scene, np.arange(0))]
+    distinct, which = np.unique(ticks, return_inverse=True)
+    return [(history.at(one), np.flatnonzero(which == k)) for k, one in enumerate(distinct.tolist())]
+
+
+def fired(scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str) -> Hits:
+    """Decide what checked shots hit; the other arguments are those of `fire`."""
     parts = ray_parts_of(weapon)
     if parts is not None:
         choice("strategy", strategy, ("auto", "direct"))
@@ -94,7 +120,7 @@ def fire(
         rows.append(rows_of_met(met, volley, stack.ids, begin))
         verdicts.append(met.counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     leave_out_unused(plan, scene, candidates, first.table, why)
-    return Hits(Rows.joined(rows), np.concatenate(verdicts), scene, weapon, shots, plan)
+    return Hits(Rows.joined(rows or [Rows.none()]), np.concatenate(verdicts), scene, weapon, shots, plan)
 
 
 def _bits(scene: Scene, accept: object) -> object:

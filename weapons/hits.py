@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from planes.arrays import InputError, Ints, integer
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Spans, merged_runs
+from weapons.columns import Columns
 from weapons.explain import (
     Blocked,
     Detail,
@@ -31,7 +32,7 @@ from weapons.resolve import Met
 from weapons.volley import Shots, Volley
 from weapons.weapon import Weapon
 
-__all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
+__all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "plan_of", "rows_of_met"]
 
 
 class HitRow(NamedTuple):
@@ -65,10 +66,9 @@ class OwnerRow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class Rows(Columns):
     """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack)."""
 
-    shot: Ints
     round: Ints
     object: Ints
     samples: Ints
@@ -79,13 +79,10 @@ class Rows:
     distance2: Ints
 
     @classmethod
-    def joined(cls, parts: list[Rows]) -> Rows:
-        """Rows of several parts of a batch, in order."""
-        if len(parts) == 1:
-            return parts[0]
+    def none(cls) -> Rows:
+        """No rows."""
         none = np.zeros(0, np.int64)
-        every = [cls(none, none, none, none, none, none, none, np.zeros((0, 2), np.int64), none), *parts]
-        return cls(*(np.concatenate([getattr(p, name) for p in every]) for name in HitRow._fields))
+        return cls(none, none, none, none, none, none, none, np.zeros((0, 2), np.int64), none)
 
 
 class Hits:
@@ -101,7 +98,7 @@ class Hits:
     verdicts : (N, 5), of rays (N, 6): samples of each shot by verdict, in the order of `Verdict`
     fired : (N,) samples of each shot
     plan : what ran and what was left out
-    scene, version : what was fired on, and its version then
+    scene, version : what was fired on, and its version then; of shots at several ticks the first
     weapon, shots : what was fired
     """
 
@@ -117,6 +114,7 @@ class Hits:
         self.starts = np.searchsorted(rows.shot, np.arange(len(shots) + 1))
         self.weapon, self.shots, self.plan = weapon, shots, plan
         self.scene, self.version = scene, scene.version
+        self._scenes: list[Scene] | None = None
         self._walked: tuple[int, Any] | None = None
         for name in (*HitRow._fields, "starts"):
             getattr(self, name).flags.writeable = False
@@ -176,10 +174,10 @@ class Hits:
 
     def by_owner(self) -> list[OwnerRow]:
         """Rows added up by body: one event for one shot and owner, ordered by (shot, first row of the owner)."""
-        owner = self._fresh().items.owner
         bodies: dict[tuple[int, int], list[HitRow]] = {}
         for row in self:
-            bodies.setdefault((row.shot, int(owner[row.object])), []).append(row)
+            owner = int(self.scene_of(row.shot).items.owner[row.object])
+            bodies.setdefault((row.shot, owner), []).append(row)
         return [
             OwnerRow(
                 shot, owner, sum(r.samples for r in rows), sum(r.pixels for r in rows), sum(r.weight for r in rows),
@@ -207,8 +205,10 @@ class Hits:
 
     def shares(self, shot: int | None = None) -> list[Share]:
         """For each row, of one shot or of all, its share of the pattern, of the visible object, of the whole mask."""
-        rows = list(self) if shot is None else self.of(shot)
-        return shares_of(self._fresh(), self.weapon, self.shots, rows)
+        if self._scenes is None:
+            return shares_of(self.scene_of(0), self.weapon, self.shots, list(self) if shot is None else self.of(shot))
+        numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
+        return [share for i in numbers for share in shares_of(self.scene_of(i), self.weapon, self.shots, self.of(i))]
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
         """Objects within 32 px of one shot that it did not hit, and why."""
@@ -225,11 +225,11 @@ class Hits:
         For each object that a shift of up to 8 px turns from hit to not hit or back: the length of the shortest such
         whole-pixel shift, px. One of 1 px is fragile.
         """
-        return margins_of(self._fresh(), self.weapon, self._one(shot))
+        return margins_of(self.scene_of(shot), self.weapon, self._one(shot))
 
     def _detail(self, shot: int) -> Detail:
         """One shot sample by sample; that of the last one asked for is kept."""
-        scene, row = self._fresh(), self._checked(shot)
+        scene, row = self.scene_of(shot), self._checked(shot)
         if self._walked is None or self._walked[0] != row:
             self._walked = row, detail_of(scene, self.weapon, self.shots.take(row, row + 1))
         return self._walked[1]
@@ -241,12 +241,46 @@ class Hits:
     def _checked(self, shot: int) -> int:
         return integer("shot", shot, 0, len(self.shots) - 1)
 
-    def _fresh(self) -> Scene:
-        """The scene, if it is still as it was fired on."""
+    def scene_of(self, shot: int) -> Scene:
+        """The scene that a shot was fired on, if it is still as it was then."""
+        if self._scenes is not None:
+            return self._scenes[self._checked(shot)]  # of the past, which does not change
         if self.scene.version != self.version:
             now = self.scene.version
             raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
         return self.scene
+
+    @classmethod
+    def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> Hits:
+        """Hits of shots that were fired at several ticks, in the order of the shots.
+
+        Parameters
+        ----------
+        parts, rows : hits of some of the shots, and which those are
+        """
+        verdicts = np.concatenate([part.verdicts for part in parts])[np.argsort(np.concatenate(rows))]
+        found = cls(cls._gathered_rows(parts, rows), verdicts, parts[0].scene, parts[0].weapon, shots, plan_of(parts))
+        found._remember(parts, rows)
+        return found
+
+    @staticmethod
+    def _gathered_rows(parts: Sequence[Hits], rows: Sequence[Ints]) -> Rows:
+        each = [Rows(*(getattr(part, name) for name in HitRow._fields)) for part in parts]
+        return Rows.gathered(each, rows)
+
+    def _remember(self, parts: Sequence[Hits], rows: Sequence[Ints]) -> None:
+        """Keep the scene of each shot."""
+        scene_of = {row: part.scene for part, own in zip(parts, rows, strict=True) for row in own.tolist()}
+        self._scenes = [scene_of[row] for row in range(len(self.shots))]
+
+
+def plan_of(parts: Sequence[Hits]) -> Plan:
+    """What ran for several parts, added up."""
+    plan = Plan(left_out=list(parts[0].plan.left_out))
+    for part in parts:
+        for stage in part.plan.ran:
+            plan.run(stage.name, stage.why, stage.bytes_made, stage.pairs)
+    return plan
 
 
 def _named(row: tuple[Any, ...]) -> HitRow:

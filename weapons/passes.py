@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from planes.arrays import Floats, Ints
 from planes.constants import HALF, SUB, WEIGHT_FULL
 from planes.grid256 import pixel
 from planes.items import Stack
+from weapons.columns import Columns
 from weapons.ends import Ends, Reason
 from weapons.meetings import Meetings, last_of_each, stretches
 from weapons.pattern import smoothed
@@ -25,36 +24,6 @@ GRADIENT_XY = np.stack(np.meshgrid(SIDE, SIDE), axis=-1).reshape(-1, 2)
 GRADIENT = -GRADIENT_XY * (3 - np.abs(GRADIENT_XY)).prod(axis=1, keepdims=True)
 """Weights of the pixels around one, whose sum is its outward normal: nearer ones count more. On straight edges and
 circles it is off by 4 degrees in the mean."""
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns of one length."""
-
-    def __len__(self) -> int:
-        return len(getattr(self, fields(self)[0].name))
-
-    def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def take(self, rows: Ints | slice) -> Any:
-        """Some of the rows."""
-        return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
-
-    def to_rows(self) -> list[dict[str, Any]]:
-        """Rows as JSON."""
-        names = [f.name for f in fields(self)]
-        columns = [getattr(self, name).tolist() for name in names]
-        return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
-
-    @classmethod
-    def joined(cls, parts: Sequence[Any]) -> Any:
-        """All rows of one or more."""
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +44,6 @@ class Passes(Columns):
     samples : (n,) cells of the object that it walked
     """
 
-    shot: Ints
     round: Ints
     pellet: Ints
     object: Ints
@@ -108,7 +76,6 @@ class Stops(Columns):
     normal_xy : (R, 2) outward normal of what it ran into, in whole numbers; (0, 0) for RANGE and BUDGET
     """
 
-    shot: Ints
     round: Ints
     pellet: Ints
     reason: Ints

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from planes.spans import Spans
 from weapons.arsenal import ray_parts_of
 from weapons.ends import Reason
 from weapons.explain import Blocked, Samples, Share, WhyNot
-from weapons.hits import HitRow, Hits, Rows
+from weapons.hits import HitRow, Hits, Rows, plan_of
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
@@ -43,6 +45,9 @@ class RayHits(Hits):
         self._keep(rows, scene, weapon, shots, plan)
         self._verdicts = None
         self.passes, self.stop = passes, stop
+        for columns in (passes, stop):
+            for f in fields(columns):
+                getattr(columns, f.name).flags.writeable = False
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hits):
@@ -59,15 +64,11 @@ class RayHits(Hits):
 
     def passes_at(self, shot: int) -> Passes:
         """Passes of the rays of one shot."""
-        row = self._checked(shot)
-        found: Passes = self.passes.take(slice(*np.searchsorted(self.passes.shot, [row, row + 1]).tolist()))
-        return found
+        return self.passes.of_shot(self._checked(shot))
 
     def stops_at(self, shot: int) -> Stops:
         """Ends of the rays of one shot."""
-        row = self._checked(shot)
-        found: Stops = self.stop.take(slice(*np.searchsorted(self.stop.shot, [row, row + 1]).tolist()))
-        return found
+        return self.stop.of_shot(self._checked(shot))
 
     def to_dict(self) -> dict[str, Any]:
         """Rows, passes and stops as JSON; verdicts are counted when they are asked for."""
@@ -103,7 +104,7 @@ class RayHits(Hits):
         raise InputError("hits: expected those of a weapon with a pattern, got those of rays: see nearest_miss")
 
     def _rays(self, shot: int) -> RayDetail:
-        scene, row = self._fresh(), self._checked(shot)
+        scene, row = self.scene_of(shot), self._checked(shot)
         if self._walked is None or self._walked[0] != row:
             self._walked = row, ray_detail(scene, self._parts, self.shots.take(row, row + 1))
         found: RayDetail = self._walked[1]
@@ -116,9 +117,24 @@ class RayHits(Hits):
         return parts
 
     def _counted(self) -> Ints:
-        scene, none = self._fresh(), np.zeros((0, len(Verdict)), np.int64)
-        each = (ray_detail(scene, self._parts, self.shots.take(i, i + 1)).counts() for i in range(len(self.shots)))
-        return np.concatenate([none, *each])
+        none = np.zeros((0, len(Verdict)), np.int64)
+        return np.concatenate([none, *(self._rays(shot).counts() for shot in range(len(self.shots)))])
+
+    @classmethod
+    def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
+        """Hits of shots that were fired at several ticks, in the order of the shots."""
+        rays = [part for part in parts if isinstance(part, RayHits)]
+        found = cls(
+            cls._gathered_rows(parts, rows),
+            Passes.gathered([part.passes for part in rays], rows),
+            Stops.gathered([part.stop for part in rays], rows),
+            parts[0].scene,
+            parts[0].weapon,
+            shots,
+            plan_of(parts),
+        )
+        found._remember(parts, rows)
+        return found
 
 
 def rows_of_passes(passes: Passes, cells: Meetings, rays: Rays) -> Rows:

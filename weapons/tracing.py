@@ -196,7 +196,7 @@ def _touched(
     if isinstance(ray, Projectile) and ray.steps is not None:
         scale = np.full(len(met.x), COMMON) if _moving(ray, through) else lines.scale[met.ray][met.pair]
         met = _at_steps(met, scale, ray.steps)
-    return _started(met, rays, ray, stack)
+    return _started(met, rays, ray, shots, stack)
 
 
 def _in_common(met: Meetings, scale: Ints) -> Meetings:
@@ -220,14 +220,14 @@ def _shared(lines: Lines) -> Lines:
     return shared
 
 
-def _started(met: Meetings, rays: Rays, ray: Traced, stack: Stack) -> Meetings:
+def _started(met: Meetings, rays: Rays, ray: Traced, shots: Shots, stack: Stack) -> Meetings:
     """Apply the weapon's rule to items in which rays start."""
     if ray.inside == "hit" or not len(met):
         return met
     inside = np.flatnonzero(met.entry[met.first] == 0)
     if ray.inside == "error" and len(inside):
         pair = inside[np.lexsort((met.rank[inside], met.ray[inside]))[0]]
-        shot, item = int(rays.shot[met.ray[pair]]), int(stack.ids[met.rank[pair]])
+        shot, item = int(shots.row[rays.shot[met.ray[pair]]]), int(stack.ids[met.rank[pair]])
         raise InputError(f"at[{shot}]: expected a start outside of every item, got one inside of id {item}")
     out = np.full(len(met), -1)
     if len(inside):

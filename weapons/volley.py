@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class Shots:
     exclude : (N, K) owners, -1 for none
     number : (N,) shot numbers, for the draws
     seed : (N,) uint64, of the draws
+    row : (N,) their places in the call, for errors
     """
 
     at_256: Ints
@@ -42,6 +44,7 @@ class Shots:
     exclude: Ints
     number: Ints
     seed: Words
+    row: Ints
 
     def __len__(self) -> int:
         return len(self.number)
@@ -53,17 +56,13 @@ class Shots:
 
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
-        part = slice(first, last)
-        return replace(
-            self,
-            at_256=self.at_256[part],
-            direction=self.direction[part],
-            toward_256=None if self.toward_256 is None else self.toward_256[part],
-            accept=self.accept[part],
-            exclude=self.exclude[part],
-            number=self.number[part],
-            seed=self.seed[part],
-        )
+        return self.pick(slice(first, last))
+
+    def pick(self, rows: Ints | slice) -> Shots:
+        """Some of the shots."""
+        columns: list[Any] = [getattr(self, f.name) for f in fields(self)]
+        some: list[Any] = [None if column is None else column[rows] for column in columns]
+        return Shots(*some)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +122,7 @@ def checked_shots(
         _owners(exclude, n, single),
         integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
+        np.arange(n),
     )
 
 
