@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from weapons.arsenal import Stencil as Stencil
     from weapons.arsenal import arsenal_of as arsenal_of
     from weapons.arsenal import weapon_from_json as weapon_from_json
+    from weapons.clock import FixedStep as FixedStep
     from weapons.facts import report_of as report_of
     from weapons.firing import fire as fire
     from weapons.guns import Laser as Laser
@@ -38,6 +39,7 @@ _HOME = {
         "weapons.arsenal",
     ),
     **dict.fromkeys(("Laser", "Pistol", "Projectile", "Rifle", "Sweep"), "weapons.guns"),
+    "FixedStep": "weapons.clock",
     "RayHits": "weapons.rayhits",
     "Reason": "weapons.rayhits",
     "Weapon": "weapons.weapon",
@@ -53,7 +55,7 @@ _HOME = {
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
     "Laser", "Pistol", "Projectile", "Rifle", "Sweep", "arsenal_of", "weapon_from_json", "fire", "Hits", "RayHits",
-    "Reason", "Verdict", "report_of", "picture_of_report",
+    "Reason", "Verdict", "FixedStep", "report_of", "picture_of_report",
 ]  # fmt: skip
 
 
