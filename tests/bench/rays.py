@@ -1,0 +1,169 @@
+"""Rays: microseconds for one of 1000 px, beside pymunk in the same run, and what stretches and boxes save.
+
+python tests/bench/rays.py [objects ...]
+
+Objects are discs and stars of 48 px, turned, and 60 occluders, over 1920x1080; 10,000 objects also over ten times the
+side. pymunk gets the convex hulls of the same masks, and answers one ray a call.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import cv2
+import numpy as np
+import pymunk
+from turns import least
+
+from planes import Role, Scene, Sprite
+from weapons import Laser, Pistol, RayHits, Rifle, Weapon, fire, tracing
+
+LENGTH, BATCH, SINGLE = 1000, 10_000, 100
+WORLD = (1920, 1080)
+Shots = tuple[np.ndarray, np.ndarray]
+
+
+def weapons(width: float) -> dict[str, Weapon]:
+    """The weapons of the table."""
+    return {
+        "pistol": Pistol(LENGTH, width=width),
+        "rifle, 60 px": Rifle(LENGTH, budget=60, width=width),
+        "laser": Laser(LENGTH, width=width),
+    }
+
+
+def sprites() -> list[Sprite]:
+    """Discs and stars of 48 px, as an alpha channel would have them."""
+    y, x = np.mgrid[:48, :48] - 23.5
+    waves = (17 + 6.5 * np.cos(points * np.arctan2(y, x) + points) for points in (0, 5, 7, 3))
+    return [Sprite.from_mask(np.hypot(x, y) < np.maximum(wave, 20 * (k == 0))) for k, wave in enumerate(waves)]
+
+
+def scene_of(objects: int, size_wh: tuple[int, int]) -> Scene:
+    """The scene: objects over all of the world, and 60 walls of 20 x 80 px or so."""
+    rng = np.random.default_rng(objects)
+    scene, shapes = Scene(size_wh), sprites()
+    for _ in range(objects):
+        where = rng.uniform((0, 0), size_wh)
+        scene.add(shapes[rng.integers(len(shapes))], where, angle=float(rng.integers(0, 24) * 15))
+    for _ in range(60):
+        wall = np.ones(rng.integers((16, 60), (24, 100)), np.bool_)
+        scene.add(wall, rng.uniform((0, 0), size_wh), role="occluder", angle=float(rng.integers(0, 4) * 45))
+    return scene
+
+
+def space_of(scene: Scene) -> pymunk.Space:
+    """The same items, as the hulls of their masks."""
+    space = pymunk.Space()
+    for item in scene.ids().tolist():
+        mask, corner = scene.mask(item)
+        y, x = np.nonzero(mask)
+        squares = np.concatenate([np.stack([x + i, y + j], axis=1) for i in (-0.5, 0.5) for j in (-0.5, 0.5)])
+        hull = cv2.convexHull(squares.astype(np.float32))[:, 0] + corner
+        space.add(pymunk.Poly(space.static_body, hull.tolist()))
+    space.step(0.001)  # builds its index
+    return space
+
+
+def shots_of(count: int, size_wh: tuple[int, int]) -> Shots:
+    """Muzzles and whole degrees."""
+    rng = np.random.default_rng(5)
+    return rng.uniform((0, 0), size_wh, (count, 2)), rng.integers(0, 360, count).astype(np.float64)
+
+
+def rays(scene: Scene, weapon: Weapon, shots: Shots, **options: str) -> RayHits:
+    """A batch."""
+    hits = fire(scene, weapon, shots[0], aim=shots[1], **options)
+    assert isinstance(hits, RayHits)
+    return hits
+
+
+def one_by_one(scene: Scene, weapon: Weapon, shots: Shots) -> None:
+    """A call for each."""
+    for at, aim in zip(*shots, strict=True):
+        fire(scene, weapon, at, aim=aim)
+
+
+def queries(space: pymunk.Space, shots: Shots, radius: float, everything: bool) -> None:
+    """Ask pymunk for the first shape on each segment, or for all."""
+    ends = shots[0] + LENGTH * np.stack([np.cos(np.radians(shots[1])), np.sin(np.radians(shots[1]))], axis=1)
+    ask = space.segment_query if everything else space.segment_query_first
+    shape_filter = pymunk.ShapeFilter()
+    for start, end in zip(shots[0].tolist(), ends.tolist(), strict=True):
+        ask(tuple(start), tuple(end), radius, shape_filter)
+
+
+@contextmanager
+def one_stretch() -> Iterator[None]:
+    """Follow rays to their full length at once."""
+    edges = tracing._edges
+    tracing._edges = lambda *_: [-np.inf, np.inf]
+    try:
+        yield
+    finally:
+        tracing._edges = edges
+
+
+def in_one_stretch(scene: Scene, weapon: Weapon, shots: Shots) -> RayHits:
+    """A batch, without stretches."""
+    with one_stretch():
+        return rays(scene, weapon, shots)
+
+
+def table(scene: Scene, size_wh: tuple[int, int]) -> None:
+    """Times a ray, of batches and of single calls, of ours and of pymunk."""
+    batch, single = shots_of(BATCH, size_wh), shots_of(SINGLE, size_wh)
+    space = space_of(scene)
+    print(
+        f"{'weapon':14} {'width':>5} {'batch us':>9} {'pymunk':>7} {'ratio':>6} {'single us':>10} {'ratio':>6} passes"
+    )
+    for width in (0, 4):
+        for name, weapon in weapons(width).items():
+            everything = name != "pistol"
+            passes = len(rays(scene, weapon, batch).passes) / BATCH  # and warms up
+            calls: list[Callable[[], object]] = [
+                lambda w=weapon: rays(scene, w, batch),
+                lambda e=everything, r=width / 2: queries(space, single, r, e),
+                lambda w=weapon: one_by_one(scene, w, single),
+            ]
+            seconds = least(*calls)
+            ours, theirs, alone = (1e6 * s / n for s, n in zip(seconds, (BATCH, SINGLE, SINGLE), strict=True))
+            ratios = f"{ours:9.1f} {theirs:7.1f} {ours / theirs:6.2f} {alone:10.0f} {alone / theirs:6.1f}"
+            print(f"{name:14} {width:5} {ratios} {passes:6.2f}", flush=True)
+
+
+def savings(scene: Scene, size_wh: tuple[int, int]) -> None:
+    """What stretches and boxes save; the rows are the same."""
+    shots = shots_of(1000, size_wh)
+    print(f"{'1000 rays':14} {'width':>5} {'us':>9} {'one stretch':>12} {'no boxes':>9}")
+    for width in (0, 4):
+        for name, weapon in weapons(width).items():
+            expected = rays(scene, weapon, shots)
+            assert in_one_stretch(scene, weapon, shots) == expected
+            calls: list[Callable[[], object]] = [
+                lambda w=weapon: rays(scene, w, shots),
+                lambda w=weapon: in_one_stretch(scene, w, shots),
+            ]
+            if len(scene) <= 1100:
+                assert rays(scene, weapon, shots, prefilter="none") == expected
+                calls.append(lambda w=weapon: rays(scene, w, shots, prefilter="none"))
+            plain, *others = (1e3 * s for s in least(*calls))
+            print(f"{name:14} {width:5} {plain:9.1f} " + " ".join(f"{t / plain:10.2f} x" for t in others), flush=True)
+
+
+def main(counts: list[int]) -> None:
+    """Print the tables."""
+    worlds = [(count, WORLD) for count in counts]
+    worlds += [(count, (10 * WORLD[0], 10 * WORLD[1])) for count in counts if count >= 10_000]
+    for objects, size_wh in worlds:
+        scene = scene_of(objects, size_wh)
+        walls = len(scene.ids(Role.OCCLUDER))
+        print(f"\n{objects} objects, {walls} occluders, {size_wh[0]} x {size_wh[1]}; pymunk {pymunk.version}")
+        table(scene, size_wh)
+        savings(scene, size_wh)
+
+
+if __name__ == "__main__":
+    main([int(v) for v in sys.argv[1:]] or [10, 100, 1000, 10_000])
