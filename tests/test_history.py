@@ -519,13 +519,17 @@ def test_a_position_is_rounded_half_to_even() -> None:
     assert position_of(history.at(0.5)) == [1, 1]
     history = two_ends({"position_xy": (1 / 256, 1 / 256)}, {"position_xy": (4 / 256, -2 / 256)})
     assert position_of(history.at(0.5)) == [3, -1]
+    history = two_ends({"position_xy": (0, 0)}, {"position_xy": (384 / 256, -640 / 256)})
+    assert position_of(history.at(1 / 256)) == [2, -2]
 
 
 def test_a_very_long_way_between_two_ticks() -> None:
-    history = two_ends({"position_xy": (-(2**40), 0)}, {"position_xy": (2**40, 3)}, (-(2**45), 2**45))
-    assert position_of(history.at(0)) == [0, 384]
-    x, y = position_of(history.at(2**44))
-    assert abs(x - 2**47) <= 2**19 and y == 576
+    end = (2**40, (2**32 - 1) / 256)
+    history = two_ends({"position_xy": (-(2**40), 0)}, {"position_xy": end}, (-(2**45), 2**45))
+    assert position_of(history.at(0)) == [0, 2**31]
+    assert position_of(history.at(2**44)) == [2**47, 3 * 2**30 - 1]
+    x, _ = position_of(history.at(2**44 + 1 / 256))
+    assert abs(x - 2**47) <= 2**49 // 2**30
 
 
 @pytest.mark.parametrize(
