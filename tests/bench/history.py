@@ -73,7 +73,8 @@ def bytes_freed(scene: Scene, change: Callable[[Scene, np.random.Generator], Non
 
 def bytes_kept(scene: Scene, change: Callable[[Scene, np.random.Generator], None]) -> float:
     """Bytes of each tick after the first."""
-    return (bytes_freed(scene, change, TICKS + 1) - bytes_freed(scene, change, 1)) / TICKS
+    ticks = TICKS if change is not turned else 4
+    return (bytes_freed(scene, change, ticks + 1) - bytes_freed(scene, change, 1)) / ticks
 
 
 def bytes_copied(scene: Scene) -> float:
