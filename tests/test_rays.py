@@ -410,6 +410,22 @@ def test_rows_and_passes_have_a_total_order(rng: random.Random) -> None:
         assert a[:2] != b[:2] or first <= second
 
 
+def test_cells_past_the_stop_keep_the_order_of_the_walk() -> None:
+    for seed in range(150):
+        battle = harmless(some_battle(random.Random(seed)))
+        hits = battle.fired()
+        for which, rays in enumerate(battle.walks()):
+            order = [cell for _, walked in rays for cell in walked.order]
+            assert [(x, y) for x, y in hits.samples_at(which).xy.tolist()] == order, f"{seed=}"
+
+
+@settings(max_examples=50, deadline=None)
+@given(worlds)
+def test_a_pass_tells_its_row(rng: random.Random) -> None:
+    hits = harmless(some_battle(rng)).fired()
+    assert hits.passes.row.tolist() == [row["row"] for row in told(hits)[1]]
+
+
 @settings(max_examples=50, deadline=None)
 @given(worlds)
 def test_a_shotgun_of_rays_is_its_pellets_one_by_one(rng: random.Random) -> None:
@@ -558,6 +574,7 @@ PICTURES = {
     "two in one place, one dearer": (
         Gun("rifle", budget=6), Shot((0, 0), (9, 0)), [bar(1, 4), bar(1, 4, cost=3)],
     ),
+    "nothing to spend, on a border": (Gun("rifle", budget=0), Shot((6, 0.5), (7, 0)), [bar(6, 6, 0, 1)]),
     "nothing to spend, and nothing asked": (Gun("rifle", budget=0), Shot((0, 0), (9, 0)), [bar(2, 4, cost=0)]),
     "a border of two rows is one way": (Gun("rifle", budget=2.5), Shot((0, 0.5), (9, 0.5)), [bar(2, 6)]),
     "limit and wall in one cell": (
