@@ -291,9 +291,10 @@ def walk(
     by_id = {item.id: item for item in items}
     passes = []
     for place, (i, its) in enumerate(met.items()):
-        last = max((min(cells[c][1], time), cells[c][0], c[1], c[0]) for c in its)
+        last = max((cells[c][1], cells[c][0], c[1], c[0]) for c in its)
         normal, material = normal_at(by_id[i], its[0], a, b, r), path.px(covered(unions[i], time))
-        passes.append(Pass(i, place, its, cells[its[0]][0], last[0], (last[3], last[2]), material, normal))
+        out = min(last[0], time)
+        passes.append(Pass(i, place, its, cells[its[0]][0], out, (last[3], last[2]), material, normal))
     if ended is None:
         return Walk(path, order, walked, passes, Stop(reason, time))
     cell = order[walked - 1]

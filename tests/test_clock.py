@@ -91,7 +91,7 @@ def test_any_kind_of_number_is_a_time(elapsed: float) -> None:
 
 
 def flown(pictures_a_second: float, jitter: float = 0) -> list[tuple[int, int, tuple[int, int], float]]:
-    """Fly a projectile for half a second at 240 steps a second; what it hits at which tick, where, and when in the step.
+    """Fly a projectile for half a second at 240 steps a second; what it hits at which tick, where, and when.
 
     Targets are 1 px wide, and it flies 3 px a step; it goes on through what it hits.
     """

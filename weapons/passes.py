@@ -34,7 +34,7 @@ class Passes(Columns):
     ----------
     shot, round, pellet, object : (n,) whose ray, through what
     order : (n,) its number among the objects that the ray hit
-    entry_xy, exit_xy : (n, 2) the first cell of the object, and the last before the ray ended
+    entry_xy, exit_xy : (n, 2) the first cell of the object, and of those walked the one that the ray leaves last
     entry, exit : (n,) when, as parts of the ray; of a projectile as parts of the frame
     entry_px, exit_px : (n,) how far along the ray, px
     material : (n,) length of the ray inside the object's pixel squares, px
@@ -42,6 +42,7 @@ class Passes(Columns):
     weight : (n,) of the falloff where it enters, up to 65,535
     point_xy : (n, 2) where its point is when it enters, px
     samples : (n,) cells of the object that it walked
+    row : (n,) the row of the hits under which it is listed
     """
 
     round: Ints
@@ -59,6 +60,7 @@ class Passes(Columns):
     weight: Ints
     point_xy: Floats
     samples: Ints
+    row: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +109,7 @@ def passes_of(
     walked, chosen = walked.take(order), chosen[order]
     ray, rank, cell = walked.ray, walked.rank, walked.first
     entry = walked.entry[cell]
-    last = np.minimum(walked.leave, ends.time[ray][walked.pair])
-    out = last_of_each(walked.begin, walked.pair, (last, walked.entry, walked.y, walked.x))
+    out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
     scale, length = lines.scale[ray], np.sqrt(lines.length2[ray]) / SUB
     first_part, last_part = entry / scale, np.minimum(walked.leave[out] / scale, ends.fraction[ray])
     last_part = np.maximum(last_part, first_part)
@@ -125,6 +126,7 @@ def passes_of(
             _weights(entry, scale, falloff),
             _points(rays, ray, first_part),
             walked.count,
+            np.zeros_like(ray),
         ),
         walked,
     )  # fmt: skip

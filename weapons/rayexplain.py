@@ -16,7 +16,7 @@ from planes.items import Stack
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Box, Spans
-from weapons.candidates import Candidates, refused
+from weapons.candidates import Candidates, prefilter_of, refused
 from weapons.ends import Ends, Reason
 from weapons.explain import Behind, Blocked, Samples, WhyNot
 from weapons.meetings import Meetings, meet
@@ -106,7 +106,11 @@ class RayDetail:
         if self.bounds is not None:
             outside = ((xy < self.bounds[:2]) | (xy > self.bounds[2:])).any(axis=1)
             verdict[outside], rank[outside] = Verdict.OUTSIDE, -1
-        order = np.lexsort((np.arange(len(ray)), beyond, ray))  # of cells entered at once, those walked come first
+        blocked = np.zeros(len(ray), np.bool_)
+        walls = self.met.take(np.flatnonzero(self.stack.occluder[self.met.rank]))
+        found = _places(keys, place, _keys(walls.ray[walls.pair], walls.x, walls.y))[0]
+        blocked[found] = True
+        order = np.lexsort((xy[:, 0], xy[:, 1], ~blocked, entry, ray))
         return ray[order], xy[order], verdict[order], rank[order]
 
     def samples(self) -> Samples:
@@ -131,10 +135,15 @@ def _mark(
     verdict: Ints, rank: Ints, keys: Ints, place: Ints, ray: Ints, x: Ints, y: Ints, told: Verdict, ranks: Ints
 ) -> None:
     """Give cells a verdict and what decided it; of a projectile some lie beside its own path."""
-    wanted = _keys(ray, x, y)
+    cell, found = _places(keys, place, _keys(ray, x, y))
+    verdict[cell], rank[cell] = told, ranks[found]
+
+
+def _places(keys: Ints, place: Ints, wanted: Ints) -> tuple[Ints, Ints]:
+    """Cells of some keys, and the numbers of the keys that there are; `place` sorts the cells by their keys."""
     at = np.minimum(np.searchsorted(keys, wanted, sorter=place), max(len(keys) - 1, 0))
     found = np.flatnonzero(keys[place[at]] == wanted) if len(keys) else at[:0]
-    verdict[place[at[found]]], rank[place[at[found]]] = told, ranks[found]
+    return place[at[found]], found
 
 
 def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
@@ -144,17 +153,18 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     samples = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
     if samples > DETAIL_SAMPLES_MAX:
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {samples}")
-    through = Range(scene.items, stack, scene.bounds, Candidates(scene.items, stack), Plan())
+    every = Candidates(scene.items, stack, prefilter_of("none"))  # so that all rays are followed in one stretch
+    through = Range(scene.items, stack, scene.bounds, every, Plan())
     met, ends, lines, _ = trace(rays, parts[2], shots, through)
     own = Lines(lines.start, lines.step, lines.radius)
     boxes = np.concatenate([rays.start_256, rays.start_256], axis=1)
     boxes[:, :2] = np.minimum(rays.start_256, rays.start_256 + rays.step_256) // SUB - wide
     boxes[:, 2:] = np.maximum(rays.start_256, rays.start_256 + rays.step_256) // SUB + wide
-    row, rank = through.candidates.meeting(boxes)
+    row, rank = Candidates(scene.items, stack).meeting(boxes)
     origin = rays.origin_xy[row]
     item = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
-    every = meet(own.take(row), row, rank, item, stack, None, origin)
-    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every)
+    touched = meet(own.take(row), row, rank, item, stack, None, origin)
+    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, touched)
 
 
 def pixels_of(detail: RayDetail) -> dict[tuple[int, int], Spans]:

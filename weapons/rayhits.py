@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,8 @@ class RayHits(Hits):
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
         self._verdicts = None
-        self.passes, self.stop = passes, stop
-        for columns in (passes, stop):
+        self.passes, self.stop = replace(passes, row=_rows_of(rows, passes)), stop
+        for columns in (self.passes, stop):
             for f in fields(columns):
                 getattr(columns, f.name).flags.writeable = False
 
@@ -135,6 +135,14 @@ class RayHits(Hits):
         )
         found._remember(parts, rows)
         return found
+
+
+def _rows_of(rows: Rows, passes: Passes) -> Ints:
+    """Row of each pass: of the same shot, round and object."""
+    rounds, objects = (int(v.max(initial=0)) + 1 for v in (rows.round, rows.object))
+    of_row, of_pass = ((one.shot * rounds + one.round) * objects + one.object for one in (rows, passes))
+    order = np.argsort(of_row)
+    return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
 
 
 def rows_of_passes(passes: Passes, cells: Meetings, rays: Rays) -> Rows:
