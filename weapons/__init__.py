@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from weapons.picture import picture_of_report as picture_of_report
     from weapons.rayhits import RayHits as RayHits
     from weapons.rayhits import Reason as Reason
+    from weapons.record import ShotRecord as ShotRecord
+    from weapons.record import replay as replay
     from weapons.weapon import Weapon as Weapon
 
 _HOME = {
@@ -42,6 +44,8 @@ _HOME = {
     "FixedStep": "weapons.clock",
     "RayHits": "weapons.rayhits",
     "Reason": "weapons.rayhits",
+    "ShotRecord": "weapons.record",
+    "replay": "weapons.record",
     "Weapon": "weapons.weapon",
     "arsenal_of": "weapons.arsenal",
     "weapon_from_json": "weapons.arsenal",
@@ -55,7 +59,7 @@ _HOME = {
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
     "Laser", "Pistol", "Projectile", "Rifle", "Sweep", "arsenal_of", "weapon_from_json", "fire", "Hits", "RayHits",
-    "Reason", "Verdict", "FixedStep", "report_of", "picture_of_report",
+    "Reason", "ShotRecord", "replay", "Verdict", "FixedStep", "report_of", "picture_of_report",
 ]  # fmt: skip
 
 

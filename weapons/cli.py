@@ -102,6 +102,16 @@ examples:
   hitplanes demo bvh -o frames
 """
 
+REPLAY_HELP = """\
+Fire the shots of a record again, and tell the first that differs, and how. A record is written by
+weapons.ShotRecord, which a game fires with. Exit code: 0 all do the same, 1 one differs, 2 bad input.
+"""
+
+REPLAY_EXAMPLES = """\
+examples:
+  hitplanes replay fixtures/gallery match.jsonl
+"""
+
 COMPARE_EXAMPLES = """\
 examples:
   hitplanes report fixtures/gallery --json before.json
@@ -213,6 +223,10 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw them, too")
     told = "scene of one of them or of both, to draw them on; may be given twice"
     one.add_argument("--scene", type=Path, metavar="SCENE", action="append", help=told)
+    one = _word(
+        words, replay, "fire a record of shots again, and tell the first that differs", REPLAY_HELP, REPLAY_EXAMPLES
+    )
+    one.add_argument("record", type=Path, metavar="RECORD.jsonl", help="a file of weapons.ShotRecord")
     one = _word(words, demo, "show a quadtree, a grid or a BVH in motion", DEMO_HELP, DEMO_EXAMPLES)
     one.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
     told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
@@ -229,7 +243,7 @@ def _word(
         run.__name__, help=told, description=text, epilog=examples, formatter_class=raw
     )
     one.set_defaults(run=run)
-    if run in (report, fire):
+    if run in (report, fire, replay):
         one.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
     return one
 
@@ -357,6 +371,19 @@ def compare(arguments: argparse.Namespace) -> int:
     for line in lines or ["no difference"]:
         _say(line)
     return 1 if lines else 0
+
+
+def replay(arguments: argparse.Namespace) -> int:
+    """Print the first shot of a record that differs, and tell by the exit code whether there is one."""
+    from weapons.record import replay as replayed  # no other word needs it
+
+    found = replayed(arguments.record, load_scene(arguments.scene))
+    if found is None:
+        _say("all shots do the same again")
+        return 0
+    for told in found.told:
+        _say(f"{arguments.record} line {found.line}, shot {found.shot}: {told}")
+    return 1
 
 
 def demo(arguments: argparse.Namespace) -> None:

@@ -14,10 +14,11 @@ import os
 import re
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
 
@@ -28,11 +29,13 @@ from planes.items import Role
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import arsenal_of
+from weapons.columns import Columns
 from weapons.firing import fire
 from weapons.hits import Hits
 from weapons.part import Part
 from weapons.plan import PlanSum
 from weapons.progress import Progress
+from weapons.rayhits import RayHits, Reason
 from weapons.shotlog import Salvo, ShotReader, body_of, read_lines
 
 __all__ = ["COLUMNS", "FORMAT", "Streamed", "fire_log"]
@@ -40,6 +43,12 @@ __all__ = ["COLUMNS", "FORMAT", "Streamed", "fire_log"]
 FORMAT = "hitplanes-hits/1"
 COLUMNS = ("object", "round", "samples", "pixels", "weight", "pellets", "x", "y", "distance2")
 """Of a row: as in `Hits`, with first_xy as x and y."""
+
+PASSES = (
+    "object", "round", "pellet", "order", "entry_xy", "exit_xy", "entry_px", "exit_px", "material", "normal_xy", "weight",
+)  # fmt: skip
+STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
+"""Of rays: of each pass and each end; a name that ends in _xy stands for two numbers."""
 
 LINES_FIRST, LINES_MAX = 16, 16384
 """Lines of the first chunk, for shots that may hit thousands of objects each, and of the largest: larger ones make
@@ -50,7 +59,11 @@ SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 follows what the shots hit, and an interrupt loses little."""
 
 SUFFIX = ".jsonl"
-ANSWER = re.compile(rb'\{"shot":\d+,"of":"[0-9a-f]{8}","rows":\[[-\d,\[\]]*\],"verdicts":\[\d+(,\d+){4}\]\}\n')
+LISTS = rb"\[[-+.\de,\[\]]*\]"
+ANSWER = re.compile(
+    rb'\{"shot":\d+,"of":"[0-9a-f]{8}","rows":%b,("verdicts":\[\d+(,\d+){4}\]|"passes":%b,"stops":%b)\}\n'
+    % (LISTS, LISTS, LISTS)
+)
 NOTHING = b'"rows":[],'
 """In the answer to a shot that hit nothing."""
 
@@ -143,6 +156,9 @@ def _header(scene: Scene, reader: ShotReader) -> bytes:
         "weapons": _hash({name: weapon.to_json() for name, weapon in reader.arsenal.items()}),
         "columns": COLUMNS,
         "verdicts": [verdict.name.lower() for verdict in OF_PATTERNS],
+        "passes": PASSES,
+        "stops": STOPS,
+        "reasons": [reason.name.lower() for reason in Reason],
         "objects": {item: scene.name_of(item) for item in scene.ids(Role.HITTABLE).tolist()},
     }
     return json.dumps(data, separators=(",", ":")).encode() + b"\n"
@@ -216,9 +232,20 @@ def _answers(hits: Hits) -> Iterator[bytes]:
     columns = [*(getattr(hits, name) for name in COLUMNS[:-3]), *hits.first_xy.T, hits.distance2]
     rows = np.stack(columns, axis=1).tolist()
     starts = hits.starts.tolist()
+    if isinstance(hits, RayHits):
+        for shot, (first, last) in enumerate(pairwise(starts)):
+            passes, stops = _lists(hits.passes_at(shot), PASSES), _lists(hits.stops_at(shot), STOPS)
+            yield f'"rows":{rows[first:last]},"passes":{passes},"stops":{stops}}}\n'.replace(" ", "").encode()
+        return
     for first, last, verdicts in zip(starts, starts[1:], hits.verdicts.tolist(), strict=False):
         # Lists of whole numbers look the same in Python and in JSON.
         yield f'"rows":{rows[first:last]},"verdicts":{verdicts}}}\n'.replace(" ", "").encode()
+
+
+def _lists(columns: Columns, names: Sequence[str]) -> list[list[float]]:
+    """Columns as rows of numbers; a column of points is two."""
+    every = [getattr(columns, name).reshape(len(columns), -1).T.tolist() for name in names]
+    return [list(row) for row in zip(*(column for one in every for column in one), strict=True)]
 
 
 def _fired_one_by_one(

@@ -16,7 +16,7 @@ from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
 
-__all__ = ["Shots", "Volley", "checked_shots", "recoiled", "volley_of"]
+__all__ = ["Shots", "Volley", "check_aimed", "checked_shots", "recoiled", "volley_of"]
 
 OWNER_MAX = 2**31
 
@@ -113,7 +113,7 @@ def checked_shots(
     n = len(at_256)
     numbers = np.arange(n) if shot is None else shot
     offset = None if toward is None else _offsets(at_256, aim, toward)
-    _check_aimed(weapon, offset)
+    check_aimed(weapon, offset)
     return Shots(
         at_256,
         _directions(n, aim, offset),
@@ -170,7 +170,7 @@ def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
     return offset
 
 
-def _check_aimed(weapon: Weapon, offset: Ints | None) -> None:
+def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
     """Check that a ray without a range has an end, and within reach."""
     parts = ray_parts_of(weapon)
     if parts is None or parts[2].length_256 is not None:
