@@ -45,7 +45,8 @@ COLUMNS = ("object", "round", "samples", "pixels", "weight", "pellets", "x", "y"
 """Of a row: as in `Hits`, with first_xy as x and y."""
 
 PASSES = (
-    "object", "round", "pellet", "order", "entry_xy", "exit_xy", "entry_px", "exit_px", "material", "normal_xy", "weight",
+    "object", "round", "pellet", "order", "entry_xy", "exit_xy", "entry_px", "exit_px", "material", "normal_xy",
+    "weight",
 )  # fmt: skip
 STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
 """Of rays: of each pass and each end; a name that ends in _xy stands for two numbers."""
