@@ -23,6 +23,7 @@ from weapons.heat import heat_of
 from weapons.hits import HitRow, Hits
 from weapons.rayfacts import ray_boxes, rays_told
 from weapons.rayhits import RayHits
+from weapons.thennow import present_of
 from weapons.volley import Volley, volley_of
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def report_of(
     fired: Sequence[Hits],
     names: Sequence[str] | None = None,
     *,
+    now: Scene | None = None,
     prefilter: str | None = None,
     broadphase: str | None = None,
 ) -> dict[str, Any]:
@@ -59,6 +61,7 @@ def report_of(
     scene : what was fired on
     fired : answers of `fire` on it, of one shot or of many
     names : of their weapons; by default the kinds
+    now : the present, beside which shots at the past are shown: what has moved since, and what they would hit
     prefilter, broadphase : what the picture shows of the way to the hits: the volumes of a pre-filter ("circle",
         "4 boxes", ...), the cells of a broad phase ("grid", "quadtree", "bvh"), and how many objects were tested
 
@@ -94,6 +97,7 @@ def report_of(
         "shots": told,
         "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
         **({} if sieve is None else {"filter": _sifted(sieve, fired, each if told else [], told)}),
+        **({} if now is None else {"now": present_of(scene, now, fired, view)}),
     }
 
 

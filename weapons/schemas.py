@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from planes.arrays import InputError, within
-from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, VIEW_MAX
+from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, TICK_MAX, VIEW_MAX
 from planes.image import read_text, write_text
 from planes.index import STRUCTURES
 from planes.sampling import OF_PATTERNS, Verdict
@@ -203,7 +203,17 @@ KEYS: dict[str, Value] = {
     "shots": Rows(TOLD),
     "batch": Optional(BATCH),
 }
-REPORT = Keys({**KEYS, "filter": FILTER}, tuple(KEYS))
+NOW = _all(
+    {
+        "tick": Optional(Number(-TICK_MAX, TICK_MAX)),
+        "hash": Text(),
+        "moved": Rows(_all({**ITEM, "runs": RUNS, "from_xy": POINT, "to_xy": POINT})),
+        "gone": Rows(_all(dict(ITEM))),
+        "new": Rows(_all(dict(ITEM))),
+        "shots": Rows(Rows(_all({**ITEM, "pixels": COUNT}))),
+    }
+)
+REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))
 """The table of a report."""
 
 

@@ -1,0 +1,73 @@
+"""A shot at the past beside the present: what has moved since, and what the same shot would hit now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planes.arrays import InputError
+from planes.history import PastScene
+from planes.scene import Scene
+from planes.spans import Box, Spans, meets
+from weapons.firing import fired as fire_checked
+from weapons.hits import Hits
+
+__all__ = ["present_of"]
+
+MOVED_MAX = 200
+"""Objects told of as moved; a scene where more did is too full to read."""
+
+
+def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
+    """Tell, as JSON, how a scene of the past differs from the present.
+
+    Parameters
+    ----------
+    then, now : the scene that was fired at, and as it is
+    fired : hits of the past
+    view_xyxy : items that were or are in this box are told
+
+    Returns
+    -------
+    "tick", the present "hash", items that "moved" (with their present pixels as runs, and the middles of their boxes),
+    those that are "gone" or "new", and what each of the "shots" hits now
+    """
+    if not isinstance(now, Scene):
+        raise InputError(f"now: expected a Scene, got {type(now).__name__}")
+    before, after = then.items.stack(), now.items.stack()
+    was = {item: rank for rank, item in enumerate(before.ids.tolist())}
+    is_now = {item: rank for rank, item in enumerate(after.ids.tolist())}
+    moved = []
+    for item in sorted(was.keys() & is_now.keys()):
+        old, new = before.box_xyxy[was[item]], after.box_xyxy[is_now[item]]
+        mask, corner = now.mask(item)
+        same = np.array_equal(old, new) and np.array_equal(before.mask(was[item]), mask)
+        if same or not meets(np.array(view_xyxy), np.stack([old, new])).any():
+            continue
+        moved.append(
+            {
+                **_item(now, item),
+                "runs": Spans.from_mask(mask, corner).runs().tolist(),
+                "from_xy": ((old[:2] + old[2:]) / 2).tolist(),
+                "to_xy": ((new[:2] + new[2:]) / 2).tolist(),
+            }
+        )
+    again = [fire_checked(now, hits.weapon, hits.shots, "auto", "auto", "auto") for hits in fired]
+    return {
+        "tick": then.tick if isinstance(then, PastScene) else None,
+        "hash": now.content_hash(),
+        "moved": moved[:MOVED_MAX],
+        "gone": [_item(then, item) for item in sorted(was.keys() - is_now.keys())],
+        "new": [_item(now, item) for item in sorted(is_now.keys() - was.keys())],
+        "shots": [
+            [{**_item(now, row.object), "pixels": row.pixels} for row in hits.of(shot)]
+            for hits in again
+            for shot in range(len(hits.shots))
+        ],
+    }
+
+
+def _item(scene: Scene, item: int) -> dict[str, Any]:
+    return {"object": item, "name": scene.name_of(item)}
