@@ -248,7 +248,7 @@ def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
     report = told(scene, (Disc(6), (10, 10)))
     painted = {*MARKS, "occluder", "object hit", "object blocked", "object other"}
     wide, narrow = (legend_of(report, painted, width) for width in (2000, 400))
-    assert wide.height < narrow.height and len(wide.entries) == len(narrow.entries) == 9
+    assert wide.height < narrow.height and len(wide.entries) == len(narrow.entries) == len(painted)
     for legend, width in ((wide, 2000), (narrow, 400)):
         ends = [x + e.mark.shape[1] + 8 * len(e.word) for (x, _), e in zip(legend.places, legend.entries, strict=True)]
         assert max(ends) < width

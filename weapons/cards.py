@@ -11,6 +11,7 @@ import cv2
 from planes.arrays import Image
 from planes.constants import WEIGHT_FULL
 from planes.scene import Scene
+from weapons import raywords
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
 from weapons.marks import MARKS, tiled_glyph
 from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
@@ -51,6 +52,7 @@ class Card:
     verdicts : samples by verdict
     inset : of the first hit
     lines : below; of one cell a sentence, of two what and why, of more a row of a table
+    ray : the only one of a shot, drawn from end to end above its verdicts; None draws these as parts of a bar
     """
 
     number: int | None
@@ -59,6 +61,7 @@ class Card:
     verdicts: Mapping[str, int]
     inset: Inset | None
     lines: Sequence[Sequence[str]]
+    ray: Mapping[str, Any] | None = None
 
     @property
     def height(self) -> int:
@@ -82,7 +85,10 @@ class Card:
             left = x + 38
         texts.append(Text(left, y + 22, clipped(self.title, wide // 3), INK, bold=True))
         texts.append(Text(x + wide - 10, y + 22, clipped(self.told, wide * 2 // 3 - 50), FAINT, right=True))
-        _bar(page, self.verdicts, x + 10, y + 36, wide - 20)
+        if self.ray is None:
+            _bar(page, self.verdicts, x + 10, y + 36, wide - 20)
+        else:
+            _strip(page, self.ray, x + 10, y + 36, wide - 20)
         top = y + 52
         counts_x = x + 10
         if self.inset:
@@ -110,24 +116,43 @@ class Card:
 
 def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
     """Card of one shot."""
+    rays = shot.get("rays")
+    hit = _hits(shot) if rays is None else raywords.table(shot)
+    lines: list[Sequence[str]] = [*hit[: HIT_LINES + 1], *_rest(hit, HIT_LINES + 1, "")]
+    near = None if rays is None else raywords.missed(shot)
+    if rays is not None:
+        ends = raywords.ended(rays)
+        lines += [[line] for line in ends[:NOT_LINES]] + _rest(ends, NOT_LINES, " ends")
+    blockers = [_blocks(entry) for entry in shot["blockers"]] if rays is None else raywords.blocked(shot)
+    lines += [*blockers[:NOT_LINES], *_rest(blockers, NOT_LINES, " block")]
+    others = shot["why_not"]
+    if near is not None:
+        lines.append(near)
+        others = [e for e in others if e["object"] != shot["nearest_miss"]["object"] or e["reason"] != "missed"]
+    lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in others[:NOT_LINES]]
+    lines += _rest(others, NOT_LINES, " near it")
+    if "tested" in shot:
+        lines.append([_tested(shot["tested"])])
+    alone = rays[0] if rays is not None and len(rays) == 1 else None
+    return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines, alone)
+
+
+def _hits(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Rows of what a pattern hit."""
     weighted = any(row["weight"] != WEIGHT_FULL * row["samples"] for row in shot["rows"])
-    lines: list[Sequence[str]] = [WEIGHT_HEADER if weighted else HEADER] if shot["rows"] else []
+    lines: list[tuple[str, ...]] = [WEIGHT_HEADER if weighted else HEADER] if shot["rows"] else []
     rounds = len({row["round"] for row in shot["rows"]}) > 1
-    for row in shot["rows"][:HIT_LINES]:
+    for row in shot["rows"]:
         name = f"{row['name']}, round {row['round']}" if rounds else row["name"]
         shares = [percent(share) for share in row["shares"].values()]
         weight = [f"{row['weight'] / WEIGHT_FULL:.1f}"] if weighted else []
         lines.append((name, str(row["pixels"]), *weight, *shares, f"{row['distance2'] ** 0.5:.1f} px"))
-    lines += _rest(shot["rows"], HIT_LINES, "")
-    for entry in shot["blockers"][:NOT_LINES]:
-        behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
-        lines.append((f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"))
-    lines += _rest(shot["blockers"], NOT_LINES, " block")
-    lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in shot["why_not"][:NOT_LINES]]
-    lines += _rest(shot["why_not"], NOT_LINES, " near it")
-    if "tested" in shot:
-        lines.append([_tested(shot["tested"])])
-    return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines)
+    return lines
+
+
+def _blocks(entry: Mapping[str, Any]) -> tuple[str, str]:
+    behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
+    return f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"
 
 
 def batch_cards(report: Mapping[str, Any]) -> list[Card]:
@@ -180,12 +205,26 @@ def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) ->
     total = sum(verdicts.values())
     page[y : y + BAR, x : x + wide] = (58, 62, 70)
     begun = 0
-    for verdict in ("hit", "occluded", "filtered", "outside"):
-        done = begun + verdicts[verdict]
+    for verdict in ("hit", "occluded", "filtered", "outside", "beyond"):
+        done = begun + verdicts.get(verdict, 0)
         if total:
             part = page[y : y + BAR, x + begun * wide // total : x + done * wide // total]
             part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]
         begun = done
+
+
+def _strip(page: Image, ray: Mapping[str, Any], x: int, y: int, wide: int) -> None:
+    """A ray from end to end: what of it lies in objects, where it ended, and dashes beyond."""
+    strip = page[y : y + BAR, x : x + wide]
+    strip[:] = (58, 62, 70)
+    stop = int(ray["stop"]["fraction"] * (wide - 2))
+    for verdict, first, last in (
+        ("beyond", stop, wide),
+        *(("hit", int(told["entry"] * (wide - 2)), int(told["exit"] * (wide - 2)) + 1) for told in ray["passes"]),
+    ):
+        part = strip[:, first:last]
+        part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]
+    strip[:, stop : stop + 2] = MARKS["occluded"][0] if ray["stop"]["reason"] == "occluder" else (255, 255, 255)
 
 
 def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> list[Text]:
@@ -194,7 +233,7 @@ def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int)
     if not total:
         return [Text(x, y + 14, "no samples", FAINT)]
     texts = []
-    for row, verdict in enumerate(v for v in reversed(MARKS) if verdicts[v]):
+    for row, verdict in enumerate(v for v in reversed(MARKS) if verdicts.get(v, 0)):
         top = y + 3 + row * LINE
         page[top : top + 12, x : x + 12] = verdict_mark(verdict, 12)
         share = percent(verdicts[verdict] / total)

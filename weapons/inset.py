@@ -11,6 +11,7 @@ from planes.arrays import Image
 from planes.scene import Scene
 from planes.spans import Box
 from weapons.marks import MARKS
+from weapons.raymarks import draw_arrows
 from weapons.world import World
 
 __all__ = ["CELL", "COLUMNS", "ROWS", "Inset", "inset_of"]
@@ -46,6 +47,8 @@ def inset_of(shot: Mapping[str, Any], scene: Scene) -> Inset | None:
     image = world.image
     for line in (image[::CELL], image[:, ::CELL]):
         line[:] = (line.astype(np.uint16) * GRID // 255).astype(np.uint8)
+    if "rays" in shot:
+        draw_arrows(world, shot)
     left, top = COLUMNS // 2 * CELL, ROWS // 2 * CELL
     frame = image[top : top + CELL + 1, left : left + CELL + 1]
     frame[[0, -1]] = frame[:, [0, -1]] = (255, 255, 255)

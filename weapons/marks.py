@@ -9,6 +9,7 @@ from planes.arrays import Bools
 __all__ = ["HEAT", "LET_THROUGH", "MARKS", "PASSED_OVER", "SKETCH", "TINT", "glyph", "tiled_glyph"]
 
 MARKS: dict[str, tuple[tuple[int, int, int], int]] = {
+    "beyond": ((178, 184, 196), 190),
     "empty": ((255, 255, 255), 190),
     "outside": ((240, 228, 66), 220),
     "filtered": ((230, 140, 200), 235),
@@ -51,7 +52,7 @@ def tiled_glyph(verdict: str, factor: int, shape: tuple[int, ...]) -> Bools:
 
 
 def glyph(verdict: str, size: int) -> Bools:
-    """Shape (size, size) of a mark: block with an eye, cross, bar, frame or dot; a block where it is too small."""
+    """Shape (size, size) of a mark: block with an eye, cross, bar, frame, dot, dashes; a block if it is too small."""
     if size < 3:
         return np.ones((size, size), np.bool_)
     free = int(size > 3)  # larger marks leave a line between neighbours
@@ -65,5 +66,6 @@ def glyph(verdict: str, size: int) -> Bools:
         "filtered": abs(2 * y - last) <= thick,
         "outside": (x < thick) | (y < thick) | (x > last - thick) | (y > last - thick),
         "empty": dot,
+        "beyond": (abs(2 * y - last) <= thick) & (x * 5 // size % 2 == 0),
     }
     return np.asarray(shapes[verdict] & (x <= last) & (y <= last), np.bool_)

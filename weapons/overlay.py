@@ -17,6 +17,7 @@ from planes.scene import Scene
 from planes.spans import Box, Spans
 from weapons.marks import MARKS
 from weapons.panel import INK, Text
+from weapons.signs import MINT, NEAR_MISS
 from weapons.words import NAME_MAX, short
 from weapons.world import OUTLINES_MAX, World, enlarged, fill_runs
 
@@ -73,7 +74,7 @@ class Overlay:
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Number a shot: a cross on its pixel, a disc beside the pattern, a line between; an arrow if it is far off."""
         height, width = self.image.shape[:2]
-        x, y = (v + self.factor // 2 for v in self._at(*shot["at_xy"]))
+        x, y = self._start(shot)
         inside = 0 <= x < width and 0 <= y < height
         if not inside:
             edge = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
@@ -89,6 +90,14 @@ class Overlay:
         self._take(bx - BADGE, by - BADGE, bx + BADGE + 1, by + BADGE + 1)
         label = str(number)
         self.texts.append(Text(bx - 4 * len(label), by + 4, label, WHITE, bold=True))
+
+    def _start(self, shot: Mapping[str, Any]) -> tuple[int, int]:
+        """Where a shot begins: in the middle of its pixel, or where its rays do."""
+        if "rays" in shot:
+            x, y = np.floor(self.world.placed(np.array(shot["at"]))).astype(np.int64).tolist()
+            return x, y
+        x, y = self._at(*shot["at_xy"])
+        return x + self.factor // 2, y + self.factor // 2
 
     def names(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Name the objects that were hit, most pixels first."""
@@ -118,6 +127,15 @@ class Overlay:
                 linked.add(by["object"])
                 for shade, thick in ((DARK, 3), (color, 1)):
                     cv2.circle(self.image, (x, y), 6, shade, thick)
+
+    def distances(self, shots: Sequence[Mapping[str, Any]]) -> None:
+        """Write how far the nearest object was missed by rays, beside the line between."""
+        for miss in (shot["nearest_miss"] for shot in shots if shot.get("nearest_miss")):
+            ends = self.world.placed(np.array([miss["ray_xy"], miss["object_xy"]]))
+            x, y = np.rint(np.clip(ends.mean(axis=0), -FAR, max(self.image.shape) + FAR)).astype(np.int64).tolist()
+            inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
+            if inside and 0 < miss["distance"] <= NEAR_MISS:
+                self._label(f"{miss['distance']:.1f} px", (x - 4, y - 4, x + 5, y + 5), MINT, NEAR)
 
     def _label(
         self, text: str, box: Box, color: tuple[int, int, int], farthest: int, pixels: Ints | None = None

@@ -11,6 +11,7 @@ import numpy as np
 
 from planes.arrays import Image
 from weapons.marks import HEAT, LET_THROUGH, MARKS, SKETCH, glyph
+from weapons.signs import SIGNS, sign_mark
 from weapons.world import HATCH, OUTLINES, World
 
 __all__ = [
@@ -33,6 +34,10 @@ LETTER, ENTRY_GAP = 8, 28
 
 SIZE = 0.42
 """Scale of OpenCV's font, about 8 px a letter."""
+
+
+NAMED_SIGNS = [name for name in SIGNS if name not in ("swept", "goes in", "comes out", "number")]
+"""Signs of rays that a legend has."""
 
 
 class Text(NamedTuple):
@@ -161,6 +166,7 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     for name, color in SKETCH.items():
         if name in painted:
             entries.append(Entry(name, _sketched(color, name)))
+    entries += [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
     if "occluder" in painted:
         rows, columns = np.mgrid[:14, :14]
         mark = _blank(14)

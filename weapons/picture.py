@@ -15,6 +15,7 @@ from weapons.cards import batch_cards, shot_card
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import Text, draw_texts, page_of
+from weapons.raymarks import draw_rays, marked
 from weapons.world import World, factor_of
 
 __all__ = ["picture_of_report"]
@@ -64,7 +65,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]} - hit
     world.outline_seen([item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked])
     for verdict in MARKS:
-        world.mark_samples(shots, verdict)
+        world.mark_samples(marked(shots, verdict), verdict)
     for kind, items in (("blocked", blocked), ("hit", hit)):
         for item in sorted(items):
             world.outline(item, kind)
@@ -72,13 +73,16 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
         from weapons.sketch import draw_volumes
 
         draw_volumes(world, report, scene)
+    told, drawn = draw_rays(world, report)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)
+    overlay.taken |= drawn
     for number, shot in enumerate(shots):
         overlay.shot(shot, number)
+    overlay.distances(shots)
     overlay.names(shots, scene)
     overlay.links(shots, hit)
-    return overlay.texts
+    return [*told, *overlay.texts]
 
 
 def _heat(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:

@@ -15,6 +15,7 @@ from planes.spans import meets, ragged
 from weapons.candidates import prefilter_of
 from weapons.marks import LET_THROUGH, PASSED_OVER, SKETCH
 from weapons.sieve import outline_of, rectangle
+from weapons.strokes import within
 from weapons.world import OUTLINES_MAX, World
 
 __all__ = ["draw_cells", "draw_volumes"]
@@ -37,7 +38,7 @@ def draw_cells(world: World, report: Mapping[str, Any]) -> None:
             if cell["opened"] is not opened:
                 continue
             x, y, x_max, y_max = cell["box_xyxy"]
-            ring = _placed(world, np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)]))
+            ring = world.placed(np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)]))
             if opened:
                 (left, top), (right, low) = (
                     np.rint(np.clip(v, -1, max(world.image.shape))) for v in (ring[0], ring[2])
@@ -80,7 +81,7 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
 
 def _draw(world: World, rings: list[Floats], name: str) -> None:
     for ring in rings:
-        _trace(world, _placed(world, ring), name)
+        _trace(world, world.placed(ring), name)
 
 
 def _trace(world: World, ring: Floats, name: str) -> None:
@@ -89,7 +90,7 @@ def _trace(world: World, ring: Floats, name: str) -> None:
     Not by OpenCV: where a line leaves the picture its pixels depend on the version.
     """
     height, width = world.image.shape[:2]
-    begin, end = (np.rint(v) for v in _within(ring, np.roll(ring, -1, axis=0), np.array([width, height])))
+    begin, end = (np.rint(v) for v in within(ring, np.roll(ring, -1, axis=0), np.array([width, height]), BEYOND))
     step = (end - begin).astype(np.int64)
     edge, place = ragged(np.maximum(np.abs(step).max(axis=1, initial=0), 1))
     count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True, initial=0), 1)
@@ -100,26 +101,3 @@ def _trace(world: World, ring: Floats, name: str) -> None:
     world.image[y, x] = SKETCH[name]
     if len(x):
         world.painted.add(name)
-
-
-def _within(begin: Floats, end: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Cut segments to a little more than the picture.
-
-    References
-    ----------
-    Liang and Barsky, "A new concept and method for line clipping" (1984).
-    """
-    step = end - begin
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_low, to_high = (-BEYOND - begin) / step, (size + BEYOND - begin) / step
-    level = step == 0
-    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
-    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
-    first, last = np.maximum(first, 0), np.minimum(last, 1)
-    some = first <= last
-    return (begin + first[:, None] * step)[some], (begin + last[:, None] * step)[some]
-
-
-def _placed(world: World, points: Floats) -> Floats:
-    """Points of the world in the picture."""
-    return np.asarray((points - world.view[:2] + 0.5) * world.factor)

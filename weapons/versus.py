@@ -16,6 +16,7 @@ from weapons.differences import differences
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import EDGE, FAINT, GROUND, INK, LINE, TOP, Entry, Legend, Text, clipped, draw_texts, verdict_mark
+from weapons.raymarks import draw_rays, marked
 from weapons.world import World, factor_of, fill, fill_runs, heat_boxes
 
 __all__ = ["compared_pixels", "picture_of_difference"]
@@ -133,16 +134,18 @@ def _around(a: Box, b: Box) -> Box:
 def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     """Mark the samples of one report, and number its shots."""
     for verdict in MARKS:
-        world.mark_samples(report["shots"], verdict)
+        world.mark_samples(marked(report["shots"], verdict), verdict)
         if report["batch"]:
             world.mark_heat(report["batch"]["heat"], verdict)
     there = set() if world.scene is None else set(world.scene.ids().tolist())
     for item in sorted(there & {row["object"] for shot in report["shots"] for row in shot["rows"]}):
         world.outline(item, "hit")
+    numbers, drawn = draw_rays(world, report)
     overlay = Overlay(world)
+    overlay.taken |= drawn
     for number, shot in enumerate(report["shots"]):
         overlay.shot(shot, number)
-    return overlay.texts
+    return [*numbers, *overlay.texts]
 
 
 def _difference(

@@ -9,7 +9,12 @@ from weapons.jsondiff import entries, shown
 
 __all__ = ["percent", "reason", "short", "unquoted"]
 
-REASONS = {"category": "not an accepted category", "excluded": "its owner is excluded", "outside": "out of bounds"}
+REASONS = {
+    "category": "not an accepted category",
+    "excluded": "its owner is excluded",
+    "outside": "out of bounds",
+    "inside": "it started inside of it",
+}
 
 NAME_MAX = 24
 """Letters of a name on a label."""

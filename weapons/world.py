@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Image, Ints
+from planes.arrays import Bools, Floats, Image, Ints
 from planes.compose import label_plane
 from planes.items import Role
 from planes.render import GROUND, blend, draw_view
@@ -73,6 +73,10 @@ class World:
             _frame(self.image, view, bounds, factor)
         if scene is not None and len(scene.ids(Role.OCCLUDER)):
             self._hatch(np.isin(label_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1))
+
+    def placed(self, points: Floats) -> Floats:
+        """Points (n, 2) of the world in the picture."""
+        return np.asarray((points - self.view[:2] + 0.5) * self.factor)
 
     def mark_samples(self, shots: Sequence[Mapping[str, Any]], verdict: str) -> None:
         """Mark the samples of one verdict, each with the verdict's shape."""
