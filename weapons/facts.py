@@ -107,7 +107,7 @@ def _sifted(
     """Tell what each shot was compared with, and what the pre-filter is."""
     for (hits, _, row), shot in zip(each, told, strict=True):
         shot["tested"] = sieve.told(hits, row)
-    opened = [np.zeros(0, np.int64), *(sieve.opened(volley) for hits in fired for volley in _volleys(hits))]
+    opened = [np.zeros(0, np.int64), *(sieve.opened(hits) for hits in fired)]
     return sieve.to_dict(np.unique(np.concatenate(opened)))
 
 

@@ -8,15 +8,22 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, choice
+from planes.constants import SUB
 from planes.index import STRUCTURES, Index
 from planes.parts import Parts
 from planes.scene import Scene
 from planes.spans import Box, meets
-from planes.volumes import Volumes
+from planes.volumes import Capsules, Volumes
+from weapons.arsenal import ray_parts_of
 from weapons.candidates import PREFILTERS, Candidates, Prefilter, prefilter_of
 from weapons.hits import Hits
 from weapons.narrow import pattern_volumes
-from weapons.volley import Volley, volley_of
+from weapons.plan import Plan
+from weapons.rayhits import RayHits
+from weapons.rays import rays_of
+from weapons.trace import Lines
+from weapons.tracing import Looked, Range, trace
+from weapons.volley import Shots, Volley, volley_of
 
 __all__ = ["Sieve", "outline_of", "rectangle", "sieve_of"]
 
@@ -25,6 +32,9 @@ CELLS_MAX = 4096
 
 PATTERNS_MAX = 64
 """Volumes told of one shot: of its first pellets."""
+
+SHOTS_AT_A_TIME = 2**8
+"""Shots of a batch whose cells are told at once."""
 
 ROUND_CORNERS = 72
 """Corners of a circle that is drawn."""
@@ -60,22 +70,54 @@ class Sieve:
     def told(self, hits: Hits, row: int) -> dict[str, Any]:
         """What the pixels of a shot were compared with, of how many, as JSON; and how many cells were opened for it."""
         shot, stack = hits.shots.take(row, row + 1), self.scene.items.stack()
-        volley = volley_of(hits.weapon, shot)
-        candidates = Candidates(self.scene.items, stack, self.prefilter, self.index)
-        pairs = candidates.pairs(volley, np.arange(len(volley.shot)), volley.boxes, shot)
+        if isinstance(hits, RayHits):
+            boxes, ranks, lines = self._rays(hits, shot)
+            patterns = self._capsules(boxes, lines)
+        else:
+            volley = volley_of(hits.weapon, shot)
+            boxes = _boxes_of(volley)
+            pairs = self._candidates().pairs(volley, np.arange(len(volley.shot)), volley.boxes, shot)
+            ranks, patterns = pairs.rank, self._patterns(volley)
         return {
-            "objects": np.unique(stack.ids[pairs.rank]).tolist(),
+            "objects": np.unique(stack.ids[ranks]).tolist(),
             "of": len(stack),
-            "opened": len(self.opened(volley)),
-            "patterns": [{"points": points.tolist()} for points in self._patterns(volley)],
+            "opened": len(self._visited(boxes)),
+            "patterns": [{"points": points.tolist()} for points in patterns],
         }
 
-    def opened(self, volley: Volley) -> Ints:
-        """Numbers of the cells or nodes that are looked into for the boxes of a volley."""
+    def opened(self, hits: Hits) -> Ints:
+        """Numbers of the cells or nodes that were looked into for all shots."""
         if self.index is None:
             return np.zeros(0, np.int64)
-        boxes = volley.boxes[volley.count > 0].astype(np.float64)
-        return np.unique(self.index.read(self.scene.items).work(boxes).visited[1])
+        each = (
+            self._rays(hits, hits.shots.take(i, i + SHOTS_AT_A_TIME))[0]
+            if isinstance(hits, RayHits)
+            else _boxes_of(volley_of(hits.weapon, hits.shots.take(i, i + SHOTS_AT_A_TIME)))
+            for i in range(0, len(hits.shots), SHOTS_AT_A_TIME)
+        )
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *(self._visited(boxes) for boxes in each)]))
+
+    def _visited(self, boxes_xyxy: Ints) -> Ints:
+        """Numbers of the cells or nodes that are looked into for boxes (n, 4)."""
+        if self.index is None:
+            return np.zeros(0, np.int64)
+        return np.unique(self.index.read(self.scene.items).work(boxes_xyxy.astype(np.float64)).visited[1])
+
+    def _candidates(self) -> Candidates:
+        return Candidates(self.scene.items, self.scene.items.stack(), self.prefilter, self.index)
+
+    def _rays(self, hits: RayHits, shots: Shots) -> tuple[Ints, Ints, Lines]:
+        """Trace rays again: the boxes (n, 4) that they asked for, ranks compared by their pixels, and the rays."""
+        parts = ray_parts_of(hits.weapon)
+        assert parts is not None  # its hits are those of rays
+        rays, looked = rays_of(parts, shots), Looked()
+        through = Range(
+            self.scene.items, self.scene.items.stack(), self.scene.bounds, self._candidates(), Plan(), looked
+        )
+        trace(rays, parts[2], shots, through)
+        boxes = np.concatenate([np.zeros((0, 4), np.int64), *looked.boxes_xyxy])
+        ranks = np.concatenate([np.zeros(0, np.int64), *(rank for _, rank in looked.pairs)])
+        return boxes, ranks, Lines(rays.start_256, rays.step_256, parts[2].radius_256)
 
     def _cells(self) -> tuple[Ints, Floats]:
         """Numbers and boxes (C, 4) of the cells of the view, cut to it."""
@@ -97,6 +139,21 @@ class Sieve:
         fired = [volley.table.patterns[i] for i in volley.pattern[some].tolist()]
         volumes = pattern_volumes(self.prefilter.name, fired)
         return [outline_of(volumes, i)[0] + volley.xy[p] for i, p in enumerate(some.tolist())]
+
+    def _capsules(self, boxes_xyxy: Ints, lines: Lines) -> list[Floats]:
+        """Outlines of the first boxes that rays asked for, or of the capsules around the first rays."""
+        if self.prefilter.name == "none":
+            return []
+        if not self.prefilter.volume:
+            return [rectangle(box) for box in boxes_xyxy[:PATTERNS_MAX]]
+        some = lines.take(np.arange(min(len(lines), PATTERNS_MAX)))
+        capsules = Capsules(some.start / SUB, (some.start + some.step) / SUB, some.radius / SUB)
+        return [outline_of(capsules, i)[0] for i in range(len(some))]
+
+
+def _boxes_of(volley: Volley) -> Ints:
+    """Boxes (n, 4) of the placements that have pixels."""
+    return volley.boxes[volley.count > 0]
 
 
 def sieve_of(scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: str | None) -> Sieve | None:

@@ -6,7 +6,7 @@ followed stretch by stretch, each longer than the one before, until its end is k
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,7 @@ from weapons.rays import Rays
 from weapons.trace import Lines
 from weapons.volley import Shots
 
-__all__ = ["Range", "trace"]
+__all__ = ["Looked", "Range", "trace"]
 
 BOXES_FIRST, GROWTH = 8, 4
 """Boxes that a ray is expected to meet in its first stretch, and how much longer each next stretch is."""
@@ -34,14 +34,23 @@ SLACK = 2.0**-20
 
 
 @dataclass(frozen=True, eq=False)
+class Looked:
+    """Where rays looked for items: boxes (n, 4) asked for, and (ray, rank) of what was compared by its pixels."""
+
+    boxes_xyxy: list[Ints] = field(default_factory=list)
+    pairs: list[tuple[Ints, Ints]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
 class Range:
-    """What rays go through, and where what was done is recorded."""
+    """What rays go through, and where what was done is recorded; `looked` only if a report is to tell it."""
 
     items: Items
     stack: Stack
     bounds: Box | None
     candidates: Candidates
     plan: Plan
+    looked: Looked | None = None
 
 
 def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetings, Ends, Lines, Lines]:
@@ -130,7 +139,10 @@ def _pairs(
     if through.candidates.prefilter.name == "none":
         row, rank = through.candidates.meeting(np.zeros((len(live), 4), np.int64))
         return live[row], rank
-    row, rank = through.candidates.meeting(_stretch_boxes(rays, lines, live, *edges))
+    asked = _stretch_boxes(rays, lines, live, *edges)
+    if through.looked:
+        through.looked.boxes_xyxy.append(asked)
+    row, rank = through.candidates.meeting(asked)
     enters = _enters(rays, lines, live[row], stack.box_xyxy[rank])
     some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
     return live[row[some]], rank[some]
@@ -186,6 +198,8 @@ def _touched(
 
         kept = near_rays(Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], boxes[:, :2], own)
         row, rank, own, origin, boxes = row[kept], rank[kept], own.take(kept), origin[kept], boxes[kept]
+    if through.looked:
+        through.looked.pairs.append((row, rank))
     plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
     met = meet(own, row, rank, boxes, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
