@@ -16,7 +16,7 @@ from weapons.world import HATCH, OUTLINES, World
 
 __all__ = [
     "CARD", "EDGE", "FAINT", "GROUND", "INK", "LINE", "TOP", "Entry", "Legend", "Text", "clipped", "draw_texts",
-    "legend_of", "page_of", "verdict_mark",
+    "legend_of", "page_of", "sign_entries", "verdict_mark",
 ]  # fmt: skip
 
 Color = tuple[int, int, int]
@@ -166,13 +166,18 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     for name, color in SKETCH.items():
         if name in painted:
             entries.append(Entry(name, _sketched(color, name)))
-    entries += [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
+    entries += sign_entries(painted)
     if "occluder" in painted:
         rows, columns = np.mgrid[:14, :14]
         mark = _blank(14)
         mark[(rows + columns) % 6 < 2] = HATCH
         entries.append(Entry("occluder", mark))
     return Legend(entries, width)
+
+
+def sign_entries(painted: Set[str]) -> list[Entry]:
+    """What a picture has of rays."""
+    return [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
 
 
 def _per(report: Mapping[str, Any]) -> str:

@@ -17,9 +17,6 @@ __all__ = ["draw_arrows", "draw_rays", "marked"]
 NUMBERED_MAX = 3
 """Shots of more rays than these have no numbers and no normals."""
 
-THICK_MAX = 24
-"""More rays than these in one picture are drawn thinner."""
-
 STEPS_SHOWN = 256
 """Tests of a projectile that are drawn, each by its disc."""
 
@@ -45,7 +42,7 @@ def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bool
     numbers, and what of the picture (h, w) is drawn on
     """
     shots = [shot for shot in report["shots"] if "rays" in shot]
-    signs = Signs(world.image.shape[:2], sum(len(shot["rays"]) for shot in shots) > THICK_MAX)
+    signs = Signs(world.image.shape[:2], sum(len(shot["rays"]) for shot in shots))
     for shot in shots:
         _sweeps(signs, world, shot, _steps_of(report["weapons"][shot["weapon"]]))
         _arrows(signs, world, shot)
@@ -60,7 +57,7 @@ def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bool
 
 def draw_arrows(world: World, shot: Mapping[str, Any]) -> None:
     """Draw the rays of one shot alone, with what they go through."""
-    signs = Signs(world.image.shape[:2])
+    signs = Signs(world.image.shape[:2], len(shot["rays"]))
     _arrows(signs, world, shot)
     signs.lay(world.image)
 

@@ -14,7 +14,7 @@ __all__ = ["RAY_HEADER", "blocked", "ended", "missed", "table"]
 RAY_HEADER = ("object hit", "in", "out", "material")
 """Along the ray: where it goes in and comes out, and how much of the object's own pixels lies between."""
 
-WHY = {"occluder": "occluder", "hits": "its last hit", "budget": "budget used up", "range": "range"}
+WHY = {"occluder": "occluder", "hits": "last hit", "budget": "budget used up", "range": "range"}
 
 SLANT = 2.4142135623730951
 """A miss is low or left alone where the one is so much as the other, or more: within 22.5 degrees of it."""

@@ -52,6 +52,9 @@ DOT, RING, CROSS, BAR = 3.4, 4.2, 5.5, 8.0
 NEAR_MISS = 16
 """Misses by more px of the world are told in words alone: lines to them would cross the picture."""
 
+SEVERAL, CROWDED = 24, 120
+"""More rays in one picture are drawn thinner, and thinner still."""
+
 BADGE = 8.5
 """Radius of the disc of a number, px."""
 
@@ -65,11 +68,13 @@ class Signs:
     Parameters
     ----------
     shape : (h, w) of the picture
-    fine : draws thinner, for many rays
+    rays : how many there will be: more are drawn thinner, and at last without what lies beyond their ends
     """
 
-    def __init__(self, shape: tuple[int, int], fine: bool = False) -> None:
-        self.shape, self.size = shape, 0.7 if fine else 1.0
+    def __init__(self, shape: tuple[int, int], rays: int = 1) -> None:
+        self.shape = shape
+        self.crowded = rays > CROWDED
+        self.size = 0.4 if self.crowded else 0.7 if rays > SEVERAL else 1.0
         self.strokes: dict[str, Strokes] = {}
 
     def of(self, name: str) -> Strokes:
@@ -82,7 +87,7 @@ class Signs:
         length = np.sqrt(((stop - begin) ** 2).sum())
         head = min(HEAD * self.size, float(length))
         width = 2.4 * self.size
-        if (stop != end).any():
+        if (stop != end).any() and not self.crowded:
             self.of("beyond its end").line(stop, end, FINE, DASH)
         shaft = self.of("ray")
         shaft.line(begin, stop - ahead * (head / 2 if reason != "range" else 0.0), width)
@@ -160,7 +165,7 @@ class Signs:
 def sign_mark(name: str) -> Image:
     """Mark (14, w, 3) of a kind of sign, for a legend."""
     wide = 14 if name == "first contact" else 30
-    signs = Signs((14, wide), fine=True)
+    signs = Signs((14, wide), SEVERAL + 1)
     left, middle, right = (np.array([x, 7.0]) for x in (2.0, wide / 2, wide - 4.0))
     if name in ENDS.values():
         signs.ray(left, right - 3, right - 3, next(reason for reason, told in ENDS.items() if told == name))

@@ -15,7 +15,21 @@ from planes.spans import Box
 from weapons.differences import differences
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
-from weapons.panel import EDGE, FAINT, GROUND, INK, LINE, TOP, Entry, Legend, Text, clipped, draw_texts, verdict_mark
+from weapons.panel import (
+    EDGE,
+    FAINT,
+    GROUND,
+    INK,
+    LINE,
+    TOP,
+    Entry,
+    Legend,
+    Text,
+    clipped,
+    draw_texts,
+    sign_entries,
+    verdict_mark,
+)
 from weapons.raymarks import draw_rays, marked
 from weapons.world import World, factor_of, fill, fill_runs, heat_boxes
 
@@ -74,7 +88,8 @@ def picture_of_difference(
     sides.append((_difference(got, scenes[1], kinds, view, factor), []))
     painted = worlds[0].painted | worlds[1].painted
     wide = sides[0][0].shape[1] + 2 * EDGE
-    marks = Legend([Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted], wide)
+    verdicts = [Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted]
+    marks = Legend([*verdicts, *sign_entries(painted)], 2 * (wide - EDGE))
     kept = [(name, n) for name, n in reversed(counts.items()) if n]
     legend = Legend([Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in kept], wide)
     page, texts = _page(sides, [marks, legend], differences(expected, got))
