@@ -15,14 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planes import Scene, Sprite, load_scene
-from weapons import Disc, Point, Rounds, Spread, Weapon, arsenal_of, fire
+from weapons import Disc, Laser, Pistol, Point, Rifle, Rounds, Spread, Weapon, arsenal_of, fire
 from weapons.differences import decisive, differences
 from weapons.facts import report_of
 from weapons.jsondiff import same
 from weapons.orders import fire_order, orders_of
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
-REPORTS = 5
+REPORTS = 6
 LEFT_OUT = ("version", "hash", "plan", "times")
 
 Json = Any
@@ -50,6 +50,7 @@ def reports() -> tuple[dict[str, Any], ...]:
     """Of every kind: the gallery's shots, rounds, a batch, a scene without bounds, one without shots."""
     gallery = load_scene(GALLERY)
     orders = orders_of(gallery, arsenal_of(gallery))[:3]
+    rays = [fire(game(), Rounds(Spread(Laser(90), count=3, radius=20), count=2), (190, 110), toward=(240, 115))]
     free = Scene()
     free.add(Sprite.circle(4), (3, 3), name="ball")
     return (
@@ -58,6 +59,7 @@ def reports() -> tuple[dict[str, Any], ...]:
         told(game(), Disc(3), [(x, 110) for x in range(190, 220)]),
         told(free, Point(), (9, 3)),
         report_of(free, []),
+        report_of(rays[0].scene, rays),
     )
 
 
@@ -265,3 +267,29 @@ def test_a_change_that_only_samples_show_is_told() -> None:
     lines = differences(*(told(scene, Disc(10), (32, 30)) for scene in wall))
     assert lines[-1].startswith("shot 0 (disc at 32, 30): ")
     assert any("occluded samples: gained at " in line and "lost at " in line for line in lines)
+
+
+def test_words_about_rays() -> None:
+    """Where they stopped and why, what they went through: by their pellets where there are several."""
+    near, far = game(duck=(250, 180)), game(duck=(250, 180))
+    far.remove(far.find("house"))
+    one, other = (told(scene, Rifle(60), (190, 104), aim=0) for scene in (near, far))
+    lines = differences(one, other)
+    assert "shot 0 (rifle at 190, 104): ray: stopped after 60.0 px (range), was at house, 4.5 px (occluder)" in lines
+    assert "shot 0 (rifle at 190, 104): ray: stopped at house, 4.5 px (occluder), was 60.0 px (range)" in differences(
+        other, one
+    )
+    moved = game(duck=(252, 180))
+    ducks = [told(scene, Pistol(90), (200, 180), aim=0) for scene in (near, moved)]
+    here = "shot 0 (pistol at 200, 180): ray: "
+    assert f"{here}stopped at duck, 39.5 px (hits), was 37.5 px" in differences(*ducks)
+    assert f'{here}goes through object 0 "duck" from 39.5 px to 39.5 px, was from 37.5 px to 37.5 px' in differences(
+        *ducks
+    )
+    fans = [told(scene, Spread(Pistol(90), count=3, radius=9), (200, 180), aim=0, seed=2) for scene in (near, moved)]
+    assert any("): ray 2: stopped at duck, " in line for line in differences(*fans))
+    bursts = [told(scene, Rounds(Pistol(90), count=2), (200, 180), aim=0) for scene in (near, moved)]
+    assert any("): ray of round 1: stopped at duck, " in line for line in differences(*bursts))
+    lost = copy.deepcopy(fans[0])
+    del lost["shots"][0]["rays"][1]
+    assert differences(fans[0], lost) == ["shot 0 (spread at 200, 180): ray 1 is missing"]

@@ -24,6 +24,7 @@ from weapons.jsondiff import (
     shown,
     text_of_json,
 )
+from weapons.raychanges import ray_changes
 from weapons.words import reason, unquoted
 
 __all__ = ["decisive", "differences"]
@@ -132,7 +133,7 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
 def _shot(was: Entry, now: Entry) -> list[str]:
     words: dict[str, Words] = {
         "at": _at, "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts,
-        "samples": _samples,
+        "rays": ray_changes, "samples": _samples,
     }  # fmt: skip
     return _told(_chief(was), _chief(now), words) or _told(was, now, words)
 
