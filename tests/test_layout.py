@@ -22,10 +22,10 @@ ORDER = {
         "candidates", "plan", "resolve", "explain", "hits", "meetings", "ends", "passes", "tracing",
         "rayexplain", "rayhits", "rayfire", "firing", "clock", "orders", "heat", "thennow", "rayfacts",
         "sieve", "facts", "schemas", "jsondiff", "record", "words", "raywords", "marks", "strokes",
-        "signs", "world", "sketch", "panel", "overlay", "raymarks", "inset", "cards", "picture",
-        "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage", "goldcheck",
-        "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter", "animation", "demo",
-        "cli", "__main__",
+        "signs", "world", "ghosts", "sketch", "panel", "overlay", "raymarks", "inset", "cards",
+        "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
+        "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
+        "animation", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -114,8 +114,10 @@ class Card:
         return texts
 
 
-def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
-    """Card of one shot."""
+def shot_card(
+    shot: Mapping[str, Any], number: int, scene: Scene, now: Sequence[Mapping[str, Any]] | None = None
+) -> Card:
+    """Card of one shot; of one at the past with what it would hit now."""
     rays = shot.get("rays")
     hit = _hits(shot) if rays is None else raywords.table(shot)
     lines: list[Sequence[str]] = [*hit[: HIT_LINES + 1], *_rest(hit, HIT_LINES + 1, "")]
@@ -131,6 +133,9 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene) -> Card:
         others = [e for e in others if e["object"] != shot["nearest_miss"]["object"] or e["reason"] != "missed"]
     lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in others[:NOT_LINES]]
     lines += _rest(others, NOT_LINES, " near it")
+    if now is not None:
+        told = ", ".join(f"{short(row['name'])} {row['pixels']} px" for row in now[:NOT_LINES]) or "nothing"
+        lines.append(("the same shot now", f"hits {told}" + (" and more" if len(now) > NOT_LINES else "")))
     if "tested" in shot:
         lines.append([_tested(shot["tested"])])
     alone = rays[0] if rays is not None and len(rays) == 1 else None

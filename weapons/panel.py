@@ -12,7 +12,7 @@ import numpy as np
 from planes.arrays import Image
 from weapons.marks import HEAT, LET_THROUGH, MARKS, SKETCH, glyph
 from weapons.signs import SIGNS, sign_mark
-from weapons.world import HATCH, OUTLINES, World
+from weapons.world import DASHED, HATCH, OUTLINES, World
 
 __all__ = [
     "CARD", "EDGE", "FAINT", "GROUND", "INK", "LINE", "TOP", "Entry", "Legend", "Text", "clipped", "draw_texts",
@@ -160,7 +160,12 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
         scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
         entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{_per(report)}", np.repeat(scale, 5, axis=1)))
     told = "other target" if painted & {"object hit", "object blocked"} else "target"
-    for kind, word in (("hit", "object hit"), ("blocked", "object blocked"), ("other", told)):
+    for kind, word in (
+        ("hit", "object hit"),
+        ("blocked", "object blocked"),
+        ("other", told),
+        ("now", "where it is now"),
+    ):
         if f"object {kind}" in painted:
             entries.append(Entry(word, _outlined(kind)))
     for name, color in SKETCH.items():
@@ -204,7 +209,7 @@ def _outlined(kind: str) -> Image:
     border = np.ones((14, 14), np.bool_)
     border[thick:-thick, thick:-thick] = False
     rows, columns = np.ogrid[:14, :14]
-    mark[border & ((kind != "blocked") | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
+    mark[border & ((kind not in DASHED) | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
     return mark
 
 
@@ -231,6 +236,8 @@ def _summary(report: Mapping[str, Any], width: int) -> Text:
     shots, batch = report["shots"], report["batch"]
     objects = {row["object"] for shot in shots for row in shot["rows"]} | {o["object"] for o in _of(batch, "objects")}
     told = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
+    if report.get("now", {}).get("tick") is not None:
+        told = f"tick {report['now']['tick']:g}: {told}"
     return Text(width - EDGE, 28, told, FAINT, right=True)
 
 

@@ -12,6 +12,7 @@ from planes.arrays import Image, InputError
 from planes.items import Role
 from planes.scene import Scene
 from weapons.cards import batch_cards, shot_card
+from weapons.ghosts import draw_present
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
 from weapons.panel import Text, draw_texts, page_of
@@ -51,7 +52,10 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
         texts, cards = _heat(world, report, scene), batch_cards(report)
     else:
         texts = _shots(world, report, scene)
-        cards = [shot_card(shot, number, scene) for number, shot in enumerate(report["shots"])]
+        again = report["now"]["shots"] if "now" in report else [None] * len(report["shots"])
+        cards = [
+            shot_card(shot, n, scene, now) for n, (shot, now) in enumerate(zip(report["shots"], again, strict=True))
+        ]
     page, texts = page_of(report, world, texts, cards)
     if text:
         draw_texts(page, texts)
@@ -73,10 +77,11 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
         from weapons.sketch import draw_volumes
 
         draw_volumes(world, report, scene)
+    moved = draw_present(world, report) if "now" in report else False
     told, drawn = draw_rays(world, report)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)
-    overlay.taken |= drawn
+    overlay.taken |= drawn | moved
     for number, shot in enumerate(shots):
         overlay.shot(shot, number)
     overlay.distances(shots)

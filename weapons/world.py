@@ -14,7 +14,7 @@ from planes.compose import label_plane
 from planes.items import Role
 from planes.render import GROUND, blend, draw_view
 from planes.scene import Scene
-from planes.spans import Box, each_pixel
+from planes.spans import Box, Spans, each_pixel
 from weapons.marks import HEAT, MARKS, TINT, tiled_glyph
 
 __all__ = ["HATCH", "OUTLINES", "World", "enlarged", "factor_of", "fill", "fill_runs", "heat_boxes", "heat_step"]
@@ -26,8 +26,16 @@ DIM = 125
 """How much of the scene's light is left, of 255."""
 
 HATCH = (200, 212, 230)
-OUTLINES = {"hit": ((255, 200, 40), 255), "blocked": ((86, 180, 233), 255), "other": ((240, 240, 240), 130)}
-"""Colour and opacity of the outline of an object that was hit, that was only blocked, and of any other."""
+OUTLINES = {
+    "hit": ((255, 200, 40), 255),
+    "blocked": ((86, 180, 233), 255),
+    "other": ((240, 240, 240), 130),
+    "now": ((206, 156, 255), 255),
+}
+"""Colour and opacity of the outline of an object that was hit, that was only blocked, of any other, and of where what
+has moved is now."""
+
+DASHED = ("blocked", "now")
 
 DASH = 5
 """Dashes of the outline of a blocked object, px."""
@@ -123,6 +131,10 @@ class World:
         if self.scene is not None:
             self._border(*self.scene.mask(item), kind)
 
+    def outline_pixels(self, spans: Spans, kind: str) -> None:
+        """Draw the border of a set of pixels."""
+        self._border(*spans.to_mask(), kind)
+
     def outline_seen(self, items: Sequence[int]) -> None:
         """Draw the borders of what is seen of objects, at most OUTLINES_MAX of them."""
         if self.scene is None:
@@ -156,7 +168,7 @@ class World:
         if not border.any():
             return
         self.painted.add(f"object {kind}")
-        if kind == "blocked":
+        if kind in DASHED:
             rows, columns = np.ogrid[: border.shape[0], : border.shape[1]]
             border &= (rows + columns) // DASH % 2 == 0
         window = self.image[(top - view[1]) * factor : (low - view[1]) * factor]
