@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planes.arrays import Bools, Ints, choice
+from planes.constants import CHUNK_PAIRS
 from planes.index import Index
 from planes.items import Items, Stack, boxes_in
 from planes.sampling import Pairs
@@ -126,8 +127,12 @@ class Candidates:
         if self.prefilter.name == "none":
             return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
         if self.index is None:
-            row, rank = np.nonzero(meets(boxes_xyxy[:, None], self.stack.box_xyxy[None]))
-            return row, rank
+            step = max(1, CHUNK_PAIRS // max(m, 1))
+            parts = [np.nonzero(meets(boxes_xyxy[i : i + step, None], self.stack.box_xyxy)) for i in range(0, n, step)]
+            if len(parts) == 1:
+                return parts[0][0], parts[0][1]
+            row = np.concatenate([np.zeros(0, np.int64), *(part[0] + i * step for i, part in enumerate(parts))])
+            return row, np.concatenate([np.zeros(0, np.int64), *(part[1] for part in parts)])
         some = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
         row, item = self.index.query(self.items, boxes_xyxy[some])
         rank_of = np.zeros(self.items.count, np.int64)

@@ -16,9 +16,6 @@ from weapons.trace import Lines
 
 __all__ = ["Meetings", "first_of_each", "last_of_each", "meet", "stretches"]
 
-COMMON = 2**60
-"""Scale of the times of rays that move differently against each item: they are compared in whole parts of this."""
-
 
 @dataclass(frozen=True, eq=False)
 class Meetings:

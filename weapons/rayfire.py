@@ -25,11 +25,12 @@ def fired_rays(
 ) -> RayHits:
     """Decide what shots of a traced weapon hit; arguments are those of `fire`."""
     plan, stack, ray = Plan(), scene.items.stack(), parts[2]
-    each = len(rays_of(parts, shots.take(0, 1)))
+    burst, several, _ = parts
+    each = (burst.count if burst else 1) * (several.count if several else 1)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, each * len(shots))
     through = Range(scene.items, stack, scene.bounds, candidates, plan)
     most = CHUNK_PAIRS // max(len(stack), 1) if candidates.index is None else CHUNK_ROWS
-    step = max(1, min(most, CHUNK_ROWS) // max(each, 1))
+    step = max(1, min(most, CHUNK_ROWS) // each)
     rows, passes, stops = [], [], []
     for begin in range(0, max(len(shots), 1), step):
         some = shots.take(begin, min(begin + step, len(shots)))

@@ -22,10 +22,13 @@ from planes.constants import HALF, SUB
 from planes.grid256 import isqrt
 from planes.spans import each_pixel, ragged
 
-__all__ = ["Lines", "cells", "in_order"]
+__all__ = ["COMMON", "ROOM", "Lines", "cells", "in_order"]
 
 DIAGONAL = 182
 """Half the diagonal of a pixel in 1/256 px, rounded up: a disc so large has the centre of every square it touches."""
+
+COMMON = 2**60
+"""Scale of the times of rays that each item sees in its own way: they are compared in whole parts of this."""
 
 ROOM = 2**62
 """Products below it leave room for a sum in int64; larger ones are worked out in Python integers."""
@@ -41,18 +44,20 @@ class Lines:
     ----------
     start, step : (n, 2) where they begin and how far they go, 1/256 px
     radius : half of their width, 1/256 px; 0 for thin rays
+    common : a scale of the times for all of them; 0 for each its own
     """
 
     start: Ints
     step: Ints
     radius: int
+    common: int = 0
 
     def __len__(self) -> int:
         return len(self.start)
 
     def take(self, rows: Ints | Bools) -> Lines:
         """Some of the segments."""
-        return Lines(self.start[rows], self.step[rows], self.radius)
+        return Lines(self.start[rows], self.step[rows], self.radius, self.common)
 
     @cached_property
     def steep(self) -> Bools:
@@ -67,6 +72,8 @@ class Lines:
     @cached_property
     def scale(self) -> Ints:
         """What times are counted over: the end of the segment."""
+        if self.common:
+            return np.full(len(self), self.common)
         if self.radius:
             return np.maximum(self.length2, 1)
         return np.asarray(np.maximum(np.abs(self.step), 1).prod(axis=1))

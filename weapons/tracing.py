@@ -12,22 +12,23 @@ from itertools import pairwise
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints
-from planes.constants import HALF, SUB
+from planes.constants import CHUNK_PAIRS, HALF, SUB
 from planes.items import Items, Stack
 from planes.spans import Box
 from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, ends_of
 from weapons.guns import Projectile, Traced
-from weapons.meetings import COMMON, Meetings, meet, stretches
+from weapons.meetings import Meetings, meet, stretches
 from weapons.plan import Plan
 from weapons.rays import Rays
-from weapons.trace import Lines
+from weapons.trace import COMMON, Lines
 from weapons.volley import Shots
 
 __all__ = ["Looked", "Range", "trace"]
 
-BOXES_FIRST, GROWTH = 8, 4
-"""Boxes that a ray is expected to meet in its first stretch, and how much longer each next stretch is."""
+PAIRS_FIRST, GROWTH = 150, 2
+"""Pairs of rays and boxes that are expected in the first stretch, of a ray at least one, and how much longer each next
+stretch is: one costs as much as so many pairs. Measured with `tests/bench/rays.py`."""
 
 SLACK = 2.0**-20
 """Floats tell in which stretch a ray meets a box, to this part of its length and this part of a px."""
@@ -87,7 +88,7 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     met = Meetings.joined(found)
     relative = _relative(lines, ray, met.ray, met.rank, through)
     if _moving(ray, through):
-        lines = _shared(lines)
+        lines = Lines(lines.start, lines.step, lines.radius, COMMON)
     return met, ends_of(met, lines, through.stack, cost, ray), lines, relative
 
 
@@ -116,7 +117,7 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
         return [-np.inf, np.inf]
     mean_wh, world_wh = stack.sizes
     per_px = len(stack) * float((mean_wh + 2 * lines.radius / SUB).sum() / world_wh.prod())
-    first = BOXES_FIRST / per_px
+    first = max(PAIRS_FIRST / max(len(lines), 1), 1) / per_px
     longest = float(np.sqrt(lines.length2.max(initial=0))) / SUB
     if longest <= GROWTH * first:
         return [-np.inf, np.inf]
@@ -135,7 +136,7 @@ def _pairs(
     if not len(live) or not len(stack):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     if _moving(ray, through):
-        return np.repeat(live, len(stack)), np.tile(np.arange(len(stack)), len(live))
+        return _moving_pairs(rays, ray, lines, live, through)
     if through.candidates.prefilter.name == "none":
         row, rank = through.candidates.meeting(np.zeros((len(live), 4), np.int64))
         return live[row], rank
@@ -143,9 +144,27 @@ def _pairs(
     if through.looked:
         through.looked.boxes_xyxy.append(asked)
     row, rank = through.candidates.meeting(asked)
-    enters = _enters(rays, lines, live[row], stack.box_xyxy[rank])
+    index = through.candidates.index
+    if index is not None:
+        through.plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew")
+    enters = _enters(rays.origin_xy[live[row]], lines.take(live[row]), stack.box_xyxy[rank])
     some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
     return live[row[some]], rank[some]
+
+
+def _moving_pairs(rays: Rays, ray: Traced, lines: Lines, live: Ints, through: Range) -> tuple[Ints, Ints]:
+    """Rays and ranks whose boxes a projectile enters, as each moving item sees it."""
+    stack = through.stack
+    step = max(1, CHUNK_PAIRS // len(stack))
+    found = []
+    for first in range(0, len(live), step):
+        some = live[first : first + step]
+        row, rank = np.repeat(some, len(stack)), np.tile(np.arange(len(stack)), len(some))
+        relative = _relative(lines, ray, row, rank, through)
+        kept = np.isfinite(_enters(rays.origin_xy[row], relative, stack.box_xyxy[rank]))
+        found.append((row[kept], rank[kept]))
+    row, rank = (np.concatenate(column) for column in zip(*found, strict=True))
+    return row, rank
 
 
 def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float) -> Ints:
@@ -159,17 +178,16 @@ def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float
     return np.concatenate([low.astype(np.int64) + origin, high.astype(np.int64) + origin], axis=1)
 
 
-def _enters(rays: Rays, lines: Lines, ray: Ints, boxes_xyxy: Ints) -> Floats:
-    """How far along rays boxes are entered, px, or a little less; NaN where they are passed by.
+def _enters(origin_xy: Ints, lines: Lines, boxes_xyxy: Ints) -> Floats:
+    """How far along lines, each about its origin, boxes are entered, px, or a little less; NaN where they pass by.
 
     References
     ----------
     Kay and Kajiya, "Ray tracing complex scenes" (1986): slabs.
     """
-    origin = rays.origin_xy[ray]
     grown = (lines.radius + HALF) / SUB + SLACK
-    start, step = lines.start[ray] / SUB, lines.step[ray] / SUB
-    low, high = boxes_xyxy[:, :2] - origin - grown - start, boxes_xyxy[:, 2:] - origin + grown - start
+    start, step = lines.start / SUB, lines.step / SUB
+    low, high = boxes_xyxy[:, :2] - origin_xy - grown - start, boxes_xyxy[:, 2:] - origin_xy + grown - start
     with np.errstate(divide="ignore", invalid="ignore"):
         to_low, to_high = low / step, high / step
     level = step == 0
@@ -177,7 +195,7 @@ def _enters(rays: Rays, lines: Lines, ray: Ints, boxes_xyxy: Ints) -> Floats:
     first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
     last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
     missed = beside | (first > last + SLACK) | (first > 1 + SLACK) | (last < -SLACK)
-    return np.where(missed, np.nan, np.maximum(first, 0) * _lengths(lines)[ray] - SLACK)
+    return np.where(missed, np.nan, np.maximum(first, 0) * _lengths(lines) - SLACK)
 
 
 def _touched(
@@ -225,13 +243,6 @@ def _at_steps(met: Meetings, scale: Ints, steps: int) -> Meetings:
     keep = np.asarray(k * scale <= met.leave.astype(object) * steps, np.bool_)
     entry = np.asarray(k * scale // steps, np.int64)
     return Meetings(met.ray, met.rank, met.count, met.x, met.y, entry, met.leave).only(keep)
-
-
-def _shared(lines: Lines) -> Lines:
-    """The same lines, with times over the scale that all have in common."""
-    shared = Lines(lines.start, lines.step, lines.radius)
-    shared.__dict__["scale"] = np.full(len(lines), COMMON)
-    return shared
 
 
 def _started(met: Meetings, rays: Rays, ray: Traced, shots: Shots, stack: Stack) -> Meetings:
