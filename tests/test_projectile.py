@@ -169,7 +169,6 @@ def test_many_projectiles_agree_with_the_reference(steps: int | None, moving: bo
     assert told["hit"] > 3000
 
 
-@pytest.mark.xfail(strict=True, reason="times of steps are told in whole parts of |d|^2, not as k / steps")
 @pytest.mark.parametrize("radius", [0, 3])
 def test_the_time_of_a_step_is_its_number_over_all(radius: float) -> None:
     scene = Scene((20, 5))
@@ -180,7 +179,6 @@ def test_the_time_of_a_step_is_its_number_over_all(radius: float) -> None:
     assert hits.stop.fraction == pytest.approx(k / 7, abs=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="a disc that rests relative to a thing is not tested later than at 0")
 @pytest.mark.parametrize("velocity", [(0, 0), (5, 0)])
 def test_a_disc_that_rests_on_a_thing_touches_it_at_every_step(velocity: Vector) -> None:
     scene = Scene()
@@ -188,7 +186,6 @@ def test_a_disc_that_rests_on_a_thing_touches_it_at_every_step(velocity: Vector)
     assert fire(scene, Projectile(velocity[0], 1, steps=4), (0, 0))
 
 
-@pytest.mark.xfail(strict=True, reason="no test in steps counts as a start inside")
 def test_what_a_projectile_in_steps_starts_in_can_be_ignored() -> None:
     scene = Scene()
     scene.add(np.ones((1, 9), np.bool_))

@@ -70,6 +70,10 @@ class Meetings:
         some = np.flatnonzero(count)
         return self._of(some, count[some], np.flatnonzero(keep))
 
+    def at_times(self, entry: Ints, leave: Ints) -> Meetings:
+        """The same cells at other times."""
+        return Meetings(self.ray, self.rank, self.count, self.x, self.y, entry, leave)
+
     def _of(self, pairs: Ints, count: Ints, cells: Ints) -> Meetings:
         columns = (column[cells] for column in (self.x, self.y, self.entry, self.leave))
         return Meetings(self.ray[pairs], self.rank[pairs], count, *columns)

@@ -69,6 +69,8 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     """
     lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
     cost = through.items.cost[through.stack.ids]
+    common = _steps_of(ray) or (COMMON if _moving(ray, through) else 0)
+    timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
     edges = _edges(lines, ray, through)
     length = _lengths(lines)
     live = np.arange(len(rays))
@@ -81,15 +83,13 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
             break
         so_far = np.zeros(len(rays), np.bool_)
         so_far[live] = True
-        ends = ends_of(Meetings.joined([met.of_rays(so_far) for met in found]), lines, through.stack, cost, ray)
+        ends = ends_of(Meetings.joined([met.of_rays(so_far) for met in found]), timed, through.stack, cost, ray)
         live = live[(ends.fraction[live] + SLACK) * length[live] >= far]
         if not len(live):
             break
     met = Meetings.joined(found)
     relative = _relative(lines, ray, met.ray, met.rank, through)
-    if _moving(ray, through):
-        lines = Lines(lines.start, lines.step, lines.radius, COMMON)
-    return met, ends_of(met, lines, through.stack, cost, ray), lines, relative
+    return met, ends_of(met, timed, through.stack, cost, ray), timed, relative
 
 
 def _relative(lines: Lines, ray: Traced, row: Ints, rank: Ints, through: Range) -> Lines:
@@ -221,28 +221,39 @@ def _touched(
     plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
     met = meet(own, row, rank, boxes, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
-    if _moving(ray, through):
+    if isinstance(ray, Projectile):
         key = row * len(stack) + rank
-        scale = own.scale[np.searchsorted(key, met.ray * len(stack) + met.rank)]
-        met = _in_common(met, scale[met.pair])
-    if isinstance(ray, Projectile) and ray.steps is not None:
-        scale = np.full(len(met.x), COMMON) if _moving(ray, through) else lines.scale[met.ray][met.pair]
-        met = _at_steps(met, scale, ray.steps)
-    return _started(met, rays, ray, shots, stack)
+        own = own.take(np.searchsorted(key, met.ray * len(stack) + met.rank))
+        met = _in_frame(met, own, _moving(ray, through))
+    met = _started(met, rays, ray, shots, stack)
+    steps = _steps_of(ray)
+    if steps is not None:
+        met = _at_steps(met, COMMON if _moving(ray, through) else lines.scale[met.ray][met.pair], steps)
+    return met
 
 
-def _in_common(met: Meetings, scale: Ints) -> Meetings:
-    """Times over the scales of their cells as times over one scale for all."""
-    entry, leave = (np.asarray(time.astype(object) * COMMON // scale, np.int64) for time in (met.entry, met.leave))
-    return Meetings(met.ray, met.rank, met.count, met.x, met.y, entry, leave)
+def _steps_of(ray: Traced) -> int | None:
+    return ray.steps if isinstance(ray, Projectile) else None
 
 
-def _at_steps(met: Meetings, scale: Ints, steps: int) -> Meetings:
-    """Cells that are touched at one of the moments k / steps, and the first of those."""
-    k = np.maximum(-(-met.entry.astype(object) * steps // scale), 1)
-    keep = np.asarray(k * scale <= met.leave.astype(object) * steps, np.bool_)
-    entry = np.asarray(k * scale // steps, np.int64)
-    return Meetings(met.ray, met.rank, met.count, met.x, met.y, entry, met.leave).only(keep)
+def _in_frame(met: Meetings, own: Lines, moving: bool) -> Meetings:
+    """Times of a projectile as parts of the frame: what it rests on it touches all the time.
+
+    Where items move, the times over the scales of their pairs become times over one scale for all.
+    """
+    scale = own.scale[met.pair]
+    entry, leave = met.entry, np.where((own.length2 == 0)[met.pair], scale, met.leave)
+    if moving:
+        entry, leave = (np.asarray(t.astype(object) * COMMON // scale, np.int64) for t in (entry, leave))
+    return met.at_times(entry, leave)
+
+
+def _at_steps(met: Meetings, scale: Ints | int, steps: int) -> Meetings:
+    """Cells that are touched at one of the moments k / steps: the first and the last of those, as k."""
+    first = np.maximum(-(-met.entry.astype(object) * steps // scale), 1)
+    last = met.leave.astype(object) * steps // scale
+    told = met.at_times(np.asarray(first, np.int64), np.asarray(last, np.int64))
+    return told.only(told.entry <= told.leave)
 
 
 def _started(met: Meetings, rays: Rays, ray: Traced, shots: Shots, stack: Stack) -> Meetings:
