@@ -12,7 +12,7 @@ import pytest
 
 from planes import InputError, Scene, Sprite, load_scene
 from planes.render import blend, draw_view
-from weapons import Disc, Weapon, arsenal_of, fire
+from weapons import Disc, Laser, Pistol, Projectile, Rifle, Rounds, Spread, Sweep, Weapon, arsenal_of, fire
 from weapons.facts import report_of
 from weapons.marks import MARKS, TINT, glyph
 from weapons.orders import fire_order, orders_of
@@ -31,6 +31,22 @@ def gallery_report(scene: Scene, prefilter: str | None = None, broadphase: str |
     orders = orders_of(scene, arsenal_of(scene))
     fired, names = [fire_order(scene, order) for order in orders], [order.name for order in orders]
     return report_of(scene, fired, names, prefilter=prefilter, broadphase=broadphase)
+
+
+def ray_report(scene: Scene, prefilter: str | None = None, broadphase: str | None = None) -> dict[str, Any]:
+    """Every traced weapon, and every reason to end."""
+    shots: list[tuple[Weapon, tuple[float, float], float]] = [
+        (Rifle(600, budget=60), (20.25, 170.5), -3),
+        (Rifle(300, max_hits=2, width=5), (440, 190), -170),
+        (Sweep(Laser(260), 50, 9), (250, 160), -80),
+        (Spread(Pistol(300), 8, 40), (30, 60), 10),
+        (Rounds(Laser(90, width=2, falloff="linear"), 3, recoil_deg=-9), (330, 130), -60),
+        (Projectile(120, 4), (40, 130), 14),
+        (Projectile(160, 6, steps=5), (60, 110), 4),
+        (Pistol(10**6), (-900, 140), 0.5),
+    ]
+    fired = [fire(scene, weapon, at, aim=aim, seed=4) for weapon, at, aim in shots]
+    return report_of(scene, fired, prefilter=prefilter, broadphase=broadphase)
 
 
 def blank(scene: Scene | None, view: tuple[int, int, int, int], factor: int) -> World:
@@ -122,7 +138,9 @@ def test_text_is_a_layer_of_its_own() -> None:
     assert not np.array_equal(with_text, without)
 
 
-@pytest.mark.parametrize("kind", ["shots", "batch", "out of view", "circles", "boxes", "polygons"])
+@pytest.mark.parametrize(
+    "kind", ["shots", "batch", "out of view", "circles", "boxes", "polygons", "rays", "rays, boxes"]
+)
 def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
     scene = load_scene(GALLERY)
     weapons = arsenal_of(scene)
@@ -134,6 +152,8 @@ def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
         "batch": lambda: report_of(scene, [fire(scene, weapons["shotgun"], [(8 * i, 5 * i) for i in range(60)])]),
         "out of view": lambda: told(scene, (weapons["blast"], (-300, 100)), (weapons["pistol"], (1e4, 9e4))),
     }
+    reports["rays"] = lambda: ray_report(scene)
+    reports["rays, boxes"] = lambda: ray_report(scene, "4 boxes", "grid")
     picture = picture_of_report(reports[kind](), scene, text=False)
     assert hashlib.sha256(picture.tobytes()).hexdigest()[:16] == PICTURE_HASHES[kind]
 
@@ -145,6 +165,8 @@ PICTURE_HASHES = {
     "circles": "484e7ac8e8fe2da3",
     "boxes": "9132ed929da2f872",
     "polygons": "8228d0d954fc5111",
+    "rays": "2e20a401f5f5c5ab",
+    "rays, boxes": "07fdf928db32ed1e",
 }
 """Of pictures without text; look at a picture before changing its hash."""
 

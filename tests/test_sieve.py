@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from planes import InputError, Scene, Sprite, load_scene
-from weapons import Beam, Disc, Point, Spread, Weapon, fire
+from weapons import Beam, Disc, Laser, Pistol, Point, Projectile, Rifle, Spread, Sweep, Weapon, fire
 from weapons.cli import main
 from weapons.differences import differences
 from weapons.facts import SHOTS_MAX, report_of
@@ -228,3 +228,80 @@ def test_each_cell_told_as_opened_meets_a_shot() -> None:
         opened = [cell["box_xyxy"] for cell in told["filter"]["cells"] if cell["opened"]]
         assert opened
         assert all(x <= 320 and x_max >= 280 and y <= 220 and y_max >= 180 for x, y, x_max, y_max in opened), broadphase
+
+
+def ray_report(scene: Scene, weapon: Weapon, at: Any, aim: float = 0, **how: Any) -> dict[str, Any]:
+    told = report_of(scene, [fire(scene, weapon, at, aim=aim)], **how)
+    REPORT.check("report", json.loads(json.dumps(told)))
+    return told
+
+
+@pytest.mark.parametrize(("prefilter", "broadphase"), WAYS)
+def test_what_a_ray_was_tested_against_is_told(prefilter: str | None, broadphase: str | None) -> None:
+    """A ray of width 4 along y = 51: by its box beside of mid, by its capsule against it; on to the wall."""
+    scene = yard()
+    told = ray_report(scene, Laser(95, width=4), (45, 51), prefilter=prefilter, broadphase=broadphase)
+    (shot,) = told["shots"]
+    every = sorted(scene.find(name) for name in ("west", "mid", "east", "wall"))
+    near = sorted(scene.find(name) for name in ("mid", "wall"))
+    assert shot["tested"]["objects"] == (every if prefilter == "none" else near)
+    assert shot["tested"]["of"] == 4
+    assert (shot["tested"]["opened"] > 0) == (broadphase not in (None, "none"))
+    assert any(cell["opened"] for cell in told["filter"]["cells"]) == (broadphase not in (None, "none"))
+    patterns = [np.array(pattern["points"]) for pattern in shot["tested"]["patterns"]]
+    assert len(patterns) == (prefilter != "none")
+    for ring in patterns:
+        assert (ring.min(axis=0) <= (45 - 1.9, 51 - 1.9)).all() and (ring.max(axis=0) >= (140 + 1.9, 51 + 1.9)).all()
+        assert (ring.min(axis=0) >= (45 - 6, 51 - 6)).all() and (ring.max(axis=0) <= (140 + 6, 51 + 6)).all()
+    picture_of_report(told, scene)
+
+
+def test_a_volume_lets_fewer_rays_through_than_a_box() -> None:
+    scene = Scene((200, 120))
+    item = scene.add(Sprite.circle(9), (90, 60))
+    (by_box,), (by_circle,) = (
+        ray_report(scene, Laser(120), (40, 26), 45, prefilter=name)["shots"] for name in ("box", "circle")
+    )
+    assert by_box["tested"]["objects"] == [item] and by_circle["tested"]["objects"] == []
+    (ring,) = by_circle["tested"]["patterns"]
+    assert [40, 26] in ring["points"] and len(ring["points"]) == 2, "a thin ray is its own volume"
+
+
+def test_what_a_ray_refuses_is_not_tested() -> None:
+    scene = yard()
+    (shot,) = report_of(scene, [fire(scene, Laser(150), (10, 40), aim=0, exclude=scene.find("west"))], prefilter="box")[
+        "shots"
+    ]
+    assert scene.find("west") not in shot["tested"]["objects"]
+
+
+def test_a_ray_that_ends_early_looks_no_farther() -> None:
+    """In a crowd a pistol is followed stretch by stretch: most of the row behind its target is never asked for."""
+    scene = Scene((3000, 40))
+    for x in range(30, 2990, 12):
+        scene.add(Sprite.circle(4), (x, 20))
+    short, long = (
+        ray_report(scene, weapon, (5, 20), prefilter="box", broadphase="bvh")["shots"][0]["tested"]
+        for weapon in (Pistol(2900), Laser(2900))
+    )
+    assert len(short["objects"]) < 30 and len(long["objects"]) > 200
+    assert short["opened"] < long["opened"] / 4
+
+
+def test_pellets_and_flights_have_volumes_of_their_own() -> None:
+    scene = yard()
+    for weapon, count in (
+        (Sweep(Laser(90), 40, 9), 9),
+        (Spread(Rifle(90), 100, 30), PATTERNS_MAX),
+        (Projectile(90, 3), 1),
+    ):
+        told = ray_report(scene, weapon, (20, 60), prefilter="circle")
+        assert len(told["shots"][0]["tested"]["patterns"]) == count
+
+
+def test_a_batch_of_rays_tells_the_cells_of_all() -> None:
+    scene = yard()
+    many = [(10, 20 + i) for i in range(SHOTS_MAX + 1)]
+    told = ray_report(scene, Laser(60), many, prefilter="circle", broadphase="grid")
+    assert not told["shots"] and {cell["opened"] for cell in told["filter"]["cells"]} == {True, False}
+    picture_of_report(told, scene)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from planes import Scene, Sprite, load_scene, read_png
-from weapons import Disc, Point, Spread, arsenal_of, fire, report_of
+from weapons import Disc, Laser, Point, Spread, arsenal_of, fire, report_of
 from weapons.cli import main
 from weapons.differences import differences
 from weapons.marks import MARKS
@@ -152,3 +152,16 @@ def test_shots_are_called_by_the_number_that_the_picture_has() -> None:
     scene, moved = yard(), yard(22)
     a, b = (report_of(s, [fire(s, Point(), (58, 38)), fire(s, Disc(8), (24, 20))]) for s in (scene, moved))
     assert differences(a, b)[0].startswith("shot 1 (disc at 24, 20): object 0")
+
+
+def test_rays_are_drawn_in_both_pictures_and_told() -> None:
+    scenes = yard(), yard(26)
+    reports = [report_of(scene, [fire(scene, Laser(50), (4, 20), aim=0)]) for scene in scenes]
+    picture = picture_of_difference(*reports, scenes, text=False)
+    third = picture.shape[1] // 3
+    white = [(picture[:, k * third : (k + 1) * third] == 255).all(axis=2) for k in range(3)]
+    rows = [side.sum(axis=1).max() for side in white]
+    assert min(rows[:2]) > 60 and rows[2] < 20, "an arrow in each, none in the difference"
+    lines = differences(*reports)
+    where = 'goes through object 0 "crate" from 17.5 px to 26.5 px, was from 11.5 px to 20.5 px'
+    assert f"shot 0 (laser at 4, 20): ray: {where}" in lines

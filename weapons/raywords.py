@@ -58,9 +58,12 @@ def ended(rays: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def missed(shot: Mapping[str, Any]) -> tuple[str, str] | None:
-    """The nearest object that was not hit, and how it was missed: where the ray went by, or that it ended before."""
+    """The nearest object that was not hit, and how it was missed: where the ray went by, or that it ended before.
+
+    None where there is none, or where the ray was in it: why that is no hit is told elsewhere.
+    """
     miss = shot["nearest_miss"]
-    if miss is None:
+    if miss is None or not miss["distance"]:
         return None
     told = f"{miss['distance']:.1f} px"
     if any(_short(ray, miss) for ray in shot["rays"]):
