@@ -125,11 +125,16 @@ def test_pictures_are_there() -> None:
     assert all((ROOT / name).stat().st_size < 400_000 for name in names)
 
 
-def test_volumes_example_prints_what_is_shown() -> None:
-    told = section("Volumes and broad phases")
+@pytest.mark.parametrize(
+    "heading", ["Volumes and broad phases", "Rays and projectiles", "Rewind, and a record of what was fired"]
+)
+def test_an_example_prints_what_is_shown(heading: str, tmp_path: Path) -> None:
+    told = section(heading)
     code, shown = (re.findall(rf"```{word}\n(.*?)```", told, flags=re.DOTALL)[0] for word in ("python", "text"))
-    words = [sys.executable, "-W", "error", "-c", code]
-    assert subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True).stdout == shown
+    words = [sys.executable, "-W", "error", "-c", code.replace("fixtures/", f"{ROOT}/fixtures/")]
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=env, check=True)
+    assert done.stdout == shown
 
 
 def test_volumes_are_as_false_as_the_table_tells() -> None:
