@@ -1,6 +1,6 @@
 """Report JSON to pixels: the scene dimmed, what was hit outlined, each sample marked by its verdict, and cards.
 
-Everything is drawn in whole numbers; text comes last, as a layer of its own.
+Everything is blended in whole numbers and the same bytes on any OpenCV; text comes last, as a layer of its own.
 """
 
 from __future__ import annotations

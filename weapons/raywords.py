@@ -16,8 +16,8 @@ RAY_HEADER = ("object hit", "in", "out", "material")
 
 WHY = {"occluder": "occluder", "hits": "last hit", "budget": "budget used up", "range": "range"}
 
-SLANT = 2.4142135623730951
-"""A miss is low or left alone where the one is so much as the other, or more: within 22.5 degrees of it."""
+SLANT = 1 + 2**0.5
+"""Tangent of 67.5 degrees: a miss is low or left alone within 22.5 degrees of straight, else both."""
 
 
 def table(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:

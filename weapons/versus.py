@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
@@ -88,14 +88,17 @@ def picture_of_difference(
     sides.append((_difference(got, scenes[1], kinds, view, factor), []))
     painted = worlds[0].painted | worlds[1].painted
     wide = sides[0][0].shape[1] + 2 * EDGE
-    verdicts = [Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted]
-    marks = Legend([*verdicts, *sign_entries(painted)], 2 * (wide - EDGE))
-    kept = [(name, n) for name, n in reversed(counts.items()) if n]
-    legend = Legend([Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in kept], wide)
-    page, texts = _page(sides, [marks, legend], differences(expected, got))
+    page, texts = _page(sides, _legends(painted, counts, wide), differences(expected, got))
     if text:
         draw_texts(page, texts)
     return page
+
+
+def _legends(painted: Set[str], counts: dict[str, int], wide: int) -> list[Legend]:
+    """What is drawn in the first two pictures, and the counts of the third."""
+    verdicts = [Entry(verdict, verdict_mark(verdict)) for verdict in reversed(MARKS) if verdict in painted]
+    kept = [Entry(f"{name}: {n}", verdict_mark(LOOKS[name])) for name, n in reversed(counts.items()) if n]
+    return [Legend([*verdicts, *sign_entries(painted)], 2 * (wide - EDGE)), Legend(kept, wide)]
 
 
 def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: Box) -> dict[str, Bools]:
