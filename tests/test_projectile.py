@@ -107,7 +107,13 @@ def agrees(hits: RayHits, i: int, a: Vector, v: Vector, radius: int, things: Seq
     time, thing, pixel = touched[0]
     told = Fraction(float(hits.stop.fraction[i]))
     slack = max(late(relative(v, thing), radius) for _, thing, _ in touched)
-    assert time - (slack if steps else Fraction(1, 10**12)) <= told <= time + slack, (a, v, radius, things, steps)
+    assert abs(time - told) < Fraction(1, 10**12) if steps else time - Fraction(1, 10**12) <= told <= time + slack, (
+        a,
+        v,
+        radius,
+        things,
+        steps,
+    )
     here = [row for row in touched if row[0] - time <= 2 * slack]
     same = {(row[0] == time or steps is not None, relative(v, row[1])) for row in here}
     if steps is None and len(same) > 1 and not all(row[0] == 0 for row in here):
@@ -125,7 +131,7 @@ def agrees(hits: RayHits, i: int, a: Vector, v: Vector, radius: int, things: Seq
 
 def compare(seed: int, moving: bool, scenes: int, steps: Sequence[int | None]) -> dict[str, int]:
     """Fire at random scenes; how many shots were compared which way."""
-    told = dict.fromkeys(("missed", "hit", "close", "doubtful", "still"), 0)
+    told = dict.fromkeys(("missed", "hit", "close", "doubtful"), 0)
     for number in range(scenes):
         rng = np.random.default_rng((seed, number))
         things = things_of(rng, int(rng.integers(1, 6)), moving)
@@ -136,9 +142,6 @@ def compare(seed: int, moving: bool, scenes: int, steps: Sequence[int | None]) -
         hits = fired(scene, weapon, shots)
         for i, (a, toward) in enumerate(shots):
             v = flight(round(speed * SUB), (toward[0] - a[0], toward[1] - a[1]))
-            if n and any(relative(v, thing) == (0, 0) for thing in things):
-                told["still"] += 1
-                continue
             if n and doubtful(a, v, round(radius * SUB), things, n):
                 told["doubtful"] += 1
                 continue
@@ -165,7 +168,7 @@ def test_a_projectile_in_steps_agrees_with_the_reference(moving: bool) -> None:
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("steps", [None, 1, 2, 3, 10, 240], ids=str)
 def test_many_projectiles_agree_with_the_reference(steps: int | None, moving: bool) -> None:
-    told = compare(3, moving, 5000, [steps])
+    told = compare(3, moving, 1500, [steps])
     assert told["hit"] > 3000
 
 
