@@ -10,27 +10,30 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
-from itertools import groupby, islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from planes.arrays import InputError, within
-from planes.constants import ALL, POSITION_MAX, SEED_MAX, SUB, TICK_MAX
+from planes.arrays import InputError, shown, within
+from planes.constants import ALL, POSITION_MAX, SEED_MAX, SUB, TEXT_BYTES_MAX, TICK_MAX
 from planes.grid256 import ONE, snap
 from planes.history import History, PastScene
 from planes.image import check_output
 from planes.scene import Scene
-from planes.schema import Const, Keys, Mapped, Number, Numbers, Optional, Ref, Text, Whole, Wholes, json_of
+from planes.schema import Const, Keys, Number, Numbers, Optional, Ref, Rows, Text, Whole, Wholes, json_of, typed
 from weapons.arsenal import weapon_from_json
 from weapons.firing import fire, fired
 from weapons.hits import Hits
-from weapons.jsondiff import by_path, first_of
-from weapons.rayhits import RayHits
+from weapons.jsondiff import Entry, by_path, first_of, key_of, pairs
+from weapons.jsondiff import shown as number_of
+from weapons.rayhits import RayHits, Reason
 from weapons.volley import Shots, check_aimed
 from weapons.weapon import Weapon
 
@@ -39,6 +42,8 @@ __all__ = ["Difference", "ShotRecord", "replay"]
 FORMAT = "hitplanes-shots/1"
 HEADER = Keys({"format": Const(FORMAT), "version": Text()}, ("format", "version"))
 AWAY = Wholes((2,), -2 * SUB * POSITION_MAX, 2 * SUB * POSITION_MAX)
+PARTS = ("rows", "passes", "stops")
+RESULT = Keys({**{part: Rows(Ref("columns")) for part in PARTS}, "verdicts": Ref("columns")})
 LINE = Keys(
     {
         "scene": Text(),
@@ -51,14 +56,20 @@ LINE = Keys(
         "exclude": Wholes((None,), 0, 2**31),
         "seed": Whole(0, SEED_MAX),
         "shot": Whole(0, 2**63 - 1),
-        "result": Mapped(Ref("result")),
+        "result": Ref("result"),
         "hash": Text(),
     },
     ("scene", "weapon", "at", "direction", "accept", "exclude", "seed", "shot", "result", "hash"),
 )
 
-AT_ONCE = 4096
-"""Shots that are fired again in one call, if they are of one weapon on one scene."""
+AT_ONCE, BYTES_AT_ONCE = 4096, 2**22
+"""Shots, and bytes of their lines, that are fired again in one call, if they are of one weapon on one scene."""
+
+NUMBER_MAX = 2**63
+"""No number of a result is larger, either way."""
+
+STOPPED = ("reason", "item", "distance")
+"""Columns of the end of a ray that its words tell."""
 
 
 class Difference(NamedTuple):
@@ -86,13 +97,14 @@ class ShotRecord:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = _path(path)
         check_output(self.path)
         try:
-            self._file: BinaryIO = self.path.open("xb", buffering=0)
+            self._file = self.path.open("xb", buffering=0)
         except OSError as error:
             raise InputError(f"record: expected a new file, got {self.path}: {error.strerror}") from error
-        self._hashes: dict[int, tuple[Scene, int, str]] = {}
+        self._hashes = Hashes()
+        self._size = 0
         self._write([{"format": FORMAT, "version": version("hitplanes")}])
 
     def __enter__(self) -> ShotRecord:
@@ -106,24 +118,39 @@ class ShotRecord:
         self._file.close()
 
     def fire(self, scene: Scene | History, weapon: Weapon, at: object, **arguments: Any) -> Hits:
-        """Fire, write, and return what was hit; the arguments are those of `weapons.fire`."""
+        """Fire, write, and return what was hit; the arguments are those of `weapons.fire`.
+
+        Raises
+        ------
+        InputError
+            If it cannot be fired, or not be written: then the file has nothing of this call.
+        """
+        if self._file.closed:
+            raise InputError(f"record: expected one that is open, got {self.path}, which is closed")
         hits = fire(scene, weapon, at, **arguments)
         self._write([self._line(hits, row) for row in range(len(hits.shots))])
         return hits
 
     def _write(self, lines: Sequence[Mapping[str, Any]]) -> None:
-        text = "".join(json.dumps(line, separators=(",", ":"), allow_nan=False) + "\n" for line in lines)
+        """Append lines, or nothing at all."""
+        text = "".join(json.dumps(line, separators=(",", ":"), allow_nan=False) + "\n" for line in lines).encode()
+        left = memoryview(text)
         try:
-            self._file.write(text.encode())
+            while len(left):
+                left = left[self._file.write(left) :]
         except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(self._size)
+                self._file.seek(self._size)
             raise InputError(f"record: cannot write {self.path}: {error.strerror}") from error
+        self._size += len(text)
 
     def _line(self, hits: Hits, row: int) -> dict[str, Any]:
         scene, shots = hits.scene_of(row), hits.shots
         result = result_of(hits, row)
         aimed = {} if shots.toward_256 is None else {"toward_256": shots.toward_256[row].tolist()}
         return {
-            "scene": self._hash(scene),
+            "scene": self._hashes.of(scene),
             "tick": scene.tick if isinstance(scene, PastScene) else None,
             "weapon": hits.weapon.to_json(),
             "at": (shots.at_256[row] / SUB).tolist(),
@@ -137,12 +164,19 @@ class ShotRecord:
             "hash": hash_of(result),
         }
 
-    def _hash(self, scene: Scene) -> str:
-        """Hash of a scene, worked out once for each of its versions."""
-        known = self._hashes.get(id(scene))
-        if known is None or known[0] is not scene or known[1] != scene.version:
-            known = self._hashes[id(scene)] = scene, scene.version, scene.content_hash()
-        return known[2]
+
+class Hashes:
+    """Hashes of scenes, worked out once for each version of a scene, as long as someone has it."""
+
+    def __init__(self) -> None:
+        self._known: WeakKeyDictionary[Scene, tuple[int, str]] = WeakKeyDictionary()
+
+    def of(self, scene: Scene) -> str:
+        """Hash of a scene as it is."""
+        known = self._known.get(scene)
+        if known is None or known[0] != scene.version:
+            known = self._known[scene] = scene.version, scene.content_hash()
+        return known[1]
 
 
 def result_of(hits: Hits, row: int) -> dict[str, Any]:
@@ -179,45 +213,127 @@ def replay(path: str | Path, scene: Scene | History | Callable[[float | None], S
     InputError
         Naming the file, the line and the field.
     """
+    path = _path(path)
     try:
-        with Path(path).open("rb") as lines:
-            header = next(lines, b"")
+        with path.open("rb") as lines:
             with within(f"{path} line 1"):
-                HEADER.check("header", json_of(header.decode("utf-8", "replace")))
-            return _first_difference(_entries(str(path), lines), scene)
+                HEADER.check("header", _json_of_line(lines.readline(TEXT_BYTES_MAX + 1)))
+            return _first_difference(path, _groups(_entries(path, lines)), scene)
     except OSError as error:
         raise InputError(f"{path}: cannot read it: {error.strerror}") from error
 
 
-def _entries(name: str, lines: BinaryIO) -> Iterator[tuple[int, dict[str, Any]]]:
-    for number, line in enumerate(lines, 2):
-        with within(f"{name} line {number}"):
-            entry = LINE.check("shot", json_of(line.decode("utf-8", "replace")))
-            if hash_of(entry["result"]) != entry["hash"]:
-                raise InputError(f"hash: expected that of the result, {hash_of(entry['result'])}, got {entry['hash']}")
-            entry["weapon"] = weapon_from_json(entry["weapon"])
-        yield number, entry
+class Recorded(NamedTuple):
+    """A checked line: its number in the file, from 1, its length in bytes, its weapon, and what it holds."""
+
+    line: int
+    size: int
+    weapon: Weapon
+    data: dict[str, Any]
+
+    @property
+    def call(self) -> tuple[Any, ...]:
+        """What shots that are fired in one call have in common."""
+        return self.data["scene"], self.data.get("tick"), self.weapon, self.data.get("toward_256") is None
 
 
-def _first_difference(entries: Iterator[tuple[int, dict[str, Any]]], scene: Any) -> Difference | None:
-    def alike(numbered: tuple[int, dict[str, Any]]) -> tuple[Any, ...]:
-        entry = numbered[1]
-        return entry["scene"], entry.get("tick"), entry["weapon"], entry.get("toward_256") is None
+def _entries(path: Path, lines: BinaryIO) -> Iterator[Recorded]:
+    """Lines of a record, each checked."""
+    number, written, weapon = 1, None, None
+    while line := lines.readline(TEXT_BYTES_MAX + 1):
+        number += 1
+        with within(f"{path} line {number}"):
+            data = LINE.check("shot", _json_of_line(line))
+            _check_result(data["result"])
+            if not -1 <= math.hypot(*data["direction"]) - ONE <= 1:
+                raise InputError(f"direction: expected one of length {ONE}, got {list(data['direction'])}")
+            if hash_of(data["result"]) != data["hash"]:
+                raise InputError(f"hash: expected that of the result, {hash_of(data['result'])}, got {data['hash']}")
+            if weapon is None or data["weapon"] != written:
+                written, weapon = data["weapon"], weapon_from_json(data["weapon"])
+        yield Recorded(number, len(line), weapon, data)
 
-    for (hashed, tick, weapon, _), group in groupby(entries, alike):
-        while some := list(islice(group, AT_ONCE)):
-            present = _scene_at(scene, tick)
-            found = present.content_hash()
-            if found != hashed:
-                return Difference(some[0][0], some[0][1]["shot"], (f"scene: {found}, was {hashed}",))
-            shots = _shots_of([entry for _, entry in some])
-            check_aimed(weapon, shots.toward_256)
-            hits = fired(present, weapon, shots, "auto", "auto", "auto")
-            for row, (line, entry) in enumerate(some):
-                now = json.loads(json.dumps(result_of(hits, row)))
-                if now != entry["result"]:
-                    return Difference(line, entry["shot"], tuple(_told(present, entry["result"], now)))
+
+def _json_of_line(line: bytes) -> Any:
+    """JSON of a whole line."""
+    if len(line) > TEXT_BYTES_MAX:
+        raise InputError(f"expected at most {TEXT_BYTES_MAX} bytes, got more")
+    if not line.endswith(b"\n"):
+        told = "one that is cut off, as by a crash: take it out" if line else "an empty file"
+        raise InputError(f"expected a whole line of a record, got {told}")
+    return json_of(line.decode("utf-8", "replace"))
+
+
+def _check_result(result: object) -> None:
+    """Check that a result is made of columns of numbers."""
+    typed("result", result, dict)
+    with within("result"):
+        for part, rows in RESULT.check("result", result).items():
+            for i, row in enumerate([rows] if part == "verdicts" else rows):
+                with within(part if part == "verdicts" else f"{part}[{i}]"):
+                    for name, value in typed("columns", row, dict).items():
+                        if not (_is_number(value) or (type(value) is list and all(map(_is_number, value)))):
+                            raise InputError(f"{name}: expected a number, or two, got {shown(value)}")
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and abs(value) <= NUMBER_MAX  # type: ignore[arg-type]
+
+
+def _groups(entries: Iterator[Recorded]) -> Iterator[list[Recorded]]:
+    """Neighbouring shots that one call fires again; those before a bad line come before its error."""
+    some: list[Recorded] = []
+    size = 0
+    try:
+        for entry in entries:
+            if some and (entry.call != some[0].call or len(some) == AT_ONCE or size > BYTES_AT_ONCE):
+                yield some
+                some, size = [], 0
+            some.append(entry)
+            size += entry.size
+    except InputError:
+        if some:
+            yield some
+        raise
+    if some:
+        yield some
+
+
+def _first_difference(path: Path, groups: Iterator[list[Recorded]], scene: Any) -> Difference | None:
+    hashes = Hashes()
+    for group in groups:
+        line, _, _, first = group[0]
+        with within(f"{path} line {line}"):
+            present = _scene_at(scene, first.get("tick"))
+        if (found := hashes.of(present)) != first["scene"]:
+            return Difference(line, first["shot"], (f"scene: its content hash is {found}, was {first['scene']}",))
+        for entry, result in zip(group, _results(path, present, group), strict=True):
+            if result != entry.data["result"]:
+                told = _told(present, entry.data["result"], result)
+                return Difference(entry.line, entry.data["shot"], tuple(first_of(told)))
     return None
+
+
+def _results(path: Path, scene: Scene, group: Sequence[Recorded]) -> Iterator[dict[str, Any]]:
+    """What the shots of a group do now, one by one as they are read."""
+    weapon, shots = group[0].weapon, _shots_of([entry.data for entry in group])
+    try:
+        check_aimed(weapon, shots.toward_256)
+        hits = fired(scene, weapon, shots, "auto", "auto", "auto")
+    except InputError as error:
+        if len(group) == 1:
+            raise InputError(f"{path} line {group[0].line}: {error}") from error
+        for entry in group:
+            yield from _results(path, scene, [entry])
+        return
+    for row in range(len(group)):
+        yield json.loads(json.dumps(result_of(hits, row)))
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, str | Path):
+        raise InputError(f"record: expected a path, got {shown(path)}")
+    return Path(path)
 
 
 def _scene_at(scene: Any, tick: float | None) -> Scene:
@@ -225,7 +341,7 @@ def _scene_at(scene: Any, tick: float | None) -> Scene:
         if tick is None:
             raise InputError("scene: expected a Scene, as a shot has no tick, got a History")
         return scene.at(tick)
-    found = scene if isinstance(scene, Scene) else scene(tick)
+    found = scene(tick) if callable(scene) else scene
     if not isinstance(found, Scene):
         raise InputError(f"scene: expected a Scene, got {type(found).__name__}")
     return found
@@ -252,23 +368,69 @@ def _shots_of(entries: Sequence[Mapping[str, Any]]) -> Shots:
     )
 
 
-def _told(scene: Scene, was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """What differs between two results, in words."""
-    return first_of(by_path("", _named(scene, was), _named(scene, now)))
+def _told(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
+    """What differs between two results, in words: objects that were hit, passes, ends of rays, verdicts."""
+    lines = 0
+    for line in _lines(scene, was, now):
+        lines += 1
+        yield line
+    if not lines:  # as where rows are told in another order
+        yield from by_path("", was, now)
 
 
-def _named(scene: Scene, result: Mapping[str, Any]) -> dict[str, Any]:
-    """A result with its parts under names: what is gone or new is told by name."""
-    named: dict[str, Any] = {f"verdict {key}": count for key, count in result.get("verdicts", {}).items()}
-    for part, word in (("rows", ""), ("passes", "pass through "), ("stops", "stop")):
-        for one in result.get(part, ()):
-            own = dict(one)
-            place = "".join(f" of {key} {own.pop(key)}" for key in ("round", "pellet") if own.get(key) is not None)
-            item = own.pop("object", None)
-            called = "" if item is None else f"object {item} {_name(scene, item)!r}"
-            named[f"{word}{called}{place if place != ' of round 0' else ''}"] = own
-    return named
+def _lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
+    whole = set()
+    for old, new in pairs(was.get("rows"), now.get("rows"), "round", "object"):
+        if old is None or new is None:
+            whole.add(key_of(old or new or {}, "round", "object"))
+        yield from _compared(f"{_item(scene, old or new)}{_of(old or new, 'round')}", old, new, ("round", "object"))
+    names = "round", "pellet", "object"
+    for old, new in pairs(was.get("passes"), now.get("passes"), *names):
+        if key_of(old or new or {}, "round", "object") not in whole:
+            through = f"pass{_of(old or new, 'round', 'pellet')} through {_item(scene, old or new)}"
+            yield from _compared(through, old, new, names)
+    for old, new in pairs(was.get("stops"), now.get("stops"), "round", "pellet"):
+        ray = f"ray{_of(old or new, 'round', 'pellet')}"
+        if old is None or new is None or _stopped(scene, old) == _stopped(scene, new):
+            yield from _compared(ray, old, new, ("round", "pellet"))
+        else:
+            yield f"{ray}: stopped {_stopped(scene, new)}, was {_stopped(scene, old)}"
+    yield from _compared("verdicts", was.get("verdicts"), now.get("verdicts"), ())
 
 
-def _name(scene: Scene, item: int) -> str:
-    return scene.name_of(item) if item < scene.items.count else "?"
+def _compared(what: str, was: Entry | None, now: Entry | None, names: Sequence[str]) -> Iterator[str]:
+    """One line of all columns that differ, but for those that name the row."""
+    if was is None or now is None:
+        if was is not now:
+            yield f"{what}: {'is new' if was is None else 'is gone'}"
+        return
+    columns = [name for name in dict.fromkeys([*was, *now]) if name not in names]
+    told = [part for name in columns for part in by_path(name, was.get(name), now.get(name))]
+    if told:
+        yield f"{what}: {'; '.join(part.replace(': ', ' ', 1) for part in told)}"
+
+
+def _of(entry: Entry | None, *names: str) -> str:
+    """Which round and pellet, where they are not the first."""
+    told = [f"{name} {number_of(entry[name])}" for name in names if entry and entry.get(name)]
+    return f" of {', '.join(told)}" if told else ""
+
+
+def _item(scene: Scene, entry: Entry | None, key: str = "object", word: str = "object") -> str:
+    item: Any = (entry or {}).get(key)
+    known = isinstance(item, int) and 0 <= item < scene.items.count
+    return f"{word} {number_of(item)}{f' {scene.name_of(item)!r}' if known else ''}"
+
+
+def _stopped(scene: Scene, stop: Entry) -> str:
+    """Where and by what a ray ended."""
+    far = stop.get("distance")
+    at = f"at {far:.1f} px" if isinstance(far, int | float) else "nowhere"
+    words = {
+        Reason.RANGE: "by its range",
+        Reason.OCCLUDER: f"by {_item(scene, stop, 'item', 'occluder')}",
+        Reason.HITS: f"by {_item(scene, stop, 'item')}",
+        Reason.BUDGET: f"by its budget in {_item(scene, stop, 'item')}",
+    }
+    reason = stop.get("reason")
+    return f"{words[Reason(reason)] if reason in tuple(Reason) else f'by reason {number_of(reason)}'} {at}"
