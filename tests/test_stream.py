@@ -6,6 +6,7 @@ import io
 import json
 import os
 import pty
+import random
 import resource
 import shutil
 import signal
@@ -23,7 +24,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from planes import InputError, Scene, load_scene
-from weapons import arsenal_of, shotlog, stream
+from weapons import RayHits, Reason, arsenal_of, shotlog, stream
 from weapons.cli import main
 from weapons.orders import fire_order, order_from_json
 from weapons.progress import Progress
@@ -171,6 +172,179 @@ def test_chunks_follow_the_time_that_they_take(monkeypatch: pytest.MonkeyPatch) 
 
 def test_no_shots_at_all(tmp_path: Path) -> None:
     assert answers_of(b"", tmp_path) == []
+
+
+# Logs of rays
+
+RAYS: dict[str, Any] = {
+    "rifle": {"kind": "rifle", "range": 300, "max_hits": 3, "falloff": "linear"},
+    "tank": {"kind": "rifle", "range": 400, "budget": 70.5, "width": 5},
+    "beam": {"kind": "laser", "range": 250, "inside": "ignore_until_exit"},
+    "sight": {"kind": "laser", "range": None},
+    "fan": {"kind": "sweep", "ray": {"kind": "pistol", "range": 200}, "angle": 40, "count": 5},
+    "slugs": {"kind": "spread", "pellet": {"kind": "pistol", "range": 200}, "count": 4, "radius": 30},
+    "burst": {"kind": "rounds", "weapon": {"kind": "laser", "range": 90}, "count": 3, "recoil_xy": [2, 1]},
+    "shell": {"kind": "projectile", "speed": 180, "radius": 2.5},
+    "careful": {"kind": "laser", "range": 50, "inside": "error"},
+}
+
+
+@pytest.fixture(scope="module")
+def armed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The gallery with rays among its weapons."""
+    folder = tmp_path_factory.mktemp("armed") / "scene"
+    load = load_scene(GALLERY)
+    load.weapons |= RAYS
+    load.save(folder)
+    return folder
+
+
+def mixed(n: int, seed: int = 0) -> list[dict[str, Any]]:
+    """Shots of rays and of patterns, of any arguments."""
+    rng = random.Random(seed)
+    names = [name for name in [*RAYS, "pistol", "blast", "shotgun"] if name != "careful"]
+    shots: list[dict[str, Any]] = []
+    for _ in range(n):
+        at = [round(rng.uniform(60, 420), 2), round(rng.uniform(60, 230), 2)]
+        shot: dict[str, Any] = {"weapon": rng.choice(names), "at": at}
+        if shot["weapon"] == "sight" or rng.random() < 0.3:
+            shot["toward"] = [round(rng.uniform(0, 480), 1), 100]
+        elif rng.random() < 0.8:
+            shot["aim"] = rng.randint(-1800, 1800) / 10
+        if rng.random() < 0.3:
+            shot |= {"accept": ["target"], "exclude": rng.sample(["duck 1", "fly", 3], rng.randint(0, 2))}
+        if rng.random() < 0.3:
+            shot |= {"seed": rng.getrandbits(64), "shot": rng.getrandbits(60)}
+        shots.append(shot)
+    return shots
+
+
+def columns_of(told: list[str]) -> list[str]:
+    """Names of the numbers of a list: one that ends in _xy stands for two."""
+    return [name for one in told for name in ((one[:-3] + "_x", one[:-3] + "_y") if one.endswith("_xy") else (one,))]
+
+
+def table_of(columns: Any, names: list[str]) -> list[list[float]]:
+    """The same numbers, of the library's columns."""
+    rows = []
+    for number in range(len(columns)):
+        row: list[float] = []
+        for name in names:
+            value = getattr(columns, name)[number].tolist()
+            row += value if isinstance(value, list) else [value]
+        rows.append(row)
+    return rows
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1024])
+def test_lines_of_rays_answer_what_their_shots_answer_alone(chunk: int, armed: Path, tmp_path: Path) -> None:
+    world = load_scene(armed)
+    weapons = arsenal_of(world)
+    shots = mixed(60)
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(b"".join(map(line_of, shots)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stream, "LINES_FIRST", chunk)
+        done = stream.fire_log(world, log, output, Progress(io.StringIO()))
+    header, *answers = [json.loads(line) for line in output.read_bytes().splitlines()]
+    assert header["reasons"] == [reason.name.lower() for reason in Reason]
+    kinds = {"rays": 0, "patterns": 0, "passes": 0}
+    for number, (shot, answer) in enumerate(zip(shots, answers, strict=True)):
+        order = order_from_json(shot, world, weapons, number=number)
+        hits = fire_order(world, order)
+        rows = [[r.object, r.round, r.samples, r.pixels, r.weight, r.pellets, *r.first_xy, r.distance2] for r in hits]
+        expected: dict[str, Any] = {"shot": order.shot, "of": f"{zlib.crc32(json.dumps(shot).encode()):08x}"}
+        expected["rows"] = rows
+        if isinstance(hits, RayHits):
+            expected["passes"] = table_of(hits.passes, header["passes"])
+            expected["stops"] = table_of(hits.stop, header["stops"])
+            kinds["rays"] += 1
+            kinds["passes"] += len(hits.passes)
+        else:
+            expected["verdicts"] = list(hits.verdict_counts().values())
+            kinds["patterns"] += 1
+        assert answer == expected and list(answer) == list(expected)
+    assert min(kinds.values()) > 10 and done.hit == sum(bool(answer["rows"]) for answer in answers)
+
+
+def test_the_header_names_each_number_of_passes_and_stops(armed: Path, tmp_path: Path) -> None:
+    """One shot read by the header alone."""
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(line_of({"weapon": "rifle", "at": [100, 167], "aim": 0}))
+    stream.fire_log(load_scene(armed), log, output, Progress(io.StringIO()))
+    header, answer = map(json.loads, output.read_bytes().splitlines())
+    first, *_ = [dict(zip(columns_of(header["passes"]), row, strict=True)) for row in answer["passes"]]
+    (stop,) = [dict(zip(columns_of(header["stops"]), row, strict=True)) for row in answer["stops"]]
+    assert header["objects"][str(first["object"])] == "duck 1" and (first["entry_x"], first["entry_y"]) == (138, 167)
+    assert first["entry_px"] == 37.5 and first["order"] == first["round"] == first["pellet"] == 0
+    assert header["reasons"][stop["reason"]] == "hits" and stop["item"] == answer["passes"][-1][0]
+    assert stop["distance"] == answer["passes"][-1][columns_of(header["passes"]).index("entry_px")]
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.3, 0.7, 1.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_log_of_rays_cut_anywhere_goes_on_to_the_same_bytes(
+    kept: float, seed: int, armed: Path, tmp_path: Path
+) -> None:
+    world = load_scene(armed)
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(b"".join(map(line_of, mixed(50, seed))))
+    stream.fire_log(world, log, output, Progress(io.StringIO()))
+    whole = output.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    for cut in (sum(map(len, lines[: 1 + int(50 * kept)])), int(len(whole) * kept)):
+        output.unlink()
+        output.with_name("hits.jsonl.part").write_bytes(whole[:cut])
+        done = stream.fire_log(world, log, output, Progress(io.StringIO()))
+        assert output.read_bytes() == whole and done.shots == 50
+        assert done.resumed == max(whole[:cut].count(b"\n") - 1, 0)
+
+
+@pytest.mark.parametrize("name", ["passes", "stops", "rows"])
+def test_a_damaged_answer_of_rays_is_answered_again(name: str, armed: Path, tmp_path: Path) -> None:
+    world = load_scene(armed)
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(line_of({"weapon": "fan", "at": [100, 167]}) * 8)
+    stream.fire_log(world, log, output, Progress(io.StringIO()))
+    whole = output.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    for bad in (lines[4].replace(b'"%b":[' % name.encode(), b'"%b":[x' % name.encode()), b"{}\n"):
+        output.with_name("hits.jsonl.part").write_bytes(b"".join([*lines[:4], bad, *lines[5:]]))
+        output.unlink()
+        assert stream.fire_log(world, log, output, Progress(io.StringIO())).resumed == 3
+        assert output.read_bytes() == whole
+
+
+def test_every_answer_is_known_when_it_is_read_again(armed: Path, tmp_path: Path) -> None:
+    """Tiny and huge numbers have an exponent."""
+    scene = Scene()
+    scene.add(np.ones((3, 3), bool), (10**9, -(10**9)))
+    scene.weapons |= RAYS
+    shots = [{"weapon": "rifle", "at": [10**9 - x, -(10**9)], "aim": 1e-7 * x} for x in (0, 1, 2, 1.4999, 250)]
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(b"".join(map(line_of, shots)))
+    stream.fire_log(scene, log, output, Progress(io.StringIO()))
+    assert all(stream.ANSWER.fullmatch(line) for line in output.read_bytes().splitlines(keepends=True)[1:])
+    for number in ("1e-05", "-2.5e+30", "-0.0", "12"):
+        assert stream.ANSWER.fullmatch(
+            b'{"shot":0,"of":"00000000","rows":[],"passes":[[%b,1]],"stops":[]}\n' % number.encode()
+        )
+
+
+def test_a_ray_that_starts_where_it_may_not_is_named_with_its_line(
+    armed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    good, bad = ({"weapon": "careful", "at": at} for at in ([5, 5], [160, 172]))
+    sight = {"weapon": "sight", "at": [5, 5]}
+    for line, told in ((bad, "at[0]: expected a start outside of every item"), (sight, "toward: expected a point")):
+        log.write_bytes(line_of(good) * 5 + line_of(line) + line_of(good) * 5)
+        assert main(["fire", str(armed), str(log), "-o", str(output)]) == 2
+        error = capsys.readouterr().err
+        assert f"{log} line 6: {told}" in error and error.count("\n") == 1
+        log.write_bytes(line_of(good) * 11)
+        assert main(["fire", str(armed), str(log), "-o", str(output)]) == 0
+        assert "answers 5 shots: going on" in capsys.readouterr().err
 
 
 # Bad lines

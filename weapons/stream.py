@@ -245,8 +245,9 @@ def _answers(hits: Hits) -> Iterator[bytes]:
 
 def _lists(columns: Columns, names: Sequence[str]) -> list[list[float]]:
     """Columns as rows of numbers; a column of points is two."""
-    every = [getattr(columns, name).reshape(len(columns), -1).T.tolist() for name in names]
-    return [list(row) for row in zip(*(column for one in every for column in one), strict=True)]
+    every = [getattr(columns, name) for name in names]
+    flat = [one.T.tolist() if one.ndim == 2 else [one.tolist()] for one in every]
+    return [list(row) for row in zip(*(column for one in flat for column in one), strict=True)]
 
 
 def _fired_one_by_one(
