@@ -15,8 +15,9 @@ import jsonschema
 import pytest
 
 from planes import load_scene
-from weapons import starter
+from weapons import Disc, Rifle, ShotRecord, Spread, starter
 from weapons.cli import main
+from weapons.record import hash_of
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
@@ -107,7 +108,7 @@ def test_an_interrupt_is_one_line_and_leaves_the_old_report(
 RUN = [sys.executable, "-W", "error", "-m", "weapons"]
 
 
-@pytest.mark.parametrize("word", ["report", "fire", "new", "compare", "demo"])
+@pytest.mark.parametrize("word", ["report", "fire", "new", "compare", "replay", "demo"])
 def test_help_shows_examples(word: str) -> None:
     shown = subprocess.run([*RUN, word, "--help"], capture_output=True, text=True, check=True).stdout
     examples = shown.split("examples:\n")[1].splitlines()
@@ -123,6 +124,7 @@ def test_help_shows_examples(word: str) -> None:
         (["report"], "the following arguments are required: SCENE (see hitplanes report --help)"),
         (["report", "x", "--aim", "left"], "argument --aim: invalid float value: 'left'"),
         (["fire", "x"], "the following arguments are required: SHOTS.jsonl"),
+        (["replay", "x"], "the following arguments are required: RECORD.jsonl (see hitplanes replay --help)"),
         (["new", "a", "b\nc"], "unrecognized arguments: b c"),
         (["demo", "octree"], "argument KIND: invalid choice: 'octree' (choose from "),
     ],
@@ -298,3 +300,76 @@ def test_many_shots_of_a_file_are_told_as_a_batch(tmp_path: Path, capsys: pytest
     assert main(["report", str(tmp_path / "range"), "-o", str(tmp_path / "r.png"), "--plan"]) == 0
     told = capsys.readouterr().out
     assert re.match(r"30 shots, \d+ hit something\n", told) and "left out weights: the weapon has no falloff" in told
+
+
+# replay
+
+
+@pytest.fixture
+def match(tmp_path: Path) -> Path:
+    """A record of shots at the gallery."""
+    path, scene = tmp_path / "match.jsonl", load_scene(GALLERY)
+    with ShotRecord(path) as record:
+        record.fire(scene, Rifle(400, max_hits=2), [(100, 167), (100, 90)], aim=1)
+        record.fire(scene, Spread(Disc(3), 9, 20), (160, 165), seed=7)
+    return path
+
+
+def test_replay_says_that_all_is_the_same(match: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for scene in (GALLERY, GALLERY / "scene.json"):
+        assert main(["replay", str(scene), str(match)]) == 0
+        told = capsys.readouterr()
+        assert (told.out, told.err) == ("all shots do the same again\n", "")
+
+
+def test_replay_tells_the_first_that_differs(match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [json.loads(line) for line in match.read_text().splitlines()]
+    lines[2]["result"]["stops"][0].update(reason=0, item=-1, distance=400)
+    lines[2]["result"]["rows"].append({**lines[1]["result"]["rows"][0], "object": 15})
+    lines[2]["hash"] = hash_of(lines[2]["result"])
+    match.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert main(["replay", str(GALLERY), str(match)]) == 1
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{match} line 3, shot 1: object 15 'can 5': is gone"
+    assert re.fullmatch(rf"{match} line 3, shot 1: ray: stopped by .* px, was by its range at 400.0 px", second)
+    assert main(["new", str(tmp_path / "range")]) == 0
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path / "range"), str(match)]) == 1
+    told = capsys.readouterr().out
+    assert re.fullmatch(rf"{match} line 2, shot 0: scene: its content hash is \w+, was \w+\n", told)
+
+
+def test_replay_names_what_is_no_record(match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = match.read_bytes().splitlines(keepends=True)
+    empty, cut, other = tmp_path / "empty.jsonl", tmp_path / "cut.jsonl", tmp_path / "other.jsonl"
+    empty.touch()
+    cut.write_bytes(b"".join(lines[:2]) + lines[2][:80])
+    other.write_bytes(b'{"format": "hitplanes-hits/1"}\n')
+    for scene, path, told in (
+        (GALLERY, empty, f"{empty} line 1: expected a whole line of a record, got an empty file"),
+        (GALLERY, cut, f"{cut} line 3: expected a whole line of a record, got one that is cut off, as by a crash"),
+        (GALLERY, other, f"{other} line 1: format: expected 'hitplanes-shots/1', got 'hitplanes-hits/1'"),
+        (GALLERY, tmp_path, f"{tmp_path}: cannot read it: Is a directory"),
+        (GALLERY, tmp_path / "none", f"{tmp_path / 'none'}: cannot read it: No such file"),
+        (tmp_path, match, f"{tmp_path / 'scene.json'}: cannot read it"),
+    ):
+        assert main(["replay", str(scene), str(path)]) == 2
+        error = capsys.readouterr()
+        assert error.err.startswith(f"hitplanes: {told}") and error.err.count("\n") == 1 and not error.out
+
+
+def test_examples_of_fire_and_replay_run(
+    match: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("fixtures").symlink_to(ROOT / "fixtures")
+    Path("shots.jsonl").write_text('{"weapon": "pistol", "at": [62, 86]}\n' * 3)
+    ran = 0
+    for word in ("fire", "replay"):
+        with pytest.raises(SystemExit):
+            main([word, "--help"])
+        for line in capsys.readouterr().out.split("examples:\n")[1].splitlines():
+            if line.startswith("  hitplanes "):
+                assert main(shlex.split(line)[1:]) == 0, line
+                ran += 1
+    assert ran == 3

@@ -471,11 +471,12 @@ def test_headers_that_are_none(match: Path) -> None:
         b"": "expected a whole line of a record, got an empty file",
         header.rstrip(): "expected a whole line of a record, got one that is cut off",
         header.replace(b"shots/1", b"shots/2"): "format: expected 'hitplanes-shots/1', got 'hitplanes-shots/2'",
-        b'{"format":"hitplanes-hits/1"}\n': "format|version: expected",
+        b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/1', got 'hitplanes-hits/1'",
         b'{"format":"hitplanes-shots/1"}\n': "version: expected a value, got nothing",
         header.replace(b"{", b'{"rows":1,'): "key: expected one of 'format', 'version', got 'rows'",
         b"\x89PNG\r\n\x1a\n": "expected JSON in UTF-8",
-        lines[0]: "key: expected one of 'format', 'version', got 'scene'",
+        lines[0]: "format: expected 'hitplanes-shots/1', got None",
+        b"[]\n": "header: expected an object",
     }.items():
         match.write_bytes(other + b"".join(lines) if other.endswith(b"\n") else other)
         with pytest.raises(InputError, match=f"match.jsonl line 1: ({error})"):

@@ -217,7 +217,9 @@ def replay(path: str | Path, scene: Scene | History | Callable[[float | None], S
     try:
         with path.open("rb") as lines:
             with within(f"{path} line 1"):
-                HEADER.check("header", _json_of_line(lines.readline(TEXT_BYTES_MAX + 1)))
+                header = typed("header", _json_of_line(lines.readline(TEXT_BYTES_MAX + 1)), dict)
+                Const(FORMAT).check("format", header.get("format"))
+                HEADER.check("header", header)
             return _first_difference(path, _groups(_entries(path, lines)), scene)
     except OSError as error:
         raise InputError(f"{path}: cannot read it: {error.strerror}") from error
