@@ -18,9 +18,10 @@ from planes import Role, Scene, load_scene
 from planes.image import read_png
 from planes.overlap import contains_point
 from planes.sampling import Verdict
-from weapons import Hits, arsenal_of
-from weapons.arsenal import KINDS
+from weapons import Hits, arsenal_of, fire
+from weapons.arsenal import KINDS, ray_parts_of
 from weapons.orders import fire_order, orders_of
+from weapons.rayhits import RayHits, Reason
 
 ROOT = Path(__file__).parents[1]
 FIXTURES = ROOT / "fixtures"
@@ -63,7 +64,7 @@ def numbers_at(data: object, key: str) -> Iterator[float]:
 
 
 def test_every_scene_has_a_script() -> None:
-    assert {"crowd", "edges", "empty", "far", "gallery", "targets"} <= set(SCENES)
+    assert {"corridor", "crowd", "edges", "empty", "far", "gallery", "targets"} <= set(SCENES)
     assert [path.parent.name for path in sorted(FIXTURES.glob("*/draw.py"))] == SCENES
 
 
@@ -71,7 +72,7 @@ def test_every_scene_has_a_script() -> None:
 def test_scene_is_small_and_lies_on_the_grid(name: str) -> None:
     assert sum((FIXTURES / name / file).stat().st_size for file in files_of(FIXTURES / name)) < 150_000
     data = json.loads((FIXTURES / name / "scene.json").read_text(encoding="utf-8"))
-    assert 3 <= len(data["shots"]) <= 7
+    assert 3 <= len(data["shots"]) <= 8
     assert set(data["weapons"]) >= {shot["weapon"] for shot in data["shots"]}
     places = [*numbers_at(data, "position_xy"), *numbers_at(data, "at"), *numbers_at(data, "toward")]
     assert places and all(float(256 * value).is_integer() for value in places)
@@ -99,6 +100,16 @@ def test_script_draws_what_is_in_the_folder(name: str, tmp_path: Path) -> None:
 
 
 OUTCOMES: dict[str, list[tuple[str, str, list[str], list[str]]]] = {
+    "corridor": [
+        ("rifle", "empty hit outside beyond", ["guard 1", "partition", "runner", "armoured guard"], []),
+        ("pistol", "empty hit beyond", ["guard 2"], []),
+        ("shotgun", "empty hit beyond", ["guard 3", "guard 4"], []),
+        ("laser sweep", "empty hit occluded beyond", ["guard 5", "guard 6"], ["brick wall"]),
+        ("arrow", "empty beyond", ["drone"], []),
+        ("arrow once a frame", "empty filtered", [], []),
+        ("sight", "empty occluded beyond", [], ["crate 1"]),
+        ("laser", "empty hit occluded filtered outside beyond", ["guard 7"], ["brick wall"]),
+    ],
     "targets": [
         ("needler", "hit", ["bull", "inner ring", "outer ring", "board"], []),
         ("pistol", "filtered", [], []),
@@ -182,7 +193,8 @@ def test_filters_refuse_whom_they_should(name: str, shot: int, reason: str, refu
 def test_gallery_has_what_a_first_scene_should_show() -> None:
     scene = load_scene(GALLERY)
     assert all(len(scene.ids(role)) for role in Role)
-    assert {weapon.kind for weapon in arsenal_of(scene).values()} == set(KINDS)
+    found = arsenal_of(scene), arsenal_of(load_scene(FIXTURES / "corridor"))
+    assert {weapon.kind for arsenal in found for weapon in arsenal.values()} == set(KINDS), "patterns, and rays"
     assert 1 in scene.mask(scene.find("robot"))[0].sum(axis=1), "a mast of one pixel"
     hoop, _ = scene.mask(scene.find("hoop"))
     assert not hoop[hoop.shape[0] // 2, hoop.shape[1] // 2], "a ring with a hole"
@@ -199,6 +211,35 @@ def test_gallery_shots_show_every_outcome() -> None:
     assert names[1] == ["coin", "hoop"], "pellets through the ring's hole"
     assert names[3] == ["duck 1", "duck 2", "duck 3"], "a beam that pierces"
     assert found[6].why_not(0)[0].reason == "category"
+
+
+def test_corridor_has_every_weapon_of_rays_and_what_they_are_for() -> None:
+    scene = load_scene(FIXTURES / "corridor")
+    arsenal = arsenal_of(scene)
+    assert all(len(scene.ids(role)) for role in Role)
+    assert {"pistol", "rifle", "laser", "projectile", "sweep", "spread", "rounds"} == {w.kind for w in arsenal.values()}
+    assert all(ray_parts_of(weapon) is not None for weapon in arsenal.values())
+    items = scene.items
+    assert [items.cost[scene.find(name)] for name in ("guard 1", "partition", "armoured guard")] == [1, 4, 3]
+    assert scene.mask(scene.find("drone"))[0].sum(axis=1).max() == 2, "thinner than an arrow flies in a frame"
+    assert items.velocity_256[[scene.find("drone"), scene.find("runner")]].any(axis=1).all()
+
+
+def test_corridor_shots_end_for_every_reason() -> None:
+    scene = load_scene(FIXTURES / "corridor")
+    found = [hits for hits in fired_at(scene) if isinstance(hits, RayHits)]
+    assert len(found) == len(scene.shots)
+    reasons = [{Reason(value) for value in hits.stop.reason.tolist()} for hits in found]
+    assert reasons == [
+        {Reason.BUDGET}, {Reason.HITS}, {Reason.HITS}, {Reason.OCCLUDER, Reason.RANGE},
+        {Reason.HITS}, {Reason.RANGE}, {Reason.OCCLUDER}, {Reason.OCCLUDER},
+    ]  # fmt: skip
+    (order,) = (o for o in orders_of(scene, arsenal_of(scene)) if o.name == "laser")
+    assert order.accept is not None and "glass" not in order.accept
+    through = fire(scene, order.weapon, order.at)
+    assert scene.name_of(int(through.stop.item[0])) == "glass", "by itself a laser ends at the pane"
+    again = fire(scene, arsenal_of(scene)["arrow"], scene.shots[5]["at"])
+    assert names_hit(again, scene) == ["drone"], "what the arrow that is tested once a frame flies through"
 
 
 def test_targets_are_all_there_is() -> None:
