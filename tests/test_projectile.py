@@ -4,7 +4,9 @@ Times of swept discs are whole numbers over |d|^2, rounded inward, where d is th
 and over 2**60 where things move. So a time is at most 1 / |d|^2 late (below 1e-9 from 124 px a frame on), and which of
 two things comes first is not asserted where they are nearer than that, unless both are met at exactly the same time by
 the same d. Whether anything is met at all is exact. In steps a test that lies so close to the begin or the end of a
-touch may tell otherwise: those shots are left out by the reference's `doubtful`, and counted.
+touch may tell otherwise: those shots are left out by the reference's `doubtful`, and counted. A radius between 0.5 and
+0.71 px is not tried in steps: a flight across the corner of a pixel then leaves the square before or after its centre
+is near, and the library counts the whole time in between.
 """
 
 from collections.abc import Sequence
