@@ -68,14 +68,15 @@ class Blocked(NamedTuple):
     behind: tuple[Behind, ...]
 
 
-REASONS = ("missed", "category", "excluded", "behind", "outside", "inside")
+REASONS = ("missed", "category", "excluded", "behind", "outside", "inside", "tunnelled")
 
 
 class WhyNot(NamedTuple):
     """Why an object near the shot was not hit.
 
     `reason` is "missed" (no sample on it), "category", "excluded", "behind" (every sample on it ended in front of
-    it), "outside" (of the bounds) or "inside" (of a ray that ignores what it starts in); `samples` counts those on it;
+    it), "outside" (of the bounds), "inside" (of a ray that ignores what it starts in) or "tunnelled" (a projectile went
+    through it between two tests); `samples` counts those on it;
     `by` tells what ended them, as {id: samples}; `distance` is that from the pattern, px, 0 where a sample is on it.
     """
 

@@ -16,14 +16,15 @@ from planes.items import Stack
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Box, Spans
-from weapons.candidates import Candidates, prefilter_of, refused
+from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, Reason
 from weapons.explain import Behind, Blocked, Samples, WhyNot
-from weapons.meetings import Meetings, meet
+from weapons.guns import Projectile
+from weapons.meetings import Meetings
 from weapons.plan import Plan
 from weapons.rays import Parts, Rays, rays_of
 from weapons.trace import Lines, cells
-from weapons.tracing import Range, trace
+from weapons.tracing import Range, touching, trace
 from weapons.volley import Shots
 
 __all__ = ["Miss", "RayDetail", "blocked_rays", "nearest_miss", "pixels_of", "ray_detail", "ray_why_not"]
@@ -56,6 +57,8 @@ class RayDetail:
     stack, bounds, shots, rays, lines, ends : what was walked, by whom
     met : cells in which they touch accepted items, up to their ends and some beyond
     every : cells in which their whole length touches any item, also outside of the bounds
+    entered : when each pair of `every` begins, as a part of the ray
+    in_steps : whether the rays are tested at some moments only
     """
 
     stack: Stack
@@ -66,6 +69,8 @@ class RayDetail:
     ends: Ends
     met: Meetings
     every: Meetings
+    entered: Floats
+    in_steps: bool
 
     @cached_property
     def walked(self) -> Meetings:
@@ -153,18 +158,12 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     samples = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
     if samples > DETAIL_SAMPLES_MAX:
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {samples}")
-    every = Candidates(scene.items, stack, prefilter_of("none"))  # so that all rays are followed in one stretch
-    through = Range(scene.items, stack, scene.bounds, every, Plan())
+    through = Range(scene.items, stack, scene.bounds, Candidates(scene.items, stack), Plan(), whole=True)
     met, ends, lines, _ = trace(rays, parts[2], shots, through)
-    own = Lines(lines.start, lines.step, lines.radius)
-    boxes = np.concatenate([rays.start_256, rays.start_256], axis=1)
-    boxes[:, :2] = np.minimum(rays.start_256, rays.start_256 + rays.step_256) // SUB - wide
-    boxes[:, 2:] = np.maximum(rays.start_256, rays.start_256 + rays.step_256) // SUB + wide
-    row, rank = Candidates(scene.items, stack).meeting(boxes)
-    origin = rays.origin_xy[row]
-    item = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
-    touched = meet(own.take(row), row, rank, item, stack, None, origin)
-    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, touched)
+    every, relative = touching(rays, parts[2], through)
+    entered = every.entry[every.first] / relative.scale
+    steps = parts[2].steps if isinstance(parts[2], Projectile) else None
+    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, entered, steps is not None)
 
 
 def pixels_of(detail: RayDetail) -> dict[tuple[int, int], Spans]:
@@ -225,18 +224,16 @@ def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
         return WhyNot(item, "category" if foreign else "excluded", samples, {}, distance)
     if not samples:
         return WhyNot(item, "missed", 0, {}, distance)
-    rays = detail.every.ray[detail.every.rank == rank]
-    enders = stack.ids[ends.rank[rays[ends.rank[rays] >= 0]]]
-    by = {int(i): int(n) for i, n in zip(*np.unique(enders, return_counts=True), strict=True)}
-    if by:
-        return WhyNot(item, "behind", samples, by, distance)
-    inside = rank in detail.met.rank or detail.bounds is None
-    return WhyNot(item, "inside" if inside or _starts_inside(detail, rank) else "outside", samples, {}, distance)
-
-
-def _starts_inside(detail: RayDetail, rank: int) -> bool:
     pairs = np.flatnonzero(detail.every.rank == rank)
-    return bool((detail.every.entry[detail.every.first[pairs]] == 0).any())
+    rays = detail.every.ray[pairs]
+    passed = detail.entered[pairs] < ends.fraction[rays]
+    if not passed.any():
+        enders, counts = np.unique(stack.ids[ends.rank[rays[ends.rank[rays] >= 0]]], return_counts=True)
+        by = dict(zip(enders.tolist(), counts.tolist(), strict=True))
+        return WhyNot(item, "behind" if by else "outside", samples, by, distance)
+    if (detail.entered[pairs] == 0).any():
+        return WhyNot(item, "inside", samples, {}, distance)
+    return WhyNot(item, "tunnelled" if detail.in_steps else "outside", samples, {}, distance)
 
 
 def nearest_miss(detail: RayDetail, hit: Set[int]) -> Miss | None:

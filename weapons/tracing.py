@@ -24,7 +24,7 @@ from weapons.rays import Rays
 from weapons.trace import COMMON, Lines
 from weapons.volley import Shots
 
-__all__ = ["Looked", "Range", "trace"]
+__all__ = ["touching", "Looked", "Range", "trace"]
 
 PAIRS_FIRST, GROWTH = 150, 2
 """Pairs of rays and boxes that are expected in the first stretch, of a ray at least one, and how much longer each next
@@ -44,7 +44,10 @@ class Looked:
 
 @dataclass(frozen=True, eq=False)
 class Range:
-    """What rays go through, and where what was done is recorded; `looked` only if a report is to tell it."""
+    """What rays go through, and where what was done is recorded; `looked` only if a report is to tell it.
+
+    `whole` follows rays in one stretch, beyond their ends.
+    """
 
     items: Items
     stack: Stack
@@ -52,6 +55,7 @@ class Range:
     candidates: Candidates
     plan: Plan
     looked: Looked | None = None
+    whole: bool = False
 
 
 def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetings, Ends, Lines, Lines]:
@@ -92,6 +96,21 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     return met, ends_of(met, timed, through.stack, cost, ray), timed, relative
 
 
+def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
+    """Cells in which the whole length of rays touches any item, also refused ones, and out of bounds.
+
+    Returns
+    -------
+    the cells; and for each pair the ray as the item sees it
+    """
+    lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
+    row, rank = _pairs(rays, ray, lines, np.arange(len(rays)), (-np.inf, np.inf), through)
+    origin = rays.origin_xy[row]
+    boxes = through.stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
+    met = meet(_relative(lines, ray, row, rank, through), row, rank, boxes, through.stack, None, origin)
+    return met, _relative(lines, ray, met.ray, met.rank, through)
+
+
 def _relative(lines: Lines, ray: Traced, row: Ints, rank: Ints, through: Range) -> Lines:
     """Lines of pairs: a projectile flies by its velocity relative to the item."""
     own = lines.take(row)
@@ -113,7 +132,13 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
     """Distances at which rays are cut into stretches, px."""
     stack = through.stack
     endless = ray.hits_most is None and ray.budget_256 is None and not stack.occluder.any()
-    if endless or not len(stack) or through.candidates.prefilter.name == "none" or _moving(ray, through):
+    if (
+        through.whole
+        or endless
+        or not len(stack)
+        or through.candidates.prefilter.name == "none"
+        or _moving(ray, through)
+    ):
         return [-np.inf, np.inf]
     mean_wh, world_wh = stack.sizes
     per_px = len(stack) * float((mean_wh + 2 * lines.radius / SUB).sum() / world_wh.prod())

@@ -14,6 +14,7 @@ REASONS = {
     "excluded": "its owner is excluded",
     "outside": "out of bounds",
     "inside": "it started inside of it",
+    "tunnelled": "went through it between two tests",
 }
 
 NAME_MAX = 24
