@@ -18,7 +18,7 @@ from weapons.panel import NAMED_SIGNS, legend_of
 from weapons.picture import picture_of_report
 from weapons.raymarks import draw_rays
 from weapons.raywords import missed
-from weapons.signs import BADGE, BLUE, MINT, NEAR_MISS, ORANGE, SIGNS, THROUGH, YELLOW, sign_mark
+from weapons.signs import BADGE, BLUE, CROWDED, MINT, NEAR_MISS, ORANGE, SEVERAL, SIGNS, THROUGH, YELLOW, sign_mark
 from weapons.strokes import Strokes, within
 from weapons.world import World
 
@@ -112,6 +112,8 @@ def test_the_head_is_at_the_stop() -> None:
     tip = int(30.5 * FACTOR)
     assert tall[tip - 12] >= 9 and tall[tip - 40] <= 4, "the head is wider than the shaft"
     assert not inked[:, tip + 2 :].any()
+    sharp, _ = drawn(shot(ray((5, 10), (30, 10), (30, 10), "hits")))
+    assert not near(sharp.image, WHITE)[:, tip - 5 :].any(), "the shaft ends within the head"
     back, _ = drawn(shot(ray((30, 10), (5, 10), (5, 10), "occluder")))
     assert near(back.image, WHITE).sum(axis=0)[int(5.5 * FACTOR) + 12] >= 9, "it points where the ray goes"
 
@@ -165,6 +167,15 @@ def test_entries_are_numbered_and_exits_are_rings() -> None:
     assert not has(world, YELLOW, 15 + 1.5, 20 + 1.5, reach=0.8)
 
 
+def test_a_ray_that_ends_in_an_object_does_not_come_out() -> None:
+    a, b = (5, 20), (55, 20)
+    inside, _ = drawn(shot(ray(a, (30, 20), b, "budget", crossing(a, b, 0.3, 0.5, 0, (-5, 0)))))
+    assert "ray: goes in" in inside.painted and "ray: comes out" not in inside.painted
+    at_its_entry, texts = drawn(shot(ray(a, (30, 20), b, "hits", crossing(a, b, 0.5, 0.5, 0, (-5, 0)))))
+    assert not at_its_entry.painted & {"ray: goes in", "ray: comes out", f"ray: {THROUGH}"}
+    assert len(texts) == 1 and {"ray: normal", "ray: ends: last hit"} <= at_its_entry.painted
+
+
 def test_shots_of_many_rays_have_no_numbers_and_numbers_have_room() -> None:
     a, b = (5, 20), (55, 20)
     one = ray(a, b, b, "range", crossing(a, b, 0.2, 0.4, 0, (-5, 0)))
@@ -176,6 +187,16 @@ def test_shots_of_many_rays_have_no_numbers_and_numbers_have_room() -> None:
     assert 2 <= len(spots) < 9
     apart = [np.hypot(p[0] - q[0], p[1] - q[1]) for i, p in enumerate(spots) for q in spots[:i]]
     assert min(apart) > 2 * BADGE
+
+
+def test_of_many_rays_each_is_thinner() -> None:
+    one = ray((5, 10), (30, 10), (50, 10), "occluder")
+    inked = []
+    for count in (1, SEVERAL + 1, CROWDED + 1):
+        world, _ = drawn(shot(*[one] * count))
+        inked.append(int(world.image[:, : 20 * FACTOR].astype(int).sum()))
+        assert ("ray: beyond its end" in world.painted) == (count <= CROWDED)
+    assert inked[0] > 1.2 * inked[1] > 1.2 * 1.2 * inked[2] > 0
 
 
 def test_a_ray_out_of_view_draws_nothing() -> None:
@@ -237,6 +258,9 @@ def test_what_is_thick_has_an_outline_and_a_projectile_its_first_contact() -> No
     assert (
         has(flight, YELLOW, 40, 16, 0.2) and has(flight, YELLOW, 44.5, 20, 0.2) and not has(laser, YELLOW, 40, 16, 0.2)
     )
+    struck = ray((10, 20), (40, 20), (50, 20), "hits", crossing((10, 20), (50, 20), 0.75, 0.75, 0, (-5, 0)))
+    _, (text,) = drawn(shot(struck, radius=4.0), kind={"kind": "projectile", "radius": 4})
+    assert abs((text.y - 4) / FACTOR - 0.5 - 20) > 4 + BADGE / FACTOR, "a number beside it"
     missed, _ = drawn(shot(ray((10, 20), (50, 20), (50, 20)), radius=4.0), kind={"kind": "projectile", "radius": 4})
     assert "ray: first contact" not in missed.painted
 
@@ -455,7 +479,7 @@ def test_the_legend_tells_what_is_drawn_of_rays() -> None:
         draw_rays(world, report)
         words.append([e.word for e in legend_of(report, world.painted, 2000).entries if e.word in SIGNS])
     assert words == [
-        ["beyond its end", "near miss", "ray", THROUGH, "normal", "ends: occluder"],
+        ["beyond its end", "near miss", "ray", THROUGH, "ends: occluder", "normal"],
         ["what it sweeps", "ray"],
-        ["beyond its end", "ray", THROUGH, "ends: last hit"],
+        ["beyond its end", "ray", "ends: last hit"],
     ]

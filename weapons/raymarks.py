@@ -25,7 +25,7 @@ OF_RAYS = ("filtered", "occluded", "hit")
 
 INK = (18, 20, 24)
 
-CLEAR_OF = ("number", "goes in", "comes out", "ends: occluder", "ends: budget", "ray")
+CLEAR_OF = ("number", "first contact", "goes in", "comes out", "ends: occluder", "ends: budget", "ray")
 """Signs that a number may not cover."""
 
 
@@ -95,7 +95,8 @@ def _arrows(signs: Signs, world: World, shot: Mapping[str, Any]) -> None:
         signs.ray(begin, at, end, ray["stop"]["reason"])
         for told in ray["passes"]:
             into = world.placed(np.array([told["point"]]))[0]
-            signs.through(into, begin + (end - begin) * told["exit"])
+            if told["entry"] < ray["stop"]["fraction"]:  # else the head of the arrow is there
+                signs.through(into, begin + (end - begin) * told["exit"], told["exit"] < ray["stop"]["fraction"])
             normal = np.array(told["normal"], np.float64)
             if normal.any() and len(shot["rays"]) <= NUMBERED_MAX:
                 signs.normal(into, normal)
@@ -105,11 +106,12 @@ def _numbers(signs: Signs, world: World, shot: Mapping[str, Any]) -> Iterator[Te
     """Number the entries of few rays, each beside its point."""
     if len(shot["rays"]) > NUMBERED_MAX:
         return
+    radius = shot["radius"] * world.factor
     for ray in shot["rays"]:
         begin, end = world.placed(np.array([ray["start"], ray["end"]]))
         for told in ray["passes"]:
             into = world.placed(np.array([told["point"]]))[0]
-            spot = next(_spots(signs, into, end - begin, np.array(told["normal"])), None)
+            spot = next(_spots(signs, into, end - begin, np.array(told["normal"]), radius), None)
             if spot is not None:
                 signs.badge(spot)
                 label = str(told["order"] + 1)
@@ -117,8 +119,8 @@ def _numbers(signs: Signs, world: World, shot: Mapping[str, Any]) -> Iterator[Te
                 yield Text(x - 4 * len(label), y + 4, label, INK, bold=True)
 
 
-def _spots(signs: Signs, at: Floats, ahead: Floats, normal: Floats) -> Iterator[Floats]:
-    """Free places for a number beside a point of a ray, first on the side that the normal is not on."""
+def _spots(signs: Signs, at: Floats, ahead: Floats, normal: Floats, radius: float) -> Iterator[Floats]:
+    """Free places for a number beside a point of a ray of a radius, first on the side that the normal is not on."""
     length = float(np.sqrt((ahead**2).sum()))
     if not length:
         return
@@ -126,7 +128,7 @@ def _spots(signs: Signs, at: Floats, ahead: Floats, normal: Floats) -> Iterator[
     if (side * normal).sum() > 0 or ((side * normal).sum() == 0 and side[1] > 0):
         side = -side
     height, width = signs.shape
-    for far in (BADGE + 6, 2 * BADGE + 8):
+    for far in (radius + BADGE + 6, radius + 2 * BADGE + 8):
         for spot in (at + far * side, at - far * side):
             x, y = (int(v) for v in np.floor(np.clip(spot, -BADGE, (width, height))))
             reach = int(BADGE) + 2

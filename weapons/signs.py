@@ -8,7 +8,10 @@ from planes.arrays import Floats, Image
 from weapons.marks import MARKS
 from weapons.strokes import Strokes
 
-__all__ = ["BADGE", "MINT", "NEAR_MISS", "SIGNS", "Signs", "sign_mark"]
+__all__ = [
+    "BADGE", "BLUE", "CROWDED", "MINT", "NEAR_MISS", "ORANGE", "SEVERAL", "SIGNS", "THROUGH", "YELLOW", "Signs",
+    "sign_mark",
+]  # fmt: skip
 
 WHITE, ORANGE, BLUE = (255, 255, 255), MARKS["hit"][0], MARKS["occluded"][0]
 MINT, YELLOW = (120, 240, 190), (255, 236, 130)
@@ -23,13 +26,13 @@ SIGNS: dict[str, tuple[tuple[int, int, int], int, bool]] = {
     "near miss": (MINT, 255, True),
     "ray": (WHITE, 255, True),
     THROUGH: (ORANGE, 255, True),
-    "normal": (YELLOW, 255, True),
     "goes in": (ORANGE, 255, True),
     "comes out": (ORANGE, 255, True),
     "first contact": (YELLOW, 255, True),
     "ends: last hit": (ORANGE, 255, True),
     "ends: budget": (ORANGE, 255, True),
     "ends: occluder": (BLUE, 255, True),
+    "normal": (YELLOW, 255, True),
     "number": (ORANGE, 255, True),
 }
 """Colour, opacity and whether there is a dark ground, of what is told of rays, in the order of drawing."""
@@ -90,7 +93,7 @@ class Signs:
         if (stop != end).any() and not self.crowded:
             self.of("beyond its end").line(stop, end, FINE, DASH)
         shaft = self.of("ray")
-        shaft.line(begin, stop - ahead * (head / 2 if reason != "range" else 0.0), width)
+        shaft.line(begin, stop, width)
         if reason == "range":
             for side in (-1, 1):
                 back = stop - head * ahead * 0.85 + side * head * 0.5 * _across(ahead)
@@ -110,11 +113,12 @@ class Signs:
             reach = CROSS * self.size * slant
             self.of(ENDS["occluder"]).line(at - reach, at + reach, 2.6 * self.size)
 
-    def through(self, begin: Floats, end: Floats) -> None:
-        """Draw the part of a ray that lies in an object, and where it goes in and comes out."""
+    def through(self, begin: Floats, end: Floats, comes_out: bool = True) -> None:
+        """Draw the part of a ray that lies in an object, where it goes in, and where it comes out, if it does."""
         self.of(THROUGH).line(begin, end, 3.2 * self.size)
         self.of("goes in").line(begin, begin, 2 * DOT * self.size)
-        self.of("comes out").around(end, end, RING * self.size, 1.8 * self.size)
+        if comes_out:
+            self.of("comes out").around(end, end, RING * self.size, 1.8 * self.size)
 
     def normal(self, at: Floats, direction: Floats) -> None:
         """Draw the normal where a ray goes in."""
