@@ -369,3 +369,32 @@ def test_false_area_is_what_lies_in_a_volume_and_in_no_pixel(volumes_page: dict[
                 assert not (pixel & ~inside).any(), panel.name
                 told = volumes_page["false_area"](volume, int(mask.sum()))
                 assert (inside & ~pixel).sum() / pixel.sum() == pytest.approx(told, abs=0.02), panel.name
+
+
+# --- the picture of a shot at the past ------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rewind() -> dict[str, Any]:
+    """Names of the script that draws a shot at the past."""
+    return runpy.run_path(str(FIXTURES / "rewind.py"))
+
+
+def test_rewind_hits_what_was_seen_and_no_longer_is_there(rewind: dict[str, Any]) -> None:
+    then, now = rewind["strips"]()
+    assert then.report["now"]["tick"] == rewind["SEEN"] == rewind["TICKS"] - 1 - 9, "150 ms are 9 ticks of 60 a second"
+    assert rewind["outcome"](then.report) == "hits guard 1, partition, runner; ends at brick wall"
+    assert rewind["outcome"](now.report) == "hits partition; ends at brick wall"
+    assert [row["name"] for row in then.report["now"]["shots"][0]] == ["partition"]
+    assert {moved["name"] for moved in then.report["now"]["moved"]} == {"guard 1", "runner"}
+
+
+def test_rewind_is_drawn_as_in_the_folder(rewind: dict[str, Any]) -> None:
+    """All but what is near to text, which OpenCV draws as its version does."""
+    drawn, bare, sheet = read_png(FIXTURES / "rewind.png")[:, :, :3], rewind["page"](text=False), rewind["page"]()
+    assert drawn.shape == sheet.shape and (FIXTURES / "rewind.png").stat().st_size < 400_000
+    near = np.zeros(sheet.shape[:2], np.bool_)
+    for y, x in np.argwhere((sheet != bare).any(axis=2)).tolist():
+        near[max(y - 4, 0) : y + 5, max(x - 12, 0) : x + 13] = True
+    assert np.array_equal(drawn[~near], bare[~near]) and 0 < near.mean() < 0.05
+    assert (drawn[near] != bare[near]).any()
