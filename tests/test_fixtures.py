@@ -106,7 +106,7 @@ OUTCOMES: dict[str, list[tuple[str, str, list[str], list[str]]]] = {
         ("shotgun", "empty hit beyond", ["guard 3", "guard 4"], []),
         ("laser sweep", "empty hit occluded beyond", ["guard 5", "guard 6"], ["brick wall"]),
         ("arrow", "empty beyond", ["drone"], []),
-        ("arrow once a frame", "empty filtered", [], []),
+        ("arrow once a frame", "empty", [], []),
         ("sight", "empty occluded beyond", [], ["crate 1"]),
         ("laser", "empty hit occluded filtered outside beyond", ["guard 7"], ["brick wall"]),
     ],

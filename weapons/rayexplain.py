@@ -48,6 +48,31 @@ class Miss(NamedTuple):
     object_xy: tuple[float, float]
 
 
+class _Keyed:
+    """Cells of rays, to be found by where they are; of a projectile some that it touches lie beside its own path."""
+
+    def __init__(self, ray: Ints, x: Ints, y: Ints) -> None:
+        self._keys = self._key(ray, x, y)
+        self._order = np.argsort(self._keys)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def places(self, ray: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Numbers of the cells that are there, and which of those asked for these are."""
+        wanted = self._key(ray, x, y)
+        if not len(self):
+            return wanted[:0], wanted[:0]
+        at = self._order[np.minimum(np.searchsorted(self._keys, wanted, sorter=self._order), len(self) - 1)]
+        found = np.flatnonzero(self._keys[at] == wanted)
+        return at[found], found
+
+    @staticmethod
+    def _key(ray: Ints, x: Ints, y: Ints) -> Ints:
+        half = 1 << (REACH_BITS - 1)
+        return np.asarray((((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half)
+
+
 @dataclass(frozen=True, eq=False)
 class RayDetail:
     """Rays cell by cell.
@@ -86,37 +111,46 @@ class RayDetail:
     @cached_property
     def cells(self) -> tuple[Ints, Ints, Ints, Ints]:
         """Every cell as (ray, pixel (K, 2), verdict, rank of what decided it), in the order of the walk."""
-        rays, ends = self.rays, self.ends
+        rays = self.rays
         ray, xy, entry, _, scale = cells(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
         at = xy - rays.origin_xy[ray]
-        keys = _keys(ray, at[:, 0], at[:, 1])
-        place = np.argsort(keys)
-        verdict, rank = np.full(len(ray), Verdict.EMPTY, np.int64), np.full(len(ray), -1)
-        stopped = np.flatnonzero(ends.reason == Reason.OCCLUDER)
-        for met, told in ((self.every, Verdict.FILTERED), (self.walked, Verdict.HIT)):
-            order = np.argsort(-met.rank[met.pair], kind="stable")  # of several in one cell the front-most counts
-            pair = met.pair[order]
-            _mark(verdict, rank, keys, place, met.ray[pair], met.x[order], met.y[order], told, met.rank[pair])
-            if told == Verdict.FILTERED:
-                where = stopped, ends.x[stopped], ends.y[stopped]
-                _mark(verdict, rank, keys, place, *where, Verdict.OCCLUDED, ends.rank[stopped])
-        if (scale == self.lines.scale).all():
-            here = (at[:, 1] == ends.y[ray]) & (at[:, 0] == ends.x[ray])
-            before = (at[:, 1] < ends.y[ray]) | ((at[:, 1] == ends.y[ray]) & (at[:, 0] < ends.x[ray]))
-            time = ends.time[ray]
-            beyond = (entry > time) | ((entry == time) & ~here & (ends.alone[ray] | ~before))
-        else:
-            beyond = entry / scale[ray] > ends.fraction[ray]
+        every = _Keyed(ray, at[:, 0], at[:, 1])
+        verdict, rank = self._met(every)
+        beyond = self._beyond(ray, at, entry, scale)
         verdict[beyond], rank[beyond] = Verdict.BEYOND, -1
         if self.bounds is not None:
             outside = ((xy < self.bounds[:2]) | (xy > self.bounds[2:])).any(axis=1)
             verdict[outside], rank[outside] = Verdict.OUTSIDE, -1
         blocked = np.zeros(len(ray), np.bool_)
         walls = self.met.take(np.flatnonzero(self.stack.occluder[self.met.rank]))
-        found = _places(keys, place, _keys(walls.ray[walls.pair], walls.x, walls.y))[0]
-        blocked[found] = True
+        blocked[every.places(walls.ray[walls.pair], walls.x, walls.y)[0]] = True
         order = np.lexsort((xy[:, 0], xy[:, 1], ~blocked, entry, ray))
         return ray[order], xy[order], verdict[order], rank[order]
+
+    def _met(self, every: _Keyed) -> tuple[Ints, Ints]:
+        """Verdict of each cell by what is met there, and the rank of that; the front-most of several counts."""
+        verdict, rank = np.full(len(every), Verdict.EMPTY, np.int64), np.full(len(every), -1)
+        skipped = self.every.take(np.flatnonzero(self.refuses | (not self.in_steps)))
+        stopped, ends = np.flatnonzero(self.ends.reason == Reason.OCCLUDER), self.ends
+        for met, told in ((skipped, Verdict.FILTERED), (self.walked, Verdict.HIT)):
+            order = np.argsort(-met.rank[met.pair], kind="stable")
+            pair = met.pair[order]
+            cell, found = every.places(met.ray[pair], met.x[order], met.y[order])
+            verdict[cell], rank[cell] = told, met.rank[pair][found]
+            if told == Verdict.FILTERED:
+                cell, found = every.places(stopped, ends.x[stopped], ends.y[stopped])
+                verdict[cell], rank[cell] = Verdict.OCCLUDED, ends.rank[stopped][found]
+        return verdict, rank
+
+    def _beyond(self, ray: Ints, at: Ints, entry: Ints, scale: Ints) -> Bools:
+        """Which cells come after the end of their ray."""
+        ends = self.ends
+        if (scale != self.lines.scale).any():  # of a projectile, whose times are parts of the frame
+            return np.asarray(entry / scale[ray] > ends.fraction[ray])
+        x, y, time = ends.x[ray], ends.y[ray], ends.time[ray]
+        here = (at[:, 1] == y) & (at[:, 0] == x)
+        before = (at[:, 1] < y) | ((at[:, 1] == y) & (at[:, 0] < x))
+        return np.asarray((entry > time) | ((entry == time) & ~here & (ends.alone[ray] | ~before)))
 
     def samples(self) -> Samples:
         """Cells as samples."""
@@ -129,26 +163,6 @@ class RayDetail:
         n = len(Verdict)
         column = self.rays.shot[ray] * n + verdict
         return np.bincount(column, minlength=len(self.shots) * n).reshape(-1, n)
-
-
-def _keys(ray: Ints, x: Ints, y: Ints) -> Ints:
-    half = 1 << (REACH_BITS - 1)
-    return (((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half
-
-
-def _mark(
-    verdict: Ints, rank: Ints, keys: Ints, place: Ints, ray: Ints, x: Ints, y: Ints, told: Verdict, ranks: Ints
-) -> None:
-    """Give cells a verdict and what decided it; of a projectile some lie beside its own path."""
-    cell, found = _places(keys, place, _keys(ray, x, y))
-    verdict[cell], rank[cell] = told, ranks[found]
-
-
-def _places(keys: Ints, place: Ints, wanted: Ints) -> tuple[Ints, Ints]:
-    """Cells of some keys, and the numbers of the keys that there are; `place` sorts the cells by their keys."""
-    at = np.minimum(np.searchsorted(keys, wanted, sorter=place), max(len(keys) - 1, 0))
-    found = np.flatnonzero(keys[place[at]] == wanted) if len(keys) else at[:0]
-    return place[at[found]], found
 
 
 def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
