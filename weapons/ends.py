@@ -7,7 +7,7 @@ items from the front.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any
 
@@ -55,6 +55,11 @@ class Ends:
     rank: Ints
     alone: Bools
     fraction: Floats
+
+    def replaced(self, rays: Bools, other: Ends) -> Ends:
+        """These ends, but for some rays those of another list."""
+        columns = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return Ends(*(np.where(rays, new, old) for old, new in columns))
 
     def walked(self, met: Meetings) -> Bools:
         """Which cells (K,) of meetings were walked before the end."""

@@ -79,12 +79,16 @@ class Meetings:
         return Meetings(self.ray[pairs], self.rank[pairs], count, *columns)
 
     @classmethod
+    def none(cls) -> Meetings:
+        """No pairs."""
+        return cls(*[np.zeros(0, np.int64)] * 7)
+
+    @classmethod
     def joined(cls, parts: Sequence[Meetings]) -> Meetings:
         """All pairs of several lists."""
         if len(parts) == 1:
             return parts[0]
-        none = np.zeros(0, np.int64)
-        every = [cls(none, none, none, none, none, none, none), *parts]
+        every = [cls.none(), *parts]
         names = ("ray", "rank", "count", "x", "y", "entry", "leave")
         return cls(*(np.concatenate([getattr(part, name) for part in every]) for name in names))
 

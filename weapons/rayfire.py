@@ -5,7 +5,7 @@ scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> pas
 
 from __future__ import annotations
 
-from planes.constants import CHUNK_PAIRS, CHUNK_ROWS
+from planes.constants import CHUNK_SAMPLES
 from planes.items import Role
 from planes.scene import Scene
 from weapons.hits import Rows
@@ -19,6 +19,10 @@ from weapons.weapon import Weapon
 
 __all__ = ["fired_rays"]
 
+RAYS_FIRST, RAYS_MOST = 128, 1024
+"""Rays of the first part of a batch, and of the largest: larger parts make nothing faster. A part has twice the rays of
+the one before unless that met many cells."""
+
 
 def fired_rays(
     scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, prefilter: object, broadphase: object
@@ -29,10 +33,11 @@ def fired_rays(
     each = (burst.count if burst else 1) * (several.count if several else 1)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, each * len(shots))
     through = Range(scene.items, stack, scene.bounds, candidates, plan)
-    most = CHUNK_PAIRS // max(len(stack), 1) if candidates.index is None else CHUNK_ROWS
-    step = max(1, min(most, CHUNK_ROWS) // each)
-    rows, passes, stops = [], [], []
-    for begin in range(0, max(len(shots), 1), step):
+    rows: list[Rows] = []
+    passes: list[Passes] = []
+    stops: list[Stops] = []
+    begin, step = 0, max(RAYS_FIRST // each, 1)
+    while not rows or begin < len(shots):
         some = shots.take(begin, min(begin + step, len(shots)))
         rays = rays_of(parts, some)
         plan.run("rays", "both ends on the grid", rays.start_256.nbytes * 2)
@@ -43,6 +48,8 @@ def fired_rays(
         stops.append(stops_of(met, ends, rays, lines, relative, stack))
         for columns in (rows[-1], passes[-1], stops[-1]):
             columns.shot[:] += begin
+        begin += step
+        step = max(1, min(2 * step, RAYS_MOST // each, step * CHUNK_SAMPLES // max(len(met.x), 1)))
     _leave_out_unused(plan, scene, candidates.why_unindexed, ray.fades)
     return RayHits(Rows.joined(rows), Passes.joined(passes), Stops.joined(stops), scene, weapon, shots, plan)
 

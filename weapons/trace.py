@@ -112,11 +112,13 @@ class Lines:
         if self.radius >= DIAGONAL:
             return entry, exit_
         first, last = self._thin_times(line, x, y)
-        axis = np.maximum(np.abs(self.step), 1).prod(axis=1)[line].astype(object)
+        axis = np.maximum(np.abs(self.step), 1).prod(axis=1)[line]
         length2 = self.length2[line]
         beside = np.abs(SUB * np.stack([x, y], axis=1) - self.start[line]) > HALF
         thin = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
-        first, last = (np.where(thin, time, 0).astype(object) for time in (first, last))  # products leave int64
+        first, last = np.where(thin, first, 0), np.where(thin, last, 0)
+        if int(last.max(initial=0)) * int(length2.max(initial=0)) >= ROOM:
+            first, last, axis = first.astype(object), last.astype(object), axis.astype(object)
         first = np.asarray(-(-first * length2 // axis), np.int64)
         last = np.asarray(last * length2 // axis, np.int64)
         thick = entry <= exit_

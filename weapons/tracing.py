@@ -77,23 +77,21 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
     edges = _edges(lines, ray, through)
     length = _lengths(lines)
-    live = np.arange(len(rays))
-    found = []
+    live = np.ones(len(rays), np.bool_)
+    found, told = [], ends_of(Meetings.none(), timed, through.stack, cost, ray)
+    pending = Meetings.none()
     for near, far in pairwise(edges):
-        pairs = _pairs(rays, ray, lines, live, (near, far), through)
+        pairs = _pairs(rays, ray, lines, np.flatnonzero(live), (near, far), through)
         possible = len(rays) * len(through.stack) if near == -np.inf else 0
         found.append(_touched(rays, ray, lines, shots, pairs, possible, through))
-        if far == np.inf:
-            break
-        so_far = np.zeros(len(rays), np.bool_)
-        so_far[live] = True
-        ends = ends_of(Meetings.joined([met.of_rays(so_far) for met in found]), timed, through.stack, cost, ray)
-        live = live[(ends.fraction[live] + SLACK) * length[live] >= far]
-        if not len(live):
+        pending = Meetings.joined([pending.of_rays(live), found[-1]]) if len(found) > 1 else found[0]
+        ends = ends_of(pending, timed, through.stack, cost, ray)
+        told = told.replaced(live, ends)
+        live &= (ends.fraction + SLACK) * length >= far
+        if not live.any():
             break
     met = Meetings.joined(found)
-    relative = _relative(lines, ray, met.ray, met.rank, through)
-    return met, ends_of(met, timed, through.stack, cost, ray), timed, relative
+    return met, told, timed, _relative(lines, ray, met.ray, met.rank, through)
 
 
 def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
