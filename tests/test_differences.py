@@ -293,3 +293,19 @@ def test_words_about_rays() -> None:
     lost = copy.deepcopy(fans[0])
     del lost["shots"][0]["rays"][1]
     assert differences(fans[0], lost) == ["shot 0 (spread at 200, 180): ray 1 is missing"]
+
+
+def test_of_rays_what_has_no_words_is_told_beside_what_has() -> None:
+    one = told(game(), Rifle(60), (190, 104), aim=0)
+    other = copy.deepcopy(one)
+    (ray,) = other["shots"][0]["rays"]
+    ray["stop"]["distance"] += 2
+    ray["end"][0] += 1
+    other["shots"][0]["rays"] = [ray, "torn"]
+    here = "shot 0 (rifle at 190, 104): ray: "
+    lines = differences(one, other)
+    assert f"{here}stopped at house, 6.5 px (occluder), was 4.5 px" in lines
+    assert f"{here}end[0]: 251, was 250" in lines
+    other["shots"][0]["rays"] = [*one["shots"][0]["rays"], "torn"]
+    other["shots"][0]["seed"] = 7
+    assert "shot 0 (rifle at 190, 104): rays: 2 entries, was 1" in differences(one, other)
