@@ -111,7 +111,10 @@ class RayDetail:
     @cached_property
     def cells(self) -> tuple[Ints, Ints, Ints, Ints]:
         """Every cell as (ray, pixel (K, 2), verdict, rank of what decided it), in the order of the walk."""
-        rays = self.rays
+        rays, wide = self.rays, 2 * (self.lines.radius // SUB) + 3
+        most = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
+        if most > DETAIL_SAMPLES_MAX:
+            raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {most}")
         ray, xy, entry, _, scale = cells(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
         at = xy - rays.origin_xy[ray]
         every = _Keyed(ray, at[:, 0], at[:, 1])
@@ -168,10 +171,6 @@ class RayDetail:
 def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     """Walk shots cell by cell."""
     stack, rays = scene.items.stack(), rays_of(parts, shots)
-    wide = 2 * (parts[2].radius_256 // SUB) + 3
-    samples = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
-    if samples > DETAIL_SAMPLES_MAX:
-        raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {samples}")
     through = Range(scene.items, stack, scene.bounds, Candidates(scene.items, stack), Plan(), whole=True)
     met, ends, lines, _ = trace(rays, parts[2], shots, through)
     every, relative = touching(rays, parts[2], through)
