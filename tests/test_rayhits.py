@@ -71,20 +71,21 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("weapons.rayfire.trace", lambda *given, calls=calls: calls.append(1) or trace(*given))
-            patch.setattr("weapons.rayfire.CHUNK_PAIRS", chunk * 8)
-            patch.setattr("weapons.rayfire.CHUNK_ROWS", chunk)
+            patch.setattr("weapons.rayfire.RAYS_FIRST", chunk)
+            patch.setattr("weapons.rayfire.RAYS_MOST", chunk)
+            patch.setattr("weapons.candidates.CHUNK_PAIRS", chunk * 8)
             patch.setattr("weapons.meetings.CHUNK_SAMPLES", chunk)
             cut = fired(battle, scene=scene, **options)
             assert len(calls) == 9 if chunk == 1 else len(calls) <= 9
         same(whole, cut)
 
 
-@pytest.mark.parametrize("pairs", [1, 4, 2**21])
+@pytest.mark.parametrize("rays", [1, 4, 128])
 @pytest.mark.parametrize("bad", [[0], [3], [5], [2, 4]])
 def test_a_start_inside_is_named_by_its_row_in_any_part(
-    pairs: int, bad: list[int], monkeypatch: pytest.MonkeyPatch
+    rays: int, bad: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("weapons.rayfire.CHUNK_PAIRS", pairs)
+    monkeypatch.setattr("weapons.rayfire.RAYS_FIRST", rays)
     for around in ({}, {"sweep": (30.0, 3)}, {"rounds": (2, (0.0, 0.0), 5.0)}):
         gun = Gun(range=9, inside="error", **around)  # type: ignore[arg-type]
         shots = [Shot((20 if i in bad else 0, 20)) for i in range(6)]
