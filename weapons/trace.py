@@ -106,26 +106,36 @@ class Lines:
 
     def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """When segments enter and leave cells; one that is not met is left before it is entered."""
+        (entry, leave), *others = self.spells(line, x, y)
+        for first, last in others:
+            met, also = entry <= leave, first <= last
+            entry, leave = (
+                np.where(also & (~met | (first < entry)), first, entry),
+                np.where(also & (~met | (last > leave)), last, leave),
+            )
+        return entry, leave
+
+    def spells(self, line: Ints, x: Ints, y: Ints) -> list[tuple[Ints, Ints]]:
+        """When the disc around a segment's point covers the centres of cells, and when the point is in their squares.
+
+        Of thin segments the second only, of wide ones the first: it is the longer.
+        """
         if not self.radius:
-            return self._thin_times(line, x, y)
-        entry, exit_ = self._thick_times(line, x, y)
-        if self.radius >= DIAGONAL:
-            return entry, exit_
+            return [self._thin_times(line, x, y)]
+        wide = self._thick_times(line, x, y)
+        return [wide] if self.radius >= DIAGONAL else [wide, self._axis_times(line, x, y)]
+
+    def _axis_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Times of the point of a thick segment over its own scale: rounded up and down."""
         first, last = self._thin_times(line, x, y)
-        axis = np.maximum(np.abs(self.step), 1).prod(axis=1)[line]
-        length2 = self.length2[line]
+        axis, length2 = np.maximum(np.abs(self.step), 1).prod(axis=1)[line], self.length2[line]
         beside = np.abs(SUB * np.stack([x, y], axis=1) - self.start[line]) > HALF
-        thin = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
-        first, last = np.where(thin, first, 0), np.where(thin, last, 0)
+        met = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
+        first, last = np.where(met, first, 0), np.where(met, last, 0)
         if int(last.max(initial=0)) * int(length2.max(initial=0)) >= ROOM:
             first, last, axis = first.astype(object), last.astype(object), axis.astype(object)
-        first = np.asarray(-(-first * length2 // axis), np.int64)
-        last = np.asarray(last * length2 // axis, np.int64)
-        thick = entry <= exit_
-        return (
-            np.where(thin & (~thick | (first < entry)), first, entry),
-            np.where(thin & (~thick | (last > exit_)), last, exit_),
-        )
+        entry, leave = np.asarray(-(-first * length2 // axis), np.int64), np.asarray(last * length2 // axis, np.int64)
+        return np.where(met, entry, 1), np.where(met, leave, 0)
 
     def entered_by(self, line: Ints, x: Ints, y: Ints) -> Ints:
         """Outward side (n, 2) by which cells are entered; (0, 0) if the segment begins strictly inside."""

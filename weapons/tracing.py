@@ -17,11 +17,12 @@ from planes.items import Items, Stack
 from planes.spans import Box
 from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, ends_of
+from weapons.flight import at_steps, common_scale, in_frame, is_moving, relative_lines
 from weapons.guns import Projectile, Traced
 from weapons.meetings import Meetings, meet, stretches
 from weapons.plan import Plan
 from weapons.rays import Rays
-from weapons.trace import COMMON, Lines
+from weapons.trace import Lines
 from weapons.volley import Shots
 
 __all__ = ["touching", "Looked", "Range", "trace"]
@@ -73,7 +74,7 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     """
     lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
     cost = through.items.cost[through.stack.ids]
-    common = _steps_of(ray) or (COMMON if _moving(ray, through) else 0)
+    common = common_scale(ray, through.items, through.stack)
     timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
     edges = _edges(lines, ray, through)
     length = _lengths(lines)
@@ -91,7 +92,7 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
         if not live.any():
             break
     met = Meetings.joined(found)
-    return met, told, timed, _relative(lines, ray, met.ray, met.rank, through)
+    return met, told, timed, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
 
 def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
@@ -105,20 +106,16 @@ def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
     row, rank = _pairs(rays, ray, lines, np.arange(len(rays)), (-np.inf, np.inf), through)
     origin = rays.origin_xy[row]
     boxes = through.stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
-    met = meet(_relative(lines, ray, row, rank, through), row, rank, boxes, through.stack, None, origin)
-    return met, _relative(lines, ray, met.ray, met.rank, through)
-
-
-def _relative(lines: Lines, ray: Traced, row: Ints, rank: Ints, through: Range) -> Lines:
-    """Lines of pairs: a projectile flies by its velocity relative to the item."""
-    own = lines.take(row)
-    if not isinstance(ray, Projectile):
-        return own
-    return Lines(own.start, own.step - through.items.velocity_256[through.stack.ids[rank]], ray.radius_256)
-
-
-def _moving(ray: Traced, through: Range) -> bool:
-    return isinstance(ray, Projectile) and bool(through.items.velocity_256[through.stack.ids].any())
+    met = meet(
+        relative_lines(lines, ray, row, through.stack.ids[rank], through.items),
+        row,
+        rank,
+        boxes,
+        through.stack,
+        None,
+        origin,
+    )
+    return met, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
 
 def _lengths(lines: Lines) -> Floats:
@@ -135,7 +132,7 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
         or endless
         or not len(stack)
         or through.candidates.prefilter.name == "none"
-        or _moving(ray, through)
+        or is_moving(ray, through.items, through.stack)
     ):
         return [-np.inf, np.inf]
     mean_wh, world_wh = stack.sizes
@@ -158,7 +155,7 @@ def _pairs(
     stack = through.stack
     if not len(live) or not len(stack):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    if _moving(ray, through):
+    if is_moving(ray, through.items, through.stack):
         return _moving_pairs(rays, ray, lines, live, through)
     if through.candidates.prefilter.name == "none":
         row, rank = through.candidates.meeting(np.zeros((len(live), 4), np.int64))
@@ -183,7 +180,7 @@ def _moving_pairs(rays: Rays, ray: Traced, lines: Lines, live: Ints, through: Ra
     for first in range(0, len(live), step):
         some = live[first : first + step]
         row, rank = np.repeat(some, len(stack)), np.tile(np.arange(len(stack)), len(some))
-        relative = _relative(lines, ray, row, rank, through)
+        relative = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
         kept = np.isfinite(_enters(rays.origin_xy[row], relative, stack.box_xyxy[rank]))
         found.append((row[kept], rank[kept]))
     row, rank = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -229,7 +226,7 @@ def _touched(
     row, rank = pairs
     accepted = np.flatnonzero(~refused(stack, rank, shots, rays.shot[row]))
     row, rank = row[accepted], rank[accepted]
-    own = _relative(lines, ray, row, rank, through)
+    own = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
     origin = rays.origin_xy[row]
     boxes = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
     wanted = through.candidates.prefilter
@@ -244,39 +241,14 @@ def _touched(
     plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
     met = meet(own, row, rank, boxes, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
-    if isinstance(ray, Projectile):
-        key = row * len(stack) + rank
-        own = own.take(np.searchsorted(key, met.ray * len(stack) + met.rank))
-        met = _in_frame(met, own, _moving(ray, through))
-    met = _started(met, rays, ray, shots, stack)
-    steps = _steps_of(ray)
-    if steps is not None:
-        met = _at_steps(met, COMMON if _moving(ray, through) else lines.scale[met.ray][met.pair], steps)
-    return met
-
-
-def _steps_of(ray: Traced) -> int | None:
-    return ray.steps if isinstance(ray, Projectile) else None
-
-
-def _in_frame(met: Meetings, own: Lines, moving: bool) -> Meetings:
-    """Times of a projectile as parts of the frame: what it rests on it touches all the time.
-
-    Where items move, the times over the scales of their pairs become times over one scale for all.
-    """
-    scale = own.scale[met.pair]
-    entry, leave = met.entry, np.where((own.length2 == 0)[met.pair], scale, met.leave)
-    if moving:
-        entry, leave = (np.asarray(t.astype(object) * COMMON // scale, np.int64) for t in (entry, leave))
-    return met.at_times(entry, leave)
-
-
-def _at_steps(met: Meetings, scale: Ints | int, steps: int) -> Meetings:
-    """Cells that are touched at one of the moments k / steps: the first and the last of those, as k."""
-    first = np.maximum(-(-met.entry.astype(object) * steps // scale), 1)
-    last = met.leave.astype(object) * steps // scale
-    told = met.at_times(np.asarray(first, np.int64), np.asarray(last, np.int64))
-    return told.only(told.entry <= told.leave)
+    if not isinstance(ray, Projectile):
+        return _started(met, rays, ray, shots, stack)
+    moving = is_moving(ray, through.items, stack)
+    own = relative_lines(lines, ray, met.ray, stack.ids[met.rank], through.items)
+    met = _started(in_frame(met, own, moving), rays, ray, shots, stack)
+    if ray.steps is None:
+        return met
+    return at_steps(met, relative_lines(lines, ray, met.ray, stack.ids[met.rank], through.items), ray.steps)
 
 
 def _started(met: Meetings, rays: Rays, ray: Traced, shots: Shots, stack: Stack) -> Meetings:
