@@ -280,7 +280,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "stencil, empty": (lambda: Stencil([]), r"mask: expected shape \(any, any\), got \(0,\)"),
     "stencil, uneven": (lambda: Stencil(["##", "#"]), r"mask\[1\]: expected 2 of '#' and '.', got '#'"),
     "pellet, a name": (
-        lambda: Spread("disc", 3, 1), "pellet: expected a weapon of one pattern, got 'disc'"),  # type: ignore[arg-type]
+        lambda: Spread("disc", 3, 1), "pellet: expected a weapon of one pattern or ray, got 'disc'"),  # type: ignore[arg-type]
     "pellets, none": (lambda: Spread(Disc(1), 0, 1), "count: expected a whole number from 1 to 65536, got 0"),
     "rounds of rounds": (
         lambda: Rounds(Rounds(Disc(1), 2), 2), "weapon: expected a weapon other than rounds"),  # type: ignore[arg-type]
@@ -301,7 +301,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "weapon: pellet: radius: expected a number from 0 .*got -1"),
     # fire
     "fire at no scene": (
-        lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene, got NoneType"),  # type: ignore[arg-type]
+        lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
     "fire no weapon": (lambda: shot(weapon="disc"), "weapon: expected a weapon, got str"),
     "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got type"),
     "aim, NaN": (lambda: shot(aim=math.nan), "aim.*: expected a finite number, got nan"),

@@ -648,7 +648,7 @@ def test_what_is_no_weapon_is_refused(weapon: Any) -> None:
 
 
 def test_what_is_no_scene_is_refused() -> None:
-    with pytest.raises(InputError, match="scene: expected a Scene, got str"):
+    with pytest.raises(InputError, match="scene: expected a Scene or a History, got str"):
         fire("scene", Disc(1), (0, 0))  # type: ignore[arg-type]
 
 
