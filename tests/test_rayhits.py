@@ -67,6 +67,7 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     note(repr(battle))
     scene = battle.scene()
     whole = fired(battle, scene=scene)
+    assert sorted(set(whole.stop.shot.tolist())) == list(range(9))
     for options in ({}, {"prefilter": "none"}, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:
@@ -147,7 +148,8 @@ def test_hits_are_equal_when_rows_passes_and_stops_are() -> None:
     battle = Battle(Gun("rifle", range=20, max_hits=3), [Shot((0, 0)), Shot((0, 9))], [bar(4, 6), bar(9, 9)])
     hits = fired(battle)
     assert hits == fired(battle) and hits == fired(battle, prefilter="none")
-    assert hits != fired(replace(battle, gun=replace(battle.gun, range=21))), "the stop alone differs"
+    empty = replace(battle, bodies=[])
+    assert fired(empty) != fired(replace(empty, gun=replace(battle.gun, range=21))), "the stops alone differ"
     longer = replace(battle, bodies=[bar(4, 6), bar(9, 9), Body(frozenset({(4, 20)}))])
     assert hits == fired(longer)
     thinner = fired(replace(battle, bodies=[Body(frozenset({(4, 0), (5, 0), (6, 0), (4, 1)})), bar(9, 9)]))

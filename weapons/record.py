@@ -62,8 +62,9 @@ LINE = Keys(
     ("scene", "weapon", "at", "direction", "accept", "exclude", "seed", "shot", "result", "hash"),
 )
 
-AT_ONCE, BYTES_AT_ONCE = 4096, 2**22
-"""Shots, and bytes of their lines, that are fired again in one call, if they are of one weapon on one scene."""
+AT_ONCE, BYTES_AT_ONCE = 1024, 2**21
+"""Shots, and bytes of their lines, that are fired again in one call, if they are of one weapon on one scene: more would
+be no faster, and take more memory."""
 
 NUMBER_MAX = 2**63
 """No number of a result is larger, either way."""
