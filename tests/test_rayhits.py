@@ -283,7 +283,7 @@ def squared(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction], cell: Pi
 @settings(max_examples=60, deadline=None)
 @given(worlds)
 def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
-    battle = replace(many(rng, 2), bounds=None)
+    battle = many(rng, 2)
     bodies = battle.bodies[:3]
     bodies += [some_body(rng, len(bodies)).moved(9, 5), some_body(rng, len(bodies)).moved(-9, 2)]
     battle = replace(battle, bodies=bodies)
@@ -340,6 +340,12 @@ def test_the_nearest_miss_in_a_picture() -> None:
     behind = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [bodies[0], bodies[1], bodies[2]]))
     assert behind.stop.distance.tolist() == [8.5]
     assert behind.nearest_miss() == (2, 0, 0, 4.0, (8.5, 0.0), (12.5, 0.0))
+    corner = Body(frozenset({(3, 8), (3, 9), (12, -8), (12, -9)}))
+    for two in ([corner, bar(5, 6, 3, 4)], [bar(5, 6, 3, 4), corner]):  # a box that is crossed, and its pixels far
+        near = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], two)).nearest_miss()
+        assert near is not None and near[0] == 1 - two.index(corner) and near.distance == 2.5
+    outside = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [bar(13, 14)], (0, 0, 9, 9)))
+    assert (outside.nearest_miss() or [None] * 4)[3] == 0.0, "the way goes through it"
     wide = fired(Battle(Gun("laser", range=20, width=4), [Shot((0, 0), accept=1)], [bodies[3]]))
     assert (wide.nearest_miss() or [None] * 4)[3] == 1.5
     assert fired(Battle(Gun(range=20), [Shot((0, 0))], [bodies[0]])).nearest_miss() is None
@@ -373,6 +379,30 @@ def test_why_an_object_was_not_hit(name: str) -> None:
     assert hits.why_not() == [told]
     if told[1] == "missed":
         assert hits.nearest_miss() is not None
+
+
+def test_what_a_projectile_slips_past() -> None:
+    """It lies between two tests, or it moved away; in a world with and without bounds."""
+    for scene in (Scene(), Scene((90, 90), (-9, -9))):
+        board = scene.add(np.ones((9, 2), bool), (15, 0), velocity_xy=(0, 0))
+        through = fire(scene, Projectile(40, 1, steps=1), (0, 0))
+        assert through.why_not() == [(board, "tunnelled", 6, {}, 0.0)] and not through
+        assert fire(scene, Projectile(40, 1), (0, 0)).object.tolist() == [board]
+        scene.set(board, velocity_xy=(0, 60))
+        away = fire(scene, Projectile(40, 1), (0, 0))
+        assert not away and away.why_not()[0][:3] == (board, "missed", 0)
+        for weapon in (Projectile(40, 1), Projectile(40, 1, steps=2)):
+            ignored = fire(scene, replace(weapon, inside="ignore_until_exit"), (15, 0))
+            assert ignored.why_not()[0][:2] == (board, "inside") and not ignored
+
+
+def test_what_lies_partly_out_of_bounds() -> None:
+    edge = Scene((20, 20))
+    half = edge.add(np.ones((3, 6), bool), (20, 10))
+    assert fire(edge, Projectile(40, 1, steps=1), (10, 10)).why_not()[0][:2] == (half, "tunnelled")
+    assert [fire(edge, Laser(9), at, aim=90).why_not()[0][:2] for at in ((25, 10), (21, 5))] == [
+        (half, "missed"), (half, "outside"),
+    ]  # fmt: skip
 
 
 def test_why_not_looks_32_px_around_and_tells_the_nearest_first() -> None:
@@ -494,8 +524,13 @@ def test_a_long_thick_ray_tells_all_but_its_cells() -> None:
     assert [why[:2] for why in hits.why_not()] == [(2, "behind"), (3, "missed")]
     assert {key: len(spans.pixels()) for key, spans in hits.pixels_at().items()} == {(0, 0): 3, (0, 1): 1}
     assert hits.blockers() == []
+
+
+def test_cells_that_are_too_many_are_refused_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("weapons.rayexplain.DETAIL_SAMPLES_MAX", 500)
+    hits = fired(Battle(Gun("rifle", range=100, width=9, max_hits=1), [Shot((0, 0))], [bar(9, 9), bar(50, 50)]))
     for ask in (hits.samples_at, hits.verdict_counts, lambda: hits.verdicts):
-        with pytest.raises(
-            InputError, match=r"samples: expected a shot of at most 33554432 to tell one by one, got \d+"
-        ):
+        with pytest.raises(InputError, match=r"samples: expected a shot of at most 500 to tell one by one, got 1221"):
             ask()
+    assert [why.object for why in hits.why_not()] == [1] and hits.nearest_miss() is not None
+    assert list(hits.pixels_at()) == [(0, 0)] and hits.blockers() == []
