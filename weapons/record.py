@@ -69,9 +69,6 @@ be no faster, and take more memory."""
 NUMBER_MAX = 2**63
 """No number of a result is larger, either way."""
 
-STOPPED = ("reason", "item", "distance")
-"""Columns of the end of a ray that its words tell."""
-
 
 class Difference(NamedTuple):
     """The first shot of a record that differs: its line in the file, from 1, its number, and how."""
