@@ -84,6 +84,7 @@ class RayDetail:
     every : cells in which their whole length touches any item, also outside of the bounds
     entered : when each pair of `every` begins, as a part of the ray
     in_steps : whether the rays are tested at some moments only
+    ignores : whether they ignore what they start in
     """
 
     stack: Stack
@@ -96,6 +97,7 @@ class RayDetail:
     every: Meetings
     entered: Floats
     in_steps: bool
+    ignores: bool
 
     @cached_property
     def walked(self) -> Meetings:
@@ -176,7 +178,8 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     every, relative = touching(rays, parts[2], through)
     entered = every.entry[every.first] / relative.scale
     steps = parts[2].steps if isinstance(parts[2], Projectile) else None
-    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, entered, steps is not None)
+    rules = steps is not None, parts[2].inside == "ignore_until_exit"
+    return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, entered, *rules)
 
 
 def pixels_of(detail: RayDetail) -> dict[tuple[int, int], Spans]:
@@ -244,7 +247,7 @@ def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
         enders, counts = np.unique(stack.ids[ends.rank[rays[ends.rank[rays] >= 0]]], return_counts=True)
         by = dict(zip(enders.tolist(), counts.tolist(), strict=True))
         return WhyNot(item, "behind" if by else "outside", samples, by, distance)
-    if (detail.entered[pairs] == 0).any():
+    if detail.ignores and (detail.entered[pairs] == 0).any():
         return WhyNot(item, "inside", samples, {}, distance)
     return WhyNot(item, "tunnelled" if detail.in_steps else "outside", samples, {}, distance)
 
