@@ -43,6 +43,16 @@ def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFi
     assert [row["name"] for row in shot["rows"]] == ["duck 1", "duck 2", "duck 3"]
 
 
+def test_a_line_of_sight_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    facts = tmp_path / "r.json"
+    words = ["report", str(ROOT / "fixtures" / "corridor"), "--weapon", "sight", "--at", "330,194"]
+    assert main([*words, "--toward", "400,194", "-o", str(tmp_path / "r.png"), "--json", str(facts)]) == 0
+    (ray,) = json.loads(facts.read_text())["shots"][0]["rays"]
+    assert ray["end"] == [400, 194] and ray["stop"]["item"]["name"] == "crate 1"
+    assert main([*words, "-o", str(tmp_path / "r.png")]) == 2
+    assert "toward: expected a point, as the weapon has no range" in capsys.readouterr().err
+
+
 def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> None:
     facts = tmp_path / "r.json"
     words = ["report", str(GALLERY), "--weapon", "pistol", "--at=-5,3", "-o", str(tmp_path / "r.png")]
@@ -57,6 +67,10 @@ def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> N
         (["report", "nowhere"], "nowhere/scene.json: cannot read it"),
         (["report", str(GALLERY), "--weapon", "lazer", "--at", "1,2"], "did you mean 'laser'?"),
         (["report", str(GALLERY), "--weapon", "laser"], "--at: expected X,Y"),
+        (
+            ["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--toward", "a,b"],
+            "--toward: expected two numbers",
+        ),
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1;2"], "--at: expected two numbers X,Y, got '1;2'"),
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1,nan"], "at[1]: expected a finite number"),
         (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),

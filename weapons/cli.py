@@ -197,6 +197,7 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
     one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
     one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
+    one.add_argument("--toward", metavar="X,Y", help="or the point that it is aimed at, px")
     one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
     one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
     one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
@@ -269,10 +270,10 @@ def _orders(arguments: argparse.Namespace, scene: Scene) -> list[Order]:
     """Shots of the scene's file, or the one of the command line."""
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
         arsenal = arsenal_of(scene)
-        if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "seed")):
+        if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "toward", "seed")):
             return orders_of(scene, arsenal)
     if arguments.weapon is None:
-        given = next(name for name in ("at", "aim", "seed") if getattr(arguments, name) is not None)
+        given = next(name for name in ("at", "aim", "toward", "seed") if getattr(arguments, name) is not None)
         raise InputError(f"--{given}: expected only together with --weapon, got no weapon")
     return [order_from_json(_shot(arguments), scene, arsenal, "command line")]
 
@@ -346,12 +347,18 @@ def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
     """One shot of the command line as a scene file would have it."""
     if arguments.at is None:
         raise InputError("--at: expected X,Y with --weapon, got nothing")
-    try:
-        at = [float(part) for part in arguments.at.split(",")]
-    except ValueError as error:
-        raise InputError(f"--at: expected two numbers X,Y, got {arguments.at!r}") from error
-    shot: dict[str, Any] = {"weapon": arguments.weapon, "at": at}
+    shot: dict[str, Any] = {"weapon": arguments.weapon, "at": _point("at", arguments.at)}
+    if arguments.toward is not None:
+        shot["toward"] = _point("toward", arguments.toward)
     return shot | {name: getattr(arguments, name) for name in ("aim", "seed") if getattr(arguments, name) is not None}
+
+
+def _point(name: str, text: str) -> list[float]:
+    """Two numbers of the command line."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"--{name}: expected two numbers X,Y, got {text!r}") from error
 
 
 def compare(arguments: argparse.Namespace) -> int:
