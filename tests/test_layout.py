@@ -129,3 +129,14 @@ def test_whatever_a_package_lists_is_there(package: str) -> None:
     assert f"{package}.{ORDER[package][0]}" in loaded_by(code)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         __import__(package).nothing  # noqa: B018
+
+
+RAYS = {
+    f"weapons.{name}" for name in ("trace", "tracing", "meetings", "ends", "passes", "rayfire", "rayhits", "rayexplain")
+}
+
+
+def test_shots_of_patterns_load_neither_rays_nor_the_past() -> None:
+    code = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene(); fire(scene, {}, (0, 0))"
+    assert not loaded_by(code.format("Disc(3)")) & {"planes.history", *RAYS}
+    assert loaded_by(code.format("Pistol(3)")) >= RAYS

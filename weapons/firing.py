@@ -6,22 +6,24 @@ scene -> stack -> weapon -> patterns -> placed -> pre-filter -> samples -> rows
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planes.arrays import InputError, Ints, choice, each, reals, shown
 from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
-from planes.history import History
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import pierces, ray_parts_of
 from weapons.candidates import Candidates
 from weapons.hits import Hits, Rows, rows_of_met
 from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, sweep_pays
-from weapons.rayfire import fired_rays
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Shots, Volley, checked_shots, volley_of
 from weapons.weapon import Weapon
+
+if TYPE_CHECKING:  # most shots are of patterns, at the present: rays and the past are loaded when they are asked for
+    from planes.history import History
 
 __all__ = ["fire"]
 
@@ -70,17 +72,23 @@ def fire(
     InputError
         Naming the argument and the row.
     """
-    present = scene.scene if isinstance(scene, History) else scene
-    if not isinstance(present, Scene):
-        raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
+    present = scene if isinstance(scene, Scene) else _history(scene).scene
     shots = checked_shots(weapon, at, aim, toward, _bits(present, accept), exclude, seed, shot)
-    if isinstance(scene, History):
+    if not isinstance(scene, Scene):
         moments = moments_of(scene, tick, len(shots))
         parts = [fired(past, weapon, shots.pick(rows), prefilter, broadphase, strategy) for past, rows in moments]
         return parts[0] if len(parts) == 1 else parts[0].gathered(parts, [rows for _, rows in moments], shots)
     if tick is not None:
         raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
     return fired(scene, weapon, shots, prefilter, broadphase, strategy)
+
+
+def _history(scene: object) -> History:
+    from planes.history import History
+
+    if not isinstance(scene, History):
+        raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
+    return scene
 
 
 def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
@@ -98,6 +106,8 @@ def fired(scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase
     """Decide what checked shots hit; the other arguments are those of `fire`."""
     parts = ray_parts_of(weapon)
     if parts is not None:
+        from weapons.rayfire import fired_rays
+
         choice("strategy", strategy, ("auto", "direct"))
         return fired_rays(scene, weapon, parts, shots, prefilter, broadphase)
     plan, stack = Plan(), scene.items.stack()
