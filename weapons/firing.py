@@ -1,6 +1,8 @@
 """Fire a weapon at a scene: the whole flow on one screen.
 
 scene -> stack -> weapon -> patterns -> placed -> pre-filter -> samples -> rows
+
+Shots of rays go on in `rayfire`.
 """
 
 from __future__ import annotations
