@@ -175,6 +175,8 @@ class Hits:
     def by_owner(self) -> list[OwnerRow]:
         """Rows added up by body: one event for one shot and owner, ordered by (shot, first row of the owner)."""
         bodies: dict[tuple[int, int], list[HitRow]] = {}
+        if self._scenes is None:
+            self.scene_of(0)  # an old answer is refused, also an empty one
         for row in self:
             owner = int(self.scene_of(row.shot).items.owner[row.object])
             bodies.setdefault((row.shot, owner), []).append(row)
