@@ -225,12 +225,7 @@ class Scene:
         if owner is not None:
             columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
         if role is not None:
-            kind = _role(role)
-            columns["role"] = ROLES.index(kind)
-            if categories is None:  # what has the categories that its old role gave it gets those of the new one
-                old = np.where(self.items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
-                now = self.items.categories[rows]
-                columns["categories"] = np.where(now == old, _default_bits(kind), now)
+            columns = self._of_role(rows, _role(role)) | columns
         angles, forms = changed_forms(self.items, rows, angle, scale, flip, frame)
         before = self.items.deciding_boxes(rows)
         if forms is not None:
@@ -240,6 +235,12 @@ class Scene:
         for name, values in columns.items():
             getattr(self.items, name)[rows] = values
         self.items.record(rows, before)
+
+    def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
+        """Columns of a new role: what has the categories that its old role gave it gets those of the new one."""
+        old = np.where(self.items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
+        now = self.items.categories[rows]
+        return {"role": ROLES.index(role), "categories": np.where(now == old, _default_bits(role), now)}
 
     def ids(self, role: Role | str | None = None) -> Ints:
         """Ids of the objects in the scene, of one role or of all, rising."""

@@ -193,18 +193,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"hitplanes {version('hitplanes')}")
     words = top.add_subparsers(required=True, metavar="COMMAND")
 
-    one = _word(words, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
-    one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
-    one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
-    one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
-    one.add_argument("--toward", metavar="X,Y", help="or the point that it is aimed at, px")
-    one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
-    one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
-    one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
-    told = "fire with it and draw its volumes: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon, swept"
-    one.add_argument("--prefilter", metavar="NAME", help=told)
-    one.add_argument("--broadphase", metavar="NAME", help="fire with it and draw its cells: grid, quadtree, bvh")
-    one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
+    _add_report(words)
     one = _word(words, fire, "resolve a log of shots", FIRE_HELP, FIRE_EXAMPLES)
     one.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="the log")
     one.add_argument(
@@ -233,6 +222,21 @@ def parser() -> argparse.ArgumentParser:
     told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
     one.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=told)
     return top
+
+
+def _add_report(words: Any) -> None:
+    one = _word(words, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
+    one.add_argument("--weapon", metavar="NAME", help="a weapon of the scene; fires one shot, with the options below")
+    one.add_argument("--at", metavar="X,Y", help="where it is fired, px (--at=-5,3 where X is negative)")
+    one.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 to the right, 90 down")
+    one.add_argument("--toward", metavar="X,Y", help="or the point that it is aimed at, px")
+    one.add_argument("--seed", type=int, metavar="N", help="seed of the pellets")
+    one.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help="default: report.png")
+    one.add_argument("--json", type=Path, metavar="JSON", help="write the facts, too")
+    told = "fire with it and draw its volumes: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon, swept"
+    one.add_argument("--prefilter", metavar="NAME", help=told)
+    one.add_argument("--broadphase", metavar="NAME", help="fire with it and draw its cells: grid, quadtree, bvh")
+    one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
 
 
 def _word(
