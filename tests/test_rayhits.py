@@ -6,6 +6,7 @@ import json
 import math
 import random
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any
@@ -280,6 +281,12 @@ def squared(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction], cell: Pi
     return min(of_point(a), of_point(b), *corners)
 
 
+def beyond(pixels: Collection[tuple[int, int]], bounds: tuple[int, int, int, int]) -> bool:
+    """Whether the box around pixels lies wholly out of bounds."""
+    xs, ys = ([p[axis] for p in pixels] for axis in (0, 1))
+    return max(xs) < bounds[0] or min(xs) > bounds[2] or max(ys) < bounds[1] or min(ys) > bounds[3]
+
+
 @settings(max_examples=60, deadline=None)
 @given(worlds)
 def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
@@ -299,13 +306,20 @@ def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
             end = tuple(p + Fraction(part) * (Fraction(q, 256) - p) for p, q in zip(start, b, strict=True))
             segments.append((start, end))
         distances = {}
+        cells, owner = hits.samples_at(which), hits.scene.items.owner
+        walked = {tuple(xy) for xy in cells.xy[cells.verdict != Verdict.BEYOND].tolist()}
+        bodies_hit = {int(owner[item]) for item in hit}
         for item in battle.accepted(shot):
-            if not item.occluder and item.id not in hit and item.pixels:
+            if item.occluder or not item.pixels or int(owner[item.id]) in bodies_hit or item.pixels & walked:
+                continue
+            if battle.bounds is None or not beyond(item.pixels, battle.bounds):
                 least = min(squared(a, b, cell) for a, b in segments for cell in item.pixels)  # type: ignore[arg-type]
                 distances[item.id] = max(math.sqrt(least) - radius, 0.0)
+        grazed = {item for item, distance in distances.items() if not distance}  # met as the ray ended, or not at all
         miss = hits.nearest_miss(which)
-        if not distances:
-            assert miss is None
+        distances = {item: distance for item, distance in distances.items() if distance}
+        if miss is None or not miss.distance:
+            assert (miss is None and not distances) or (miss is not None and miss.object in grazed)
             continue
         assert miss is not None and miss.object not in hit
         nearest = min(distances.values())
@@ -345,7 +359,7 @@ def test_the_nearest_miss_in_a_picture() -> None:
         near = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], two)).nearest_miss()
         assert near is not None and near[0] == 1 - two.index(corner) and near.distance == 2.5
     outside = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [bar(13, 14)], (0, 0, 9, 9)))
-    assert (outside.nearest_miss() or [None] * 4)[3] == 0.0, "the way goes through it"
+    assert outside.nearest_miss() is None, "what lies out of bounds is no miss"
     wide = fired(Battle(Gun("laser", range=20, width=4), [Shot((0, 0), accept=1)], [bodies[3]]))
     assert (wide.nearest_miss() or [None] * 4)[3] == 1.5
     assert fired(Battle(Gun(range=20), [Shot((0, 0))], [bodies[0]])).nearest_miss() is None

@@ -406,7 +406,7 @@ def test_a_ray_that_started_inside_says_so() -> None:
     assert not shot["rows"]
     lines = shot_card(shot, 0, scene).lines
     assert ("not apple", "it started inside of it") in lines
-    assert not any("nearest" in line[0] for line in lines)
+    assert not any("nearest apple" in line[0] for line in lines)
 
 
 def test_a_card_draws_its_only_ray_from_end_to_end() -> None:

@@ -172,7 +172,7 @@ def test_shots_at_ticks_are_fired_at_them_again(path: Path) -> None:
     assert [entry["tick"] for entry in entries[-2:]] == [10, 30]
     assert replay(path, history) is None and replay(path, history.at) is None
     found = replay(path, world)
-    assert found is not None and found.line == 2 and found.told[0].startswith("scene: its content hash is ")
+    assert found is not None and found.told[0].startswith("scene: its content hash is ")
 
 
 def test_a_tick_that_has_left_is_named(path: Path) -> None:
@@ -201,6 +201,9 @@ def test_a_shot_without_a_tick_is_not_fired_at_a_history(path: Path) -> None:
 # What differs
 
 
+SAME = "all shots do the same again"
+
+
 def test_a_scene_that_changed_is_told_with_line_and_shot(path: Path) -> None:
     world = load_scene(GALLERY)
     with ShotRecord(path) as record:
@@ -209,8 +212,8 @@ def test_a_scene_that_changed_is_told_with_line_and_shot(path: Path) -> None:
         world.move(8, (99, 99))
         record.fire(world, RIFLE, places(2), shot=[8, 9])
     now = world.content_hash()
-    assert replay(path, world) == (2, 5, (f"scene: its content hash is {now}, was {before}",))
-    assert replay(path, scene) == (5, 8, (f"scene: its content hash is {before}, was {now}",))
+    assert replay(path, world) == (2, 5, (f"scene: its content hash is {now}, was {before}", SAME))
+    assert replay(path, scene) == (5, 8, (f"scene: its content hash is {before}, was {now}", SAME))
 
 
 Result = dict[str, list[dict[str, Any]]]

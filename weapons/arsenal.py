@@ -25,7 +25,7 @@ from weapons.weapon import LENGTH, Part, Weapon
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Plain", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil",
-    "arsenal_of", "parts_of", "pattern_of", "pierces", "ray_parts_of", "weapon_from_json",
+    "arsenal_of", "has_no_range", "parts_of", "pattern_of", "pierces", "ray_parts_of", "weapon_from_json",
 ]  # fmt: skip
 
 ORIGIN = np.zeros(2, np.int64)
@@ -335,6 +335,12 @@ def _apart(weapon: object) -> tuple[Rounds | None, Spread | Sweep | None, object
     if isinstance(inner, Spread):
         return burst, inner, inner.pellet
     return (burst, inner, inner.ray) if isinstance(inner, Sweep) else (burst, None, inner)
+
+
+def has_no_range(weapon: Weapon) -> bool:
+    """Whether a weapon is a ray that ends where it is aimed, and so must be aimed at a point."""
+    parts = ray_parts_of(weapon)
+    return parts is not None and parts[2].length_256 is None
 
 
 def pierces(weapon: Weapon) -> bool:

@@ -303,7 +303,10 @@ def _tell(facts: Mapping[str, Any], plan: bool) -> None:
 def fire(arguments: argparse.Namespace) -> None:
     """Write the answers to a log of shots."""
     check_output(arguments.output)
-    done = fire_log(load_scene(arguments.scene), arguments.shots, arguments.output, Progress(sys.stderr))
+    scene = load_scene(arguments.scene)
+    with within(str(scene_folder(arguments.scene) / FILE_NAME)):
+        arsenal_of(scene)
+    done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
     _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.to_dict(), done.plan.calls)

@@ -56,8 +56,8 @@ class FixedStep:
         self.dropped = 0
         self._rest = 0
 
-    def advance(self, elapsed_s: float) -> int:
-        """Let time pass and give how many steps are due.
+    def advance(self, elapsed_s: float) -> range:
+        """Let time pass and give the ticks of the steps that are due, the first of all being 0.
 
         Parameters
         ----------
@@ -71,12 +71,13 @@ class FixedStep:
         passed = round(real("elapsed_s", elapsed_s, 0, ELAPSED_MAX) * NANOSECONDS)
         due, self._rest = divmod(self._rest + passed * self.rate_hz, NANOSECONDS)
         steps = due if self.most is None else min(due, self.most)
+        first = self.tick
         self.tick += steps
         if steps < due:
             self.dropped += due - steps
             message = f"FixedStep: dropped {due - steps} of {due} steps that were due at tick {self.tick}"
             warnings.warn(message, RuntimeWarning, stacklevel=2)
-        return steps
+        return range(first, self.tick)
 
     @property
     def fraction(self) -> float:

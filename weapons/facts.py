@@ -184,6 +184,8 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
     for row, hits in enumerate(told):
         if not isinstance(hits, Hits):
             raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
+        if not hits.one_scene:
+            raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
         if hits.scene is not scene or hits.version != scene.version:
             got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
             raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")

@@ -101,7 +101,14 @@ def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints
     if not n:
         return [(history.at(history.ticks[-1]) if history.ticks else history.scene, np.arange(0))]
     distinct, which = np.unique(ticks, return_inverse=True)
-    return [(history.at(one), np.flatnonzero(which == k)) for k, one in enumerate(distinct.tolist())]
+    moments: list[tuple[Scene, Ints]] = []
+    for k, one in enumerate(distinct.tolist()):
+        rows = np.flatnonzero(which == k)
+        try:
+            moments.append((history.at(int(one) if one.is_integer() else one), rows))
+        except InputError as error:
+            raise InputError(str(error).replace("tick:", f"tick[{rows[0]}]:", 1) if n > 1 else str(error)) from error
+    return moments
 
 
 def fired(scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str) -> Hits:

@@ -252,6 +252,11 @@ class Hits:
             raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
         return self.scene
 
+    @property
+    def one_scene(self) -> bool:
+        """Whether all shots were fired on one scene, at one tick."""
+        return self._scenes is None or len(set(map(id, self._scenes))) == 1
+
     @classmethod
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> Hits:
         """Hits of shots that were fired at several ticks, in the order of the shots.

@@ -10,6 +10,7 @@ from planes.constants import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
 from planes.grid256 import snap
 from planes.scene import Scene
 from planes.schema import Either, Keys, Names, Number, Numbers, Optional, Rows, Text, Whole
+from weapons.arsenal import has_no_range
 from weapons.firing import fire
 from weapons.hits import Hits
 from weapons.weapon import Weapon
@@ -79,6 +80,8 @@ def order_from_json(
             raise InputError("aim: expected aim or toward, got both")
         if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
             raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
+        if shot.get("toward") is None and has_no_range(arsenal[name]):
+            raise InputError("toward: expected a point, as the weapon has no range, got none")
         accept = shot.get("accept")
         return Order(
             name,

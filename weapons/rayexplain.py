@@ -15,7 +15,7 @@ from planes.constants import DETAIL_SAMPLES_MAX, NEAR_PX, SUB
 from planes.items import Stack
 from planes.sampling import Verdict
 from planes.scene import Scene
-from planes.spans import Box, Spans
+from planes.spans import Box, Spans, meets
 from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, Reason
 from weapons.explain import Behind, Blocked, Samples, WhyNot
@@ -222,13 +222,14 @@ def _behind(detail: RayDetail, rank: int, pairs: list[int]) -> Behind:
 
 
 def ray_why_not(detail: RayDetail, hit: Set[int]) -> list[WhyNot]:
-    """Objects within NEAR_PX of the whole length of rays that were not hit, nearest first, then by id."""
-    stack, rays, met = detail.stack, detail.rays, detail.every
+    """Objects that rays did not hit, on their whole length or within NEAR_PX of what they walked: nearest first."""
+    stack, met = detail.stack, detail.every
     objects = [r for r in np.flatnonzero(~stack.occluder).tolist() if int(stack.ids[r]) not in hit]
     touched = np.bincount(met.rank, met.count, len(stack)).astype(np.int64)
-    found = []
-    for rank, (distance, _, _, _) in _gaps(detail, objects, np.ones(len(rays)), NEAR_PX).items():
-        found.append(_why(detail, rank, int(touched[rank]), 0.0 if touched[rank] else distance))
+    beside = [rank for rank in objects if not touched[rank]]
+    near = {rank: gap[0] for rank, gap in _gaps(detail, beside, detail.ends.fraction, NEAR_PX).items()}
+    near |= {rank: 0.0 for rank in objects if touched[rank]}
+    found = [_why(detail, rank, int(touched[rank]), distance) for rank, distance in near.items()]
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
@@ -253,12 +254,18 @@ def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
 
 
 def nearest_miss(detail: RayDetail, hit: Set[int]) -> Miss | None:
-    """The accepted object that was not hit and is nearest to what the rays walked; the least id of several."""
+    """The accepted object that what the rays walked passed by most closely; the least id of several.
+
+    What they touched is no miss, nor is another part of a body that was hit, or what lies out of bounds.
+    """
     stack, rays = detail.stack, detail.rays
     every = np.arange(len(stack))
-    accepted = ~stack.occluder & ~refused(stack, every, detail.shots, np.zeros(len(stack), np.int64))
-    objects = [rank for rank in np.flatnonzero(accepted).tolist() if int(stack.ids[rank]) not in hit]
-    found = _gaps(detail, objects, detail.ends.fraction, None)
+    passed = ~stack.occluder & ~refused(stack, every, detail.shots, np.zeros(len(stack), np.int64))
+    passed[detail.every.rank[detail.entered <= detail.ends.fraction[detail.every.ray]]] = False
+    passed &= ~np.isin(stack.owner, stack.owner[np.isin(stack.ids, list(hit))])
+    if detail.bounds is not None:
+        passed &= meets(np.array(detail.bounds), stack.box_xyxy)
+    found = _gaps(detail, np.flatnonzero(passed).tolist(), detail.ends.fraction, None)
     if not found:
         return None
     rank = min(found, key=lambda rank: (found[rank][0], int(stack.ids[rank])))

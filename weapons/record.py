@@ -204,7 +204,8 @@ def replay(path: str | Path, scene: Scene | History | Callable[[float | None], S
 
     Returns
     -------
-    the first shot that differs, and how; None if all do the same again
+    the first shot whose result differs, and how; or the first that was fired on another scene, if all do the same
+    again; None if nothing differs
 
     Raises
     ------
@@ -300,18 +301,20 @@ def _groups(entries: Iterator[Recorded]) -> Iterator[list[Recorded]]:
 
 
 def _first_difference(path: Path, groups: Iterator[list[Recorded]], scene: Any) -> Difference | None:
-    hashes = Hashes()
+    hashes, changed = Hashes(), None
     for group in groups:
         line, _, _, first = group[0]
         with within(f"{path} line {line}"):
             present = _scene_at(scene, first.get("tick"))
+        told: list[str] = []
         if (found := hashes.of(present)) != first["scene"]:
-            return Difference(line, first["shot"], (f"scene: its content hash is {found}, was {first['scene']}",))
+            told = [f"scene: its content hash is {found}, was {first['scene']}"]
+            changed = changed or Difference(line, first["shot"], (*told, "all shots do the same again"))
         for entry, result in zip(group, _results(path, present, group), strict=True):
             if result != entry.data["result"]:
-                told = _told(present, entry.data["result"], result)
-                return Difference(entry.line, entry.data["shot"], tuple(first_of(told)))
-    return None
+                told += first_of(_told(present, entry.data["result"], result))
+                return Difference(entry.line, entry.data["shot"], tuple(told))
+    return changed
 
 
 def _results(path: Path, scene: Scene, group: Sequence[Recorded]) -> Iterator[dict[str, Any]]:

@@ -11,7 +11,7 @@ from planes.arrays import InputError, Ints, array_of, each, integer, integers, r
 from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
 from planes.poses import points
-from weapons.arsenal import parts_of, pattern_of, ray_parts_of
+from weapons.arsenal import has_no_range, parts_of, pattern_of
 from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
@@ -172,8 +172,7 @@ def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
 
 def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
     """Check that a ray without a range has an end, and within reach."""
-    parts = ray_parts_of(weapon)
-    if parts is None or parts[2].length_256 is not None:
+    if not has_no_range(weapon):
         return
     if offset is None:
         raise InputError("toward: expected a point, as the weapon has no range, got none")
