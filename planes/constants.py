@@ -104,6 +104,9 @@ CHUNK_SAMPLES = 2**18
 CHUNK_PAIRS = 2**21
 """(placement, item) box tests made at a time: 2 MB of booleans."""
 
+CHUNK_CELLS = 2**19
+"""Cells of rays on items that are worked on at a time, about: each takes some 150 bytes on the way."""
+
 BOXES_MAX = 64
 """Boxes that one mask may be covered by: with more, the mask itself is tested sooner."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import re
+import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -35,8 +36,10 @@ from ray_battles import (
     stop_of,
 )
 
-from planes import InputError
-from weapons import Hits, Verdict, trace
+import weapons.rayfire
+import weapons.tracing
+from planes import InputError, Scene, Sprite
+from weapons import Hits, Laser, Sweep, Verdict, Weapon, fire, trace
 
 PASS_COLUMNS = (
     "shot", "round", "pellet", "object", "order", "entry_xy", "exit_xy", "entry", "exit", "entry_px", "exit_px",
@@ -275,6 +278,36 @@ def test_a_batch_is_its_shots_one_by_one(rng: random.Random) -> None:
         assert mine == alone[1]
         assert [row | {"shot": 0} for row in stops if row["shot"] == which] == alone[2]
         assert verdicts[which] == alone[3][0]
+
+
+@settings(max_examples=50, deadline=None)
+@given(worlds, st.integers(1, 60), st.integers(1, 60))
+def test_the_size_of_parts_changes_nothing(rng: random.Random, cells_at_once: int, pairs_at_once: int) -> None:
+    battle = harmless(some_battle(rng))
+    truth = battle.fired()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(weapons.rayfire, "CHUNK_CELLS", cells_at_once)
+        patched.setattr(weapons.rayfire, "CHUNK_PAIRS", pairs_at_once)
+        patched.setattr(weapons.tracing, "CHUNK_SAMPLES", pairs_at_once)
+        same(battle.fired(), truth)
+        same(battle.fired(prefilter="none"), truth)
+
+
+@pytest.mark.parametrize(("weapon", "shots"), [(Sweep(Laser(1400), 360, 4000), 1), (Laser(600, width=30), 400)])
+def test_many_rays_through_a_crowd_need_little_memory(weapon: Weapon, shots: int) -> None:
+    """Boxes that they may meet, and cells that they touch, are worked on in parts."""
+    scene, rng = Scene(), np.random.default_rng(5)
+    for xy in rng.integers(0, 1000, (1500, 2)).tolist():
+        scene.add(Sprite.circle(6), xy)
+    scene.add(Sprite.box(900, 900), (500, 500))
+    at = rng.integers(0, 500, (shots, 2))
+    tracemalloc.start()
+    try:
+        hits = fire(scene, weapon, at, aim=45)
+        assert hits.samples.sum() > 1000
+        assert tracemalloc.get_traced_memory()[1] < 320 * 2**20
+    finally:
+        tracemalloc.stop()
 
 
 @settings(max_examples=50, deadline=None)

@@ -118,14 +118,20 @@ class Candidates:
 
     def meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Rows and ranks of boxes (P, 4) and items that share a pixel; of all, without a pre-filter."""
+        if self.prefilter.name == "none":
+            return self.every(len(boxes_xyxy))
         row, rank = self._meeting(boxes_xyxy)
         self.met += len(rank)
         return row, rank
 
+    def every(self, n: int) -> tuple[Ints, Ints]:
+        """Rows and ranks of n boxes and all items."""
+        m = len(self.stack)
+        self.met += n * m
+        return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
+
     def _meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         n, m = len(boxes_xyxy), len(self.stack)
-        if self.prefilter.name == "none":
-            return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
         if self.index is None:
             step = max(1, CHUNK_PAIRS // max(m, 1))
             parts = [np.nonzero(meets(boxes_xyxy[i : i + step, None], self.stack.box_xyxy)) for i in range(0, n, step)]

@@ -27,7 +27,7 @@ from weapons.trace import Lines, cells
 from weapons.tracing import Range, touching, trace
 from weapons.volley import Shots
 
-__all__ = ["Miss", "RayDetail", "blocked_rays", "nearest_miss", "pixels_of", "ray_detail", "ray_why_not"]
+__all__ = ["Miss", "RayDetail", "blocked_rays", "nearest_miss", "pixels_of_rays", "ray_detail", "ray_why_not"]
 
 REACH_BITS = 23
 """Cells lie within 2**22 px of the origin of their ray: two such numbers and that of the ray fit int64."""
@@ -182,7 +182,7 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, entered, *rules)
 
 
-def pixels_of(detail: RayDetail) -> dict[tuple[int, int], Spans]:
+def pixels_of_rays(detail: RayDetail) -> dict[tuple[int, int], Spans]:
     """Pixels that each round hit of each object, as {(round, object): pixels}, each pixel once."""
     met, found = detail.walked, {}
     xy = np.stack([met.x, met.y], axis=1) + detail.rays.origin_xy[met.ray[met.pair]]

@@ -5,23 +5,29 @@ scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> pas
 
 from __future__ import annotations
 
-from planes.constants import CHUNK_SAMPLES
+import numpy as np
+
+from planes.arrays import Ints
+from planes.constants import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
 from planes.items import Role
 from planes.scene import Scene
+from weapons.guns import Traced
 from weapons.hits import Rows
 from weapons.passes import Passes, Stops, passes_of, stops_of
 from weapons.plan import Plan, chosen_candidates
-from weapons.rayhits import RayHits, rows_of_passes
-from weapons.rays import Parts, rays_of
-from weapons.tracing import Range, trace
+from weapons.rayhits import RayHits, pixels_of, rows_of_passes
+from weapons.rays import Parts, Rays, rays_of
+from weapons.tracing import Range, expected_cells, trace
 from weapons.volley import Shots
 from weapons.weapon import Weapon
 
 __all__ = ["fired_rays"]
 
-RAYS_FIRST, RAYS_MOST = 128, 1024
-"""Rays of the first part of a batch, and of the largest: larger parts make nothing faster. A part has twice the rays of
-the one before unless that met many cells."""
+RAYS_MOST = 1024
+"""Rays of the largest part: larger ones make nothing faster."""
+
+GROWTH = 4
+"""How much larger a part of the rays may be than the one before, if that touched few cells."""
 
 
 def fired_rays(
@@ -33,25 +39,50 @@ def fired_rays(
     each = (burst.count if burst else 1) * (several.count if several else 1)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, each * len(shots))
     through = Range(scene.items, stack, scene.bounds, candidates, plan)
+    step = max(1, CHUNK_ROWS // each)
     rows: list[Rows] = []
     passes: list[Passes] = []
     stops: list[Stops] = []
-    begin, step = 0, max(RAYS_FIRST // each, 1)
-    while not rows or begin < len(shots):
+    for begin in range(0, max(len(shots), 1), step):
         some = shots.take(begin, min(begin + step, len(shots)))
         rays = rays_of(parts, some)
         plan.run("rays", "both ends on the grid", rays.start_256.nbytes * 2)
-        met, ends, lines, relative = trace(rays, ray, some, through)
-        through_objects, cells = passes_of(met, ends, rays, lines, relative, stack, ray.fades)
+        through_objects, ends, pixels = _followed(rays, ray, some, through)
+        rows.append(rows_of_passes(through_objects, pixels, rays))
         passes.append(through_objects)
-        rows.append(rows_of_passes(through_objects, cells, rays))
-        stops.append(stops_of(met, ends, rays, lines, relative, stack))
+        stops.append(ends)
         for columns in (rows[-1], passes[-1], stops[-1]):
             columns.shot[:] += begin
-        begin += step
-        step = max(1, min(2 * step, RAYS_MOST // each, step * CHUNK_SAMPLES // max(len(met.x), 1)))
     _leave_out_unused(plan, scene, candidates.why_unindexed, ray.fades)
     return RayHits(Rows.joined(rows), Passes.joined(passes), Stops.joined(stops), scene, weapon, shots, plan)
+
+
+def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:
+    """Follow rays to their ends, in parts whose cells stay within their chunk, as far as can be told before.
+
+    Returns
+    -------
+    passes, stops, and the pixels that were hit, as `pixels_of` tells them
+    """
+    stack = through.stack
+    passes: list[Passes] = []
+    stops: list[Stops] = []
+    pixels: list[Ints] = []
+    begin = cells = 0
+    most = RAYS_MOST
+    if through.candidates.prefilter.name == "none":
+        most = min(most, CHUNK_PAIRS // max(len(stack), 1))
+    step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, stack))))
+    while begin < len(rays) or not passes:
+        some = rays.take(begin, begin + step)
+        met, ends, lines, relative = trace(some, ray, shots, through)
+        through_objects, walked = passes_of(met, ends, some, lines, relative, stack, ray.fades)
+        passes.append(through_objects)
+        stops.append(stops_of(met, ends, some, lines, relative, stack))
+        pixels.append(pixels_of(through_objects, walked, some, rays))
+        begin, cells = begin + step, cells + len(met.x)
+        step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
+    return Passes.joined(passes), Stops.joined(stops), np.concatenate(pixels)
 
 
 def _leave_out_unused(plan: Plan, scene: Scene, why_unindexed: str, falloff: str | None) -> None:

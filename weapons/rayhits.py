@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import InputError, Ints
+from planes.constants import ITEMS_MAX
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Spans
@@ -19,12 +20,12 @@ from weapons.hits import HitRow, Hits, Rows, plan_of
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
-from weapons.rayexplain import Miss, RayDetail, blocked_rays, nearest_miss, pixels_of, ray_detail, ray_why_not
+from weapons.rayexplain import Miss, RayDetail, blocked_rays, nearest_miss, pixels_of_rays, ray_detail, ray_why_not
 from weapons.rays import Parts, Rays
 from weapons.volley import Shots
 from weapons.weapon import Weapon
 
-__all__ = ["RayHits", "Reason", "rows_of_passes"]
+__all__ = ["RayHits", "Reason", "pixels_of", "rows_of_passes"]
 
 
 class RayHits(Hits):
@@ -81,7 +82,7 @@ class RayHits(Hits):
 
     def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
         """Pixels that each round of one shot hit of each object, as {(round, object): pixels}."""
-        return pixels_of(self._rays(shot))
+        return pixels_of_rays(self._rays(shot))
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
         """Objects within 32 px of the whole length of the rays of one shot that were not hit, and why."""
@@ -137,19 +138,38 @@ class RayHits(Hits):
         return found
 
 
+def _groups(of: Rows | Passes, rounds: int) -> Ints:
+    """A number for each shot, round and object."""
+    return (of.shot * rounds + of.round) * ITEMS_MAX + of.object
+
+
 def _rows_of(rows: Rows, passes: Passes) -> Ints:
     """Row of each pass: of the same shot, round and object."""
-    rounds, objects = (int(v.max(initial=0)) + 1 for v in (rows.round, rows.object))
-    of_row, of_pass = ((one.shot * rounds + one.round) * objects + one.object for one in (rows, passes))
+    rounds = int(rows.round.max(initial=0)) + 1
+    of_row, of_pass = _groups(rows, rounds), _groups(passes, rounds)
     order = np.argsort(of_row)
     return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
 
 
-def rows_of_passes(passes: Passes, cells: Meetings, rays: Rays) -> Rows:
-    """Gather the passes of all pellets into rows; `cells` are those of each pass."""
-    rounds = int(rays.round.max(initial=0)) + 1
-    objects = int(passes.object.max(initial=0)) + 1
-    group = (passes.shot * rounds + passes.round) * objects + passes.object
+def pixels_of(passes: Passes, cells: Meetings, some: Rays, rays: Rays) -> Ints:
+    """Pixels that some rays of whole shots hit, as rows (group, x, y), for shots of several pellets.
+
+    Parameters
+    ----------
+    cells : of each pass
+    """
+    if not rays.pellet.any():
+        return np.zeros((0, 3), np.int64)
+    group = _groups(passes, int(rays.round.max(initial=0)) + 1)[cells.pair]
+    x, y = (np.stack([cells.x, cells.y], axis=1) + some.origin_xy[cells.ray[cells.pair]]).T
+    found = np.stack([group, x, y], axis=1)
+    return found if len(some) == len(rays) else np.unique(found, axis=0)
+
+
+def rows_of_passes(passes: Passes, pixels: Ints, rays: Rays) -> Rows:
+    """Gather the passes of all rays of whole shots into rows; `pixels` are those of `pixels_of`."""
+    rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
+    group = _groups(passes, rounds)
     order = np.lexsort((passes.order, passes.pellet, passes.entry_px, group))
     begins = np.flatnonzero(np.diff(group[order], prepend=-1))
     best = order[begins]
@@ -158,19 +178,18 @@ def rows_of_passes(passes: Passes, cells: Meetings, rays: Rays) -> Rows:
     samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
     weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
     pellets = np.bincount(number, minlength=len(best))
-    pixels = samples if (pellets == 1).all() else _distinct(cells, rays, number, len(best))
+    distinct = samples if (pellets == 1).all() else _counted_once(pixels, group[best])
     ray_of = passes.shot[best], passes.round[best]
     sort = np.lexsort((passes.order[best], passes.pellet[best], passes.entry_px[best], *ray_of[::-1]))
     best = best[sort]
-    origin = rays.origin_xy[cells.ray[best]]
+    ray = (passes.shot[best] * rounds + passes.round[best]) * pellets_fired + passes.pellet[best]
     return Rows(
-        passes.shot[best], passes.round[best], passes.object[best], samples[sort], pixels[sort], weight[sort],
-        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - origin) ** 2).sum(axis=1),
+        passes.shot[best], passes.round[best], passes.object[best], samples[sort], distinct[sort], weight[sort],
+        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - rays.origin_xy[ray]) ** 2).sum(axis=1),
     )  # fmt: skip
 
 
-def _distinct(cells: Meetings, rays: Rays, number: Ints, rows: int) -> Ints:
-    """Cells of each row, each counted once."""
-    xy = np.stack([cells.x, cells.y], axis=1) + rays.origin_xy[cells.ray[cells.pair]]
-    each = np.unique(np.column_stack([number[cells.pair], xy]), axis=0)
-    return np.bincount(each[:, 0], minlength=rows)
+def _counted_once(pixels: Ints, groups: Ints) -> Ints:
+    """Distinct pixels of each of rising groups."""
+    group = np.unique(pixels, axis=0)[:, 0]
+    return np.bincount(np.searchsorted(groups, group), minlength=len(groups))

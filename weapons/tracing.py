@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints
-from planes.constants import CHUNK_PAIRS, HALF, SUB
+from planes.constants import CHUNK_SAMPLES, HALF, SUB
 from planes.items import Items, Stack
 from planes.spans import Box
 from weapons.candidates import Candidates, refused
@@ -25,7 +25,7 @@ from weapons.rays import Rays
 from weapons.trace import Lines
 from weapons.volley import Shots
 
-__all__ = ["touching", "Looked", "Range", "trace"]
+__all__ = ["Looked", "Range", "expected_cells", "touching", "trace"]
 
 PAIRS_FIRST, GROWTH = 150, 2
 """Pairs of rays and boxes that are expected in the first stretch, of a ray at least one, and how much longer each next
@@ -135,9 +135,7 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
         or is_moving(ray, through.items, through.stack)
     ):
         return [-np.inf, np.inf]
-    mean_wh, world_wh = stack.sizes
-    per_px = len(stack) * float((mean_wh + 2 * lines.radius / SUB).sum() / world_wh.prod())
-    first = max(PAIRS_FIRST / max(len(lines), 1), 1) / per_px
+    first = max(PAIRS_FIRST / max(len(lines), 1), 1) / _pairs_per_px(stack, lines.radius)
     longest = float(np.sqrt(lines.length2.max(initial=0))) / SUB
     if longest <= GROWTH * first:
         return [-np.inf, np.inf]
@@ -148,43 +146,62 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
     return [*edges, np.inf]
 
 
+def _pairs_per_px(stack: Stack, radius: int) -> float:
+    """Boxes that a px of a ray is expected to enter, as if they were spread evenly over the box around all."""
+    mean_wh, world_wh = stack.sizes
+    return len(stack) * float((mean_wh + 2 * radius / SUB).sum() / world_wh.prod())
+
+
+def expected_cells(rays: Rays, ray: Traced, stack: Stack) -> float:
+    """Cells of items that the longest of some rays is expected to touch before its range, and one more."""
+    if not len(stack):
+        return 1.0
+    length = float(np.sqrt((rays.step_256**2).sum(axis=1).max(initial=0))) / SUB
+    mean_wh, radius = stack.sizes[0], ray.radius_256
+    pairs = min(_pairs_per_px(stack, radius) * length, len(stack))
+    return 1 + pairs * float(min(mean_wh.prod(), (2 * radius / SUB + 1) * mean_wh.sum()))
+
+
 def _pairs(
     rays: Rays, ray: Traced, lines: Lines, live: Ints, edges: tuple[float, float], through: Range
 ) -> tuple[Ints, Ints]:
-    """Rays and ranks whose boxes a ray enters farther than `near` and not farther than `far`, px."""
-    stack = through.stack
-    if not len(live) or not len(stack):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    if is_moving(ray, through.items, through.stack):
-        return _moving_pairs(rays, ray, lines, live, through)
-    if through.candidates.prefilter.name == "none":
-        row, rank = through.candidates.meeting(np.zeros((len(live), 4), np.int64))
-        return live[row], rank
-    asked = _stretch_boxes(rays, lines, live, *edges)
-    if through.looked:
-        through.looked.boxes_xyxy.append(asked)
-    row, rank = through.candidates.meeting(asked)
-    index = through.candidates.index
-    if index is not None:
-        through.plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew")
-    enters = _enters(rays.origin_xy[live[row]], lines.take(live[row]), stack.box_xyxy[rank])
-    some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
-    return live[row[some]], rank[some]
+    """Rays and ranks whose boxes a ray enters farther than `near` and not farther than `far`, px.
 
-
-def _moving_pairs(rays: Rays, ray: Traced, lines: Lines, live: Ints, through: Range) -> tuple[Ints, Ints]:
-    """Rays and ranks whose boxes a projectile enters, as each moving item sees it."""
-    stack = through.stack
-    step = max(1, CHUNK_PAIRS // len(stack))
-    found = []
-    for first in range(0, len(live), step):
-        some = live[first : first + step]
-        row, rank = np.repeat(some, len(stack)), np.tile(np.arange(len(stack)), len(some))
-        relative = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
-        kept = np.isfinite(_enters(rays.origin_xy[row], relative, stack.box_xyxy[rank]))
-        found.append((row[kept], rank[kept]))
+    In parts whose pairs of boxes stay within their chunk: parts grow as long as rays meet few boxes.
+    """
+    none = np.zeros(0, np.int64)
+    found = [(none, none)]
+    begin, met = 0, through.candidates.met
+    step = max(1, CHUNK_SAMPLES // max(len(through.stack), 1))
+    while begin < len(live) and len(through.stack):
+        found.append(_entered(rays, ray, lines, live[begin : begin + step], edges, through))
+        begin += step
+        step = max(1, min(2 * step, CHUNK_SAMPLES * begin // max(through.candidates.met - met, 1)))
     row, rank = (np.concatenate(column) for column in zip(*found, strict=True))
     return row, rank
+
+
+def _entered(
+    rays: Rays, ray: Traced, lines: Lines, live: Ints, edges: tuple[float, float], through: Range
+) -> tuple[Ints, Ints]:
+    """Pairs of one part of the rays."""
+    candidates = through.candidates
+    if is_moving(ray, through.items, through.stack):  # each item sees the ray go its own way
+        row, rank = candidates.every(len(live))
+    else:
+        asked = _stretch_boxes(rays, lines, live, *edges)
+        row, rank = candidates.meeting(asked)
+        if candidates.prefilter.name == "none":
+            return live[row], rank
+        if through.looked:
+            through.looked.boxes_xyxy.append(asked)
+        if candidates.index is not None:
+            why = f"{candidates.index.structure}: {candidates.index.followed} boxes placed anew"
+            through.plan.run("broad phase", why)
+    relative = relative_lines(lines, ray, live[row], through.stack.ids[rank], through.items)
+    enters = _enters(rays.origin_xy[live[row]], relative, through.stack.box_xyxy[rank])
+    some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
+    return live[row[some]], rank[some]
 
 
 def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float) -> Ints:
