@@ -704,6 +704,18 @@ def test_far_ends_are_turned_and_rounded_step_by_step() -> None:
 # Cells, by the million
 
 
+def test_roots_of_far_and_wide_rays_are_exact() -> None:
+    rng = random.Random(8)
+    for _ in range(300):
+        radius = rng.randint(2, 2 ** rng.randint(2, 28))
+        length2 = rng.randint(1, min(2**59, 2**90 // radius**2))
+        side = math.isqrt(radius * radius * length2)
+        v = [rng.randint(-side, side) for _ in range(20)]
+        v += [rng.choice([-1, 1]) * max(side - rng.randint(0, 2 ** rng.randint(0, 40)), 0) for _ in range(20)]
+        found = trace._far_roots(radius, np.array(v), np.full(len(v), length2))
+        assert found.tolist() == [math.isqrt(radius * radius * length2 - one * one) for one in v]
+
+
 def lattice_rays(rng: random.Random, count: int) -> list[tuple[Pixel, Pixel]]:
     """Short rays that end on corners, borders and centres, are aimed at corners, or are any."""
 

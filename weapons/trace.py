@@ -33,7 +33,8 @@ COMMON = 2**60
 ROOM = 2**62
 """Products below it leave room for a sum in int64; larger ones are worked out in Python integers."""
 
-Bounds = tuple[Ints, Ints, Ints, Ints]
+FAR = 2**90
+"""Squares below it differ from those of their float roots by less than 2**46, which one step of Newton's corrects."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,10 +228,28 @@ class Lines:
 
     def _roots(self, v: Ints, length2: Ints) -> Ints:
         """Roots of radius^2 length^2 - v^2, rounded down."""
-        if self.radius**2 * int(length2.max(initial=0)) < ROOM:
+        most = self.radius**2 * int(length2.max(initial=0))
+        if most < ROOM:
             return isqrt(self.radius**2 * length2 - v * v)
+        if most < FAR:
+            return _far_roots(self.radius, v, length2)
         squares: npt.NDArray[np.object_] = self.radius**2 * length2.astype(object) - v.astype(object) ** 2
         return np.array([math.isqrt(square) for square in squares.tolist()], np.int64)
+
+
+def _far_roots(radius: int, v: Ints, length2: Ints) -> Ints:
+    """Roots of radius^2 length^2 - v^2, from 0 to FAR, rounded down.
+
+    The float root is off by so little that what is left of the square fits int64, and so it is exact although the
+    squares wrap around. Below 2**31 that gives the square; above, one step of Newton's gives the root or 1 more.
+    """
+    side = radius * np.sqrt(length2)
+    root = np.rint(np.sqrt(np.maximum((side - v) * (side + v), 0))).astype(np.int64)
+    left = radius**2 * length2 - v * v - root * root
+    small = root < 2**31
+    step = left // np.maximum(2 * root, 1)
+    newton = root + step - (left - 2 * root * step - step * step < 0)
+    return np.where(small, isqrt(np.where(small, root * root + left, 0)), newton)
 
 
 def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
