@@ -716,6 +716,15 @@ def test_roots_of_far_and_wide_rays_are_exact() -> None:
         assert found.tolist() == [math.isqrt(radius * radius * length2 - one * one) for one in v]
 
 
+def test_roots_just_below_a_whole_number_are_exact() -> None:
+    rng = random.Random(9)
+    for _ in range(300):
+        v, root = rng.randint(2**27, 2**28) << 16, (rng.randint(1, 8) << 31) + 1
+        length2, rest = divmod(v * v + root * root - 1, 2**32)
+        assert rest == 0
+        assert trace._far_roots(2**16, np.array([v]), np.array([length2])).tolist() == [root - 1]
+
+
 def lattice_rays(rng: random.Random, count: int) -> list[tuple[Pixel, Pixel]]:
     """Short rays that end on corners, borders and centres, are aimed at corners, or are any."""
 
