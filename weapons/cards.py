@@ -17,7 +17,7 @@ from weapons.marks import MARKS, tiled_glyph
 from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
 from weapons.words import NAME_MAX, percent, reason, short
 
-__all__ = ["Card", "batch_cards", "shot_card"]
+__all__ = ["Card", "batch_cards", "hit_now", "shot_card"]
 
 HIT_LINES = 24
 """Rows of a card; the JSON has them all."""
@@ -114,9 +114,7 @@ class Card:
         return texts
 
 
-def shot_card(
-    shot: Mapping[str, Any], number: int, scene: Scene, now: Sequence[Mapping[str, Any]] | None = None
-) -> Card:
+def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | None = None) -> Card:
     """Card of one shot; of one at the past with what it would hit now."""
     rays = shot.get("rays")
     hit = _hits(shot) if rays is None else raywords.table(shot)
@@ -134,8 +132,7 @@ def shot_card(
     lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in others[:NOT_LINES]]
     lines += _rest(others, NOT_LINES, " near it")
     if now is not None:
-        told = ", ".join(f"{short(row['name'])} {row['pixels']} px" for row in now[:NOT_LINES]) or "nothing"
-        lines.append(("the same shot now", f"hits {told}" + (" and more" if len(now) > NOT_LINES else "")))
+        lines.append(("the same shot now", now))
     if "tested" in shot:
         lines.append([_tested(shot["tested"])])
     alone = rays[0] if rays is not None and len(rays) == 1 else None
@@ -158,6 +155,17 @@ def _hits(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
 def _blocks(entry: Mapping[str, Any]) -> tuple[str, str]:
     behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
     return f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"
+
+
+def hit_now(report: Mapping[str, Any], number: int) -> str | None:
+    """What a shot at the past would hit now, in words; None if the report does not tell."""
+    if "now" not in report:
+        return None
+    rows = report["now"]["shots"][number]
+    if rows is None:
+        return "starts inside of something"
+    told = ", ".join(f"{short(row['name'])} {row['pixels']} px" for row in rows[:NOT_LINES]) or "nothing"
+    return f"hits {told}" + (" and more" if len(rows) > NOT_LINES else "")
 
 
 def batch_cards(report: Mapping[str, Any]) -> list[Card]:

@@ -11,7 +11,7 @@ from typing import Any
 from planes.arrays import Image, InputError
 from planes.items import Role
 from planes.scene import Scene
-from weapons.cards import batch_cards, shot_card
+from weapons.cards import batch_cards, hit_now, shot_card
 from weapons.ghosts import draw_present
 from weapons.marks import MARKS
 from weapons.overlay import Overlay
@@ -52,7 +52,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
         texts, cards = _heat(world, report, scene), batch_cards(report)
     else:
         texts = _shots(world, report, scene)
-        again = report["now"]["shots"] if "now" in report else [None] * len(report["shots"])
+        again = [hit_now(report, number) for number in range(len(report["shots"]))]
         cards = [
             shot_card(shot, n, scene, now) for n, (shot, now) in enumerate(zip(report["shots"], again, strict=True))
         ]

@@ -210,7 +210,7 @@ NOW = _all(
         "moved": Rows(_all({**ITEM, "runs": RUNS, "from_xy": POINT, "to_xy": POINT})),
         "gone": Rows(_all(dict(ITEM))),
         "new": Rows(_all(dict(ITEM))),
-        "shots": Rows(Rows(_all({**ITEM, "pixels": COUNT}))),
+        "shots": Rows(Optional(Rows(_all({**ITEM, "pixels": COUNT})))),
     }
 )
 REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))

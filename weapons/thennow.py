@@ -32,16 +32,19 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
     Returns
     -------
     "tick", the present "hash", items that "moved" (with their present pixels as runs, and the middles of their boxes),
-    those that are "gone" or "new", and what each of the "shots" hits now
+    those that are "gone" or "new", and what each of the "shots" hits now (null if it would start in something, which is
+    an error for its weapon)
     """
     if not isinstance(now, Scene):
         raise InputError(f"now: expected a Scene, got {type(now).__name__}")
     before, after = then.items.stack(), now.items.stack()
     was = {item: rank for rank, item in enumerate(before.ids.tolist())}
     is_now = {item: rank for rank, item in enumerate(after.ids.tolist())}
-    moved = []
+    moved: list[dict[str, Any]] = []
     for item in sorted(was.keys() & is_now.keys()):
         old, new = before.box_xyxy[was[item]], after.box_xyxy[is_now[item]]
+        if len(moved) == MOVED_MAX:
+            break
         mask, corner = now.mask(item)
         same = np.array_equal(old, new) and np.array_equal(before.mask(was[item]), mask)
         if same or not meets(np.array(view_xyxy), np.stack([old, new])).any():
@@ -54,19 +57,23 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
                 "to_xy": ((new[:2] + new[2:]) / 2).tolist(),
             }
         )
-    again = [fire_checked(now, hits.weapon, hits.shots, "auto", "auto", "auto") for hits in fired]
     return {
         "tick": then.tick if isinstance(then, PastScene) else None,
         "hash": now.content_hash(),
-        "moved": moved[:MOVED_MAX],
+        "moved": moved,
         "gone": [_item(then, item) for item in sorted(was.keys() - is_now.keys())],
         "new": [_item(now, item) for item in sorted(is_now.keys() - was.keys())],
-        "shots": [
-            [{**_item(now, row.object), "pixels": row.pixels} for row in hits.of(shot)]
-            for hits in again
-            for shot in range(len(hits.shots))
-        ],
+        "shots": [_again(now, hits, shot) for hits in fired for shot in range(len(hits.shots))],
     }
+
+
+def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
+    """What a shot hits now; None if it would start in something, and its weapon refuses to."""
+    try:
+        found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1), "auto", "auto", "auto")
+    except InputError:
+        return None
+    return [{**_item(now, row.object), "pixels": row.pixels} for row in found]
 
 
 def _item(scene: Scene, item: int) -> dict[str, Any]:
