@@ -384,3 +384,26 @@ def test_the_rate_at_which_it_is_recorded_changes_no_row() -> None:
                 for i, tick in enumerate(ticks)
             ]
             assert [rows_of(found, i) for i in range(len(ticks))] == [rows_of(one, 0) for one in alone]
+
+
+@pytest.mark.parametrize("far", [10**9, -(10**9), 2**39])
+def test_a_past_far_from_the_origin_is_the_same_past(far: int) -> None:
+    """Moving the world and the shots by whole pixels changes no row, also between two ticks."""
+
+    def moved(by: int) -> History:
+        scene = Scene()
+        items = [scene.add(Sprite.circle(9), (by + 40 * i, 60 - by)) for i in range(6)]
+        scene.add(Sprite.box(9, 41), (by + 150, 60 - by), role="occluder")
+        history = History(scene, interpolate=True)
+        for tick in range(12):
+            scene.move(items, [(by + 40 * i + 3.25 * tick, 60 - by + tick * i % 7) for i in range(6)])
+            history.record(tick)
+        return history
+
+    at, ticks = np.array([(0.5, 61.25), (300, 40), (100, 10)]), [2, 5.5, 11]
+    near, away, shift = moved(0), moved(far), np.array([far, -far])
+    for weapon in (Pistol(400), Rifle(400, budget=30), Laser(400, width=5), Disc(30), Projectile(350, 2)):
+        here = fire(near, weapon, at, aim=[3, 170, 80], tick=ticks)
+        there = fire(away, weapon, at + shift, aim=[3, 170, 80], tick=ticks)
+        assert [row[:7] for row in here] == [row[:7] for row in there] and len(here)
+        assert (here.first_xy + shift == there.first_xy).all()
