@@ -23,8 +23,8 @@ class FixedStep:
 
         clock = FixedStep(240)
         while playing:
-            for _ in range(clock.advance(seconds_since_last_picture)):
-                simulate()  # 1 / 240 s
+            for tick in clock.advance(seconds_since_last_picture):
+                simulate(tick)  # 1 / 240 s
             draw(clock.fraction)  # so far from the last step to the next
 
     Parameters

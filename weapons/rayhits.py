@@ -85,7 +85,7 @@ class RayHits(Hits):
         return pixels_of_rays(self._rays(shot))
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
-        """Objects within 32 px of the whole length of the rays of one shot that were not hit, and why."""
+        """Objects on the whole length of the rays of one shot, or within 32 px of what they walked, not hit, and why."""
         return ray_why_not(self._rays(shot), {row.object for row in self.of(shot)})
 
     def blockers(self, shot: int = 0) -> list[Blocked]:
@@ -93,7 +93,7 @@ class RayHits(Hits):
         return blocked_rays(self._rays(shot))
 
     def nearest_miss(self, shot: int = 0) -> Miss | None:
-        """The accepted object that one shot did not hit and came nearest to, how near, and where."""
+        """The accepted object that one shot passed by most closely, how near, and where."""
         return nearest_miss(self._rays(shot), {row.object for row in self.of(shot)})
 
     def shares(self, shot: int | None = None) -> list[Share]:
