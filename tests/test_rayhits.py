@@ -306,7 +306,7 @@ def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
             segments.append((start, end))
         distances = {}
         cells, owner = hits.samples_at(which), hits.scene.items.owner
-        walked = {tuple(xy) for xy in cells.xy[cells.verdict != Verdict.BEYOND].tolist()}
+        walked = {tuple(xy) for xy in cells.xy[cells.verdict < Verdict.OUTSIDE].tolist()}
         bodies_hit = {int(owner[item]) for item in hit}
         for item in battle.accepted(shot):
             if item.occluder or not item.pixels or int(owner[item.id]) in bodies_hit or item.pixels & walked:
