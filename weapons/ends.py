@@ -63,11 +63,14 @@ class Ends:
 
     def walked(self, met: Meetings) -> Bools:
         """Which cells (K,) of meetings were walked before the end."""
-        ray, rank = met.ray[met.pair], met.rank[met.pair]
-        time, y, x = self.time[ray], self.y[ray], self.x[ray]
-        here = (met.y == y) & (met.x == x) & (rank <= self.rank[ray])
-        before = ~self.alone[ray] & ((met.y < y) | ((met.y == y) & (met.x < x)))
-        return np.asarray((met.entry < time) | ((met.entry == time) & (here | before)))
+        return self.reaches(met.ray[met.pair], met.entry, met.y, met.x, met.rank[met.pair])
+
+    def reaches(self, ray: Ints, entry: Ints, y: Ints, x: Ints, rank: Ints | int = -1) -> Bools:
+        """Whether rays come to cells, and there to items; by default to the cells as such."""
+        time, last_y, last_x = self.time[ray], self.y[ray], self.x[ray]
+        here = (y == last_y) & (x == last_x) & (rank <= self.rank[ray])
+        before = ~self.alone[ray] & ((y < last_y) | ((y == last_y) & (x < last_x)))
+        return np.asarray((entry < time) | ((entry == time) & (here | before)))
 
 
 def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced) -> Ends:

@@ -21,7 +21,7 @@ from planes.spans import Box, Spans
 from weapons.arsenal import parts_of
 from weapons.heat import heat_of
 from weapons.hits import HitRow, Hits
-from weapons.rayfacts import ray_boxes, rays_told
+from weapons.rayfacts import item_told, ray_boxes, rays_told
 from weapons.rayhits import RayHits
 from weapons.thennow import present_of
 from weapons.volley import Volley, volley_of
@@ -227,20 +227,20 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "rows": _rows(scene, hits, row),
         "why_not": [
             {
-                **_item(scene, entry.object),
+                **item_told(scene, entry.object),
                 "reason": entry.reason,
                 "samples": entry.samples,
-                "by": [{**_item(scene, item), "samples": n} for item, n in entry.by.items()],
+                "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
                 "distance": round(entry.distance, 3),
             }
             for entry in hits.why_not(row)
         ],
         "blockers": [
             {
-                **_item(scene, entry.occluder),
+                **item_told(scene, entry.occluder),
                 "samples": entry.samples,
                 "blocked": [
-                    {**_item(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
+                    {**item_told(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
                 ],
             }
             for entry in hits.blockers(row)
@@ -257,7 +257,7 @@ def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
     shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
     return [
         {
-            **_item(scene, row.object),
+            **item_told(scene, row.object),
             "round": row.round,
             "samples": row.samples,
             "pixels": row.pixels,
@@ -319,17 +319,13 @@ def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
         weight[item] = weight.get(item, 0) + heft
     order = sorted(shots, key=lambda item: (-len(shots[item]), -pixels[item], item))
     return [
-        {**_item(scene, item), "shots": len(shots[item]), "pixels": pixels[item], "weight": weight[item]}
+        {**item_told(scene, item), "shots": len(shots[item]), "pixels": pixels[item], "weight": weight[item]}
         for item in order
     ]
 
 
 def _flat(row: HitRow) -> list[int]:
     return [row.round, row.object, row.samples, row.pixels, row.weight, row.pellets, *row.first_xy, row.distance2]
-
-
-def _item(scene: Scene, item: int) -> dict[str, Any]:
-    return {"object": item, "name": _name(scene, item)}
 
 
 def _name(scene: Scene, item: int) -> str:

@@ -32,7 +32,7 @@ from weapons.resolve import Met
 from weapons.volley import Shots, Volley
 from weapons.weapon import Weapon
 
-__all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "plan_of", "rows_of_met"]
+__all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
 
 
 class HitRow(NamedTuple):
@@ -104,7 +104,7 @@ class Hits:
 
     def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self._verdicts: Ints | None = verdicts
+        self._verdicts = verdicts
         verdicts.flags.writeable = False
 
     def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
@@ -122,9 +122,6 @@ class Hits:
     @property
     def verdicts(self) -> Ints:
         """Samples of each shot by verdict."""
-        if self._verdicts is None:
-            self._verdicts = self._counted()
-            self._verdicts.flags.writeable = False
         return self._verdicts
 
     @property
@@ -133,10 +130,6 @@ class Hits:
         fired = np.asarray(self.verdicts.sum(axis=1))
         fired.flags.writeable = False
         return fired
-
-    def _counted(self) -> Ints:
-        """Verdicts that were not counted when it was fired."""
-        raise NotImplementedError
 
     def __len__(self) -> int:
         return len(self.shot)
@@ -266,7 +259,14 @@ class Hits:
         parts, rows : hits of some of the shots, and which those are
         """
         verdicts = np.concatenate([part.verdicts for part in parts])[np.argsort(np.concatenate(rows))]
-        found = cls(cls._gathered_rows(parts, rows), verdicts, parts[0].scene, parts[0].weapon, shots, plan_of(parts))
+        found = cls(
+            cls._gathered_rows(parts, rows),
+            verdicts,
+            parts[0].scene,
+            parts[0].weapon,
+            shots,
+            Plan.joined([part.plan for part in parts]),
+        )
         found._remember(parts, rows)
         return found
 
@@ -279,15 +279,6 @@ class Hits:
         """Keep the scene of each shot."""
         scene_of = {row: part.scene for part, own in zip(parts, rows, strict=True) for row in own.tolist()}
         self._scenes = [scene_of[row] for row in range(len(self.shots))]
-
-
-def plan_of(parts: Sequence[Hits]) -> Plan:
-    """What ran for several parts, added up."""
-    plan = Plan(left_out=list(parts[0].plan.left_out))
-    for part in parts:
-        for stage in part.plan.ran:
-            plan.run(stage.name, stage.why, stage.bytes_made, stage.pairs)
-    return plan
 
 
 def _named(row: tuple[Any, ...]) -> HitRow:

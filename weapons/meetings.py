@@ -93,21 +93,18 @@ class Meetings:
         return cls(*(np.concatenate([getattr(part, name) for part in every]) for name in names))
 
 
-def meet(
-    lines: Lines, ray: Ints, rank: Ints, boxes_xyxy: Ints, stack: Stack, bounds: Box | None, origin_xy: Ints
-) -> Meetings:
+def meet(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box | None, origin_xy: Ints) -> Meetings:
     """Cells in which rays touch the pixels of items.
 
     Parameters
     ----------
     lines : one for each pair
     ray, rank : (P,) the pairs
-    boxes_xyxy : (P, 4) boxes of the items about the origin of the ray
-    origin_xy : (P, 2) that origin
+    origin_xy : (P, 2) whole pixels that the lines are told about
     """
-    inside = boxes_xyxy
-    if bounds is not None:
-        inside = clipped(stack.box_xyxy[rank], bounds) - np.concatenate([origin_xy, origin_xy], axis=1)
+    shift = np.concatenate([origin_xy, origin_xy], axis=1)
+    boxes_xyxy = stack.box_xyxy[rank] - shift
+    inside = boxes_xyxy if bounds is None else clipped(stack.box_xyxy[rank], bounds) - shift
     size = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
     most = size.prod(axis=1) if lines.radius else 2 * size.sum(axis=1)
     found = []

@@ -110,7 +110,7 @@ def passes_of(
     ray, rank, cell = walked.ray, walked.rank, walked.first
     entry = walked.entry[cell]
     out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
-    scale, length = lines.scale[ray], np.sqrt(lines.length2[ray]) / SUB
+    scale, length = lines.scale[ray], lines.length[ray]
     first_part, last_part = entry / scale, np.minimum(walked.leave[out] / scale, ends.fraction[ray])
     last_part = np.maximum(last_part, first_part)
     at, sides = np.stack([walked.x, walked.y], axis=1), relative.entered_by(chosen, walked.x[cell], walked.y[cell])
@@ -146,9 +146,8 @@ def stops_of(met: Meetings, ends: Ends, rays: Rays, lines: Lines, relative: Line
     order = np.argsort(key)
     pair = order[np.searchsorted(key[order], row * max(len(stack), 1) + ends.rank[row])] if len(row) else row
     normal[row] = _normals(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
-    length = np.sqrt(lines.length2) / SUB
     return Stops(
-        rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction, ends.fraction * length,
+        rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction, ends.fraction * lines.length,
         _points(rays, np.arange(len(rays)), ends.fraction), normal,
     )  # fmt: skip
 

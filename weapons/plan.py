@@ -25,6 +25,8 @@ __all__ = [
     "Stage",
     "chosen_candidates",
     "chosen_strategy",
+    "leave_out_absent",
+    "leave_out_imagery",
     "leave_out_unused",
     "plan_lines",
     "sweep_pays",
@@ -71,6 +73,14 @@ class Plan:
                 self.ran[i] = Stage(name, stage.why, stage.bytes_made + bytes_made, added(stage.pairs, pairs))
                 return
         self.ran.append(Stage(name, why, bytes_made, pairs))
+
+    @classmethod
+    def joined(cls, plans: Sequence[Plan]) -> Plan:
+        """What ran in one or more, added up; what the first left out."""
+        plan = cls(left_out=list(plans[0].left_out))
+        for stage in (stage for one in plans for stage in one.ran):
+            plan.run(stage.name, stage.why, stage.bytes_made, stage.pairs)
+        return plan
 
     def has_run(self, name: str) -> bool:
         """Whether a stage ran."""
@@ -250,18 +260,28 @@ def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: Pa
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     elif not plan.has_run("pre-filter"):
         plan.leave_out("volumes", idle)
-    if table.prefix is None:
-        plan.leave_out("weights", "the weapon has no falloff")
-    if scene.bounds is None:
-        plan.leave_out("outside", "the scene has no bounds")
-    if not candidates.stack.occluder.any():
-        plan.leave_out("occluders", "the scene has none")
+    leave_out_absent(plan, scene, candidates.stack, weighted=table.prefix is not None)
     if not plan.has_run("code plane"):
         plan.leave_out("code plane", f"direct: {why_strategy}")
     if not plan.has_run("pre-filter"):
         plan.leave_out("pre-filter", idle)
     if not plan.has_run("walk"):
         plan.leave_out("walk", "no sample lay where it needed one")
+    leave_out_imagery(plan, scene)
+
+
+def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool) -> None:
+    """Record what neither the weapon nor the scene has."""
+    if not weighted:
+        plan.leave_out("weights", "the weapon has no falloff")
+    if scene.bounds is None:
+        plan.leave_out("outside", "the scene has no bounds")
+    if not stack.occluder.any():
+        plan.leave_out("occluders", "the scene has none")
+
+
+def leave_out_imagery(plan: Plan, scene: Scene) -> None:
+    """Record the roles that decide nothing."""
     for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
         if len(scene.ids(role)):
             plan.leave_out(role.value, "drawn only for a picture")

@@ -15,11 +15,12 @@ from planes.constants import DETAIL_SAMPLES_MAX, NEAR_PX, SUB
 from planes.items import Stack
 from planes.sampling import Verdict
 from planes.scene import Scene
+from planes.slabs import slabs
 from planes.spans import Box, Spans, meets
 from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, Reason
 from weapons.explain import Behind, Blocked, Samples, WhyNot
-from weapons.guns import Projectile
+from weapons.flight import steps_of
 from weapons.meetings import Meetings
 from weapons.plan import Plan
 from weapons.rays import Parts, Rays, rays_of
@@ -137,25 +138,21 @@ class RayDetail:
         verdict, rank = np.full(len(every), Verdict.EMPTY, np.int64), np.full(len(every), -1)
         skipped = self.every.take(np.flatnonzero(self.refuses | (not self.in_steps)))
         stopped, ends = np.flatnonzero(self.ends.reason == Reason.OCCLUDER), self.ends
-        for met, told in ((skipped, Verdict.FILTERED), (self.walked, Verdict.HIT)):
-            order = np.argsort(-met.rank[met.pair], kind="stable")
-            pair = met.pair[order]
-            cell, found = every.places(met.ray[pair], met.x[order], met.y[order])
-            verdict[cell], rank[cell] = told, met.rank[pair][found]
-            if told == Verdict.FILTERED:
-                cell, found = every.places(stopped, ends.x[stopped], ends.y[stopped])
-                verdict[cell], rank[cell] = Verdict.OCCLUDED, ends.rank[stopped][found]
+        at_stops = stopped, ends.x[stopped], ends.y[stopped], ends.rank[stopped]
+        for told, (ray, x, y, item) in (
+            (Verdict.FILTERED, _back_to_front(skipped)),
+            (Verdict.OCCLUDED, at_stops),
+            (Verdict.HIT, _back_to_front(self.walked)),
+        ):
+            cell, found = every.places(ray, x, y)
+            verdict[cell], rank[cell] = told, item[found]
         return verdict, rank
 
     def _beyond(self, ray: Ints, at: Ints, entry: Ints, scale: Ints) -> Bools:
         """Which cells come after the end of their ray."""
-        ends = self.ends
         if (scale != self.lines.scale).any():  # of a projectile, whose times are parts of the frame
-            return np.asarray(entry / scale[ray] > ends.fraction[ray])
-        x, y, time = ends.x[ray], ends.y[ray], ends.time[ray]
-        here = (at[:, 1] == y) & (at[:, 0] == x)
-        before = (at[:, 1] < y) | ((at[:, 1] == y) & (at[:, 0] < x))
-        return np.asarray((entry > time) | ((entry == time) & ~here & (ends.alone[ray] | ~before)))
+            return np.asarray(entry / scale[ray] > self.ends.fraction[ray])
+        return ~self.ends.reaches(ray, entry, at[:, 1], at[:, 0])
 
     def samples(self) -> Samples:
         """Cells as samples."""
@@ -170,6 +167,13 @@ class RayDetail:
         return np.bincount(column, minlength=len(self.shots) * n).reshape(-1, n)
 
 
+def _back_to_front(met: Meetings) -> tuple[Ints, Ints, Ints, Ints]:
+    """Cells as (ray, x, y, rank), those of the front-most items last."""
+    order = np.argsort(-met.rank[met.pair], kind="stable")
+    pair = met.pair[order]
+    return met.ray[pair], met.x[order], met.y[order], met.rank[pair]
+
+
 def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     """Walk shots cell by cell."""
     stack, rays = scene.items.stack(), rays_of(parts, shots)
@@ -177,8 +181,7 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     met, ends, lines, _ = trace(rays, parts[2], shots, through)
     every, relative = touching(rays, parts[2], through)
     entered = every.entry[every.first] / relative.scale
-    steps = parts[2].steps if isinstance(parts[2], Projectile) else None
-    rules = steps is not None, parts[2].inside == "ignore_until_exit"
+    rules = steps_of(parts[2]) is not None, parts[2].inside == "ignore_until_exit"
     return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, entered, *rules)
 
 
@@ -340,10 +343,6 @@ def gap(begin: Floats, end: Floats, boxes_xyxy: Floats) -> tuple[Floats, Floats,
 
 def _crossing(begin: Floats, step: Floats, low: Floats, high: Floats) -> Floats:
     """Point of the segment in the middle of where it crosses each box; any point where it does not."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_low, to_high = (low - begin) / step, (high - begin) / step
-    level = step == 0
-    first = np.where(level, 0, np.minimum(to_low, to_high)).max(axis=1)
-    last = np.where(level, 1, np.maximum(to_low, to_high)).min(axis=1)
+    first, last = slabs(begin, step, low, high)
     middle = np.clip((np.clip(first, 0, 1) + np.clip(last, 0, 1)) / 2, 0, 1)
     return np.asarray(begin + middle[:, None] * step)

@@ -16,7 +16,7 @@ from weapons.rayexplain import Miss
 from weapons.rayhits import RayHits, Reason
 from weapons.rays import rays_of
 
-__all__ = ["ray_boxes", "rays_told"]
+__all__ = ["item_told", "ray_boxes", "rays_told"]
 
 
 def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
         for i in range(len(rays))
     ]
     miss = hits.nearest_miss(row)
-    near = None if miss is None else {**_item(scene, miss.object), **_near(miss)}
+    near = None if miss is None else {**item_told(scene, miss.object), **_near(miss)}
     return {"radius": parts[2].radius_256 / SUB, "rays": told, "nearest_miss": near}
 
 
@@ -57,7 +57,8 @@ def _ray_numbers(passes: Passes, pellets: int) -> Any:
     return passes.round * pellets + passes.pellet
 
 
-def _item(scene: Scene, item: int) -> dict[str, Any]:
+def item_told(scene: Scene, item: int) -> dict[str, Any]:
+    """An item by its id and its name."""
     return {"object": item, "name": scene.name_of(item)}
 
 
@@ -65,7 +66,7 @@ def _stop(scene: Scene, stops: Stops, i: int) -> dict[str, Any]:
     item = int(stops.item[i])
     return {
         "reason": Reason(int(stops.reason[i])).name.lower(),
-        "item": None if item < 0 else _item(scene, item),
+        "item": None if item < 0 else item_told(scene, item),
         "cell_xy": stops.cell_xy[i].tolist(),
         "point": stops.point_xy[i].tolist(),
         "distance": float(stops.distance[i]),
@@ -76,7 +77,7 @@ def _stop(scene: Scene, stops: Stops, i: int) -> dict[str, Any]:
 
 def _pass(scene: Scene, passes: Passes, k: int) -> dict[str, Any]:
     return {
-        **_item(scene, int(passes.object[k])),
+        **item_told(scene, int(passes.object[k])),
         "order": int(passes.order[k]),
         "entry_xy": passes.entry_xy[k].tolist(),
         "exit_xy": passes.exit_xy[k].tolist(),

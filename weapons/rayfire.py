@@ -9,12 +9,11 @@ import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
-from planes.items import Role
 from planes.scene import Scene
 from weapons.guns import Traced
 from weapons.hits import Rows
 from weapons.passes import Passes, Stops, passes_of, stops_of
-from weapons.plan import Plan, chosen_candidates
+from weapons.plan import Plan, chosen_candidates, leave_out_absent, leave_out_imagery
 from weapons.rayhits import RayHits, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
 from weapons.tracing import Range, expected_cells, trace
@@ -53,7 +52,12 @@ def fired_rays(
         stops.append(ends)
         for columns in (rows[-1], passes[-1], stops[-1]):
             columns.shot[:] += begin
-    _leave_out_unused(plan, scene, candidates.why_unindexed, ray.fades)
+    if not plan.has_run("broad phase"):
+        plan.leave_out("broad phase", candidates.why_unindexed)
+    plan.leave_out("cells between items", "only those inside their boxes are looked at")
+    plan.leave_out("verdicts", "counted when asked for")
+    leave_out_absent(plan, scene, stack, weighted=ray.fades is not None)
+    leave_out_imagery(plan, scene)
     return RayHits(Rows.joined(rows), Passes.joined(passes), Stops.joined(stops), scene, weapon, shots, plan)
 
 
@@ -83,20 +87,3 @@ def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Pa
         begin, cells = begin + step, cells + len(met.x)
         step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
     return Passes.joined(passes), Stops.joined(stops), np.concatenate(pixels)
-
-
-def _leave_out_unused(plan: Plan, scene: Scene, why_unindexed: str, falloff: str | None) -> None:
-    """Complete a plan with what this scene and this weapon did not need."""
-    if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", why_unindexed)
-    plan.leave_out("cells between items", "only those inside their boxes are looked at")
-    plan.leave_out("verdicts", "counted when asked for")
-    if falloff is None:
-        plan.leave_out("weights", "the weapon has no falloff")
-    if scene.bounds is None:
-        plan.leave_out("outside", "the scene has no bounds")
-    if not scene.items.stack().occluder.any():
-        plan.leave_out("occluders", "the scene has none")
-    for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
-        if len(scene.ids(role)):
-            plan.leave_out(role.value, "drawn only for a picture")

@@ -16,7 +16,7 @@ from planes.spans import Spans
 from weapons.arsenal import ray_parts_of
 from weapons.ends import Reason
 from weapons.explain import Blocked, Samples, Share, WhyNot
-from weapons.hits import HitRow, Hits, Rows, plan_of
+from weapons.hits import HitRow, Hits, Rows
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
@@ -44,7 +44,6 @@ class RayHits(Hits):
         self, rows: Rows, passes: Passes, stop: Stops, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self._verdicts = None
         self.passes, self.stop = replace(passes, row=_rows_of(rows, passes)), stop
         for columns in (self.passes, stop):
             for f in fields(columns):
@@ -85,7 +84,7 @@ class RayHits(Hits):
         return pixels_of_rays(self._rays(shot))
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
-        """Objects on the whole length of the rays of one shot, or within 32 px of what they walked, not hit, and why."""
+        """Objects on the whole length of the rays of one shot, or within 32 px of their way, not hit, and why."""
         return ray_why_not(self._rays(shot), {row.object for row in self.of(shot)})
 
     def blockers(self, shot: int = 0) -> list[Blocked]:
@@ -117,9 +116,14 @@ class RayHits(Hits):
         assert parts is not None  # it was fired as one
         return parts
 
-    def _counted(self) -> Ints:
-        none = np.zeros((0, len(Verdict)), np.int64)
-        return np.concatenate([none, *(self._rays(shot).counts() for shot in range(len(self.shots)))])
+    @property
+    def verdicts(self) -> Ints:
+        """Cells of each shot by verdict, counted when they are first asked for."""
+        if not hasattr(self, "_verdicts"):
+            none = np.zeros((0, len(Verdict)), np.int64)
+            self._verdicts = np.concatenate([none, *(self._rays(i).counts() for i in range(len(self.shots)))])
+            self._verdicts.flags.writeable = False
+        return self._verdicts
 
     @classmethod
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
@@ -132,7 +136,7 @@ class RayHits(Hits):
             parts[0].scene,
             parts[0].weapon,
             shots,
-            plan_of(parts),
+            Plan.joined([part.plan for part in parts]),
         )
         found._remember(parts, rows)
         return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Bools, Floats, Image, Ints
+from planes.slabs import slabs
 
 __all__ = ["Strokes", "within"]
 
@@ -112,18 +113,9 @@ def _pixels(a: Floats, b: Floats, reach: float, shape: tuple[int, int]) -> tuple
 
 
 def within(begin: Floats, end: Floats, size: Floats | Ints, over: float) -> tuple[Floats, Floats]:
-    """Cut segments (n, 2) to a picture and so much around it; those that lie elsewhere are left out.
-
-    References
-    ----------
-    Liang and Barsky, "A new concept and method for line clipping" (1984).
-    """
+    """Cut segments (n, 2) to a picture and so much around it; those that lie elsewhere are left out."""
     step = end - begin
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_low, to_high = (-over - begin) / step, (size + over - begin) / step
-    level = step == 0
-    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
-    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
+    first, last = slabs(begin, step, np.full(2, -over), size + over)
     first, last = np.maximum(first, 0), np.minimum(last, 1)
     some = first <= last
     return (begin + first[:, None] * step)[some], (begin + last[:, None] * step)[some]

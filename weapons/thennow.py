@@ -13,6 +13,7 @@ from planes.scene import Scene
 from planes.spans import Box, Spans, meets
 from weapons.firing import fired as fire_checked
 from weapons.hits import Hits
+from weapons.rayfacts import item_told
 
 __all__ = ["present_of"]
 
@@ -51,7 +52,7 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
             continue
         moved.append(
             {
-                **_item(now, item),
+                **item_told(now, item),
                 "runs": Spans.from_mask(mask, corner).runs().tolist(),
                 "from_xy": ((old[:2] + old[2:]) / 2).tolist(),
                 "to_xy": ((new[:2] + new[2:]) / 2).tolist(),
@@ -61,8 +62,8 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
         "tick": then.tick if isinstance(then, PastScene) else None,
         "hash": now.content_hash(),
         "moved": moved,
-        "gone": [_item(then, item) for item in sorted(was.keys() - is_now.keys())],
-        "new": [_item(now, item) for item in sorted(is_now.keys() - was.keys())],
+        "gone": [item_told(then, item) for item in sorted(was.keys() - is_now.keys())],
+        "new": [item_told(now, item) for item in sorted(is_now.keys() - was.keys())],
         "shots": [_again(now, hits, shot) for hits in fired for shot in range(len(hits.shots))],
     }
 
@@ -73,8 +74,4 @@ def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
         found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1), "auto", "auto", "auto")
     except InputError:
         return None
-    return [{**_item(now, row.object), "pixels": row.pixels} for row in found]
-
-
-def _item(scene: Scene, item: int) -> dict[str, Any]:
-    return {"object": item, "name": scene.name_of(item)}
+    return [{**item_told(now, row.object), "pixels": row.pixels} for row in found]

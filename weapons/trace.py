@@ -17,12 +17,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
+from planes.arrays import Bools, Floats, Ints
 from planes.constants import HALF, SUB
 from planes.grid256 import isqrt
 from planes.spans import each_pixel, ragged
 
-__all__ = ["COMMON", "ROOM", "Lines", "cells", "in_order"]
+__all__ = ["COMMON", "ROOM", "Lines", "cells"]
 
 DIAGONAL = 182
 """Half the diagonal of a pixel in 1/256 px, rounded up: a disc so large has the centre of every square it touches."""
@@ -71,6 +71,11 @@ class Lines:
         return np.asarray((self.step**2).sum(axis=1))
 
     @cached_property
+    def length(self) -> Floats:
+        """Lengths, px."""
+        return np.asarray(np.sqrt(self.length2) / SUB)
+
+    @cached_property
     def scale(self) -> Ints:
         """What times are counted over: the end of the segment."""
         if self.common:
@@ -81,8 +86,15 @@ class Lines:
 
     @cached_property
     def sides(self) -> Ints:
-        """Products of the radius and the length, rounded down: how far centres lie from the axis, times the length."""
-        reach = max(self.radius, DIAGONAL)
+        """How far centres lie from the axis at most, times the length, rounded down."""
+        return self._lengths_times(self.radius)
+
+    @cached_property
+    def wide_sides(self) -> Ints:
+        """Of all cells: of those that the axis touches, too."""
+        return self._lengths_times(max(self.radius, DIAGONAL))
+
+    def _lengths_times(self, reach: int) -> Ints:
         return np.array([math.isqrt(reach * reach * n) for n in self.length2.tolist()], np.int64)
 
     def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
@@ -187,7 +199,7 @@ class Lines:
         begin, along = self.start[line, major], self.step[line, major]
         low, high = np.minimum(begin, begin + along) - reach, np.maximum(begin, begin + along) + reach
         # |(p - start) x step| <= reach * length bounds p along the major axis, unless the segment is level.
-        cross, side = (SUB * v - self.start[line, minor]) * along, self.sides[line]
+        cross, side = (SUB * v - self.start[line, minor]) * along, self.wide_sides[line]
         step = self.step[line, minor]
         per, sign = np.maximum(np.abs(step), 1), np.where(step < 0, -1, 1)
         cross = cross * sign
@@ -215,16 +227,12 @@ class Lines:
         u, v = px * dx + py * dy, px * dy - py * dx
         length2 = self.length2[line]
         still = length2 == 0
-        near = np.where(still, px * px + py * py <= self.radius**2, np.abs(v) <= self._true_sides[line])
+        near = np.where(still, px * px + py * py <= self.radius**2, np.abs(v) <= self.sides[line])
         root = np.zeros_like(u)
         root[near] = self._roots(v[near], length2[near])
         entry, leave = np.maximum(u - root, 0), np.minimum(u + root, length2)
         entry[~near], leave[~near] = 1, 0
         return entry, leave
-
-    @cached_property
-    def _true_sides(self) -> Ints:
-        return np.array([math.isqrt(self.radius**2 * n) for n in self.length2.tolist()], np.int64)
 
     def _roots(self, v: Ints, length2: Ints) -> Ints:
         """Roots of radius^2 length^2 - v^2, rounded down."""
@@ -272,13 +280,8 @@ def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, In
     low, high = np.minimum(reach[0], 0) - wide, np.maximum(reach[1], 0) + wide
     line, x, y = lines.candidates(np.concatenate([low, high], axis=1))
     entry, leave = lines.times(line, x, y)
-    order = in_order(line, entry, y, x)
+    order = np.lexsort((x, y, entry, line))
     order = order[entry[order] <= leave[order]]
     line = line[order]
     xy = np.stack([x, y], axis=1)[order] + origin[line]
     return line, xy, entry[order], leave[order], lines.scale
-
-
-def in_order(ray: Ints, entry: Ints, y: Ints, x: Ints) -> Ints:
-    """Order of cells on their rays: by (ray, entry, y, x)."""
-    return np.lexsort((x, y, entry, ray))

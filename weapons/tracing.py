@@ -14,6 +14,7 @@ import numpy as np
 from planes.arrays import Floats, InputError, Ints
 from planes.constants import CHUNK_SAMPLES, HALF, SUB
 from planes.items import Items, Stack
+from planes.slabs import slabs
 from planes.spans import Box
 from weapons.candidates import Candidates, refused
 from weapons.ends import Ends, ends_of
@@ -72,25 +73,25 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     InputError
         Naming the shot and the item in which a ray starts, if that is an error for the weapon.
     """
-    lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
+    lines = _lines_of(rays, ray)
     cost = through.items.cost[through.stack.ids]
     common = common_scale(ray, through.items, through.stack)
     timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
     edges = _edges(lines, ray, through)
-    length = _lengths(lines)
     live = np.ones(len(rays), np.bool_)
-    found, told = [], ends_of(Meetings.none(), timed, through.stack, cost, ray)
-    pending = Meetings.none()
+    found: list[Meetings] = []
+    pending, told = Meetings.none(), None
     for near, far in pairwise(edges):
         pairs = _pairs(rays, ray, lines, np.flatnonzero(live), (near, far), through)
         possible = len(rays) * len(through.stack) if near == -np.inf else 0
         found.append(_touched(rays, ray, lines, shots, pairs, possible, through))
-        pending = Meetings.joined([pending.of_rays(live), found[-1]]) if len(found) > 1 else found[0]
+        pending = Meetings.joined([pending.of_rays(live), found[-1]]) if len(pending) else found[-1]
         ends = ends_of(pending, timed, through.stack, cost, ray)
-        told = told.replaced(live, ends)
-        live &= (ends.fraction + SLACK) * length >= far
+        told = ends if told is None else told.replaced(live, ends)
+        live &= (ends.fraction + SLACK) * lines.length >= far
         if not live.any():
             break
+    assert told is not None  # there is one stretch at least
     met = Meetings.joined(found)
     return met, told, timed, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
@@ -102,25 +103,16 @@ def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
     -------
     the cells; and for each pair the ray as the item sees it
     """
-    lines = Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
+    lines = _lines_of(rays, ray)
     row, rank = _pairs(rays, ray, lines, np.arange(len(rays)), (-np.inf, np.inf), through)
-    origin = rays.origin_xy[row]
-    boxes = through.stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
-    met = meet(
-        relative_lines(lines, ray, row, through.stack.ids[rank], through.items),
-        row,
-        rank,
-        boxes,
-        through.stack,
-        None,
-        origin,
-    )
+    own = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
+    met = meet(own, row, rank, through.stack, None, rays.origin_xy[row])
     return met, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
 
-def _lengths(lines: Lines) -> Floats:
-    """Lengths of lines, px."""
-    return np.asarray(np.sqrt(lines.length2) / SUB)
+def _lines_of(rays: Rays, ray: Traced) -> Lines:
+    """Rays about the whole pixels that they begin on."""
+    return Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
 
 
 def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
@@ -136,7 +128,7 @@ def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
     ):
         return [-np.inf, np.inf]
     first = max(PAIRS_FIRST / max(len(lines), 1), 1) / _pairs_per_px(stack, lines.radius)
-    longest = float(np.sqrt(lines.length2.max(initial=0))) / SUB
+    longest = float(lines.length.max(initial=0))
     if longest <= GROWTH * first:
         return [-np.inf, np.inf]
     edges = [-np.inf]
@@ -206,7 +198,7 @@ def _entered(
 
 def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float) -> Ints:
     """Inclusive boxes (n, 4) around what rays touch between two distances, or a little more."""
-    safe = np.maximum(_lengths(lines)[live], SLACK)[:, None]
+    safe = np.maximum(lines.length[live], SLACK)[:, None]
     start, step = lines.start[live] / SUB, lines.step[live] / SUB
     ends = [start + np.clip(edge / safe, 0, 1) * step for edge in (near, far)]
     wide = lines.radius / SUB + 1
@@ -216,23 +208,14 @@ def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float
 
 
 def _enters(origin_xy: Ints, lines: Lines, boxes_xyxy: Ints) -> Floats:
-    """How far along lines, each about its origin, boxes are entered, px, or a little less; NaN where they pass by.
-
-    References
-    ----------
-    Kay and Kajiya, "Ray tracing complex scenes" (1986): slabs.
-    """
+    """How far along lines, each about its origin, boxes are entered, px, or a little less; NaN where they pass by."""
     grown = (lines.radius + HALF) / SUB + SLACK
     start, step = lines.start / SUB, lines.step / SUB
-    low, high = boxes_xyxy[:, :2] - origin_xy - grown - start, boxes_xyxy[:, 2:] - origin_xy + grown - start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_low, to_high = low / step, high / step
-    level = step == 0
-    beside = (level & ((low > 0) | (high < 0))).any(axis=1)
-    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=1)
-    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=1)
+    low, high = boxes_xyxy[:, :2] - origin_xy - grown, boxes_xyxy[:, 2:] - origin_xy + grown
+    first, last = slabs(start, step, low, high)
+    beside = ((step == 0) & ((low > start) | (high < start))).any(axis=1)
     missed = beside | (first > last + SLACK) | (first > 1 + SLACK) | (last < -SLACK)
-    return np.where(missed, np.nan, np.maximum(first, 0) * _lengths(lines) - SLACK)
+    return np.where(missed, np.nan, np.maximum(first, 0) * lines.length - SLACK)
 
 
 def _touched(
@@ -243,20 +226,19 @@ def _touched(
     row, rank = pairs
     accepted = np.flatnonzero(~refused(stack, rank, shots, rays.shot[row]))
     row, rank = row[accepted], rank[accepted]
-    own = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
-    origin = rays.origin_xy[row]
-    boxes = stack.box_xyxy[rank] - np.concatenate([origin, origin], axis=1)
+    own, origin = relative_lines(lines, ray, row, stack.ids[rank], through.items), rays.origin_xy[row]
     wanted = through.candidates.prefilter
     if wanted.volume:
         from planes.bounding import Kind  # few calls need them
         from weapons.narrow import near_rays
 
-        kept = near_rays(Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], boxes[:, :2], own)
-        row, rank, own, origin, boxes = row[kept], rank[kept], own.take(kept), origin[kept], boxes[kept]
+        corner = stack.box_xyxy[rank, :2] - origin
+        kept = near_rays(Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], corner, own)
+        row, rank, own, origin = row[kept], rank[kept], own.take(kept), origin[kept]
     if through.looked:
         through.looked.pairs.append((row, rank))
     plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
-    met = meet(own, row, rank, boxes, stack, through.bounds, origin)
+    met = meet(own, row, rank, stack, through.bounds, origin)
     plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
     if not isinstance(ray, Projectile):
         return _started(met, rays, ray, shots, stack)
