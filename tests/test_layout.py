@@ -26,7 +26,7 @@ ORDER = {
         "strokes", "signs", "world", "ghosts", "sketch", "panel", "overlay", "raymarks", "inset",
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
-        "animation", "demo", "cli", "__main__",
+        "animation", "decisions", "timing", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -1,0 +1,153 @@
+"""What a method decided, and by how much that differs from the truth: the error axis of the study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planes.arrays import Floats, Ints
+
+__all__ = ["Curve", "Decisions", "Errors", "Method", "Question", "errors_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Decisions:
+    """Pairs (shot, object) that are hit; a pair that is not there is not hit.
+
+    Parameters
+    ----------
+    shot, object : (K,) int64
+    xy : (K, 2) float, px: where, as the method tells it; NaN where it tells nothing
+    share : (K,) float: how much of the shot lies on the object, 0 to 1; NaN where the method tells nothing
+    """
+
+    shot: Ints
+    object: Ints
+    xy: Floats
+    share: Floats
+
+    @classmethod
+    def of(cls, shot: Ints, object: Ints, xy: Floats | None = None, share: Floats | None = None) -> Decisions:  # noqa: A002
+        """Decisions without what the method does not tell."""
+        n = len(shot)
+        return cls(
+            np.asarray(shot, np.int64),
+            np.asarray(object, np.int64),
+            np.full((n, 2), np.nan) if xy is None else xy,
+            np.full(n, np.nan) if share is None else share,
+        )
+
+    def __len__(self) -> int:
+        return len(self.shot)
+
+
+class Errors(NamedTuple):
+    """How wrong a method was. All but the last two are counts.
+
+    `missed` are hits that it did not see, `false` are hits that were none; `share` is the mean of the absolute error of
+    the share over all pairs that are hit in truth or by the method, `position` the mean distance of the place hit from
+    the true one, px, over pairs that both hit. None where there is nothing to compare.
+    """
+
+    missed: int
+    false: int
+    share: float | None
+    position: float | None
+
+    @property
+    def wrong(self) -> int:
+        """Wrong decisions, of both kinds."""
+        return self.missed + self.false
+
+
+def errors_of(found: Decisions, truth: Decisions) -> Errors:
+    """Compare what a method decided with the truth; both have each pair once."""
+    pairs, where = np.unique(_pairs(found, truth), return_inverse=True)
+    row = np.full((2, len(pairs)), -1)
+    row[0, where[: len(found)]] = np.arange(len(found))
+    row[1, where[len(found) :]] = np.arange(len(truth))
+    both = (row >= 0).all(axis=0)
+    share = [np.where(r >= 0, np.append(d.share, 0.0)[r], 0.0) for r, d in zip(row, (found, truth), strict=True)]
+    apart = found.xy[row[0, both]] - truth.xy[row[1, both]]
+    return Errors(
+        int((row[0] < 0).sum()), int((row[1] < 0).sum()), _mean(np.abs(share[0] - share[1])), _mean(_lengths(apart))
+    )
+
+
+def _pairs(found: Decisions, truth: Decisions) -> Ints:
+    """A number for each pair, of both, one after the other."""
+    shot, item = (np.concatenate([getattr(found, n), getattr(truth, n)]) for n in ("shot", "object"))
+    return np.asarray(shot * (int(item.max(initial=0)) + 1) + item)
+
+
+def _lengths(xy: Floats) -> Floats:
+    return np.asarray(np.sqrt((xy**2).sum(axis=1)))
+
+
+def _mean(values: Floats) -> float | None:
+    """Mean of what is known; None where nothing is, or where the method tells nothing."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """One point of a curve: a way to decide, at one setting.
+
+    Parameters
+    ----------
+    setting : its value, in the unit of the curve; None where there is nothing to set; or a word
+    prepare : makes what is kept for all shots, and returns the run; its time is the set-up's
+    read : what a run returns, as decisions; not timed
+    """
+
+    setting: float | str | None
+    prepare: Callable[[], Callable[[], Any]]
+    read: Callable[[Any], Decisions]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A method over its own setting.
+
+    Parameters
+    ----------
+    name : of the method
+    setting : what is set, with its unit; "" where nothing is
+    methods : in the order of the curve, from coarse to fine
+    note : what a reader must know to compare it, as that it answers an easier question
+    left_out : why it was not measured; then there are no methods
+    """
+
+    name: str
+    setting: str = ""
+    methods: tuple[Method, ...] = ()
+    note: str = ""
+    left_out: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is decided, of which shots, what is true, and the methods that try.
+
+    Parameters
+    ----------
+    name : one word, for files
+    asks : the question, a sentence
+    shots : number of shots
+    truth : the right answers
+    truth_told : where they come from
+    curves : of the methods
+    kind_of : a word for each object that is told apart in the answer, by id
+    """
+
+    name: str
+    asks: str
+    shots: int
+    truth: Decisions
+    truth_told: str
+    curves: tuple[Curve, ...]
+    kind_of: dict[int, str] = field(default_factory=dict)
