@@ -26,7 +26,8 @@ ORDER = {
         "strokes", "signs", "world", "ghosts", "sketch", "panel", "overlay", "raymarks", "inset",
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
-        "animation", "decisions", "timing", "demo", "cli", "__main__",
+        "animation", "decisions", "timing", "areatruth", "copies", "discs", "planestudy", "volumestudy",
+        "kinds", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

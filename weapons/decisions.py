@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +42,11 @@ class Decisions:
 
     def __len__(self) -> int:
         return len(self.shot)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Decisions]) -> Decisions:
+        """All pairs of one or more."""
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("shot", "object", "xy", "share")))
 
 
 class Errors(NamedTuple):
@@ -141,7 +146,7 @@ class Question:
     truth : the right answers
     truth_told : where they come from
     curves : of the methods
-    kind_of : a word for each object that is told apart in the answer, by id
+    aimed : (N,) the object near which each shot is, to tell kinds of objects apart; None where that means nothing
     """
 
     name: str
@@ -150,4 +155,4 @@ class Question:
     truth: Decisions
     truth_told: str
     curves: tuple[Curve, ...]
-    kind_of: dict[int, str] = field(default_factory=dict)
+    aimed: Ints | None = None

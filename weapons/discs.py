@@ -1,0 +1,97 @@
+"""Which objects does a disc touch? The shots of the study's first question, and the truth about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, Ints
+from planes.constants import SCALE_BITS, SUB
+from planes.scene import Scene
+from weapons.areatruth import Found, Pixels, Round, Straight, discs_on_pixels, discs_on_shapes, placed_rings
+from weapons.copies import copied
+from weapons.decisions import Curve, Decisions, Question
+
+__all__ = ["Discs", "areas_question", "discs_at"]
+
+REACH = 8
+"""Objects of the middle size are so many times as large as the radius of the disc."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Shots, what they are fired at, and where that is known exactly.
+
+    Parameters
+    ----------
+    scene : objects alone, numbered from 0
+    exact : (M,) whether an object is a shape of which the points are known
+    at : (N, 2) px; whole where no shape is exact
+    aimed : (N,) the object near which a shot is
+    radius : px
+    """
+
+    scene: Scene
+    exact: Bools
+    at: Floats
+    aimed: Ints
+    radius: float
+
+
+def discs_at(scene: Scene, shots: int, seed: int) -> Discs:
+    """Discs near each object in turn, evenly over its box and twice their radius around it."""
+    ids = scene.ids("hittable")
+    alone = copied(scene, ids[scene.items.size_wh[ids, 0] > 0])
+    items, count = alone.items, len(alone)
+    exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
+    size = float(np.median(items.size_wh[:count].max(axis=1))) if count else REACH
+    radius = float(max(1, round(size / REACH)))
+    aimed = np.arange(shots if count else 0) % max(count, 1)
+    box = items.boxes(aimed) + np.array([-0.5, -0.5, 0.5, 0.5])
+    low, high = box[:, :2] - 2 * radius, box[:, 2:] + 2 * radius
+    part = np.random.Generator(np.random.PCG64(seed)).random((len(aimed), 2))
+    grid = SUB if exact.any() else 1
+    return Discs(alone, exact, np.floor((low + part * (high - low)) * grid) / grid, aimed, radius)
+
+
+def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
+    """The question, with its true answers."""
+    exact, masks = int(discs.exact.sum()), int((~discs.exact).sum())
+    told = [f"exact shapes of {exact} objects"] * bool(exact) + [f"masks at full scale of {masks}"] * bool(masks)
+    asks = f"Which objects does a disc of radius {discs.radius:g} px touch?"
+    truth = " and ".join(told) or "nothing can be hit"
+    return Question("areas", asks, len(discs.at), _truth(discs), truth, tuple(curves), aimed=discs.aimed)
+
+
+def _truth(discs: Discs) -> Decisions:
+    """What discs touch, with places and shares: exact shapes, and the pixels of masks."""
+    exact, masked = np.flatnonzero(discs.exact), np.flatnonzero(~discs.exact)
+    masks = [Pixels(*discs.scene.mask(item)) for item in masked.tolist()]
+    shapes = [_shape(discs.scene, item) for item in exact.tolist()]
+    of_shapes = discs_on_shapes(discs.at, discs.radius, shapes)
+    of_masks = discs_on_pixels(np.floor(discs.at + 0.5).astype(np.int64), discs.radius, masks)
+    return Decisions.joined([_numbered(of_shapes, exact), _numbered(of_masks, masked)])
+
+
+def _numbered(found: Found, ids: Ints) -> Decisions:
+    return Decisions(found.shot, ids[found.object], found.xy, found.share)
+
+
+def _is_exact(scene: Scene, item: int) -> bool:
+    """Whether the exact form of an object is known: of polygons, and of circles that are no ellipses."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    return outline is not None and (outline.radius is None or form.scale_x == form.scale_y)
+
+
+def _shape(scene: Scene, item: int) -> Round | Straight:
+    """The exact form of an object in the world."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    assert outline is not None  # it is exact
+    position = scene.items.position_256[item] / SUB
+    scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
+    if outline.radius is not None:
+        return Round(position, outline.radius / SUB * scale[0])
+    rings = [ring / SUB for ring in outline.rings]
+    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[item], position))

@@ -1,0 +1,139 @@
+"""Discs against volumes: each kind, fitted to the masks of the objects as they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from planes import fit
+from planes.arrays import Bools, Floats, Ints
+from planes.constants import SUB, TRIG_BITS
+from planes.overlap import overlap
+from planes.parts import ConcavePolygons, Parts, joined
+from planes.rings import convex_parts, starts_of
+from planes.scene import Scene
+from planes.sprite import variant_of
+from planes.volumes import Circles, Polygons, Volumes
+from weapons.arsenal import Disc
+from weapons.copies import copied
+from weapons.decisions import Curve, Decisions, Method
+from weapons.discs import Discs
+
+__all__ = ["volume_curves"]
+
+BOXES = (1, 2, 4, 8, 16, 32, 64)
+CORNERS = (4, 5, 6, 8, 12, 16, 24)
+TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
+
+POINTS_AT_ONCE = 1 << 16
+"""Points that are compared with volumes at once."""
+
+Make = Callable[[Scene, int], Volumes]
+"""A volume of an object of a scene, in the world: one row."""
+
+
+def volume_curves(discs: Discs) -> list[Curve]:
+    """The curves of all kinds of volumes."""
+
+    def curve(name: str, setting: str, makes: Mapping[float | None, Make]) -> Curve:
+        return Curve(name, setting, tuple(_method(discs, value, make) for value, make in makes.items()))
+
+    return [
+        curve("circle", "", {None: _fit(fit.least_circle)}),
+        curve("circle about the pivot", "", {None: _pivot_circle}),
+        curve("box, re-boxed", "", {None: _reboxed}),
+        curve("box, refitted", "", {None: _fit(fit.box)}),
+        curve("oriented box", "", {None: _fit(fit.oriented_box)}),
+        curve("boxes", "boxes an object", {k: _fit(partial(fit.boxes, k=k)) for k in BOXES}),
+        curve("convex polygon", "corners", {n: _fit(partial(fit.convex, n=n)) for n in CORNERS}),
+        curve("hull", "", {None: _fit(fit.hull)}),
+        curve("polygon", "tolerance, px", {t: _fit(partial(_concave, tolerance=t)) for t in TOLERANCES}),
+        curve("triangles", "tolerance, px", {t: _fit(partial(_triangles, tolerance=t)) for t in TOLERANCES}),
+    ]
+
+
+def _fit(make: Callable[[Bools], Volumes]) -> Make:
+    """A volume of an object from one of its mask."""
+
+    def fitted(scene: Scene, item: int) -> Volumes:
+        mask, corner_xy = scene.mask(item)
+        return make(mask).translated(corner_xy)
+
+    return fitted
+
+
+def _concave(mask: Bools, tolerance: float) -> Volumes:
+    return ConcavePolygons(fit.concave(mask, tolerance), [0])
+
+
+def _triangles(mask: Bools, tolerance: float) -> Volumes:
+    """The outline cut into triangles: fans of its convex parts."""
+    points = fit.concave(mask, tolerance)
+    parts = convex_parts([(x, y) for x, y in points.tolist()])
+    fans = [[part[0], part[k], part[k + 1]] for part in parts for k in range(1, len(part) - 1)]
+    return Parts(Polygons(points[np.array(fans).ravel()], starts_of([3] * len(fans))), [0])
+
+
+def _pivot_circle(scene: Scene, item: int) -> Volumes:
+    """The circle about the pivot that no turn changes: fitted before the turn."""
+    mask, pivot_xy, corner_xy = _unturned(scene, item)
+    return fit.pivot_circle(mask, pivot_xy.tolist()).translated(corner_xy)
+
+
+def _reboxed(scene: Scene, item: int) -> Volumes:
+    """The box before the turn, its corners turned, and boxed again."""
+    mask, pivot_xy, corner_xy = _unturned(scene, item)
+    return fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy)
+
+
+def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
+    """Mask of an object before its turn, its pivot in the mask, and where the mask goes then, px."""
+    items = scene.items
+    variant = variant_of(items.sprites[item], replace(items.forms[item], quarter=0, c=1 << TRIG_BITS, s=0))
+    pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
+    return variant.mask, pivot, items.position_256[item] / SUB - pivot
+
+
+def _method(discs: Discs, setting: float | None, make: Make) -> Method:
+    """A volume for each object; a run compares boxes around all, then volumes."""
+
+    def prepare() -> Callable[[], tuple[Volumes, Ints, Ints]]:
+        alone = copied(discs.scene, np.arange(len(discs.scene)))
+        made = [make(alone, item) for item in range(len(alone))]
+        volumes = joined(made) if made else Circles(np.zeros((0, 2)), 0.0)
+        box = volumes.bounds()
+        return lambda: (volumes, *_touched(volumes, box.min, box.max, discs))
+
+    return Method(setting, prepare, lambda found: _decided(discs, *found))
+
+
+def _touched(volumes: Volumes, low: Floats, high: Floats, discs: Discs) -> tuple[Ints, Ints]:
+    """Shots and objects, of which disc and volume touch; `low` and `high` are corners of the boxes around volumes."""
+    near = np.ones((len(discs.at), len(low)), np.bool_)
+    for axis in range(2):
+        place = discs.at[:, axis, None]
+        near &= (place + discs.radius >= low[:, axis]) & (place - discs.radius <= high[:, axis])
+    shot, item = np.nonzero(near)
+    meet = overlap(volumes.take(item), Circles(discs.at[shot], discs.radius))
+    return shot[meet], item[meet]
+
+
+def _decided(discs: Discs, volumes: Volumes, shot: Ints, item: Ints) -> Decisions:
+    """Decisions of a volume; its share and its nearest place are those of the centres of the disc's pixels."""
+    x, y = Disc(discs.radius).spans(1 << TRIG_BITS, 0).pixels().T
+    off = np.stack([x, y], axis=1)[np.lexsort((x, y, x * x + y * y))].astype(np.float64)
+    share, xy = np.zeros(len(shot)), np.full((len(shot), 2), np.nan)
+    step = max(1, POINTS_AT_ONCE // len(off))
+    for first in range(0, len(shot), step):
+        some = slice(first, first + step)
+        points = discs.at[shot[some], None] + off
+        rows = np.repeat(item[some], len(off))
+        met = overlap(volumes.take(rows), Circles(points.reshape(-1, 2), 0.0), conservative=True)
+        on: Bools = met.reshape(-1, len(off))
+        share[some] = on.mean(axis=1)
+        nearest = points[np.arange(len(on)), on.argmax(axis=1)]
+        xy[some] = np.where((share[some] > 0)[:, None], nearest, np.nan)
+    return Decisions(shot, item, xy, share)
