@@ -48,14 +48,14 @@ class Round:
         """Its point that is nearest to another."""
         away = at - self.center_xy
         far = math.sqrt(float((away**2).sum()))
-        edge: Reals = self.center_xy + away * (self.radius / far) if far else at
-        return at if far <= self.radius else edge
+        nearest: Reals = at if far <= self.radius else self.center_xy + away * (self.radius / far)
+        return nearest
 
     def chords(self, y: Reals, low: Reals, high: Reals) -> Reals:
         """Lengths of it on horizontal lines, between two places on each."""
         half = np.sqrt(np.maximum(self.radius**2 - (y - self.center_xy[1]) ** 2, 0))
         x = self.center_xy[0]
-        return np.maximum(np.minimum(high, x + half) - np.maximum(low, x - half), 0)
+        return np.asarray(np.maximum(np.minimum(high, x + half) - np.maximum(low, x - half), 0))
 
 
 @dataclass(frozen=True, eq=False)

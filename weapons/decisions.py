@@ -107,11 +107,13 @@ class Method:
     setting : its value, in the unit of the curve; None where there is nothing to set; or a word
     prepare : makes what is kept for all shots, and returns the run; its time is the set-up's
     read : what a run returns, as decisions; not timed
+    kept_bytes : of what a run returned, the bytes of what is kept; None where they are traced, which slows a set-up down
     """
 
     setting: float | str | None
     prepare: Callable[[], Callable[[], Any]]
     read: Callable[[Any], Decisions]
+    kept_bytes: Callable[[Any], int] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,9 +65,10 @@ def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
     if len(squares):
         k = int(scale)
         pixels = np.array(Disc(discs.radius).spans(1 << TRIG_BITS, 0).to_mask()[0])
-        stencil = Stencil(np.kron(pixels, np.ones((k, k), np.bool_)), pivot_xy=(0, 0), pierce=True)
-        big, corner = enlarged(discs.scene, squares, k), k * (np.floor(discs.at + 0.5) - len(pixels) // 2)
-        runs.append(lambda: (fire(big, stencil, corner), squares))
+        middle = k * len(pixels) // 2
+        stencil = Stencil(np.kron(pixels, np.ones((k, k), np.bool_)), pivot_xy=(middle, middle), pierce=True)
+        big, center = enlarged(discs.scene, squares, k), k * (np.floor(discs.at + 0.5) - len(pixels) // 2) + middle
+        runs.append(lambda: (fire(big, stencil, center), squares))
     return lambda: [run() for run in runs]
 
 

@@ -6,11 +6,16 @@ import gc
 import statistics
 import time
 import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from weapons.decisions import Method
 
 __all__ = ["Cost", "measured"]
+
+RUNS_MAX = 1000
+"""Runs of a method that takes no time are enough after so many."""
 
 
 class Cost(NamedTuple):
@@ -28,44 +33,55 @@ class Cost(NamedTuple):
 def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     """Set a method up, run it to warm up, then at least `runs` times, and on for `seconds`.
 
-    Memory is traced in a set-up and a run of their own: tracing takes time.
+    Memory is traced in a run of its own, as tracing takes time.
 
     Returns
     -------
     what a run returned, and its cost
     """
-    kept, needed = _traced(method)
     begin = time.perf_counter()
     run = method.prepare()
     setup = time.perf_counter() - begin
     answer = run()
     times: list[float] = []
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
+    with _undisturbed():
         while len(times) < runs or (sum(times) < seconds and len(times) < RUNS_MAX):
             begin = time.perf_counter()
             run()
             times.append(time.perf_counter() - begin)
-    finally:
-        if enabled:
-            gc.enable()
+    kept, needed = _traced(method, run) if method.kept_bytes is None else (method.kept_bytes(answer), _peak(run))
     return answer, Cost(setup, min(times), statistics.median(times), max(times), len(times), kept, needed)
 
 
-RUNS_MAX = 1000
-"""Runs of a method that takes no time are enough after so many."""
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """No garbage is collected while the clock runs."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
-def _traced(method: Method) -> tuple[int, int]:
-    """Bytes that are kept after the set-up and a first run, and the most that a second run needs beside them."""
+def _traced(method: Method, run: Callable[[], Any]) -> tuple[int, int]:
+    """Bytes that another set-up keeps, its first run too; and the most that a run needs beside them."""
     tracemalloc.start()
     try:
-        run = method.prepare()
-        run()
+        again = method.prepare()
+        again()
         kept, _ = tracemalloc.get_traced_memory()
-        tracemalloc.reset_peak()
+    finally:
+        tracemalloc.stop()
+    return kept, _peak(run)
+
+
+def _peak(run: Callable[[], Any]) -> int:
+    """The most bytes that a run needs at once."""
+    tracemalloc.start()
+    try:
         run()
-        return kept, tracemalloc.get_traced_memory()[1] - kept
+        return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

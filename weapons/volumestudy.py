@@ -16,7 +16,7 @@ from planes.parts import ConcavePolygons, Parts, joined
 from planes.rings import convex_parts, starts_of
 from planes.scene import Scene
 from planes.sprite import variant_of
-from planes.volumes import Circles, Polygons, Volumes
+from planes.volumes import Aabbs, Circles, Polygons, Volumes
 from weapons.arsenal import Disc
 from weapons.copies import copied
 from weapons.decisions import Curve, Decisions, Method
@@ -31,8 +31,8 @@ TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
 POINTS_AT_ONCE = 1 << 16
 """Points that are compared with volumes at once."""
 
-Make = Callable[[Scene, int], Volumes]
-"""A volume of an object of a scene, in the world: one row."""
+Make = Callable[[Scene], list[Volumes]]
+"""The volume of each object of a scene, in the world: one row each."""
 
 
 def volume_curves(discs: Discs) -> list[Curve]:
@@ -43,7 +43,7 @@ def volume_curves(discs: Discs) -> list[Curve]:
 
     return [
         curve("circle", "", {None: _fit(fit.least_circle)}),
-        curve("circle about the pivot", "", {None: _pivot_circle}),
+        curve("circle about the pivot", "", {None: _pivot_circles}),
         curve("box, re-boxed", "", {None: _reboxed}),
         curve("box, refitted", "", {None: _fit(fit.box)}),
         curve("oriented box", "", {None: _fit(fit.oriented_box)}),
@@ -56,11 +56,16 @@ def volume_curves(discs: Discs) -> list[Curve]:
 
 
 def _fit(make: Callable[[Bools], Volumes]) -> Make:
-    """A volume of an object from one of its mask."""
+    """Volumes of objects from those of their masks; equal masks have one."""
 
-    def fitted(scene: Scene, item: int) -> Volumes:
-        mask, corner_xy = scene.mask(item)
-        return make(mask).translated(corner_xy)
+    def fitted(scene: Scene) -> list[Volumes]:
+        made: dict[int, Volumes] = {}
+        placed = []
+        for item, variant in enumerate(scene.items.variants):
+            if variant.uid not in made:
+                made[variant.uid] = make(variant.mask)
+            placed.append(made[variant.uid].translated(scene.mask(item)[1]))
+        return placed
 
     return fitted
 
@@ -77,16 +82,19 @@ def _triangles(mask: Bools, tolerance: float) -> Volumes:
     return Parts(Polygons(points[np.array(fans).ravel()], starts_of([3] * len(fans))), [0])
 
 
-def _pivot_circle(scene: Scene, item: int) -> Volumes:
-    """The circle about the pivot that no turn changes: fitted before the turn."""
-    mask, pivot_xy, corner_xy = _unturned(scene, item)
-    return fit.pivot_circle(mask, pivot_xy.tolist()).translated(corner_xy)
+def _pivot_circles(scene: Scene) -> list[Volumes]:
+    """Circles about the pivots, which no turn changes: fitted before the turn."""
+    unturned = [_unturned(scene, item) for item in range(len(scene))]
+    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in unturned]
 
 
-def _reboxed(scene: Scene, item: int) -> Volumes:
-    """The box before the turn, its corners turned, and boxed again."""
-    mask, pivot_xy, corner_xy = _unturned(scene, item)
-    return fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy)
+def _reboxed(scene: Scene) -> list[Volumes]:
+    """Boxes before the turn, their corners turned, and boxed again."""
+    boxes: list[Volumes] = []
+    for item in range(len(scene)):
+        mask, pivot_xy, corner_xy = _unturned(scene, item)
+        boxes.append(fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy))
+    return boxes
 
 
 def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
@@ -102,12 +110,22 @@ def _method(discs: Discs, setting: float | None, make: Make) -> Method:
 
     def prepare() -> Callable[[], tuple[Volumes, Ints, Ints]]:
         alone = copied(discs.scene, np.arange(len(discs.scene)))
-        made = [make(alone, item) for item in range(len(alone))]
+        made = make(alone)
         volumes = joined(made) if made else Circles(np.zeros((0, 2)), 0.0)
         box = volumes.bounds()
         return lambda: (volumes, *_touched(volumes, box.min, box.max, discs))
 
-    return Method(setting, prepare, lambda found: _decided(discs, *found))
+    return Method(setting, prepare, lambda found: _decided(discs, *found), lambda found: _stored(found[0]))
+
+
+def _stored(volumes: Volumes) -> int:
+    """Bytes of the numbers of volumes."""
+    if isinstance(volumes, Parts):
+        return _stored(volumes.parts) + volumes.starts.nbytes
+    if isinstance(volumes, Aabbs):
+        return volumes.min.nbytes + volumes.max.nbytes
+    core = volumes.core()
+    return core.points.nbytes + core.radius.nbytes * isinstance(volumes, Circles)
 
 
 def _touched(volumes: Volumes, low: Floats, high: Floats, discs: Discs) -> tuple[Ints, Ints]:
