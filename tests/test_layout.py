@@ -27,7 +27,7 @@ ORDER = {
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
         "animation", "decisions", "timing", "areatruth", "copies", "discs", "planestudy", "volumestudy",
-        "kinds", "demo", "cli", "__main__",
+        "kinds", "study", "studywords", "figures", "diagram", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -50,17 +50,19 @@ class Decisions:
 
 
 class Errors(NamedTuple):
-    """How wrong a method was. All but the last two are counts.
+    """How wrong a method was.
 
     `missed` are hits that it did not see, `false` are hits that were none; `share` is the mean of the absolute error of
     the share over all pairs that are hit in truth or by the method, `position` the mean distance of the place hit from
-    the true one, px, over pairs that both hit. None where there is nothing to compare.
+    the true one, px, over pairs that both hit; None where there is nothing to compare. `objects` has the object of each
+    wrong decision.
     """
 
     missed: int
     false: int
     share: float | None
     position: float | None
+    objects: Ints
 
     @property
     def wrong(self) -> int:
@@ -70,22 +72,23 @@ class Errors(NamedTuple):
 
 def errors_of(found: Decisions, truth: Decisions) -> Errors:
     """Compare what a method decided with the truth; both have each pair once."""
-    pairs, where = np.unique(_pairs(found, truth), return_inverse=True)
+    shot, item = (np.concatenate([getattr(found, n), getattr(truth, n)]) for n in ("shot", "object"))
+    objects = int(item.max(initial=0)) + 1
+    pairs, where = np.unique(shot * objects + item, return_inverse=True)
     row = np.full((2, len(pairs)), -1)
     row[0, where[: len(found)]] = np.arange(len(found))
     row[1, where[len(found) :]] = np.arange(len(truth))
     both = (row >= 0).all(axis=0)
     share = [np.where(r >= 0, np.append(d.share, 0.0)[r], 0.0) for r, d in zip(row, (found, truth), strict=True)]
     apart = found.xy[row[0, both]] - truth.xy[row[1, both]]
+    missed, false = row < 0
     return Errors(
-        int((row[0] < 0).sum()), int((row[1] < 0).sum()), _mean(np.abs(share[0] - share[1])), _mean(_lengths(apart))
+        int(missed.sum()),
+        int(false.sum()),
+        _mean(np.abs(share[0] - share[1])),
+        _mean(_lengths(apart)),
+        pairs[missed | false] % objects,
     )
-
-
-def _pairs(found: Decisions, truth: Decisions) -> Ints:
-    """A number for each pair, of both, one after the other."""
-    shot, item = (np.concatenate([getattr(found, n), getattr(truth, n)]) for n in ("shot", "object"))
-    return np.asarray(shot * (int(item.max(initial=0)) + 1) + item)
 
 
 def _lengths(xy: Floats) -> Floats:
@@ -107,7 +110,7 @@ class Method:
     setting : its value, in the unit of the curve; None where there is nothing to set; or a word
     prepare : makes what is kept for all shots, and returns the run; its time is the set-up's
     read : what a run returns, as decisions; not timed
-    kept_bytes : of what a run returned, the bytes of what is kept; None where they are traced, which slows a set-up down
+    kept_bytes : bytes that are kept, of what a run returned; None where they are traced, which slows a set-up down
     """
 
     setting: float | str | None
@@ -149,6 +152,7 @@ class Question:
     truth_told : where they come from
     curves : of the methods
     aimed : (N,) the object near which each shot is, to tell kinds of objects apart; None where that means nothing
+    by_share : whether the share is what is asked for: then its error is the error, and not the wrong decisions
     """
 
     name: str
@@ -158,3 +162,4 @@ class Question:
     truth_told: str
     curves: tuple[Curve, ...]
     aimed: Ints | None = None
+    by_share: bool = False
