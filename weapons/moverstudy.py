@@ -1,0 +1,65 @@
+"""The question of fast movers: what a disc that flies far in a frame hits first, tested so often, or swept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.constants import REACH_MAX, SUB
+from planes.scene import Scene
+from weapons.byfire import fired_method
+from weapons.decisions import Curve, Decisions, Method, Question
+from weapons.guns import Projectile
+from weapons.movertruth import Flights, flown, impacts, touching
+from weapons.rayhits import RayHits
+from weapons.targets import ahead, checked_draw, drawn_places, only_hittable, size_of, targets_of, velocities_of
+
+__all__ = ["movers_question"]
+
+SUBSTEPS = tuple(2**k for k in range(1, 7))
+
+
+def movers_question(scene: Scene, shots: int, seed: int) -> Question:
+    """Ask what flying discs hit first, while objects move by their velocities.
+
+    A disc flies eight median sizes of the objects in a frame; its radius is a sixth of one, 1 px at least; whole px.
+    Each begins about an object, at most half of its flight away: see `drawn_places`. None begins on an object.
+
+    Parameters
+    ----------
+    scene : of which the hittable objects take part
+    shots : how many discs
+    seed : of their flights
+    """
+    shots, seed = checked_draw(shots, seed)
+    alone = only_hittable(scene)
+    targets = targets_of(alone)
+    size = size_of(targets)
+    radius, speed = max(1, round(size / 6)), min(max(1, round(8 * size)), REACH_MAX)
+    start, angle = drawn_places(targets, shots, seed, SUB * speed // 2, lambda xy: touching(xy, SUB * radius, targets))
+    way = ahead(speed, angle)
+    flights = Flights(start, flown(SUB * speed, way), SUB * radius)
+    first = impacts(flights, targets, velocities_of(alone, targets))
+    point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
+    shot = {"at": start / SUB, "toward": (start + way) / SUB}
+
+    def tested(setting: int | None, steps: int | None) -> Method:
+        return fired_method(setting, alone, Projectile(speed, radius, steps=steps), _impacts, **shot)
+
+    return Question(
+        "movers",
+        f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
+        shots,
+        Decisions.of(first.flight, first.object, point),
+        "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
+        (
+            Curve("one test a frame", "", (tested(None, 1),), "at the end of the frame"),
+            Curve("substeps", "tests a frame", tuple(tested(steps, steps) for steps in SUBSTEPS)),
+            Curve("swept", "", (tested(None, None),)),
+        ),
+    )
+
+
+def _impacts(hits: RayHits) -> Decisions:
+    """First objects, and where the middle of the disc is then."""
+    passes = hits.passes
+    return Decisions.of(passes.shot, passes.object, np.asarray(passes.point_xy))
