@@ -59,11 +59,9 @@ def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
     pymunk = _installed("pymunk")
     if pymunk is None:
         return _absent("pymunk")
-    item_of: dict[Any, int] = {}
 
-    def prepare() -> Callable[[], list[Any]]:
-        space = pymunk.Space()
-        item_of.clear()
+    def prepare() -> Callable[[], tuple[list[Any], dict[Any, int]]]:
+        space, item_of = pymunk.Space(), {}
         for item, mask, corner in targets:
             hull = fit.hull(mask).translated(corner).points
             shape = pymunk.Poly(space.static_body, hull.tolist())
@@ -71,9 +69,10 @@ def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
             item_of[shape] = item
         space.step(1)  # builds its index
         ask, every, shots = space.segment_query_first, pymunk.ShapeFilter(), _pairs(rays)
-        return lambda: [ask(start, end, 0, every) for start, end in shots]
+        return lambda: ([ask(start, end, 0, every) for start, end in shots], item_of)
 
-    def read(found: list[Any]) -> Decisions:
+    def read(answer: tuple[list[Any], dict[Any, int]]) -> Decisions:
+        found, item_of = answer
         hit = [(shot, item_of[one.shape], *one.point) for shot, one in enumerate(found) if one is not None]
         rows = np.array(hit, np.float64).reshape(-1, 4)
         return _entered(rays, rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2:])
