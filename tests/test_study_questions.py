@@ -354,7 +354,7 @@ def test_a_peer_agrees_nearly_where_it_is_installed(peer: str) -> None:
     pytest.importorskip(peer)
     question = rays_question(load_scene(ROOT / "fixtures" / "gallery"), 100, 1)
     (errors,) = errors_in(question, peer)
-    assert errors.wrong <= (0 if peer == "shapely" else 8) and errors.position < (0.01 if peer == "shapely" else 20)
+    assert errors.wrong <= (0 if peer == "shapely" else 8) and errors.position < (0.01 if peer == "shapely" else 5)
 
 
 @pytest.mark.parametrize("peer", PEERS)

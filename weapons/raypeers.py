@@ -73,9 +73,12 @@ def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
 
     def read(answer: tuple[list[Any], dict[Any, int]]) -> Decisions:
         found, item_of = answer
-        hit = [(shot, item_of[one.shape], *one.point) for shot, one in enumerate(found) if one is not None]
-        rows = np.array(hit, np.float64).reshape(-1, 4)
-        return _entered(rays, rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2:])
+        hit = [(shot, item_of[one.shape], one.alpha) for shot, one in enumerate(found) if one is not None]
+        rows = np.array(hit, np.float64).reshape(-1, 3)
+        shot, item = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
+        # Of a hull in which a segment begins the alpha is 0, but the point that it tells is the segment's end.
+        way = rows[:, 2:] * (rays.end_xy - rays.start_xy)[shot]
+        return _entered(rays, shot, item, rays.start_xy[shot] + way)
 
     return Curve(
         "pymunk", "", (Method(None, prepare, read),), "an easier question: convex hulls of the masks; in floats"
