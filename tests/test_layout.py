@@ -28,8 +28,8 @@ ORDER = {
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
         "animation", "decisions", "timing", "targets", "byfire", "raytruth", "raypeers", "raystudy",
         "movertruth", "moverstudy", "spreadtruth", "spreadstudy", "areatruth", "copies", "discs",
-        "planestudy", "volumestudy", "kinds", "study", "studywords", "figures", "diagram", "demo",
-        "cli", "__main__",
+        "planestudy", "volumestudy", "kinds", "study", "studywords", "figures", "diagram", "studyfiles",
+        "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -13,7 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from planes.arrays import InputError, within
+from planes.arrays import InputError, integer, real, within
+from planes.constants import SEED_MAX
 from planes.image import check_output, write_png, write_text
 from planes.items import Role
 from planes.loading import load_scene
@@ -110,6 +111,21 @@ weapons.ShotRecord, which a game fires with. Exit code: 0 all do the same, 1 one
 REPLAY_EXAMPLES = """\
 examples:
   hitplanes replay fixtures/gallery match.jsonl
+"""
+
+STUDY_HELP = """\
+Measure error against run time: which test is fast, which accurate, which good enough? Pixel planes at each scale, all
+volumes, pre-filters and broad phases, rays by steps, fast movers by substeps, spread by pellets, and pymunk, pygame and
+shapely where they are installed, all on the objects of SCENE that can be hit; without SCENE, on a shape of each kind.
+
+Writes study.json, study.csv, study.md, and a diagram for each question (matplotlib: pip install 'hitplanes[study]').
+After an interrupt it keeps what was measured.
+"""
+
+STUDY_EXAMPLES = """\
+examples:
+  hitplanes study --quick
+  hitplanes study fixtures/gallery -o study --error 0.05
 """
 
 COMPARE_EXAMPLES = """\
@@ -217,6 +233,15 @@ def parser() -> argparse.ArgumentParser:
         words, replay, "fire a record of shots again, and tell the first that differs", REPLAY_HELP, REPLAY_EXAMPLES
     )
     one.add_argument("record", type=Path, metavar="RECORD.jsonl", help="a file of weapons.ShotRecord")
+    one = _word(words, study, "measure error against run time of all tests", STUDY_HELP, STUDY_EXAMPLES)
+    told = "folder with scene.json and its images (default: a shape of each kind)"
+    one.add_argument("scene", type=Path, metavar="SCENE", nargs="?", help=told)
+    told = "a new folder, or that of an earlier study (default: study)"
+    one.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="FOLDER", help=told)
+    told = "what is good enough: wrong decisions a shot, or error of a share (default: 0.01)"
+    one.add_argument("--error", type=float, default=0.01, metavar="E", help=told)
+    one.add_argument("--quick", action="store_true", help="fewer shots and runs: under half a minute")
+    one.add_argument("--seed", type=int, default=0, metavar="N", help="of the shots (default: 0)")
     one = _word(words, demo, "show a quadtree, a grid or a BVH in motion", DEMO_HELP, DEMO_EXAMPLES)
     one.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
     told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
@@ -310,6 +335,24 @@ def fire(arguments: argparse.Namespace) -> None:
     _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
         _print_plan(done.plan.to_dict(), done.plan.calls)
+
+
+def study(arguments: argparse.Namespace) -> None:
+    """Measure all methods, and say which is the fastest that is good enough."""
+    from weapons.kinds import kinds_scene  # a study loads much that no other word needs
+    from weapons.study import Effort
+    from weapons.studyfiles import NO_DIAGRAMS, write_study
+    from weapons.studywords import verdict
+
+    error, seed = real("--error", arguments.error, 0, 1), integer("--seed", arguments.seed, 0, SEED_MAX)
+    scene = kinds_scene() if arguments.scene is None else load_scene(arguments.scene)
+    effort = Effort.quick() if arguments.quick else Effort()
+    done, drawn = write_study(scene, arguments.output, seed, effort, error, Progress(sys.stderr))
+    for line in verdict(done, error):
+        _say(line)
+    _say(f"{'tables and diagrams are' if drawn else 'the tables are'} in {arguments.output}")
+    if not drawn:
+        _say(NO_DIAGRAMS)
 
 
 def new(arguments: argparse.Namespace) -> None:

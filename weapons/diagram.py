@@ -23,6 +23,9 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
 """Okabe and Ito, "Color universal design" (2008): told apart by the colour-blind. Shapes of the marks tell the rest."""
 
 
+DECADES = 30
+"""Least ratio of the ends of the axis of time."""
+
 CLOSE = 1.12
 """Points of which the times are within this ratio have one label."""
 
@@ -80,7 +83,7 @@ def work_precision(question: Mapping[str, Any], title: str) -> Figure:
         _write_words(plot, found, floor)
         _draw_floor(plot, question, floor)
         _draw_axes(plot, question, floor)
-        plot.set_title(f"{title}: {question['asks']}", loc="left", weight="bold", size=12)
+        plot.set_title(f"{title}\n{question['asks']}", loc="left", weight="bold", size=11)
         figure.legend(loc="outside right upper", frameon=False, fontsize=9, title="method", alignment="left")
     return figure
 
@@ -94,6 +97,9 @@ def _draw_axes(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
     plot.grid(which="major", color="#dde2e7", linewidth=0.8)
     plot.set_axisbelow(True)
     plot.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    plot.xaxis.set_minor_formatter("")
+    least, most = plot.get_xlim()
+    plot.set_xlim(min(least, most / DECADES), max(most, least * DECADES))
 
 
 def _asked(question: Mapping[str, Any]) -> str:
@@ -116,7 +122,7 @@ def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, fl
     label = own[0].curve + (f" ({setting})" if setting and joined else "")
     plot.plot(
         x, y, linestyle="-" if joined else "", color=style.color, marker=style.mark, label=label,
-        markersize=7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4, clip_on=False, zorder=3,
+        markersize=10 if style.mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4, clip_on=False, zorder=3,
     )  # fmt: skip
     for place, left, low in zip(own, x, y, strict=True):
         if joined and place.setting is not None:

@@ -9,15 +9,16 @@ import numpy as np
 
 from planes.arrays import Bools, Floats, Ints
 from planes.constants import SCALE_BITS, SUB
+from planes.grid256 import pixel
 from planes.scene import Scene
 from weapons.areatruth import Found, Pixels, Round, Straight, discs_on_pixels, discs_on_shapes, placed_rings
-from weapons.copies import copied
 from weapons.decisions import Curve, Decisions, Question
+from weapons.targets import drawn_places, size_of, targets_of
 
 __all__ = ["Discs", "areas_question", "discs_at"]
 
 REACH = 8
-"""Objects of the middle size are so many times as large as the radius of the disc."""
+"""Objects of the median size are so many times as large as the radius of the disc."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +41,22 @@ class Discs:
     radius: float
 
 
-def discs_at(scene: Scene, shots: int, seed: int) -> Discs:
-    """Discs near each object in turn, evenly over its box and twice their radius around it."""
-    ids = scene.ids("hittable")
-    alone = copied(scene, ids[scene.items.size_wh[ids, 0] > 0])
-    items, count = alone.items, len(alone)
+def discs_at(alone: Scene, shots: int, seed: int) -> Discs:
+    """Discs near objects: each evenly over the box of one and twice the radius around it.
+
+    Parameters
+    ----------
+    alone : objects alone, numbered from 0, each with a pixel
+    shots : how many
+    seed : of their places
+    """
+    targets, count = targets_of(alone), len(alone)
     exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
-    size = float(np.median(items.size_wh[:count].max(axis=1))) if count else REACH
-    radius = float(max(1, round(size / REACH)))
-    aimed = np.arange(shots if count else 0) % max(count, 1)
-    box = items.boxes(aimed) + np.array([-0.5, -0.5, 0.5, 0.5])
-    low, high = box[:, :2] - 2 * radius, box[:, 2:] + 2 * radius
-    part = np.random.Generator(np.random.PCG64(seed)).random((len(aimed), 2))
-    grid = SUB if exact.any() else 1
-    return Discs(alone, exact, np.floor((low + part * (high - low)) * grid) / grid, aimed, radius)
+    radius = max(1, round(size_of(targets) / REACH))
+    place, _, near = drawn_places(targets, shots, seed, 2 * SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
+    at = place / SUB if exact.any() else pixel(place).astype(np.float64)
+    items = np.array([item for item, _, _ in targets] or [0])
+    return Discs(alone, exact, at, items[near], float(radius))
 
 
 def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from planes.arrays import Ints
 from planes.constants import REACH_MAX, SUB
 from planes.scene import Scene
+from weapons.arsenal import Disc
 from weapons.byfire import fired_method
 from weapons.decisions import Curve, Decisions, Method, Question
+from weapons.firing import fire
 from weapons.guns import Projectile
 from weapons.movertruth import Flights, flown, impacts, touching
 from weapons.rayhits import RayHits
@@ -35,7 +40,9 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     targets = targets_of(alone)
     size = size_of(targets)
     radius, speed = max(1, round(size / 6)), min(max(1, round(8 * size)), REACH_MAX)
-    start, angle = drawn_places(targets, shots, seed, SUB * speed // 2, lambda xy: touching(xy, SUB * radius, targets))
+    start, angle, _ = drawn_places(
+        targets, shots, seed, SUB * speed // 2, lambda xy: touching(xy, SUB * radius, targets)
+    )
     way = ahead(speed, angle)
     flights = Flights(start, flown(SUB * speed, way), SUB * radius)
     first = impacts(flights, targets, velocities_of(alone, targets))
@@ -45,6 +52,9 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     def tested(setting: int | None, steps: int | None) -> Method:
         return fired_method(setting, alone, Projectile(speed, radius, steps=steps), _impacts, **shot)
 
+    def by_hand(setting: int | None, steps: int) -> Method:
+        return Method(setting, lambda: _stepped(alone, Disc(radius), start, way, steps), lambda found: found)
+
     return Question(
         "movers",
         f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
@@ -52,11 +62,38 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
         Decisions.of(first.flight, first.object, point),
         "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
         (
-            Curve("one test a frame", "", (tested(None, 1),), "at the end of the frame"),
-            Curve("substeps", "tests a frame", tuple(tested(steps, steps) for steps in SUBSTEPS)),
+            Curve("one test a frame", "", (by_hand(None, 1),), "a disc at the end of the frame, as many games have it"),
+            Curve("substeps", "tests a frame", tuple(by_hand(n, n) for n in SUBSTEPS), "a disc at each of them"),
+            Curve(
+                "swept, read at steps",
+                "tests a frame",
+                tuple(tested(steps, steps) for steps in (1, *SUBSTEPS)),
+                "the same answers by `Projectile(steps=)`, which works out the whole flight first",
+            ),
             Curve("swept", "", (tested(None, None),)),
         ),
     )
+
+
+def _stepped(scene: Scene, disc: Disc, start: Ints, way: Ints, steps: int) -> Callable[[], Decisions]:
+    """Fire a disc at each step of the frame, with the objects where they are then; the first that hits counts."""
+    own = only_hittable(scene)
+    ids = own.ids()
+    begin, velocity = own.items.position_256[ids] / SUB, own.items.velocity_256[ids] / SUB
+
+    def run() -> Decisions:
+        flying, found = np.arange(len(start)), []
+        for k in range(1, steps + 1):
+            if velocity.any():
+                own.move(ids, begin + velocity * (k / steps))
+            at = (start[flying] + way[flying] * (k / steps)) / SUB
+            hits = fire(own, disc, at)
+            first = np.flatnonzero(np.diff(hits.shot, prepend=-1))
+            found.append(Decisions.of(flying[hits.shot[first]], hits.object[first], at[hits.shot[first]]))
+            flying = np.delete(flying, hits.shot[first])
+        return Decisions.joined(found)
+
+    return run
 
 
 def _impacts(hits: RayHits) -> Decisions:

@@ -12,6 +12,9 @@ __all__ = ["Progress"]
 SECONDS = 0.2
 """Least time between two drawings."""
 
+BAR = 24
+"""Letters of a bar."""
+
 
 class Progress:
     """Draws on a terminal; on any other stream it only says what it is told to say.
@@ -57,6 +60,14 @@ class Progress:
             return
         self._drawn = now
         self._draw(self._text(shots, at, max(now - self._begin, SECONDS)))
+
+    def step(self, what: str, done: int, of: int) -> None:
+        """Draw what is at work, and how much of all is done, unless the line was drawn a moment ago."""
+        now = time.monotonic()
+        if self._draws and now - self._drawn >= SECONDS:
+            self._drawn = now
+            full = BAR * done // max(of, 1)
+            self._draw(f"[{'#' * full}{'.' * (BAR - full)}] {done} of {of}, {what}")
 
     def clear(self) -> None:
         """Leave the terminal's line empty."""

@@ -45,7 +45,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     alone = only_hittable(scene)
     targets = targets_of(alone)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
-    start, angle = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, targets))
+    start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, targets))
     step = ahead(length, angle)
     shot, item, pixel_xy = first_pixels(start, step, targets)
     return Question(

@@ -35,7 +35,7 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     alone = only_hittable(scene)
     targets = targets_of(alone)
     radius = max(1, round(size_of(targets) / 2))
-    place, _ = drawn_places(targets, shots, seed, SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
+    place, _, _ = drawn_places(targets, shots, seed, SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = pixel(place)
     parts = parts_of_discs(at, radius, targets)
 
@@ -59,6 +59,7 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
             ),
             Curve("every pixel", "", (every,)),
         ),
+        by_share=True,
     )
 
 

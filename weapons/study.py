@@ -19,7 +19,10 @@ from weapons.copies import copied
 from weapons.decisions import Curve, Errors, Method, Question, errors_of
 from weapons.discs import areas_question, discs_at
 from weapons.kinds import kind_of
+from weapons.moverstudy import movers_question
 from weapons.planestudy import plane_curves
+from weapons.raystudy import rays_question
+from weapons.spreadstudy import spread_question
 from weapons.timing import Cost, measured
 from weapons.volumestudy import volume_curves
 
@@ -27,6 +30,9 @@ __all__ = ["FORMAT", "Effort", "run_study"]
 
 FORMAT = "hitplanes-study/1"
 FILE_NAME = "study.json"
+
+SPREAD_PART = 5
+"""Blasts of thousands of pellets take long: so many times fewer of them than other shots."""
 
 Show = Callable[[str, int, int], None]
 """Told what is measured next, how many points are done, and of how many."""
@@ -98,7 +104,12 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
 
 def _questions(alone: Scene, shots: int, seed: int) -> list[Question]:
     discs = discs_at(alone, shots, seed)
-    return [areas_question(discs, [*plane_curves(discs), *volume_curves(discs)])]
+    return [
+        areas_question(discs, [*plane_curves(discs), *volume_curves(discs)]),
+        rays_question(alone, shots, seed),
+        movers_question(alone, shots, seed),
+        spread_question(alone, max(1, shots // SPREAD_PART), seed),
+    ]
 
 
 def _told(question: Question) -> dict[str, Any]:

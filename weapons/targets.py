@@ -64,7 +64,7 @@ def checked_draw(shots: object, seed: object) -> tuple[int, int]:
 
 def drawn_places(
     targets: list[Target], shots: int, seed: int, grow_256: int, taken: Callable[[Ints], Bools]
-) -> tuple[Ints, Floats]:
+) -> tuple[Ints, Floats, Ints]:
     """Draw places and directions: an object, then a place in its box grown on all sides; about (0, 0) without objects.
 
     The draws are those of splitmix64 from the seed, four for each try: object, x, y, angle. A place that is taken is
@@ -77,7 +77,7 @@ def drawn_places(
 
     Returns
     -------
-    (shots, 2) places in 1/256 px, and (shots,) angles in degrees
+    (shots, 2) places in 1/256 px, (shots,) angles in degrees, and (shots,) the target near which a place is
 
     Raises
     ------
@@ -86,7 +86,7 @@ def drawn_places(
     """
     boxes = np.array([[x, y, x + m.shape[1] - 1, y + m.shape[0] - 1] for _, m, (x, y) in targets] or [[0, 0, 0, 0]])
     low, high = SUB * boxes[:, :2] - HALF - grow_256, SUB * boxes[:, 2:] + HALF + grow_256
-    places, angles = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    places, angles, near = [np.zeros((0, 2), np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
     begin = free = 0
     while free < shots:
         if begin > TRIES * shots:
@@ -97,8 +97,9 @@ def drawn_places(
         good = np.flatnonzero(~taken(xy))
         places.append(xy[good])
         angles.append(words[good, 3].astype(np.float64) * (360 / 2.0**64))
+        near.append(which[good])
         begin, free = begin + shots, free + len(good)
-    return np.concatenate(places)[:shots], np.concatenate(angles)[:shots]
+    return np.concatenate(places)[:shots], np.concatenate(angles)[:shots], np.concatenate(near)[:shots]
 
 
 TRIES = 1000

@@ -17,6 +17,9 @@ __all__ = ["Cost", "measured"]
 RUNS_MAX = 1000
 """Runs of a method that takes no time are enough after so many."""
 
+SLOW = 0.5
+"""Seconds after which a method is not run more often, even if it ran less often than was asked for."""
+
 
 class Cost(NamedTuple):
     """Seconds to set up, seconds of a run (least, median, most of `runs`), bytes kept, and bytes that a run needs.
@@ -34,7 +37,7 @@ class Cost(NamedTuple):
 
 
 def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
-    """Set a method up, run it to warm up, then at least `runs` times, and on for `seconds`.
+    """Set a method up, run it to warm up, then `runs` times, and on for `seconds`; a slow one at least once.
 
     Memory is traced in a run of its own, as tracing takes time.
 
@@ -48,7 +51,7 @@ def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     setup = time.perf_counter() - begin
     times: list[float] = []
     with _undisturbed():
-        while len(times) < runs or (sum(times) < seconds and len(times) < RUNS_MAX):
+        while not times or _goes_on(times, runs, seconds):
             begin = time.perf_counter()
             run()
             times.append(time.perf_counter() - begin)
@@ -56,6 +59,13 @@ def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     return answer, Cost(
         max(setup - min(times), 0.0), min(times), statistics.median(times), max(times), len(times), kept, needed
     )
+
+
+def _goes_on(times: list[float], runs: int, seconds: float) -> bool:
+    """Whether a method is run once more."""
+    if len(times) < runs:
+        return sum(times) < max(seconds, SLOW)
+    return sum(times) < seconds and len(times) < RUNS_MAX
 
 
 @contextmanager

@@ -1,0 +1,89 @@
+"""A study in a folder: study.json, study.csv, study.md, and a diagram for each question."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from planes.arrays import InputError
+from planes.image import write_text
+from planes.scene import Scene
+from weapons.progress import Progress
+from weapons.study import Effort, run_study
+from weapons.studywords import csv_of, markdown, places
+
+__all__ = ["NO_DIAGRAMS", "own_folder", "write_study"]
+
+NO_DIAGRAMS = "the diagrams are left out: matplotlib is not installed (pip install 'hitplanes[study]')"
+QUESTIONS = ("areas", "rays", "movers", "spread")
+FILES = ("study.json", "study.csv", "study.md", *(f"{name}.png" for name in QUESTIONS))
+
+
+def write_study(
+    scene: Scene, folder: Path, seed: int, effort: Effort, error: float, progress: Progress
+) -> tuple[dict[str, Any], list[str]]:
+    """Run a study and keep it in a folder, a new one or that of an earlier study; an interrupted one, too.
+
+    Returns
+    -------
+    the study as JSON, and the names of the questions of which there is a diagram
+
+    Raises
+    ------
+    InputError
+        If the folder holds other things, or cannot be written.
+    KeyboardInterrupt
+        After what was measured was kept.
+    """
+    own_folder(folder, FILES)
+    for name in FILES:
+        (folder / name).unlink(missing_ok=True)
+    try:
+        study = run_study(scene, folder, seed, effort, progress.step)
+    except KeyboardInterrupt:
+        progress.clear()
+        if not (folder / FILES[0]).exists():
+            raise
+        _write_told(json.loads((folder / FILES[0]).read_text(encoding="utf-8")), folder, error)
+        raise KeyboardInterrupt(f"what was measured is in {folder}") from None
+    progress.clear()
+    return study, _write_told(study, folder, error)
+
+
+def _write_told(study: Mapping[str, Any], folder: Path, error: float) -> list[str]:
+    """Write tables, and diagrams where they can be drawn."""
+    drawn = []
+    if find_spec("matplotlib") is not None:
+        from weapons.diagram import work_precision
+        from weapons.figures import save_figure
+
+        for question in study["questions"]:
+            if places(question):
+                save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
+                drawn.append(question["name"])
+    write_text(folder / FILES[1], csv_of(study))
+    write_text(folder / FILES[2], markdown(study, error, drawn))
+    return drawn
+
+
+def own_folder(folder: Path, names: tuple[str, ...]) -> None:
+    """Make the folder, or take one that holds nothing but files of these names.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made, or holds something else.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+        held = sorted(path.name for path in folder.iterdir() if path.name not in names)
+    except FileExistsError:
+        raise InputError(f"--output: expected a folder, got the file {folder}") from None
+    except OSError as error:
+        raise InputError(f"--output: cannot make {folder}: {error.strerror}") from error
+    if held:
+        told = f"got {folder} with {held[0]!r} in it"
+        raise InputError(f"--output: expected a new folder, or that of an earlier run, {told}")
