@@ -26,10 +26,10 @@ ORDER = {
         "strokes", "signs", "world", "ghosts", "sketch", "panel", "overlay", "raymarks", "inset",
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
-        "animation", "decisions", "timing", "targets", "byfire", "raytruth", "raypeers", "raystudy",
-        "movertruth", "moverstudy", "spreadtruth", "spreadstudy", "areatruth", "copies", "discs",
-        "planestudy", "volumestudy", "kinds", "study", "studywords", "figures", "diagram", "studyfiles",
-        "demo", "cli", "__main__",
+        "animation", "decisions", "timing", "targets", "peerworlds", "byfire", "raytruth", "raypeers",
+        "raystudy", "movertruth", "moverstudy", "spreadtruth", "spreadstudy", "areatruth", "copies",
+        "discs", "planestudy", "volumestudy", "areapeers", "kinds", "study", "studywords", "figures",
+        "diagram", "studyfiles", "demo", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

@@ -122,7 +122,8 @@ def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, fl
     label = own[0].curve + (f" ({setting})" if setting and joined else "")
     plot.plot(
         x, y, linestyle="-" if joined else "", color=style.color, marker=style.mark, label=label,
-        markersize=10 if style.mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4, clip_on=False, zorder=3,
+        markersize=10 if style.mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4,
+        clip_on=False, zorder=3,
     )  # fmt: skip
     for place, left, low in zip(own, x, y, strict=True):
         if joined and place.setting is not None:

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planes import fit
-from planes.arrays import Bools, Floats, Ints
+from planes.arrays import Floats, Ints
 from planes.constants import SUB
-from planes.spans import Spans
 from weapons.decisions import Curve, Decisions, Method
+from weapons.peerworlds import (
+    PYGAME_MOST,
+    absent,
+    hulls_in_pymunk,
+    installed,
+    masks_in_pygame,
+    pairs,
+    squares_in_shapely,
+)
 from weapons.targets import Target
 
 __all__ = ["Segments", "peer_curves"]
-
-WHOLE_MAX = 2**30
-"""pygame's rectangles hold C ints: places within this, and twice it for a sum."""
 
 
 class Segments(NamedTuple):
@@ -35,19 +37,6 @@ def peer_curves(targets: list[Target], rays: Segments) -> tuple[Curve, ...]:
     return _pymunk_curve(targets, rays), _shapely_curve(targets, rays), _pygame_curve(targets, rays)
 
 
-def _installed(name: str) -> Any:
-    """A module, or None where it is not installed."""
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    try:
-        return import_module(name)
-    except ImportError:
-        return None
-
-
-def _absent(name: str) -> Curve:
-    return Curve(name, left_out=f"{name} is not installed")
-
-
 def _entered(rays: Segments, shot: Ints, item: Ints, point: Floats) -> Decisions:
     """Decisions of points on borders: the pixel entered is that of half a unit of the grid farther along the ray."""
     way = rays.end_xy[shot] - rays.start_xy[shot]
@@ -56,19 +45,13 @@ def _entered(rays: Segments, shot: Ints, item: Ints, point: Floats) -> Decisions
 
 
 def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
-    pymunk = _installed("pymunk")
+    pymunk = installed("pymunk")
     if pymunk is None:
-        return _absent("pymunk")
+        return absent("pymunk")
 
     def prepare() -> Callable[[], tuple[list[Any], dict[Any, int]]]:
-        space, item_of = pymunk.Space(), {}
-        for item, mask, corner in targets:
-            hull = fit.hull(mask).translated(corner).points
-            shape = pymunk.Poly(space.static_body, hull.tolist())
-            space.add(shape)
-            item_of[shape] = item
-        space.step(1)  # builds its index
-        ask, every, shots = space.segment_query_first, pymunk.ShapeFilter(), _pairs(rays)
+        space, item_of = hulls_in_pymunk(pymunk, targets)
+        ask, every, shots = space.segment_query_first, pymunk.ShapeFilter(), pairs(rays.start_xy, rays.end_xy)
         return lambda: ([ask(start, end, 0, every) for start, end in shots], item_of)
 
     def read(answer: tuple[list[Any], dict[Any, int]]) -> Decisions:
@@ -85,17 +68,13 @@ def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
     )
 
 
-def _pairs(rays: Segments) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
-    return [(tuple(a), tuple(b)) for a, b in zip(rays.start_xy.tolist(), rays.end_xy.tolist(), strict=True)]
-
-
 def _shapely_curve(targets: list[Target], rays: Segments) -> Curve:
-    shapely = _installed("shapely")
+    shapely = installed("shapely")
     if shapely is None:
-        return _absent("shapely")
+        return absent("shapely")
 
     def prepare() -> Callable[[], tuple[Ints, Ints, Floats]]:
-        shapes = np.array([_squares(shapely, mask, corner) for _, mask, corner in targets], object)
+        shapes = squares_in_shapely(shapely, targets)
         tree = shapely.STRtree(shapes)
 
         def run() -> tuple[Ints, Ints, Floats]:
@@ -117,24 +96,17 @@ def _shapely_curve(targets: list[Target], rays: Segments) -> Curve:
     return Curve("shapely", "", (Method(None, prepare, read),), "outlines of the masks; in floats")
 
 
-def _squares(shapely: Any, mask: Bools, corner: tuple[int, int]) -> Any:
-    """The pixel squares of a mask as one shape: its rows of runs, joined."""
-    runs, (x, y) = Spans.from_mask(mask), corner
-    rows = shapely.box(runs.x_first + x - 0.5, runs.y + y - 0.5, runs.x_last + x + 0.5, runs.y + y + 0.5)
-    return shapely.union_all(rows)
-
-
 def _pygame_curve(targets: list[Target], rays: Segments) -> Curve:
-    pygame = _installed("pygame")
+    pygame = installed("pygame")
     if pygame is None:
-        return _absent("pygame")
+        return absent("pygame")
     far = max([0.0, *(abs(float(v)) for xy in rays for v in (xy.min(), xy.max()))])
-    if far > WHOLE_MAX:
-        return Curve("pygame", left_out=f"places beyond {WHOLE_MAX} px do not fit its rectangles")
+    if far > PYGAME_MOST:
+        return Curve("pygame", left_out=f"places beyond {PYGAME_MOST} px do not fit its rectangles")
 
     def prepare() -> Callable[[], list[tuple[int, int, int] | None]]:
-        world = [(_rect(pygame, target), _mask(pygame, target[1])) for target in targets]
-        shots = _pairs(Segments(np.rint(rays.start_xy), np.rint(rays.end_xy)))
+        world = masks_in_pygame(pygame, targets)
+        shots = pairs(np.rint(rays.start_xy), np.rint(rays.end_xy))
         return lambda: [_walked(world, start, end) for start, end in shots]
 
     def read(found: list[tuple[int, int, int] | None]) -> Decisions:
@@ -144,19 +116,6 @@ def _pygame_curve(targets: list[Target], rays: Segments) -> Curve:
 
     note = "from whole pixel to whole pixel: the line is clipped to each rectangle, then its mask is read each px"
     return Curve("pygame", "", (Method(None, prepare, read),), note)
-
-
-def _rect(pygame: Any, target: Target) -> Any:
-    _, mask, (x, y) = target
-    return pygame.Rect(x, y, mask.shape[1], mask.shape[0])
-
-
-def _mask(pygame: Any, mask: Bools) -> Any:
-    surface = pygame.Surface(mask.shape[::-1], pygame.SRCALPHA, 32)
-    alpha = pygame.surfarray.pixels_alpha(surface)
-    alpha[:] = np.where(mask.T, 255, 0)
-    del alpha  # it locks the surface
-    return pygame.mask.from_surface(surface)
 
 
 def _walked(

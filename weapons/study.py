@@ -15,6 +15,7 @@ import numpy as np
 from planes.arrays import Ints
 from planes.image import write_text
 from planes.scene import Scene
+from weapons.areapeers import area_peer_curves
 from weapons.copies import copied
 from weapons.decisions import Curve, Errors, Method, Question, errors_of
 from weapons.discs import areas_question, discs_at
@@ -105,7 +106,7 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
 def _questions(alone: Scene, shots: int, seed: int) -> list[Question]:
     discs = discs_at(alone, shots, seed)
     return [
-        areas_question(discs, [*plane_curves(discs), *volume_curves(discs)]),
+        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *area_peer_curves(discs)]),
         rays_question(alone, shots, seed),
         movers_question(alone, shots, seed),
         spread_question(alone, max(1, shots // SPREAD_PART), seed),
