@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planes.arrays import Ints
 from planes.constants import REACH_MAX, SUB
 from planes.scene import Scene
 from weapons.arsenal import Disc
@@ -53,7 +52,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
         return fired_method(setting, alone, Projectile(speed, radius, steps=steps), _impacts, **shot)
 
     def by_hand(setting: int | None, steps: int) -> Method:
-        return Method(setting, lambda: _stepped(alone, Disc(radius), start, way, steps), lambda found: found)
+        return _overlapping(alone, flights, setting, steps)
 
     return Question(
         "movers",
@@ -75,25 +74,31 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     )
 
 
-def _stepped(scene: Scene, disc: Disc, start: Ints, way: Ints, steps: int) -> Callable[[], Decisions]:
-    """Fire a disc at each step of the frame, with the objects where they are then; the first that hits counts."""
-    own = only_hittable(scene)
-    ids = own.ids()
-    begin, velocity = own.items.position_256[ids] / SUB, own.items.velocity_256[ids] / SUB
+def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:
+    """A disc is placed at each step, after the objects that move: it hits the nearest that it shares a pixel with."""
+    start, step, disc = flights.start_256 / SUB, flights.step_256 / SUB, Disc(flights.radius_256 / SUB)
 
-    def run() -> Decisions:
-        flying, found = np.arange(len(start)), []
-        for k in range(1, steps + 1):
-            if velocity.any():
-                own.move(ids, begin + velocity * (k / steps))
-            at = (start[flying] + way[flying] * (k / steps)) / SUB
-            hits = fire(own, disc, at)
-            first = np.flatnonzero(np.diff(hits.shot, prepend=-1))
-            found.append(Decisions.of(flying[hits.shot[first]], hits.object[first], at[hits.shot[first]]))
-            flying = np.delete(flying, hits.shot[first])
-        return Decisions.joined(found)
+    def prepare() -> Callable[[], list[Decisions]]:
+        own = only_hittable(alone)
+        ids = own.ids()
+        moving = ids[own.items.velocity_256[ids].any(axis=1)]
+        place, velocity = (getattr(own.items, name)[moving] / SUB for name in ("position_256", "velocity_256"))
+        fire(own, disc, start[:1])
 
-    return run
+        def run() -> list[Decisions]:
+            live, found = np.arange(len(start)), []
+            for part in np.arange(1, steps + 1) / steps:
+                own.move(moving, place + part * velocity)
+                at = start[live] + part * step[live]
+                hits = fire(own, disc, at)
+                shot, row = np.unique(hits.shot, return_index=True)
+                found.append(Decisions.of(live[shot], hits.object[row], at[shot]))
+                live = np.delete(live, shot)
+            return found
+
+        return run
+
+    return Method(setting, prepare, Decisions.joined)
 
 
 def _impacts(hits: RayHits) -> Decisions:
