@@ -27,7 +27,7 @@ ORDER = {
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
         "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
         "animation", "decisions", "timing", "targets", "peerworlds", "byfire", "raytruth", "raypeers",
-        "raystudy", "movertruth", "moverstudy", "spreadtruth", "spreadstudy", "areatruth", "copies",
+        "raystudy", "movertruth", "moverstudy", "pixeltruth", "spreadstudy", "shapetruth", "copies",
         "discs", "planestudy", "volumestudy", "areapeers", "kinds", "study", "studywords", "figures",
         "diagram", "studyfiles", "demo", "cli", "__main__",
     ),

@@ -17,12 +17,12 @@ from weapons import Pistol, Projectile, fire
 from weapons.decisions import Curve, Decisions, Errors, Method, Question, errors_of
 from weapons.moverstudy import movers_question
 from weapons.movertruth import Flights, flown, impacts, touching
+from weapons.pixeltruth import parts_of_discs
 from weapons.raypeers import Segments, peer_curves
 from weapons.raystudy import rays_question
 from weapons.raytruth import first_pixels
 from weapons.raytruth import touching as in_pixels
 from weapons.spreadstudy import spread_question
-from weapons.spreadtruth import parts_of_discs
 from weapons.targets import ahead, drawn_places, only_hittable, size_of, targets_of, velocities_of
 
 ROOT = Path(__file__).parent.parent
@@ -148,7 +148,7 @@ def test_truth_tells_who_starts_inside() -> None:
     assert touching(points, 400, target).all() and not touching(points + 600, 400, target).any()
 
 
-@pytest.mark.parametrize("name", ["raytruth", "movertruth", "spreadtruth"])
+@pytest.mark.parametrize("name", ["raytruth", "movertruth", "pixeltruth"])
 def test_truth_shares_nothing_with_what_it_judges(name: str) -> None:
     tree = ast.parse((ROOT / "weapons" / f"{name}.py").read_text())
     modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}

@@ -11,8 +11,9 @@ from planes.arrays import Bools, Floats, Ints
 from planes.constants import SCALE_BITS, SUB
 from planes.grid256 import pixel
 from planes.scene import Scene
-from weapons.areatruth import Found, Pixels, Round, Straight, discs_on_pixels, discs_on_shapes, placed_rings
 from weapons.decisions import Curve, Decisions, Question
+from weapons.pixeltruth import parts_of_discs
+from weapons.shapetruth import Round, Straight, discs_on_shapes, placed_rings
 from weapons.targets import drawn_places, size_of, targets_of
 
 __all__ = ["Discs", "areas_question", "discs_at"]
@@ -70,16 +71,16 @@ def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
 
 def _truth(discs: Discs) -> Decisions:
     """What discs touch, with places and shares: exact shapes, and the pixels of masks."""
-    exact, masked = np.flatnonzero(discs.exact), np.flatnonzero(~discs.exact)
-    masks = [Pixels(*discs.scene.mask(item)) for item in masked.tolist()]
-    shapes = [_shape(discs.scene, item) for item in exact.tolist()]
-    of_shapes = discs_on_shapes(discs.at, discs.radius, shapes)
-    of_masks = discs_on_pixels(np.floor(discs.at + 0.5).astype(np.int64), discs.radius, masks)
-    return Decisions.joined([_numbered(of_shapes, exact), _numbered(of_masks, masked)])
-
-
-def _numbered(found: Found, ids: Ints) -> Decisions:
-    return Decisions(found.shot, ids[found.object], found.xy, found.share)
+    exact = np.flatnonzero(discs.exact)
+    of = discs_on_shapes(discs.at, discs.radius, [_shape(discs.scene, item) for item in exact.tolist()])
+    masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
+    on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
+    return Decisions.joined(
+        [
+            Decisions(of.shot, exact[of.object], of.xy, of.share),
+            Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole),
+        ]
+    )
 
 
 def _is_exact(scene: Scene, item: int) -> bool:

@@ -11,7 +11,7 @@ from weapons.arsenal import Disc, Point, Spread
 from weapons.byfire import fired_method
 from weapons.decisions import Curve, Decisions, Method, Question
 from weapons.hits import Hits
-from weapons.spreadtruth import parts_of_discs
+from weapons.pixeltruth import parts_of_discs
 from weapons.targets import checked_draw, drawn_places, only_hittable, size_of, targets_of
 
 __all__ = ["spread_question"]

@@ -1,7 +1,7 @@
-"""Which objects does a disc touch, in truth? Slow and plain; it shares nothing with the methods that it judges.
+"""Which exact shapes does a disc touch? Slow and plain; it shares nothing with the methods that it judges.
 
-An exact shape is worked out in float64: inside by the even-odd rule, the nearest point of its edges, and the area that
-it shares with the disc by strips. A mask is read pixel by pixel.
+Worked out in float64: inside by the even-odd rule, the nearest point of the edges, and the area that a shape shares with
+the disc, by strips.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Found", "Pixels", "Round", "Straight", "discs_on_pixels", "discs_on_shapes", "placed_rings"]
+__all__ = ["Found", "Round", "Straight", "discs_on_shapes", "placed_rings"]
 
 Reals = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
@@ -103,14 +103,6 @@ class Straight:
         return np.asarray((right - left).sum(axis=1))
 
 
-@dataclass(frozen=True, eq=False)
-class Pixels:
-    """A mask (h, w) in the world, and the whole pixel of its first one."""
-
-    mask: npt.NDArray[np.bool_]
-    corner_xy: tuple[int, int]
-
-
 def placed_rings(
     rings: Sequence[Reals], flip: str, scale_xy: tuple[float, float], degrees: float, position_xy: Reals
 ) -> tuple[Reals, ...]:
@@ -131,7 +123,8 @@ def discs_on_shapes(at: Reals, radius: float, shapes: Sequence[Round | Straight]
             nearest = shape.nearest(at[shot])
             if float(((nearest - at[shot]) ** 2).sum()) <= radius * radius:
                 found.append((shot, k, *nearest.tolist(), _share(at[shot], radius, shape)))
-    return _sorted(found)
+    table = np.array(sorted(found), np.float64).reshape(-1, 5)
+    return Found(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4])
 
 
 def _share(at: Reals, radius: float, shape: Round | Straight) -> float:
@@ -140,29 +133,3 @@ def _share(at: Reals, radius: float, shape: Round | Straight) -> float:
     off = (np.arange(STRIPS) + 0.5) * step - radius
     half = np.sqrt(radius**2 - off**2)
     return float(shape.chords(at[1] + off, at[0] - half, at[0] + half).sum() / (2 * half.sum()))
-
-
-def discs_on_pixels(at: Whole, radius: float, objects: Sequence[Pixels]) -> Found:
-    """Discs about whole pixels (N, 2) that share a pixel with masks: those whose centres they contain."""
-    reach = math.floor(radius)
-    offsets = [(x, y) for y in range(-reach, reach + 1) for x in range(-reach, reach + 1)]
-    disc = sorted((x * x + y * y, y, x) for x, y in offsets if x * x + y * y <= radius * radius)
-    off = np.array([(x, y) for _, y, x in disc])
-    found = []
-    for k, one in enumerate(objects):
-        height, width = one.mask.shape
-        local = at - one.corner_xy
-        near = ((local >= -reach) & (local < np.array([width, height]) + reach)).all(axis=1)
-        for shot in np.flatnonzero(near).tolist():
-            x, y = (local[shot] + off).T
-            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-            on = np.zeros(len(off), np.bool_)
-            on[inside] = one.mask[y[inside], x[inside]]
-            if on.any():
-                found.append((shot, k, *(at[shot] + off[on.argmax()]).tolist(), float(on.mean())))
-    return _sorted(found)
-
-
-def _sorted(found: list[tuple[float, ...]]) -> Found:
-    table = np.array(sorted(found), np.float64).reshape(-1, 5)
-    return Found(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4])
