@@ -48,9 +48,6 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
     shot = {"at": start / SUB, "toward": (start + way) / SUB}
 
-    def tested(setting: int | None, steps: int | None) -> Method:
-        return fired_method(setting, alone, Projectile(speed, radius, steps=steps), _impacts, **shot)
-
     def by_hand(setting: int | None, steps: int) -> Method:
         return _overlapping(alone, flights, setting, steps)
 
@@ -63,13 +60,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
         (
             Curve("one test a frame", "", (by_hand(None, 1),), "a disc at the end of the frame, as many games have it"),
             Curve("substeps", "tests a frame", tuple(by_hand(n, n) for n in SUBSTEPS), "a disc at each of them"),
-            Curve(
-                "swept, read at steps",
-                "tests a frame",
-                tuple(tested(steps, steps) for steps in (1, *SUBSTEPS)),
-                "the same answers by `Projectile(steps=)`, which works out the whole flight first",
-            ),
-            Curve("swept", "", (tested(None, None),)),
+            Curve("swept", "", (fired_method(None, alone, Projectile(speed, radius), _impacts, **shot),)),
         ),
     )
 

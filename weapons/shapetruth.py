@@ -1,6 +1,6 @@
 """Which exact shapes does a disc touch? Slow and plain; it shares nothing with the methods that it judges.
 
-Worked out in float64: inside by the even-odd rule, the nearest point of the edges, and the area that a shape shares with
+In float64: inside by the even-odd rule, the nearest point of the edges, and the area that a shape shares with
 the disc, by strips.
 """
 
