@@ -284,7 +284,9 @@ def test_overlap_each_step_is_that_of_a_disc_where_it_is_then() -> None:
 
 
 def test_overlap_each_step_moves_what_moves() -> None:
-    question = movers_question(load_scene(ROOT / "fixtures" / "corridor"), 150, 2)
+    scene = load_scene(ROOT / "fixtures" / "corridor")
+    scene.set(scene.ids("hittable"), velocity_xy=(40, -25))
+    question = movers_question(scene, 150, 2)
     method = curve_of(question, "substeps").methods[-1]
     run = method.prepare()
     one, again = (errors_of(method.read(run()), question.truth) for _ in range(2))
@@ -464,6 +466,6 @@ def test_impacts_at_one_time_by_different_ways_are_one(place: tuple[int, int]) -
 
 
 def test_no_mover_begins_on_an_object() -> None:
-    question = movers_question(load_scene(ROOT / "fixtures" / "crowd"), 40, 1)
+    question = movers_question(load_scene(ROOT / "fixtures" / "targets"), 60, 1)
     hits = curve_of(question, "swept").methods[0].prepare()()
     assert len(hits.passes) > 10 and (hits.passes.entry > 0).all()
