@@ -469,3 +469,22 @@ def test_no_mover_begins_on_an_object() -> None:
     question = movers_question(load_scene(ROOT / "fixtures" / "targets"), 60, 1)
     hits = curve_of(question, "swept").methods[0].prepare()()
     assert len(hits.passes) > 10 and (hits.passes.entry > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("side", "px"),
+    [(10, (40, 2, 80, 5)), (3, (12, 1, 24, 2)), (301, (1000, 50, 2408, 150)), (1101, (1000, 184, 8808, 512))],
+)
+def test_lengths_are_those_of_the_median_object(side: int, px: tuple[int, ...]) -> None:
+    scene = Scene()
+    for w, h in ((side, side), (side - 2, side + 2), (1, 2), (2, 1), (side + 9, side + 9)):
+        mask = np.zeros((h, w), np.bool_)
+        mask[0, 0] = mask[-1, -1] = True
+        scene.add(mask)
+    asked = [ask(scene, 1, 1).asks for ask in QUESTIONS.values()]
+    rays, radius, speed, blast = px
+    assert asked == [
+        f"Which object does a ray of {rays} px hit first?",
+        f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
+        f"How much of a blast of {blast} px lies on each object?",
+    ]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from planes.arrays import Ints
 from planes.constants import REACH_MAX, SUB
 from planes.scene import Scene
 from weapons.arsenal import Disc
@@ -46,22 +47,25 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     flights = Flights(start, flown(SUB * speed, way), SUB * radius)
     first = impacts(flights, targets, velocities_of(alone, targets))
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
-    shot = {"at": start / SUB, "toward": (start + way) / SUB}
-
-    def by_hand(setting: int | None, steps: int) -> Method:
-        return _overlapping(alone, flights, setting, steps)
-
     return Question(
         "movers",
         f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
         shots,
         Decisions.of(first.flight, first.object, point),
         "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
-        (
-            Curve("one test a frame", "", (by_hand(None, 1),), "a disc at the end of the frame, as many games have it"),
-            Curve("substeps", "tests a frame", tuple(by_hand(n, n) for n in SUBSTEPS), "a disc at each of them"),
-            Curve("swept", "", (fired_method(None, alone, Projectile(speed, radius), _impacts, **shot),)),
-        ),
+        _curves(alone, flights, start + way, speed),
+    )
+
+
+def _curves(alone: Scene, flights: Flights, toward: Ints, speed: int) -> tuple[Curve, ...]:
+    once = _overlapping(alone, flights, None, 1)
+    substeps = tuple(_overlapping(alone, flights, n, n) for n in SUBSTEPS)
+    weapon = Projectile(speed, flights.radius_256 / SUB)
+    swept = fired_method(None, alone, weapon, _impacts, at=flights.start_256 / SUB, toward=toward / SUB)
+    return (
+        Curve("one test a frame", "", (once,), "a disc at the end of the frame, as many games have it"),
+        Curve("substeps", "tests a frame", substeps, "a disc at each of them"),
+        Curve("swept", "", (swept,)),
     )
 
 

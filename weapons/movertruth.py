@@ -107,19 +107,31 @@ def touching(points_256: Ints, radius_256: int, targets: Sequence[Target]) -> Bo
 
 
 def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Iterator[tuple[int, _Near]]:
-    """For each flight the pixels of the targets whose box it comes near."""
-    pixels = [np.argwhere(mask)[:, ::-1] + np.array(corner) for _, mask, corner in targets]
-    boxes = [[*p.min(axis=0), *p.max(axis=0)] if len(p) else [1, 1, 0, 0] for p in pixels]
-    box = PX * np.array(boxes, np.int64).reshape(-1, 4)
+    """For each flight the pixels in the box around its way, as each target sees it."""
+    box = _boxes(targets)
     reach = max(flights.radius_256, HALF)
     for number, (start, step) in enumerate(zip(flights.start_256, flights.step_256, strict=True)):
         relative = step - velocity_256.reshape(-1, 2)
         low, high = start + np.minimum(relative, 0) - reach, start + np.maximum(relative, 0) + reach
         near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
-        if len(near):
-            xy = np.concatenate([pixels[rank] for rank in near])
-            rank = np.repeat(near, [len(pixels[rank]) for rank in near])
+        pixels = [_between(targets[rank], low[rank], high[rank]) for rank in near.tolist()]
+        if any(map(len, pixels)):
+            xy, rank = np.concatenate(pixels), np.repeat(near, [len(some) for some in pixels])
             yield number, _Near(PX * xy - start, relative[rank], xy, rank)
+
+
+def _boxes(targets: Sequence[Target]) -> Ints:
+    """First and last pixel centres (M, 4) of masks."""
+    boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for _, mask, (x, y) in targets]
+    return PX * np.array(boxes, np.int64).reshape(-1, 4)
+
+
+def _between(target: Target, low: Ints, high: Ints) -> Ints:
+    """Pixels (K, 2) of a mask whose centres lie between two corners."""
+    _, mask, corner = target
+    x, y = np.maximum(-(-low // PX) - corner, 0)
+    x_end, y_end = np.maximum(high // PX - corner + 1, 0)
+    return np.asarray(np.argwhere(mask[y:y_end, x:x_end])[:, ::-1] + (x, y) + corner)
 
 
 def _first(near: _Near, radius: int) -> tuple[float, int] | None:

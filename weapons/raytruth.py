@@ -35,17 +35,15 @@ def first_pixels(start_256: Ints, step_256: Ints, targets: Sequence[Target]) -> 
     -------
     segments (K,) that touch anything, rising; the number of the object (K,); the pixel (K, 2)
     """
-    pixels = [np.argwhere(mask)[:, ::-1] + np.array(corner) for _, mask, corner in targets]
-    boxes = [[*p.min(axis=0), *p.max(axis=0)] if len(p) else [1, 1, 0, 0] for p in pixels]
-    box = PX * np.array(boxes, np.int64).reshape(-1, 4)
+    box = _boxes(targets)
     found: list[tuple[int, int, int, int]] = []
     for shot, (start, step) in enumerate(zip(start_256, step_256, strict=True)):
         low, high = np.minimum(start, start + step) - HALF, np.maximum(start, start + step) + HALF
         near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
         if not len(near):
             continue
-        xy = np.concatenate([pixels[rank] for rank in near])
-        rank = np.repeat(near, [len(pixels[rank]) for rank in near])
+        pixels = [_between(targets[rank], low, high) for rank in near.tolist()]
+        xy, rank = np.concatenate(pixels), np.repeat(near, [len(some) for some in pixels])
         time, met = _entries(PX * xy - start, step)
         if len(met):
             first = met[np.lexsort((rank[met], xy[met, 0], xy[met, 1], time))[0]]
@@ -59,6 +57,20 @@ def touching(points_256: Ints, targets: Sequence[Target]) -> npt.NDArray[np.bool
     inside = np.zeros(len(points_256), np.bool_)
     inside[first_pixels(points_256, np.zeros_like(points_256), targets)[0]] = True
     return inside
+
+
+def _boxes(targets: Sequence[Target]) -> Ints:
+    """First and last pixel centres (M, 4) of masks."""
+    boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for _, mask, (x, y) in targets]
+    return PX * np.array(boxes, np.int64).reshape(-1, 4)
+
+
+def _between(target: Target, low: Ints, high: Ints) -> Ints:
+    """Pixels (K, 2) of a mask whose centres lie between two corners."""
+    _, mask, corner = target
+    x, y = np.maximum(-(-low // PX) - corner, 0)
+    x_end, y_end = np.maximum(high // PX - corner + 1, 0)
+    return np.asarray(np.argwhere(mask[y:y_end, x:x_end])[:, ::-1] + (x, y) + corner)
 
 
 def _entries(away: Ints, step: Ints) -> tuple[Ints, Ints]:
