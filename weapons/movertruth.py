@@ -130,7 +130,7 @@ def _between(target: Target, low: Ints, high: Ints) -> Ints:
     """Pixels (K, 2) of a mask whose centres lie between two corners."""
     _, mask, corner = target
     x, y = np.maximum(-(-low // PX) - corner, 0)
-    x_end, y_end = np.maximum(high // PX - corner + 1, 0)
+    x_end, y_end = high // PX - corner + 1
     return np.asarray(np.argwhere(mask[y:y_end, x:x_end])[:, ::-1] + (x, y) + corner)
 
 
