@@ -7,7 +7,18 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-__all__ = ["Place", "bound", "csv_of", "front", "markdown", "places", "setting_text", "verdict"]
+__all__ = [
+    "Place",
+    "bound",
+    "csv_of",
+    "front",
+    "markdown",
+    "markdown_table",
+    "places",
+    "ranks",
+    "setting_text",
+    "verdict",
+]
 
 Json = Mapping[str, Any]
 
@@ -152,7 +163,7 @@ def _lines(study: Json, error: float, pictures: Sequence[str]) -> Iterator[str]:
     if table:
         yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:"
         yield ""
-        yield from _table(["", "fast", "accurate", "good enough for"], table)
+        yield from markdown_table(["", "fast", "accurate", "good enough for"], table)
     for question in study["questions"]:
         yield from _question(question, question["name"] in pictures)
     for question in study["questions"]:
@@ -169,7 +180,7 @@ def _question(question: Json, picture: bool) -> Iterator[str]:
         yield ""
     head = ["method", "setting", "wrong a shot", "missed", "false", "error of share", "of place, px", "us a shot"]
     rows = [_row(curve, point, question) for curve in question["curves"] for point in curve["points"]]
-    yield from _table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows)
+    yield from markdown_table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows)
     for curve in question["curves"]:
         if curve["left_out"] or curve["note"]:
             yield f"- {curve['name']}: {'left out: ' + curve['left_out'] if curve['left_out'] else curve['note']}"
@@ -201,10 +212,11 @@ def _kinds(question: Json) -> Iterator[str]:
         [f"{name} {setting_text(setting)}".strip(), *(f"{by_kind[kind]:.3f}" for kind in kinds)]
         for (name, setting), by_kind in shown
     ]
-    yield from _table(["", *kinds], rows)
+    yield from markdown_table(["", *kinds], rows)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Lines of a Markdown table."""
     yield f"| {' | '.join(head)} |"
     yield "|" + " --- |" * len(head)
     yield from (f"| {' | '.join(row)} |" for row in rows)
