@@ -65,6 +65,7 @@ class Stack:
     box_xyxy : (M, 4) int64, inclusive, px
     offset : (M,) where the item's mask begins in `masks`, row by row
     masks : flat booleans of all masks in use
+    layered : whether the items lie on more layers than one
     """
 
     ids: Ints
@@ -74,9 +75,26 @@ class Stack:
     box_xyxy: Ints
     offset: Ints
     masks: Bools
+    layered: bool
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns; the masks are those of the scene."""
+        columns = (self.ids, self.occluder, self.categories, self.owner, self.box_xyxy, self.offset)
+        return sum(column.nbytes for column in columns)
+
+    @cached_property
+    def has_occluders(self) -> bool:
+        """Whether any item is an occluder."""
+        return bool(self.occluder.any())
+
+    @cached_property
+    def has_unmet(self) -> bool:
+        """Whether any item is of no category, so that every shot refuses it."""
+        return not self.categories.all()
 
     @property
     def width(self) -> Ints:
@@ -284,10 +302,15 @@ class Items:
         boxes[~np.isin(self.role[ids], (HITTABLE, OCCLUDER))] = NOWHERE
         return boxes
 
+    @property
+    def has_stack(self) -> bool:
+        """Whether the stack of the items as they are now is there."""
+        return self._stack is not None and self._stack[0] == self.version
+
     def stack(self) -> Stack:
         """Items that decide, front to back: greater layer; occluders before objects; then the later added."""
         with self._lock:
-            if self._stack is None or self._stack[0] != self.version:
+            if self._stack is None or not self.has_stack:
                 if self.atlas.wasteful:
                     self._compact()
                 self._stack = (self.version, self.stack_of(Role.HITTABLE, Role.OCCLUDER))
@@ -298,12 +321,19 @@ class Items:
         n = self.count
         wanted = np.isin(self.role[:n], [ROLES.index(role) for role in roles])
         ids = np.flatnonzero((self.alive[:n] == 1) & wanted & (self.size_wh[:n, 0] > 0))
-        occluder = self.role[ids] == OCCLUDER
-        order = np.lexsort((-ids, ~occluder, -self.layer[ids]))
+        occluder, layer = self.role[ids] == OCCLUDER, self.layer[ids]
+        layered = bool((layer[1:] != layer[:-1]).any())
+        keys = [-ids]
+        if occluder.any():
+            keys.append(~occluder)
+        if layered:
+            keys.append(-layer)
+        order = np.lexsort(keys)
         ids, occluder = ids[order], occluder[order]
         return Stack(
-            ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat
-        )
+            ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat,
+            layered,
+        )  # fmt: skip
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""

@@ -19,7 +19,9 @@ from planes.compose import Codes
 from planes.items import Stack
 from planes.spans import Box, each_pixel, ragged
 
-__all__ = ["BLOCK", "HIT", "OF_PATTERNS", "SKIP", "Events", "Pairs", "Runs", "Verdict", "read_codes", "walk"]
+__all__ = ["BLOCK", "HIT", "OF_PATTERNS", "SKIP", "Events", "Kinds", "Pairs", "Runs", "Verdict", "read_codes", "walk"]
+
+Kinds = npt.NDArray[np.uint8]
 
 HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
 """What happened to a sample: an object was hit, an occluder ended its walk, an item was skipped; it still walks."""
@@ -82,6 +84,11 @@ class Runs:
         """Samples of each run."""
         return self.x_last - self.x_first + 1
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return 5 * self.y.nbytes
+
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
@@ -90,12 +97,12 @@ class Pairs:
     Parameters
     ----------
     placement, rank : (k,) int64
-    refused : (k,) whether the shot's filter refuses the item
+    kind : (k,) what the item does to a sample: HIT, BLOCK or SKIP
     """
 
     placement: Ints
     rank: Ints
-    refused: Bools
+    kind: Kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +122,17 @@ class Events:
         every = [cls(none, none, none, none, none), *parts]
         return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return self.kind.nbytes + 4 * self.run.nbytes
+
     def take(self, chosen: Ints | Bools) -> Events:
         """Pick some of the events."""
         return Events(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
-def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tuple[Events, npt.NDArray[np.uint8]]:
+def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tuple[Events, Kinds]:
     """Let each sample meet the items in front of each other, from the front.
 
     An item that is refused is skipped; an accepted occluder ends the walk; an accepted object is hit, and ends the
@@ -136,7 +148,7 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     """
     start = np.cumsum(runs.lengths) - runs.lengths
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
-    kind = np.where(pairs.refused, SKIP, np.where(stack.occluder[pairs.rank], BLOCK, HIT)).astype(np.uint8)
+    kind = pairs.kind
     ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
     keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)

@@ -62,10 +62,10 @@ def crowd(seed: int, count: int = 40, side: int = 120, world: bool = True) -> Sc
 
 
 def pairs_tested(scene: Scene, weapon: Weapon, at: Any, **how: Any) -> tuple[int, int]:
-    stages = [stage for stage in fire(scene, weapon, at, strategy="direct", **how).plan.ran if stage.pairs]
-    assert [stage.name for stage in stages] == ["pre-filter"]
-    assert stages[0].pairs
-    return stages[0].pairs
+    ran = fire(scene, weapon, at, strategy="direct", **how).plan.ran
+    (stage,) = (stage for stage in ran if stage.name == "pre-filter")
+    assert stage.pairs
+    return stage.pairs
 
 
 @pytest.mark.parametrize("broadphase", BROADPHASES)
@@ -375,11 +375,11 @@ def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", 6000)
     most = []
     monkeypatch.setattr(
-        Candidates, "pairs", lambda self, *a, pairs=Candidates.pairs: most.append(p := pairs(self, *a)) or p
+        Candidates, "meeting", lambda self, *a, meeting=Candidates.meeting: most.append(p := meeting(self, *a)) or p
     )
     at = np.zeros((500, 2))
     hits = fire(scene, Point(), at, strategy="direct", broadphase="bvh")
-    assert max(len(pairs.rank) for pairs in most) <= 2 * 6000
+    assert max(len(rank) for _, rank in most) <= 2 * 6000
     assert hits == fire(scene, Point(), at, strategy="direct", broadphase="none")
     spread = Scene()
     for i in range(300):

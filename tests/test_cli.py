@@ -176,8 +176,9 @@ def test_the_plan_of_each_shot(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main([*words, "--plan"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith(without) and without.count("\n") == 1
-    assert re.search(r"^  ran      walk, [\d,]+ bytes: samples through the stack, front to back$", shown, re.M)
-    assert "  left out hud: drawn only for a picture\n" in shown
+    assert shown.removeprefix(without).splitlines()[0].split() == ["stage", "time", "bytes", "why"]
+    assert re.search(r"^  walk +[\d,]+\.\d us +[\d,]+  samples through the stack, front to back$", shown, re.M)
+    assert re.search(r"^  hud +left out +drawn only for a picture$", shown, re.M)
 
 
 # new
@@ -313,7 +314,9 @@ def test_many_shots_of_a_file_are_told_as_a_batch(tmp_path: Path, capsys: pytest
     capsys.readouterr()
     assert main(["report", str(tmp_path / "range"), "-o", str(tmp_path / "r.png"), "--plan"]) == 0
     told = capsys.readouterr().out
-    assert re.match(r"30 shots, \d+ hit something\n", told) and "left out weights: the weapon has no falloff" in told
+    assert re.match(r"30 shots, \d+ hit something\n", told) and re.search(
+        r"^  weights +left out +30 of 30 calls: the weapon has no falloff$", told, re.M
+    )
 
 
 # replay

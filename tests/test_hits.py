@@ -386,7 +386,7 @@ def test_giant_patterns(weapon: Any, at: tuple[int, int], bounded: bool) -> None
     results = [fire(scene, weapon, at, strategy=s) for s in (("direct", "composed") if bounded else ("direct",))]
     shares = results[0].shares()
     assert all(
-        stage.bytes_made <= 2 * 40 * 30 for hits in results for stage in hits.plan.ran if stage.name != "patterns"
+        stage.bytes_made <= 8 * 40 * 30 for hits in results for stage in hits.plan.ran if stage.name != "patterns"
     )
     assert all(hits == results[0] for hits in results)
     counts = {}
@@ -504,13 +504,17 @@ def stages(hits: Hits) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
     return ran, {s.name: s.why for s in hits.plan.left_out}, {s.name: s.bytes_made for s in hits.plan.ran}
 
 
+BEGIN = ["shots", "stack", "patterns", "plan"]
+
+
 def test_direct_makes_no_plane() -> None:
     scene = Scene((50, 40))
     scene.add(square(5), (3, 3))
     ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
     plane = scene.code_plane()
     assert plane is not None and plane.codes is None
-    assert {"patterns", "pre-filter", "walk"} == set(ran) and "code plane" in left_out and "read" not in ran
+    assert list(ran) == [*BEGIN, "verdicts", "outside", "pre-filter", "samples", "walk", "rows"]
+    assert "code plane" in left_out
     assert left_out["code plane"] == "direct: asked for"
 
 
@@ -521,7 +525,8 @@ def test_composed_tells_what_it_drew() -> None:
     for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20)), lambda: scene.move(item, (0, 0))):
         change()
         ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="composed"))
-        assert {"patterns", "code plane", "read"} == set(ran) and "walk" not in ran and "pre-filter" in left_out
+        assert list(ran) == [*BEGIN, "code plane", "verdicts", "outside", "samples", "read", "rows"]
+        assert {"walk", "pre-filter"} <= set(left_out)
         made.append(bytes_made["code plane"])
     assert made == [2 * 50 * 40, 0, 2 * 2 * 25, 2 * 2 * 25]
 
@@ -530,8 +535,8 @@ def test_what_a_scene_does_not_need_is_left_out() -> None:
     scene = Scene()
     hits = fire(scene, Disc(3), (4, 4))
     _, left_out, bytes_made = stages(hits)
-    unused = {"weights", "outside", "occluders", "broad phase", "volumes", "pre-filter", "walk", "code plane"}
-    assert unused == set(left_out) and bytes_made["patterns"] > 0
+    unused = {"weights", "outside", "occluders", "layers", "filter", "broad phase", "volumes", "pre-filter", "walk"}
+    assert unused | {"code plane"} == set(left_out) and bytes_made["patterns"] > 0
     for role in ("background", "mover", "hud"):
         scene.add(square(3), role=role)
     assert {"background", "mover", "hud"} <= set(stages(fire(scene, Disc(3), (4, 4)))[1])
@@ -707,7 +712,8 @@ def test_far_apart_items_under_a_giant_are_laid_one_by_one() -> None:
     assert giant == fire(scene, Disc(2**18), (0, 0), prefilter="none")
     assert int(giant.samples.sum()) == giant.verdict_counts()["hit"] == 5 * 10 + 25
     walked = next(stage for stage in giant.plan.ran if stage.name == "walk")
-    assert walked.bytes_made == 75
+    events = 33 * 4 * 5
+    assert 75 <= walked.bytes_made <= 75 + events
 
 
 @pytest.mark.parametrize("strategy", ["composed", "auto"])

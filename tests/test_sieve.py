@@ -163,8 +163,7 @@ def test_the_command_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[st
     words = ["report", str(GALLERY), "-o", str(tmp_path / "r.png"), "--json", str(tmp_path / "r.json"), "--plan"]
     assert main([*words, "--prefilter", "4 boxes", "--broadphase", "grid"]) == 0
     out = capsys.readouterr().out
-    assert "pre-filter, 1 of 26 pairs left" in out
-    assert "box, then 4 boxes, by grid" in out
+    assert "  box, then 4 boxes, by grid; 1 of 26 pairs left\n" in out
     found = json.loads((tmp_path / "r.json").read_text())
     assert found["filter"]["prefilter"] == "4 boxes"
     scene = load_scene(GALLERY)

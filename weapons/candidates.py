@@ -16,11 +16,13 @@ from planes.arrays import Bools, Ints, choice
 from planes.constants import CHUNK_PAIRS
 from planes.index import Index
 from planes.items import Items, Stack, boxes_in
-from planes.sampling import Pairs
+from planes.sampling import BLOCK, HIT, SKIP, Kinds, Pairs
 from planes.spans import meets
 from weapons.volley import Shots, Volley
 
-__all__ = ["PREFILTERS", "Candidates", "Prefilter", "pairs_of", "prefilter_of", "refused"]
+__all__ = [
+    "PREFILTERS", "Candidates", "Prefilter", "kinds", "may_refuse", "pairs_of", "prefilter_of", "refused"
+]  # fmt: skip
 
 PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "4 boxes", "polygon", "swept")
 """Names of pre-filters; any number of boxes up to BOXES_MAX is one."""
@@ -68,7 +70,22 @@ def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
     shot : (P,) whose they are
     """
     placement, rank = np.nonzero(meets(boxes_xyxy[:, None], stack.box_xyxy[None]))
-    return Pairs(placement, rank, refused(stack, rank, shots, shot[placement]))
+    return Pairs(placement, rank, kinds(stack, rank, refused(stack, rank, shots, shot[placement])))
+
+
+def may_refuse(stack: Stack, shots: Shots) -> bool:
+    """Whether any shot may refuse any item."""
+    return shots.choosy or stack.has_unmet
+
+
+def kinds(stack: Stack, rank: Ints, refuses: Bools | None) -> Kinds:
+    """What items do to the samples of shots that refuse some of them, or none: HIT, BLOCK or SKIP."""
+    kind = np.full(len(rank), HIT, np.uint8)
+    if stack.has_occluders:
+        kind[stack.occluder[rank]] = BLOCK
+    if refuses is not None:
+        kind[refuses] = SKIP
+    return kind
 
 
 def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
@@ -100,22 +117,6 @@ class Candidates:
     why_unindexed: str = "as asked for"
     met: int = 0
 
-    def pairs(self, volley: Volley, placements: Ints, boxes_xyxy: Ints, shots: Shots) -> Pairs:
-        """Pairs of some placements and the items that they may touch, front to back.
-
-        Parameters
-        ----------
-        placements : (P,) rising numbers of placements of the volley
-        boxes_xyxy : (P, 4) inclusive boxes of what is asked of each
-        """
-        row, rank = self.meeting(boxes_xyxy)
-        placement = placements[row]
-        if self.prefilter.volume:
-            near = volley.count[placement] > 0  # the box of an empty pattern lies within others
-            near[near] = self._near(volley, placement[near], rank[near])
-            placement, rank = placement[near], rank[near]
-        return Pairs(placement, rank, refused(self.stack, rank, shots, volley.shot[placement]))
-
     def meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Rows and ranks of boxes (P, 4) and items that share a pixel; of all, without a pre-filter."""
         if self.prefilter.name == "none":
@@ -146,10 +147,12 @@ class Candidates:
         row, rank = np.divmod(np.sort(some[row] * m + rank_of[item]), m)
         return row, rank
 
-    def _near(self, volley: Volley, placement: Ints, rank: Ints) -> Bools:
-        """Whether the volumes of pattern and item meet, or may."""
+    def near(self, volley: Volley, placement: Ints, rank: Ints) -> Bools:
+        """Whether the volumes of pattern and item meet, or may; of pairs whose boxes do."""
         from planes.bounding import Kind  # nothing of volumes is loaded before they are asked for
         from weapons.narrow import near
 
         kind = Kind(self.prefilter.volume, self.prefilter.k)
-        return near(self.prefilter.name, kind, self.items, self.stack, volley, placement, rank)
+        found = volley.count[placement] > 0  # the box of an empty pattern lies within others
+        found[found] = near(self.prefilter.name, kind, self.items, self.stack, volley, placement[found], rank[found])
+        return found

@@ -23,9 +23,10 @@ from planes.scenefile import FILE_NAME, scene_folder
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
 from weapons.facts import report_of
+from weapons.hits import Hits
 from weapons.orders import Order, fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
-from weapons.plan import plan_lines
+from weapons.plan import PlanSum, plan_lines
 from weapons.progress import Progress
 from weapons.schemas import read_report
 from weapons.starter import write_starter
@@ -220,7 +221,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="HITS.jsonl",
         help="a name that ends in .jsonl (default: hits.jsonl)",
     )
-    one.add_argument("--plan", action="store_true", help="print what ran, what was left out, and why, added up")
+    one.add_argument("--plan", action="store_true", help="print what each stage cost, and what was left out, added up")
     one = _word(words, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
     one.add_argument("folder", type=Path, metavar="FOLDER", help="where to; its parent must be there")
     one = _word(words, compare, "say and draw what differs between two reports", COMPARE_HELP, COMPARE_EXAMPLES)
@@ -261,7 +262,9 @@ def _add_report(words: Any) -> None:
     told = "fire with it and draw its volumes: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon, swept"
     one.add_argument("--prefilter", metavar="NAME", help=told)
     one.add_argument("--broadphase", metavar="NAME", help="fire with it and draw its cells: grid, quadtree, bvh")
-    one.add_argument("--plan", action="store_true", help="print what ran for each shot, what was left out, and why")
+    one.add_argument(
+        "--plan", action="store_true", help="print what each stage of a shot cost, what was left out, and why"
+    )
 
 
 def _word(
@@ -292,7 +295,7 @@ def report(arguments: argparse.Namespace) -> None:
     write_png(arguments.output, picture_of_report(facts, scene))
     if arguments.json is not None:
         write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
-    _tell(facts, arguments.plan)
+    _tell(facts, fired if arguments.plan else [])
 
 
 def _orders(arguments: argparse.Namespace, scene: Scene) -> list[Order]:
@@ -307,22 +310,25 @@ def _orders(arguments: argparse.Namespace, scene: Scene) -> list[Order]:
     return [order_from_json(_shot(arguments), scene, arsenal, "command line")]
 
 
-def _tell(facts: Mapping[str, Any], plan: bool) -> None:
-    """Print what each shot hit, or how many did; and what ran."""
+def _tell(facts: Mapping[str, Any], planned: Sequence[Hits]) -> None:
+    """Print what each shot hit, or how many did; and what the stages of some hits cost."""
     batch = facts["batch"]
     if batch:
         _say(f"{batch['shots']} shots, {batch['shots_that_hit']} hit something")
     elif not facts["shots"]:
         _say(f"{facts['scene']['name']}: no shots in its scene.json; name one with --weapon and --at")
-    for shot in facts["shots"]:
+    for i, shot in enumerate(facts["shots"]):
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
         _say(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
-        if plan:
-            _print_plan(shot["plan"])
-    for ran in batch["plan"] if batch and plan else ():
-        _print_plan(ran)
+        if planned:
+            _print_plan(planned[i].plan.timed())
+    if batch and planned:
+        done = PlanSum()
+        for hits in planned:
+            done.add(hits.plan)
+        _print_plan(done.timed(), done.calls)
 
 
 def fire(arguments: argparse.Namespace) -> None:
@@ -334,7 +340,7 @@ def fire(arguments: argparse.Namespace) -> None:
     done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
     _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:
-        _print_plan(done.plan.to_dict(), done.plan.calls)
+        _print_plan(done.plan.timed(), done.plan.calls)
 
 
 def study(arguments: argparse.Namespace) -> None:

@@ -31,6 +31,11 @@ class Columns:
 
     __hash__ = None  # type: ignore[assignment]
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(column.nbytes) for column in vars(self).values())
+
     def take(self: C, rows: Ints | slice) -> C:
         """Some of the rows."""
         return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))

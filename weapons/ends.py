@@ -17,6 +17,7 @@ from planes.arrays import Bools, Floats, Ints
 from planes.items import Stack
 from weapons.guns import Traced
 from weapons.meetings import Meetings, stretches
+from weapons.plan import Plan
 from weapons.trace import ROOM, Lines
 
 __all__ = ["Ends", "Reason", "ends_of"]
@@ -56,6 +57,11 @@ class Ends:
     alone: Bools
     fraction: Floats
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(column.nbytes) for column in vars(self).values())
+
     def replaced(self, rays: Bools, other: Ends) -> Ends:
         """These ends, but for some rays those of another list."""
         columns = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
@@ -73,7 +79,7 @@ class Ends:
         return np.asarray((entry < time) | ((entry == time) & (here | before)))
 
 
-def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced) -> Ends:
+def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced, plan: Plan) -> Ends:
     """Find the end of each ray.
 
     Parameters
@@ -81,21 +87,28 @@ def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced) 
     met : what accepted items it touches
     lines : (R,) the rays
     cost : (M,) of the items of the stack, by their place
+    plan : to be told what was looked for
     """
-    ends = _at_occluders(met, lines, stack)
-    objects = ~stack.occluder[met.rank]
+    ends = _endless(len(lines))
+    objects = np.ones(len(met), np.bool_)
+    plan.run("stops", "where each ray ends", ends.nbytes)
+    if stack.has_occluders:
+        _end_at_occluders(ends, met, stack)
+        objects = ~stack.occluder[met.rank]
+        plan.run("occluders", "the first on the way of each ray", objects.nbytes)
     if ray.hits_most is not None:
         _end_at_hits(ends, met.take(np.flatnonzero(objects)), ray.hits_most)
     if ray.budget_256 is not None:
         _end_at_budget(ends, met.take(np.flatnonzero(objects & (cost[met.rank] > 0))), lines, cost, ray.budget_256)
     told = (ends.reason == Reason.OCCLUDER) | (ends.reason == Reason.HITS)
     ends.fraction[told] = ends.time[told] / lines.scale[told]
+    plan.run("stops", "")
     return ends
 
 
-def _at_occluders(met: Meetings, lines: Lines, stack: Stack) -> Ends:
-    n = len(lines)
-    ends = Ends(
+def _endless(n: int) -> Ends:
+    """Ends of n rays that nothing ends before their range."""
+    return Ends(
         np.full(n, Reason.RANGE, np.int64),
         np.full(n, NEVER),
         np.zeros(n, np.int64),
@@ -104,10 +117,13 @@ def _at_occluders(met: Meetings, lines: Lines, stack: Stack) -> Ends:
         np.zeros(n, np.bool_),
         np.ones(n),
     )
+
+
+def _end_at_occluders(ends: Ends, met: Meetings, stack: Stack) -> None:
+    """Let rays end at the first occluder that they meet."""
     blocking = np.flatnonzero(stack.occluder[met.rank])
     _end(ends, met, *_earliest(met, blocking, met.first[blocking]), Reason.OCCLUDER)
     ends.alone[:] = ends.reason == Reason.OCCLUDER
-    return ends
 
 
 def _earliest(met: Meetings, pairs: Ints, cell: Ints) -> tuple[Ints, Ints]:

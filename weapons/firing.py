@@ -17,9 +17,9 @@ from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import pierces, ray_parts_of
-from weapons.candidates import Candidates
+from weapons.candidates import Candidates, may_refuse
 from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, sweep_pays
+from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, read_stack, sweep_pays
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Shots, Volley, checked_shots, volley_of
 from weapons.weapon import Weapon
@@ -74,15 +74,31 @@ def fire(
     InputError
         Naming the argument and the row.
     """
+    plan = Plan()
     present = scene if isinstance(scene, Scene) else _history(scene).scene
     shots = checked_shots(weapon, at, aim, toward, _bits(present, accept), exclude, seed, shot)
+    plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if not isinstance(scene, Scene):
-        moments = moments_of(scene, tick, len(shots))
-        parts = [fired(past, weapon, shots.pick(rows), prefilter, broadphase, strategy) for past, rows in moments]
-        return parts[0] if len(parts) == 1 else parts[0].gathered(parts, [rows for _, rows in moments], shots)
+        return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
     if tick is not None:
         raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
-    return fired(scene, weapon, shots, prefilter, broadphase, strategy)
+    return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+
+
+def _fired_at_moments(
+    history: History, tick: object, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
+) -> Hits:
+    """Fire shots at the scenes of their ticks; `how` are the last arguments of `fire`."""
+    moments = moments_of(history, tick, len(shots))
+    plan.run("past", f"{len(moments)} scenes of it")
+    parts: list[Hits] = []
+    for past, rows in moments:
+        parts.append(fired(past, weapon, shots.pick(rows), *how, Plan() if parts else plan))
+    if len(parts) == 1:
+        return parts[0]
+    hits = parts[0].gathered(parts, [rows for _, rows in moments], shots)
+    hits.plan.run("rows", "", hits.nbytes)
+    return hits
 
 
 def _history(scene: object) -> History:
@@ -111,16 +127,26 @@ def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints
     return moments
 
 
-def fired(scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str) -> Hits:
-    """Decide what checked shots hit; the other arguments are those of `fire`."""
+def fired(
+    scene: Scene,
+    weapon: Weapon,
+    shots: Shots,
+    prefilter: str,
+    broadphase: str,
+    strategy: str,
+    plan: Plan | None = None,
+) -> Hits:
+    """Decide what checked shots hit; the other arguments are those of `fire`, and a plan that has begun."""
+    plan = plan or Plan()
     parts = ray_parts_of(weapon)
     if parts is not None:
         from weapons.rayfire import fired_rays
 
         choice("strategy", strategy, ("auto", "direct"))
-        return fired_rays(scene, weapon, parts, shots, prefilter, broadphase)
-    plan, stack = Plan(), scene.items.stack()
+        return fired_rays(scene, weapon, parts, shots, prefilter, broadphase, plan)
+    stack = read_stack(scene, plan)
     first = volley_of(weapon, shots.take(0, 1))
+    plan.run("patterns", "" if len(shots) else "no shots", first.nbytes)
     placements = len(first.shot) * len(shots)
     name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
     asked = placements if name == "direct" or pierces(weapon) or shots.choosy else 0
@@ -128,18 +154,26 @@ def fired(scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, swept, asked)
     sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
     drawn = None
+    plan.run("plan", f"{name}: {why}")
     if name == "composed" and (plane := scene.code_plane()):
         drawn = plane.read(scene.items), plane.box_xyxy
         plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * drawn[0].itemsize)
     rows, verdicts = [], [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for begin, part in _parts(shots, first, candidates):
         volley = first if len(shots) == 1 else volley_of(weapon, part)
-        plan.run("patterns", f"{len(volley.table.count)} distinct", volley.table.nbytes)
+        plan.run("patterns", f"{len(volley.table.count)} distinct", 0 if volley is first else volley.nbytes)
+        if volley.table.prefix is not None:
+            plan.run("weights", "falloff of the hit pixels, by prefix sums", volley.table.prefix.nbytes)
         met = composed(volley, part, sight, *drawn) if drawn else direct(volley, part, sight)
         rows.append(rows_of_met(met, volley, stack.ids, begin))
+        plan.run("rows", "", rows[-1].nbytes)
         verdicts.append(met.counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
-    leave_out_unused(plan, scene, candidates, first.table, why)
-    return Hits(Rows.joined(rows or [Rows.none()]), np.concatenate(verdicts), scene, weapon, shots, plan)
+        plan.run("verdicts", "", verdicts[-1].nbytes)
+    hits = Hits(Rows.joined(rows or [Rows.none()]), np.concatenate(verdicts), scene, weapon, shots, plan)
+    plan.run("rows", "")
+    leave_out_unused(plan, scene, candidates, first.table, may_refuse(stack, shots), why)
+    plan.run("plan", "")
+    return hits
 
 
 def _bits(scene: Scene, accept: object) -> object:

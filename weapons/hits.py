@@ -120,6 +120,11 @@ class Hits:
             getattr(self, name).flags.writeable = False
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(getattr(self, name).nbytes) for name in HitRow._fields)
+
+    @property
     def verdicts(self) -> Ints:
         """Samples of each shot by verdict."""
         return self._verdicts

@@ -39,6 +39,11 @@ class Meetings:
     def __len__(self) -> int:
         return len(self.ray)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return 3 * self.ray.nbytes + 4 * self.x.nbytes
+
     @cached_property
     def begin(self) -> Ints:
         """First cell of each pair."""

@@ -99,7 +99,7 @@ def passes_of(
     met : meetings with objects and occluders, also beyond the ends
     lines, relative : (R,) the rays; and, for each pair of `met`, the ray as the item sees it
     """
-    chosen = np.flatnonzero(~stack.occluder[met.rank])
+    chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
     objects = met.take(chosen)
     keep = ends.walked(objects)
     chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]

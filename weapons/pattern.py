@@ -122,8 +122,9 @@ class PatternTable:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the spans and prefix sums."""
-        return 4 * self.y.nbytes + (0 if self.prefix is None else self.prefix.nbytes)
+        """Bytes of the spans and of what finds them, without those of the weights."""
+        columns = (self.begin, self.count, self.box_xyxy)
+        return 5 * self.y.nbytes + sum(column.nbytes for column in columns)
 
     def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
         """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ __all__ = [
     "leave_out_imagery",
     "leave_out_unused",
     "plan_lines",
+    "read_stack",
     "sweep_pays",
 ]
 
@@ -44,14 +46,22 @@ BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80
 ratios only."""
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Stage:
-    """A stage that ran, or one that was left out: why, how many bytes it made, and of a filter (kept, of how many)."""
+    """A stage that ran, or one that was left out, and why.
+
+    Parameters
+    ----------
+    bytes_made : of the arrays that it made and handed on, or keeps; while it works it holds some more
+    pairs : of a filter, how many it kept, and of how many
+    ns : how long it took; two that differ in it alone are equal
+    """
 
     name: str
     why: str
     bytes_made: int = 0
     pairs: tuple[int, int] | None = None
+    ns: int = field(default=0, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """A stage that ran, as JSON."""
@@ -61,30 +71,55 @@ class Stage:
 
 @dataclass
 class Plan:
-    """Stages of a call in the order in which they ran, and those left out."""
+    """Stages of a call in the order in which they ran, and those left out.
+
+    It is a lap timer, started when it is made: the time since the last stage ended is that of the stage which is told
+    to have ended now, so the times add up to that of the call. They are in no report: see `timed`.
+    """
 
     ran: list[Stage] = field(default_factory=list)
     left_out: list[Stage] = field(default_factory=list)
+    _mark: int = field(default_factory=perf_counter_ns, repr=False, compare=False)
 
     def run(self, name: str, why: str, bytes_made: int = 0, pairs: tuple[int, int] | None = None) -> None:
-        """Record a stage that ran; the numbers of its runs for the parts of a batch add up."""
-        for i, stage in enumerate(self.ran):
+        """Record that a stage ended; the numbers of its runs, for the parts of a batch or of the work, add up.
+
+        Why it ran is told once.
+        """
+        now = perf_counter_ns()
+        self._add(name, why, bytes_made, pairs, now - self._mark)
+        self._mark = now
+
+    def _add(self, name: str, why: str, bytes_made: int, pairs: tuple[int, int] | None, ns: int) -> None:
+        for stage in self.ran:
             if stage.name == name:
-                self.ran[i] = Stage(name, stage.why, stage.bytes_made + bytes_made, added(stage.pairs, pairs))
+                stage.why = stage.why or why
+                stage.bytes_made += bytes_made
+                stage.pairs = added(stage.pairs, pairs)
+                stage.ns += ns
                 return
-        self.ran.append(Stage(name, why, bytes_made, pairs))
+        self.ran.append(Stage(name, why, bytes_made, pairs, ns))
 
     @classmethod
     def joined(cls, plans: Sequence[Plan]) -> Plan:
-        """What ran in one or more, added up; what the first left out."""
-        plan = cls(left_out=list(plans[0].left_out))
+        """What ran in one or more that followed each other, added up; what the first left out."""
+        plan = cls(left_out=list(plans[0].left_out), _mark=plans[-1]._mark)
         for stage in (stage for one in plans for stage in one.ran):
-            plan.run(stage.name, stage.why, stage.bytes_made, stage.pairs)
+            plan._add(stage.name, stage.why, stage.bytes_made, stage.pairs, stage.ns)
         return plan
+
+    @property
+    def ns(self) -> int:
+        """How long the call took, from its first stage to the end of its last."""
+        return sum(stage.ns for stage in self.ran)
 
     def has_run(self, name: str) -> bool:
         """Whether a stage ran."""
         return any(stage.name == name for stage in self.ran)
+
+    def has_left_out(self, name: str) -> bool:
+        """Whether a stage was left out."""
+        return any(stage.name == name for stage in self.left_out)
 
     def leave_out(self, name: str, why: str) -> None:
         """Record that a stage was not needed."""
@@ -97,14 +132,19 @@ class Plan:
             "left_out": [{"stage": s.name, "why": s.why} for s in self.left_out],
         }
 
+    def timed(self) -> dict[str, list[dict[str, object]]]:
+        """The plan as JSON, with the `ns` that each stage took: never twice the same."""
+        return {**self.to_dict(), "ran": [{**stage.to_dict(), "ns": stage.ns} for stage in self.ran]}
 
-def added(a: tuple[int, int] | None, b: tuple[int, int] | None) -> tuple[int, int] | None:
+
+def added(a: Sequence[int] | None, b: Sequence[int] | None) -> tuple[int, int] | None:
     """Sum of two counts of pairs, of which either may be missing."""
-    return (a[0] + b[0], a[1] + b[1]) if a and b else a or b
+    known = [pairs for pairs in (a, b) if pairs]
+    return (sum(kept for kept, _ in known), sum(of for _, of in known)) if known else None
 
 
 class PlanSum:
-    """What many calls did, added up: how often each stage ran or was left out, its bytes, and why it first was so."""
+    """What many calls did, added up: how often each stage ran or was left out, its bytes and time, and why at first."""
 
     def __init__(self) -> None:
         self.calls = 0
@@ -117,29 +157,40 @@ class PlanSum:
             for stage in stages:
                 told = self._sums[ran].get(stage.name)
                 if told is None:
-                    self._sums[ran][stage.name] = {**stage.to_dict(), "calls": 1}
+                    self._sums[ran][stage.name] = {**stage.to_dict(), "ns": stage.ns, "calls": 1}
                     continue
                 told["bytes"] += stage.bytes_made
+                told["ns"] += stage.ns
                 told["calls"] += 1
-                if stage.pairs:
-                    told["pairs"] = [a + b for a, b in zip(told["pairs"], stage.pairs, strict=True)]
+                if pairs := added(told.get("pairs"), stage.pairs):
+                    told["pairs"] = list(pairs)
 
-    def to_dict(self) -> dict[str, list[dict[str, Any]]]:
-        """As `Plan.to_dict`, and with each stage in how many `calls` it was so."""
+    def timed(self) -> dict[str, list[dict[str, Any]]]:
+        """As `Plan.timed`, and with each stage in how many `calls` it was so."""
         return {"ran": list(self._sums[True].values()), "left_out": list(self._sums[False].values())}
 
 
 def plan_lines(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> list[str]:
-    """Lines that tell a plan, given as JSON, to a reader: what ran, what was left out, and why."""
-    lines = []
-    for key, verb in (("ran", "ran"), ("left_out", "left out")):
-        for stage in plan[key]:
-            often = "" if calls == 1 else f", {stage['calls']} of {calls} calls"
-            made = f", {stage['bytes']:,} bytes" if stage.get("bytes") else ""
-            kept, of = stage.get("pairs", (0, 0))
-            left = f", {kept:,} of {of:,} pairs left" if of else ""
-            lines.append(f"{verb:8} {stage['stage']}{often}{left}{made}: {stage['why']}")
-    return lines
+    """Lines of a table that tells a timed plan, given as JSON, to a reader: what each stage cost, what was left out."""
+    ran = plan["ran"]
+    rows = [("stage", "time", "bytes", "why")]
+    rows += [(s["stage"], _microseconds(s["ns"]), f"{s['bytes']:,}", _why(s, calls)) for s in ran]
+    whole = f"{calls} calls" if calls != 1 else ""
+    rows.append(("all", _microseconds(sum(s["ns"] for s in ran)), f"{sum(s['bytes'] for s in ran):,}", whole))
+    rows += [(s["stage"], "left out", "", _why(s, calls)) for s in plan["left_out"]]
+    name, time, made = (max(len(row[column]) for row in rows) for column in range(3))
+    return [f"{row[0]:{name}}  {row[1]:>{time}}  {row[2]:>{made}}  {row[3]}".rstrip() for row in rows]
+
+
+def _microseconds(ns: int) -> str:
+    return f"{ns / 1e3:,.1f} us"
+
+
+def _why(stage: Mapping[str, Any], calls: int) -> str:
+    """Why a stage ran or not, in how many of the calls, and what a filter left."""
+    often = f"{stage['calls']} of {calls} calls: " if calls != 1 else ""
+    kept, of = stage.get("pairs", (0, 0))
+    return f"{often}{stage['why']}" + (f"; {kept:,} of {of:,} pairs left" if of else "")
 
 
 def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTable, placements: int) -> tuple[str, str]:
@@ -251,7 +302,18 @@ def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
     return index.missed > items * BVH_BUILT_NS
 
 
-def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, why_strategy: str) -> None:
+def read_stack(scene: Scene, plan: Plan) -> Stack:
+    """Items that decide, front to back; the plan is told whether they had to be put in order."""
+    kept = scene.items.has_stack
+    stack = scene.items.stack()
+    told = "as they were" if kept else "put in order, front to back"
+    plan.run("stack", f"{len(stack)} items, {told}", 0 if kept else stack.nbytes)
+    return stack
+
+
+def leave_out_unused(
+    plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, choosy: bool, why_strategy: str
+) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
     idle = "no sample needed the stack"
     if not plan.has_run("broad phase"):
@@ -260,7 +322,10 @@ def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: Pa
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     elif not plan.has_run("pre-filter"):
         plan.leave_out("volumes", idle)
-    leave_out_absent(plan, scene, candidates.stack, weighted=table.prefix is not None)
+    leave_out_absent(plan, scene, candidates.stack, weighted=table.prefix is not None, choosy=choosy)
+    for name in ("filter", "occluders"):
+        if not plan.has_run(name) and not plan.has_left_out(name):
+            plan.leave_out(name, idle)
     if not plan.has_run("code plane"):
         plan.leave_out("code plane", f"direct: {why_strategy}")
     if not plan.has_run("pre-filter"):
@@ -270,18 +335,24 @@ def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, table: Pa
     leave_out_imagery(plan, scene)
 
 
-def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool) -> None:
-    """Record what neither the weapon nor the scene has."""
+def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, choosy: bool) -> None:
+    """Record what neither the shots nor the scene have."""
     if not weighted:
         plan.leave_out("weights", "the weapon has no falloff")
     if scene.bounds is None:
         plan.leave_out("outside", "the scene has no bounds")
-    if not stack.occluder.any():
+    if not stack.has_occluders:
         plan.leave_out("occluders", "the scene has none")
+    if not stack.layered:
+        plan.leave_out("layers", "all items lie on one")
+    if not choosy:
+        plan.leave_out("filter", "all is accepted, and nobody excluded")
 
 
 def leave_out_imagery(plan: Plan, scene: Scene) -> None:
     """Record the roles that decide nothing."""
-    for role in (Role.BACKGROUND, Role.MOVER, Role.HUD):
-        if len(scene.ids(role)):
+    items = scene.items
+    count = np.bincount(items.role[: items.count], items.alive[: items.count], len(Role)).tolist()
+    for role, there in zip(Role, count, strict=True):
+        if there and role not in (Role.HITTABLE, Role.OCCLUDER):
             plan.leave_out(role.value, "drawn only for a picture")

@@ -38,6 +38,11 @@ class Rays:
     def __len__(self) -> int:
         return len(self.shot)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(column.nbytes) for column in vars(self).values())
+
     def take(self, first: int, last: int) -> Rays:
         """Rays first .. last - 1."""
         part = slice(first, last)

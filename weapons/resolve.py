@@ -11,13 +11,13 @@ from planes.compose import Codes, area
 from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack, clipped
 from planes.sampling import (
-    BLOCK,
     HIT,
     LIVE,
     OF_PATTERNS,
     SKIP,
     VERDICT_OF,
     Events,
+    Kinds,
     Pairs,
     Runs,
     Verdict,
@@ -25,7 +25,7 @@ from planes.sampling import (
     walk,
 )
 from planes.spans import Box, merged_runs, pieces
-from weapons.candidates import Candidates, refused
+from weapons.candidates import Candidates, kinds, may_refuse, refused
 from weapons.plan import Plan
 from weapons.volley import Shots, Volley
 
@@ -68,36 +68,41 @@ class Met:
 def direct(volley: Volley, shots: Shots, sight: Sight) -> Met:
     """Walk the stack under every placement; only where an item may be is looked at all."""
     boxes = volley.boxes
-    counts = _inside(volley, boxes, sight.bounds)
+    counts = _inside(volley, boxes, sight)
     if not len(sight.stack):
-        return _met(volley, Runs.joined([]), [], counts)
+        return _met(volley, Runs.joined([]), [], counts, sight.plan)
     pairs = _candidates(volley, np.arange(len(boxes)), boxes, shots, sight)
     runs = _under_items(volley, pairs, sight)
-    return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
+    sight.plan.run("samples", "runs where items may be", runs.nbytes)
+    return _met(volley, runs, _walked(runs, pairs, sight, counts), counts, sight.plan)
 
 
 def composed(volley: Volley, shots: Shots, sight: Sight, codes: Codes, plane_xyxy: Box) -> Met:
     """Read the front item under every sample; walk the stack only where a shot looks behind it."""
-    counts = _inside(volley, volley.boxes, sight.bounds)
+    counts = _inside(volley, volley.boxes, sight)
+    plan, stack = sight.plan, sight.stack
     every = np.arange(len(volley.shot))
     runs = _laid(volley, every, np.broadcast_to(np.array(plane_xyxy), (len(every), 4)))
-    sight.plan.run("read", "one code for each sample inside the bounds", int(runs.lengths.sum()) * codes.itemsize)
-    rank_of = np.zeros(int(sight.stack.ids.max(initial=-1)) + 2, np.int64)
-    rank_of[sight.stack.ids + 1] = np.arange(len(sight.stack))
+    plan.run("samples", "runs inside the bounds", runs.nbytes)
+    rank_of = np.zeros(int(stack.ids.max(initial=-1)) + 2, np.int64)
+    rank_of[stack.ids + 1] = np.arange(len(stack))
+    plan.run("read", "one code for each sample", rank_of.nbytes)
     events, behind = [], []
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         run, x_first, x_last, code = read_codes(part, codes, plane_xyxy)
         rank = rank_of[code >> 1]
-        skip = refused(sight.stack, rank, shots, volley.shot[part.placement[run]])
-        kind = np.where(skip, SKIP, np.where(sight.stack.occluder[rank], BLOCK, HIT))
-        more = (code & 1 == 1) & (skip | (sight.pierce & (kind == HIT)))
+        plan.run("read", "", int(part.lengths.sum()) * codes.itemsize + 5 * rank.nbytes)
+        kind = _kinds(rank, volley.shot[part.placement[run]], shots, sight)
+        more = (code & 1 == 1) & ((kind == SKIP) | (sight.pierce & (kind == HIT)))
         _count(counts, part.placement[run[~more]], kind[~more], (x_last - x_first + 1)[~more])
+        plan.run("verdicts", "")
         told = ~more & (kind == HIT)
         events.append(Events(kind[told], rank[told], run[told] + strip.start, x_first[told], x_last[told]))
         seen = part.take(run[more])
         behind.append(Runs(seen.placement, seen.y, x_first[more], x_last[more], seen.ordinal))
-    front = _met(volley, runs, events, counts)
+        plan.run("read", "", events[-1].nbytes + behind[-1].nbytes)
+    front = _met(volley, runs, events, counts, plan)
     rest = Runs.joined(behind)
     return _joined(front, _look_behind(volley, rest, shots, sight, counts)) if len(rest) else front
 
@@ -127,32 +132,53 @@ def _look_behind(volley: Volley, runs: Runs, shots: Shots, sight: Sight, counts:
     left, right = np.minimum.reduceat(runs.x_first, first), np.maximum.reduceat(runs.x_last, first)
     boxes = np.stack([left, runs.y[first], right, runs.y[last]], axis=1)
     pairs = _candidates(volley, busy, boxes, shots, sight)
-    return _met(volley, runs, _walked(runs, pairs, sight, counts), counts)
+    return _met(volley, runs, _walked(runs, pairs, sight, counts), counts, sight.plan)
 
 
 def _candidates(volley: Volley, placements: Ints, boxes: Ints, shots: Shots, sight: Sight) -> Pairs:
     """Items that placements may touch, and the record of how they were found."""
-    pairs = sight.candidates.pairs(volley, placements, boxes, shots)
-    possible = len(placements) * len(sight.stack)
-    index = sight.candidates.index
-    if index:
-        sight.plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew")
-    sight.plan.run("pre-filter", sight.candidates.why, pairs.rank.nbytes * 2, (len(pairs.rank), possible))
-    return pairs
+    candidates, plan = sight.candidates, sight.plan
+    row, rank = candidates.meeting(boxes)
+    placement = placements[row]
+    made = row.nbytes + rank.nbytes + placement.nbytes
+    if index := candidates.index:
+        plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew", made)
+        made = 0
+    if candidates.prefilter.volume:
+        plan.run("pre-filter", candidates.why, made)
+        near, met = candidates.near(volley, placement, rank), len(rank)
+        placement, rank = placement[near], rank[near]
+        plan.run("volumes", str(candidates.prefilter), near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
+        made = 0
+    plan.run("pre-filter", candidates.why, made, (len(rank), len(placements) * len(sight.stack)))
+    return Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, sight))
+
+
+def _kinds(rank: Ints, shot: Ints, shots: Shots, sight: Sight) -> Kinds:
+    """What items do to samples of shots: each of the two lookups only where it may tell something."""
+    stack, plan, refuses = sight.stack, sight.plan, None
+    if may_refuse(stack, shots):
+        refuses = refused(stack, rank, shots, shot)
+        plan.run("filter", "categories and owners", refuses.nbytes, (int((~refuses).sum()), len(rank)))
+    kind = kinds(stack, rank, refuses)
+    if stack.has_occluders:
+        plan.run("occluders", "looked up of what is met", kind.nbytes)
+    return kind
 
 
 def _walked(runs: Runs, pairs: Pairs, sight: Sight, counts: Ints) -> list[Events]:
     """Walk runs strip by strip; add to the counts."""
-    found = []
+    found, plan = [], sight.plan
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         near = slice(*np.searchsorted(pairs.placement, [part.placement[0], part.placement[-1] + 1]).tolist())
-        here = Pairs(pairs.placement[near], pairs.rank[near], pairs.refused[near])
+        here = Pairs(pairs.placement[near], pairs.rank[near], pairs.kind[near])
         events, state = walk(part, here, sight.stack, sight.pierce, HIT)
-        sight.plan.run("walk", "samples through the stack, front to back", state.nbytes)
         found.append(Events(events.kind, events.rank, events.run + strip.start, events.x_first, events.x_last))
+        plan.run("walk", "samples through the stack, front to back", state.nbytes + events.nbytes)
         met = state != LIVE
         _count(counts, np.repeat(part.placement, part.lengths)[met], state[met], None)
+        plan.run("verdicts", "")
     return found
 
 
@@ -164,18 +190,23 @@ def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> 
     counts[:, Verdict.EMPTY] -= added.sum(axis=1)
 
 
-def _inside(volley: Volley, boxes: Ints, bounds: Box | None) -> Ints:
+def _inside(volley: Volley, boxes: Ints, sight: Sight) -> Ints:
     """Counts (P, 5) before anything is met: all samples inside the bounds are EMPTY, the others OUTSIDE."""
     counts = np.zeros((len(boxes), len(OF_PATTERNS)), np.int64)
     counts[:, Verdict.EMPTY] = volley.count
-    if bounds is None:
+    sight.plan.run("verdicts", "counted for each placement", counts.nbytes)
+    if sight.bounds is None:
         return counts
-    x, y, x_max, y_max = bounds
+    x, y, x_max, y_max = bounds = sight.bounds
     over = np.flatnonzero((boxes[:, :2] < (x, y)).any(axis=1) | (boxes[:, 2:] > (x_max, y_max)).any(axis=1))
+    if not len(over):
+        sight.plan.run("outside", "no placement reaches over the bounds")
+        return counts
     runs = _laid(volley, over, np.broadcast_to(np.array(bounds), (len(over), 4)))
     inside = np.bincount(runs.placement, runs.lengths, len(boxes)).astype(np.int64)[over]
     counts[over, Verdict.OUTSIDE] = counts[over, Verdict.EMPTY] - inside
     counts[over, Verdict.EMPTY] = inside
+    sight.plan.run("outside", "some placements reach over the bounds", runs.nbytes)
     return counts
 
 
@@ -186,10 +217,13 @@ def _laid(volley: Volley, placements: Ints, boxes: Ints) -> Runs:
     return Runs(placements[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
 
 
-def _met(volley: Volley, runs: Runs, events: list[Events], counts: Ints) -> Met:
+def _met(volley: Volley, runs: Runs, events: list[Events], counts: Ints, plan: Plan) -> Met:
     hit = Events.joined(events)
     under = runs.take(hit.run)
+    plan.run("rows", "hit pixels, gathered by object", hit.nbytes + under.nbytes)
     weight = volley.table.weight(under.ordinal, hit.x_first, hit.x_last)
+    if volley.table.prefix is not None:
+        plan.run("weights", "", weight.nbytes)
     return Met(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)
 
 

@@ -76,8 +76,11 @@ class Sieve:
         else:
             volley = volley_of(hits.weapon, shot)
             boxes = _boxes_of(volley)
-            pairs = self._candidates().pairs(volley, np.arange(len(volley.shot)), volley.boxes, shot)
-            ranks, patterns = pairs.rank, self._patterns(volley)
+            candidates = self._candidates()
+            placement, ranks = candidates.meeting(volley.boxes)
+            if candidates.prefilter.volume:
+                ranks = ranks[candidates.near(volley, placement, ranks)]
+            patterns = self._patterns(volley)
         return {
             "objects": np.unique(stack.ids[ranks]).tolist(),
             "of": len(stack),

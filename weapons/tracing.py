@@ -16,7 +16,7 @@ from planes.constants import CHUNK_SAMPLES, HALF, SUB
 from planes.items import Items, Stack
 from planes.slabs import slabs
 from planes.spans import Box
-from weapons.candidates import Candidates, refused
+from weapons.candidates import Candidates, may_refuse, refused
 from weapons.ends import Ends, ends_of
 from weapons.flight import at_steps, common_scale, in_frame, is_moving, relative_lines
 from weapons.guns import Projectile, Traced
@@ -85,8 +85,9 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
         pairs = _pairs(rays, ray, lines, np.flatnonzero(live), (near, far), through)
         possible = len(rays) * len(through.stack) if near == -np.inf else 0
         found.append(_touched(rays, ray, lines, shots, pairs, possible, through))
+        through.plan.run("walk", "")
         pending = Meetings.joined([pending.of_rays(live), found[-1]]) if len(pending) else found[-1]
-        ends = ends_of(pending, timed, through.stack, cost, ray)
+        ends = ends_of(pending, timed, through.stack, cost, ray, through.plan)
         told = ends if told is None else told.replaced(live, ends)
         live &= (ends.fraction + SLACK) * lines.length >= far
         if not live.any():
@@ -118,7 +119,7 @@ def _lines_of(rays: Rays, ray: Traced) -> Lines:
 def _edges(lines: Lines, ray: Traced, through: Range) -> list[float]:
     """Distances at which rays are cut into stretches, px."""
     stack = through.stack
-    endless = ray.hits_most is None and ray.budget_256 is None and not stack.occluder.any()
+    endless = ray.hits_most is None and ray.budget_256 is None and not stack.has_occluders
     if (
         through.whole
         or endless
@@ -189,7 +190,7 @@ def _entered(
             through.looked.boxes_xyxy.append(asked)
         if candidates.index is not None:
             why = f"{candidates.index.structure}: {candidates.index.followed} boxes placed anew"
-            through.plan.run("broad phase", why)
+            through.plan.run("broad phase", why, row.nbytes + rank.nbytes)
     relative = relative_lines(lines, ray, live[row], through.stack.ids[rank], through.items)
     enters = _enters(rays.origin_xy[live[row]], relative, through.stack.box_xyxy[rank])
     some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
@@ -224,8 +225,11 @@ def _touched(
     """Cells in which rays touch accepted items, by the weapon's rules for what they start in and for steps."""
     stack, plan = through.stack, through.plan
     row, rank = pairs
-    accepted = np.flatnonzero(~refused(stack, rank, shots, rays.shot[row]))
-    row, rank = row[accepted], rank[accepted]
+    plan.run("pre-filter", through.candidates.why, row.nbytes + rank.nbytes)
+    if may_refuse(stack, shots):
+        accepted = ~refused(stack, rank, shots, rays.shot[row])
+        row, rank = row[accepted], rank[accepted]
+        plan.run("filter", "categories and owners", row.nbytes + rank.nbytes, (len(rank), len(accepted)))
     own, origin = relative_lines(lines, ray, row, stack.ids[rank], through.items), rays.origin_xy[row]
     wanted = through.candidates.prefilter
     if wanted.volume:
@@ -235,11 +239,12 @@ def _touched(
         corner = stack.box_xyxy[rank, :2] - origin
         kept = near_rays(Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], corner, own)
         row, rank, own, origin = row[kept], rank[kept], own.take(kept), origin[kept]
+        plan.run("volumes", str(wanted), kept.nbytes + row.nbytes + rank.nbytes, (len(rank), len(kept)))
     if through.looked:
         through.looked.pairs.append((row, rank))
-    plan.run("pre-filter", through.candidates.why, rank.nbytes * 2, (len(rank), possible))
+    plan.run("pre-filter", "", 0, (len(rank), possible))
     met = meet(own, row, rank, stack, through.bounds, origin)
-    plan.run("walk", "cells of rays on pixels of items", met.x.nbytes * 4)
+    plan.run("walk", "cells of rays on pixels of items", met.nbytes)
     if not isinstance(ray, Projectile):
         return _started(met, rays, ray, shots, stack)
     moving = is_moving(ray, through.items, stack)

@@ -50,6 +50,13 @@ class Shots:
         return len(self.number)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        toward = 0 if self.toward_256 is None else self.toward_256.nbytes
+        words = (self.at_256, self.direction, self.accept, self.exclude, self.number, self.seed, self.row)
+        return toward + sum(column.nbytes for column in words)
+
+    @property
     def choosy(self) -> bool:
         """Whether any shot may refuse an item."""
         return bool((self.accept != ALL).any() or self.exclude.shape[1])
@@ -90,6 +97,13 @@ class Volley:
     def boxes(self) -> Ints:
         """Inclusive boxes (P, 4); an empty pattern has x_max < x_min."""
         return np.asarray(self.table.box_xyxy[self.pattern] + np.concatenate([self.xy, self.xy], axis=1))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the table and the columns."""
+        columns = (self.pattern, self.origin_xy, self.shot, self.round, self.pellet)
+        scattered = 0 if self.xy is self.origin_xy else self.xy.nbytes
+        return self.table.nbytes + scattered + sum(column.nbytes for column in columns)
 
     @property
     def count(self) -> Ints:

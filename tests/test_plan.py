@@ -1,0 +1,470 @@
+"""What each stage of a call costs in time and bytes, and that a scene pays only for what it has."""
+
+from __future__ import annotations
+
+import json
+import re
+import runpy
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planes.compose
+import planes.index
+import planes.items
+import planes.render
+import weapons.ends
+import weapons.firing
+import weapons.narrow
+import weapons.pattern
+import weapons.plan
+import weapons.rayfire
+import weapons.resolve
+import weapons.tracing
+from planes import History, Scene, Sprite
+from weapons import Box, Disc, Laser, Rifle, Weapon, fire, report_of
+from weapons.candidates import Candidates
+from weapons.hits import Hits
+from weapons.pattern import PatternTable
+from weapons.plan import Plan, PlanSum, plan_lines
+
+ROOT = Path(__file__).parent.parent
+LEFT_OUT = runpy.run_path(str(ROOT / "fixtures" / "left_out.py"))
+SHOTS = [(20 + 5 * i, 30 + 3 * i) for i in range(9)]
+IMAGERY = ("background", "mover", "hud")
+
+
+def yard(size_wh: tuple[int, int] | None = (99, 79), *, full: bool = False) -> Scene:
+    """Twelve discs; and if it is full, occluders, another layer and imagery."""
+    scene = Scene(size_wh, categories=["red"])
+    for i in range(12):
+        scene.add(Sprite.circle(6), (20 + 10 * (i % 4), 25 + 12 * (i // 4)))
+    if full:
+        scene.set([3, 4], layer=2)
+        scene.add(Sprite.box(9, 9), (40, 40), role="occluder", layer=1)
+        for role in IMAGERY:
+            scene.add(Sprite.box(30, 30), (30, 30), role=role)
+    return scene
+
+
+def costs(hits: Hits) -> list[tuple[Any, ...]]:
+    return [(stage.name, stage.bytes_made, stage.pairs) for stage in hits.plan.ran]
+
+
+def names(hits: Hits) -> tuple[list[str], set[str]]:
+    """Stages that ran, and those left out."""
+    return [stage.name for stage in hits.plan.ran], {stage.name for stage in hits.plan.left_out}
+
+
+# Times
+
+
+class Clock:
+    """Nanoseconds that pass only where the work is told to take some."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.ns, self.patch = 0, patch
+        patch.setattr(weapons.plan, "perf_counter_ns", lambda: self.ns)
+        start = Plan.__init__
+
+        def begun(plan: Plan, *args: Any, **values: Any) -> None:
+            start(plan, *args, **{"_mark": self.ns, **values})
+
+        patch.setattr(Plan, "__init__", begun)
+
+    def takes(self, owner: Any, name: str, ns: int) -> None:
+        """Let every call of a function take so long."""
+        work = getattr(owner, name)
+
+        def slow(*args: Any, **values: Any) -> Any:
+            self.ns += ns
+            return work(*args, **values)
+
+        self.patch.setattr(owner, name, slow)
+
+
+FIRING, RESOLVE, TRACING, RAYFIRE = weapons.firing, weapons.resolve, weapons.tracing, weapons.rayfire
+OF_ALL = [(FIRING, "checked_shots", "shots", 1), (planes.items.Items, "stack_of", "stack", 10)]
+OF_PATTERNS = [
+    *OF_ALL,
+    (FIRING, "volley_of", "patterns", 100),
+    (FIRING, "chosen_strategy", "plan", 10**3),
+    (FIRING, "chosen_candidates", "plan", 2 * 10**3),
+    (FIRING, "leave_out_unused", "plan", 4 * 10**3),
+    (FIRING, "rows_of_met", "rows", 10**4),
+    (RESOLVE, "_count", "verdicts", 10**5),
+    (PatternTable, "weight", "weights", 10**6),
+    (RESOLVE, "refused", "filter", 10**7),
+    (RESOLVE, "kinds", "occluders", 10**8),
+]
+OF_DIRECT = [
+    *OF_PATTERNS,
+    (Candidates, "near", "volumes", 10**9),
+    (RESOLVE, "_under_items", "samples", 10**10),
+    (RESOLVE, "walk", "walk", 10**11),
+]
+OF_RAYS = [
+    *OF_ALL,
+    (RAYFIRE, "chosen_candidates", "plan", 100),
+    (RAYFIRE, "leave_out_absent", "plan", 200),
+    (RAYFIRE, "rays_of", "rays", 10**3),
+    (TRACING, "_enters", "pre-filter", 10**4),
+    (TRACING, "refused", "filter", 10**5),
+    (weapons.narrow, "near_rays", "volumes", 10**6),
+    (TRACING, "meet", "walk", 10**7),
+    (TRACING, "_started", "walk", 2 * 10**7),
+    (weapons.ends, "_end_at_occluders", "occluders", 10**8),
+    (weapons.ends, "_end_at_hits", "stops", 10**9),
+    (RAYFIRE, "stops_of", "stops", 2 * 10**9),
+    (RAYFIRE, "passes_of", "passes", 10**10),
+    (RAYFIRE, "rows_of_passes", "rows", 10**11),
+    (RAYFIRE, "pixels_of", "rows", 2 * 10**11),
+]
+BOXES, INDEX = (Candidates, "meeting", "pre-filter", 10**12), (Candidates, "meeting", "broad phase", 10**12)
+CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]] = {
+    "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
+    "by an index": (
+        Disc(9, falloff="linear"),
+        {"strategy": "direct", "prefilter": "circle", "broadphase": "grid"},
+        [*OF_DIRECT, INDEX],
+    ),
+    "composed": (
+        Disc(9, falloff="linear"),
+        {"strategy": "composed"},
+        [
+            *OF_PATTERNS,
+            (planes.compose.CodePlane, "read", "code plane", 10**9),
+            (RESOLVE, "read_codes", "read", 10**10),
+        ],
+    ),
+    "rays": (Rifle(60, max_hits=2), {"aim": 30, "prefilter": "circle"}, [*OF_RAYS, BOXES]),
+    "rays by an index": (
+        Rifle(60, max_hits=2),
+        {"aim": 30, "prefilter": "circle", "broadphase": "bvh"},
+        [*OF_RAYS, INDEX],
+    ),
+}
+
+
+@pytest.mark.parametrize("past", [False, True])
+@pytest.mark.parametrize("name", CALLS)
+def test_the_time_of_each_stage_is_its_own(name: str, past: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    weapon, how, work = CALLS[name]
+    scene: Any = yard(full=True)
+    if past:
+        history = History(scene)
+        history.record(7)
+        scene.move(0, (9, 9))
+        history.record(8)
+        scene, how = history, {**how, "tick": [7, 8, 7, 8, 7, 8, 7, 8, 7]}
+    clock = Clock(monkeypatch)
+    spent = dict.fromkeys({stage for *_, stage, _ in work}, 0)
+    for owner, function, stage, ns in work:
+        clock.takes(owner, function, ns)
+        inner = getattr(owner, function)
+
+        def counted(*args: Any, inner: Any = inner, stage: str = stage, ns: int = ns, **values: Any) -> Any:
+            spent[stage] += ns
+            return inner(*args, **values)
+
+        monkeypatch.setattr(owner, function, counted)
+    hits = fire(scene, weapon, SHOTS, accept=["default"], exclude=5, **how)
+    took = {stage.name: stage.ns for stage in hits.plan.ran if stage.ns}
+    assert took == spent and hits.plan.ns == clock.ns > 0
+    assert all(spent.values())
+
+
+def test_the_times_are_those_of_the_call() -> None:
+    """What no stage counts is less than a tenth."""
+    scene = yard(full=True)
+    at = np.random.default_rng(3).uniform(0, 80, (3000, 2))
+    for weapon, how in ((Disc(6), {"strategy": "direct"}), (Disc(6), {"strategy": "composed"}), (Laser(90), {})):
+        begin = time.perf_counter_ns()
+        hits = fire(scene, weapon, at, **how)  # type: ignore[arg-type]
+        whole = time.perf_counter_ns() - begin
+        assert 0.9 * whole < hits.plan.ns <= whole
+        assert all(stage.ns > 0 for stage in hits.plan.ran)
+
+
+def test_times_are_in_no_report_and_make_no_difference() -> None:
+    scene = yard(full=True)
+    fire(scene, Disc(5), SHOTS)
+    first, second = (fire(scene, Disc(5), SHOTS) for _ in range(2))
+    assert [s.ns for s in first.plan.ran] != [s.ns for s in second.plan.ran]
+    assert first.plan == second.plan and first == second
+    told = [json.dumps([hits.to_dict(), report_of(scene, [hits])]) for hits in (first, second)]
+    assert told[0] == told[1] and '"ns"' not in told[0]
+    timed = first.plan.timed()
+    assert [stage.pop("ns") for stage in timed["ran"]] == [
+        s.ns for s in first.plan.ran
+    ] and timed == first.plan.to_dict()
+    assert Plan.joined([first.plan, second.plan]).ns == first.plan.ns + second.plan.ns
+
+
+# As a table
+
+
+def told_plan(*stages: tuple[Any, ...], **left: str) -> Plan:
+    plan = Plan()
+    for name, why, made, pairs, ns in stages:
+        plan.run(name, why, made, pairs)
+        plan.ran[-1].ns = ns
+    for name, why in left.items():
+        plan.leave_out(name, why)
+    return plan
+
+
+def test_a_plan_is_told_as_a_table() -> None:
+    one = told_plan(("shots", "1 checked", 64, None, 1_500), ("walk", "by depth", 12_345, None, 2_000_049), hud="none")
+    assert plan_lines(one.timed()) == [
+        "stage        time   bytes  why",
+        "shots      1.5 us      64  1 checked",
+        "walk   2,000.0 us  12,345  by depth",
+        "all    2,001.5 us  12,409",
+        "hud      left out          none",
+    ]
+
+
+def test_plans_are_added_up() -> None:
+    total = PlanSum()
+    total.add(told_plan(("sieve", "boxes", 10, (1, 4), 1_000), ("walk", "it", 1, None, 500), hud="none"))
+    total.add(told_plan(("sieve", "boxes", 5, (3, 1_200), 2_000), hud="none", walk="nothing met"))
+    total.add(told_plan(("sieve", "other", 5, None, 1_000)))
+    assert plan_lines(total.timed(), total.calls) == [
+        "stage      time  bytes  why",
+        "sieve    4.0 us     20  3 of 3 calls: boxes; 4 of 1,204 pairs left",
+        "walk     0.5 us      1  1 of 3 calls: it",
+        "all      4.5 us     21  3 calls",
+        "hud    left out         2 of 3 calls: none",
+        "walk   left out         1 of 3 calls: nothing met",
+    ]
+
+
+# Bytes
+
+
+MOST, SLACK = 16, 60_000
+"""While a stage works it holds at most so many times the bytes that it hands on, and some beside."""
+
+SELECTING = {"pre-filter", "broad phase", "volumes", "filter", "occluders", "verdicts", "plan"}
+"""Stages that hand on less than they look at."""
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each stage allocates what it says that it made, and not many times as much; nor does the call."""
+    weapon, how, _ = CALLS[name]
+    how = {key: value for key, value in how.items() if key != "prefilter"}
+    scene, at = yard((400, 300), full=True), np.random.default_rng(5).uniform(0, 80, (2000, 2))
+    fire(scene, weapon, at[:9], **how)
+    scene.move(0, (21, 25))
+    held: dict[str, int] = {}
+    run, before, whole = Plan.run, [0], [0]
+
+    def measured(plan: Plan, stage: str, why: str, made: int = 0, pairs: Any = None) -> None:
+        now, most = tracemalloc.get_traced_memory()
+        held[stage] = held.get(stage, 0) + most - before[0]
+        run(plan, stage, why, made, pairs)
+        tracemalloc.reset_peak()
+        before[0], whole[0] = now, max(whole[0], most)
+
+    monkeypatch.setattr(Plan, "run", measured)
+    tracemalloc.start()
+    try:
+        hits = fire(scene, weapon, at, accept=["default"], exclude=[5] * len(at), **how)
+    finally:
+        tracemalloc.stop()
+    made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
+    for stage in made.keys() - SELECTING:
+        assert made[stage] - SLACK <= 1.5 * held[stage] and held[stage] <= MOST * made[stage] + SLACK, stage
+    assert sum(made.values()) / 3 < whole[0] < 3 * sum(made.values())
+
+
+def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
+    """Of a square on a square all is known by hand: 9 samples in 3 runs, on one item."""
+    scene = Scene((99, 99))
+    scene.add(np.ones((5, 5), np.bool_), (20, 20))
+    word, runs, hits = 8, 3 * 5 * 8, 3 * 5 * 8
+    told = {
+        "shots": 8 * word,
+        "stack": 8 * word + 1,
+        "patterns": (3 * 5 + 2 + 1 + 4) * word + 6 * word,
+        "plan": 0,
+        "weights": (9 + 1) * word + 3 * word,
+        "verdicts": 2 * 5 * word,
+        "outside": 0,
+        "pre-filter": 3 * word,
+        "samples": runs,
+        "walk": 9 + 3 * (1 + 4 * word),
+        "rows": hits + runs + 10 * word,
+    }
+    weapon = Box(3, 3, falloff="linear")
+    assert {s.name: s.bytes_made for s in fire(scene, weapon, (20, 20)).plan.ran} == told
+    assert {s.name: s.bytes_made for s in fire(scene, weapon, (20, 20)).plan.ran} == {**told, "stack": 0}
+
+
+# What is not done
+
+
+def mixed() -> dict[str, Hits]:
+    """A shot of each way, at nothing but objects on one layer, that nothing is asked of."""
+    return {
+        "direct": fire(yard(), Disc(9), SHOTS, strategy="direct"),
+        "composed": fire(yard(), Disc(9, pierce=True), SHOTS, strategy="composed"),
+        "rays": fire(yard(), Laser(60), SHOTS, aim=30),
+        "unbounded": fire(yard(None), Disc(9), SHOTS),
+    }
+
+
+class Unread(np.ndarray[Any, Any]):
+    """A column of which no entry may be looked up."""
+
+    def __getitem__(self, key: Any) -> Any:
+        pytest.fail("a column that the scene does not need is looked up")
+
+
+def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    sorted_by: list[int] = []
+    lexsort, stack_of = np.lexsort, planes.items.Items.stack_of
+    monkeypatch.setattr(np, "lexsort", lambda keys: sorted_by.append(len(keys)) or lexsort(keys))
+
+    def guarded(self: planes.items.Items, *roles: planes.items.Role) -> planes.items.Stack:
+        sorted_by.clear()
+        stack = stack_of(self, *roles)
+        assert sorted_by == [1 + stack.has_occluders + stack.layered]
+        columns = {} if stack.has_occluders else {"occluder": stack.occluder.view(Unread)}
+        refusing = {} if filtered else {name: getattr(stack, name).view(Unread) for name in ("categories", "owner")}
+        return replace(stack, **columns, **refusing)
+
+    monkeypatch.setattr(planes.items.Items, "stack_of", guarded)
+    filtered = False
+    for hits in mixed().values():
+        assert hits and names(hits)[1] >= {"occluders", "layers", "filter"}
+    full = fire(yard(full=True), Disc(9), SHOTS)
+    assert "occluders" in names(full)[0] and not {"occluders", "layers"} & names(full)[1]
+    filtered = True
+    assert "filter" in names(fire(yard(), Disc(9), SHOTS, exclude=5))[0]
+    unmet = yard()
+    unmet.set(3, categories=0)
+    assert "filter" in names(fire(unmet, Disc(9), SHOTS))[0]
+
+
+def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = Counter[str]()
+
+    def count(owner: Any, name: str) -> None:
+        work = getattr(owner, name)
+
+        def counted(*args: Any, **values: Any) -> Any:
+            called[name] += 1
+            return work(*args, **values)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    for owner, name in (
+        (RESOLVE, "refused"), (TRACING, "refused"), (weapons.ends, "_end_at_occluders"), (RESOLVE, "_look_behind"),
+        (weapons.pattern, "falloff_weights"), (planes.compose.CodePlane, "read"), (planes.index.Index, "read"),
+        (Candidates, "near"), (weapons.narrow, "near_rays"), (planes.render, "draw_view"), (PatternTable, "weight"),
+        (RAYFIRE, "leave_out_absent"),
+    ):  # fmt: skip
+        count(owner, name)
+    hits = {"direct": fire(yard(), Disc(9), SHOTS, strategy="direct"), "rays": fire(yard(), Laser(60), SHOTS, aim=30)}
+    assert all(hits.values()) and called == {"weight": 1, "leave_out_absent": 1}
+    fire(yard(full=True), Disc(9.03125, falloff="linear"), SHOTS, strategy="composed", exclude=5)
+    fire(yard(full=True), Disc(9), SHOTS, strategy="direct", prefilter="circle", broadphase="grid")
+    fire(yard(full=True), Laser(60), SHOTS, aim=30, exclude=5, prefilter="circle")
+    assert set(called) == {
+        "refused", "_end_at_occluders", "_look_behind", "falloff_weights", "read", "near", "near_rays", "weight",
+        "leave_out_absent",
+    }  # fmt: skip
+
+
+def test_no_run_is_laid_out_for_bounds_that_nothing_reaches_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    laid: list[int] = []
+    lay = PatternTable.laid
+    monkeypatch.setattr(PatternTable, "laid", lambda *args: laid.append(1) or lay(*args))
+    for size_wh, at, times in ((None, (20, 20), 1), ((99, 79), (20, 20), 1), ((99, 79), (8, 25), 2)):
+        laid.clear()
+        hits = fire(yard(size_wh), Disc(9), at, strategy="direct")
+        assert len(laid) == times and bool(hits.verdict_counts()["outside"]) == (times == 2)
+
+
+@pytest.mark.parametrize("way", ["direct", "composed", "rays"])
+def test_imagery_costs_a_shot_nothing(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Background, movers and HUD are told to be left out; else nothing changes."""
+    scenes = yard(), yard()
+    for role in IMAGERY:
+        scenes[1].add(Sprite.from_image(np.full((400, 600, 4), 255, np.uint8)), (30, 30), role=role, layer=9)
+    monkeypatch.setattr(planes.render, "draw_view", lambda *args: pytest.fail("drawn"))
+    weapon, how = (Laser(60), {"aim": 30}) if way == "rays" else (Disc(9), {"strategy": way})
+    plain, pictured = (fire(scene, weapon, SHOTS, **how) for scene in scenes)  # type: ignore[arg-type]
+    assert plain == pictured and plain and costs(plain) == costs(pictured)
+    assert names(pictured)[1] - names(plain)[1] == set(IMAGERY) and not names(plain)[1] & set(IMAGERY)
+
+
+LOADED = """
+import sys, numpy.typing, numpy.random
+{}
+before = set(sys.modules)
+{}
+print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("planes", "weapons", "cv2", "numpy")))
+"""
+START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
+SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
+OF_SCENES = (
+    "arrays compose constants grid256 image index items kept labels poses rasterise sampling scene scenefile schema"
+    " spans sprite"
+)
+OF_FIRE = "arsenal candidates columns draws explain firing guns hits pattern plan resolve volley weapon"
+OF_A_RAY = "ends flight meetings passes rayexplain rayfire rayhits rays trace tracing"
+
+
+def loaded(before: str, code: str) -> set[str]:
+    """Modules of the project, cv2 and numpy that are loaded by some code after other code."""
+    script = LOADED.format(before, code)
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(run.stdout.split())
+
+
+def test_what_is_loaded_by_importing_and_by_a_shot() -> None:
+    """A shot of a pattern loads nothing that is not there by then; none loads cv2, volumes, broad phases, the past."""
+    assert loaded("", "import planes, weapons") == {"planes", "weapons"}
+    started = {f"planes.{name}" for name in OF_SCENES.split()} | {f"weapons.{name}" for name in OF_FIRE.split()}
+    assert loaded("import planes, weapons", START) == started
+    assert loaded(START, SHOT.format("Disc(3)")) == set()
+    of_ray = {f"weapons.{name}" for name in OF_A_RAY.split()} | {"planes.slabs"}
+    assert loaded(START, SHOT.format("Pistol(3)")) == of_ray
+
+
+# The table
+
+
+@pytest.mark.parametrize("weapon", LEFT_OUT["WEAPONS"])
+def test_the_table_of_fixture_scenes_tells_what_the_code_does(weapon: str) -> None:
+    """Bytes and what was left out; times are of one machine."""
+    page = (ROOT / "fixtures" / "left_out.md").read_text()
+    told = page.split(f"## {weapon[0].upper()}{weapon[1:]}\n\n")[1].split("\n\n")[0].rstrip() + "\n"
+    assert re.sub(r" B, [\d,]+ us", "", told) == LEFT_OUT["markdown"](LEFT_OUT["table"](weapon, False))
+    assert page.startswith(LEFT_OUT["INTRO"])
+
+
+def test_each_thing_alone_adds_what_is_its_own() -> None:
+    rows = LEFT_OUT["table"]("a disc, direct", False)
+    columns = {name: {row[0]: row[i] for row in rows} for i, name in enumerate(rows[0]) if i}
+    base = columns["only hittable"]
+    changed = {
+        name: {stage for stage, cell in column.items() if cell != base[stage] and stage not in ("stage", "**all**")}
+        for name, column in columns.items()
+    }
+    assert changed["layers"] == {"layers"} and changed["bounds"] == {"outside"}
+    assert changed["imagery"] == set(IMAGERY) and changed["falloff"] == {"weights"}
+    assert changed["occluders"] == {"stack", "pre-filter", "occluders", "samples", "walk", "rows"}
+    assert changed["filter"] == {"filter", "walk", "rows"}
