@@ -164,6 +164,28 @@ def test_volumes_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert all(f'"{name}"' in told for name in (*BROADPHASES[1:], *PREFILTERS[1:]) if name != "boxes")
 
 
+def test_a_plan_is_printed_as_it_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for the times."""
+    told = section("What a shot costs")
+    (command,) = re.findall(r"`hitplanes (report .*?)`", told)
+    monkeypatch.chdir(ROOT)
+    assert main([*command.split(), "-o", str(tmp_path / "report.png")]) == 0
+    texts = capsys.readouterr().out, re.findall(r"```text\n(.*?)```", told, flags=re.DOTALL)[0]
+    printed, shown = (re.sub(r" +", " ", re.sub(r"[\d,]+\.\d us", "us", text)) for text in texts)
+    assert printed == shown
+
+
+def test_what_a_scene_pays_for_is_as_the_table_tells() -> None:
+    left_out = runpy.run_path(str(ROOT / "fixtures" / "left_out.py"))
+    rows = left_out["table"]("a disc, direct", False)
+    chosen = [0, *(rows[0].index(name) for name in left_out["SHORT"])]
+    some = [[row[i] for i in chosen] for row in rows]
+    some = [row for row in some if set(row[1:]) - {"-", ""}]
+    assert left_out["markdown"](some) in section("What a shot costs")
+
+
 def test_glossary_names_every_verdict() -> None:
     counts = json.loads(blocks("text")[0].splitlines()[-1].replace("'", '"'))
     assert all(verdict in section("Glossary") for verdict in counts)

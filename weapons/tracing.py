@@ -162,15 +162,16 @@ def _pairs(
 
     In parts whose pairs of boxes stay within their chunk: parts grow as long as rays meet few boxes.
     """
-    none = np.zeros(0, np.int64)
-    found = [(none, none)]
+    found: list[tuple[Ints, Ints]] = []
     begin, met = 0, through.candidates.met
     step = max(1, CHUNK_SAMPLES // max(len(through.stack), 1))
     while begin < len(live) and len(through.stack):
         found.append(_entered(rays, ray, lines, live[begin : begin + step], edges, through))
         begin += step
         step = max(1, min(2 * step, CHUNK_SAMPLES * begin // max(through.candidates.met - met, 1)))
-    row, rank = (np.concatenate(column) for column in zip(*found, strict=True))
+    if len(found) == 1:
+        return found[0]
+    row, rank = (np.concatenate([np.zeros(0, np.int64), *(part[side] for part in found)]) for side in (0, 1))
     return row, rank
 
 
