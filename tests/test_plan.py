@@ -165,6 +165,7 @@ def test_the_time_of_each_stage_is_its_own(name: str, past: bool, monkeypatch: p
         scene.move(0, (9, 9))
         history.record(8)
         scene, how = history, {**how, "tick": [7, 8, 7, 8, 7, 8, 7, 8, 7]}
+        work = [*work, (FIRING, "moments_of", "past", 10**13), (Hits, "_gathered_rows", "rows", 10**14)]
     clock = Clock(monkeypatch)
     spent = dict.fromkeys({stage for *_, stage, _ in work}, 0)
     for owner, function, stage, ns in work:
@@ -187,11 +188,13 @@ def test_the_times_are_those_of_the_call() -> None:
     scene = yard(full=True)
     at = np.random.default_rng(3).uniform(0, 80, (3000, 2))
     for weapon, how in ((Disc(6), {"strategy": "direct"}), (Disc(6), {"strategy": "composed"}), (Laser(90), {})):
-        begin = time.perf_counter_ns()
-        hits = fire(scene, weapon, at, **how)  # type: ignore[arg-type]
-        whole = time.perf_counter_ns() - begin
-        assert 0.9 * whole < hits.plan.ns <= whole
-        assert all(stage.ns > 0 for stage in hits.plan.ran)
+        shares = []
+        for _ in range(5):  # another process may come in between
+            begin = time.perf_counter_ns()
+            hits = fire(scene, weapon, at, **how)  # type: ignore[arg-type]
+            shares.append(hits.plan.ns / (time.perf_counter_ns() - begin))
+            assert all(stage.ns > 0 for stage in hits.plan.ran)
+        assert 0.9 < max(shares) <= 1
 
 
 def test_times_are_in_no_report_and_make_no_difference() -> None:

@@ -80,6 +80,7 @@ class Plan:
     ran: list[Stage] = field(default_factory=list)
     left_out: list[Stage] = field(default_factory=list)
     _mark: int = field(default_factory=perf_counter_ns, repr=False, compare=False)
+    _stage_of: dict[str, Stage] = field(default_factory=dict, repr=False, compare=False)
 
     def run(self, name: str, why: str, bytes_made: int = 0, pairs: tuple[int, int] | None = None) -> None:
         """Record that a stage ended; the numbers of its runs, for the parts of a batch or of the work, add up.
@@ -91,14 +92,16 @@ class Plan:
         self._mark = now
 
     def _add(self, name: str, why: str, bytes_made: int, pairs: tuple[int, int] | None, ns: int) -> None:
-        for stage in self.ran:
-            if stage.name == name:
-                stage.why = stage.why or why
-                stage.bytes_made += bytes_made
-                stage.pairs = added(stage.pairs, pairs)
-                stage.ns += ns
-                return
-        self.ran.append(Stage(name, why, bytes_made, pairs, ns))
+        stage = self._stage_of.get(name)
+        if stage is None:
+            stage = self._stage_of[name] = Stage(name, why, bytes_made, pairs, ns)
+            self.ran.append(stage)
+            return
+        stage.why = stage.why or why
+        stage.bytes_made += bytes_made
+        stage.ns += ns
+        if pairs:
+            stage.pairs = added(stage.pairs, pairs)
 
     @classmethod
     def joined(cls, plans: Sequence[Plan]) -> Plan:
@@ -115,7 +118,7 @@ class Plan:
 
     def has_run(self, name: str) -> bool:
         """Whether a stage ran."""
-        return any(stage.name == name for stage in self.ran)
+        return name in self._stage_of
 
     def has_left_out(self, name: str) -> bool:
         """Whether a stage was left out."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,14 +57,14 @@ class Shots:
         words = (self.at_256, self.direction, self.accept, self.exclude, self.number, self.seed, self.row)
         return toward + sum(column.nbytes for column in words)
 
-    @property
+    @cached_property
     def choosy(self) -> bool:
         """Whether any shot may refuse an item."""
         return bool((self.accept != ALL).any() or self.exclude.shape[1])
 
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
-        return self.pick(slice(first, last))
+        return self if first == 0 and last >= len(self) else self.pick(slice(first, last))
 
     def pick(self, rows: Ints | slice) -> Shots:
         """Some of the shots."""
