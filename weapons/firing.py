@@ -128,13 +128,7 @@ def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints
 
 
 def fired(
-    scene: Scene,
-    weapon: Weapon,
-    shots: Shots,
-    prefilter: str,
-    broadphase: str,
-    strategy: str,
-    plan: Plan | None = None,
+    scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str, plan: Plan | None = None
 ) -> Hits:
     """Decide what checked shots hit; the other arguments are those of `fire`, and a plan that has begun."""
     plan = plan or Plan()
@@ -161,9 +155,7 @@ def fired(
     rows, verdicts = [], [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for begin, part in _parts(shots, first, candidates):
         volley = first if len(shots) == 1 else volley_of(weapon, part)
-        plan.run("patterns", f"{len(volley.table.count)} distinct", 0 if volley is first else volley.nbytes)
-        if volley.table.prefix is not None:
-            plan.run("weights", "falloff of the hit pixels, by prefix sums", volley.table.prefix.nbytes)
+        _tell_patterns(plan, volley, 0 if volley is first else volley.nbytes)
         met = composed(volley, part, sight, *drawn) if drawn else direct(volley, part, sight)
         rows.append(rows_of_met(met, volley, stack.ids, begin))
         plan.run("rows", "", rows[-1].nbytes)
@@ -174,6 +166,13 @@ def fired(
     leave_out_unused(plan, scene, candidates, first.table, may_refuse(stack, shots), why)
     plan.run("plan", "")
     return hits
+
+
+def _tell_patterns(plan: Plan, volley: Volley, made: int) -> None:
+    """Record the patterns of a part of the shots, and their weights."""
+    plan.run("patterns", f"{len(volley.table.count)} distinct", made)
+    if volley.table.prefix is not None:
+        plan.run("weights", "falloff of the hit pixels, by prefix sums", volley.table.prefix.nbytes)
 
 
 def _bits(scene: Scene, accept: object) -> object:
