@@ -29,7 +29,7 @@ ORDER = {
         "animation", "decisions", "timing", "targets", "peerworlds", "byfire", "raytruth", "raypeers",
         "raystudy", "movertruth", "moverstudy", "pixeltruth", "spreadstudy", "shapetruth", "copies",
         "discs", "planestudy", "volumestudy", "areapeers", "kinds", "study", "studywords", "figures",
-        "diagram", "studyfiles", "demo", "cli", "__main__",
+        "diagram", "studyfiles", "demo", "truth", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""
