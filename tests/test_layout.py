@@ -25,11 +25,13 @@ ORDER = {
         "thennow", "sieve", "facts", "schemas", "jsondiff", "record", "words", "raywords", "marks",
         "strokes", "signs", "world", "ghosts", "sketch", "panel", "overlay", "raymarks", "inset",
         "cards", "picture", "raychanges", "differences", "versus", "goldfile", "goldshow", "goldpage",
-        "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "starter",
-        "animation", "decisions", "timing", "targets", "peerworlds", "byfire", "raytruth", "raypeers",
-        "raystudy", "movertruth", "moverstudy", "pixeltruth", "spreadstudy", "shapetruth", "copies",
-        "discs", "planestudy", "volumestudy", "areapeers", "kinds", "study", "studywords", "figures",
-        "diagram", "studyfiles", "demo", "truth", "cli", "__main__",
+        "goldcheck", "goldstale", "golden", "shotlog", "part", "progress", "stream", "folders",
+        "starter", "animation", "decisions", "timing", "targets", "peerworlds", "byfire", "raytruth",
+        "raypeers", "raystudy", "movertruth", "moverstudy", "pixeltruth", "spreadstudy", "shapetruth",
+        "copies", "discs", "planestudy", "volumestudy", "areapeers", "kinds", "study", "studywords",
+        "figures", "diagram", "studyfiles", "demo", "truth", "families", "pointfamilies",
+        "shotfamilies", "naive", "peers", "predicates", "tally", "heatfigure", "stability", "helptexts",
+        "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

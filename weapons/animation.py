@@ -9,7 +9,7 @@ from pathlib import Path
 
 from planes.arrays import Image, InputError
 from planes.image import check_output, write_bytes, write_png
-from weapons.starter import empty_folder
+from weapons.folders import empty_folder
 
 __all__ = ["can_write_gif", "write_frames", "write_gif"]
 

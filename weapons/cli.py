@@ -23,6 +23,25 @@ from planes.scenefile import FILE_NAME, scene_folder
 from weapons.arsenal import arsenal_of
 from weapons.differences import differences
 from weapons.facts import report_of
+from weapons.helptexts import (
+    COMPARE_EXAMPLES,
+    COMPARE_HELP,
+    DEMO_EXAMPLES,
+    DEMO_HELP,
+    DESCRIPTION,
+    FIRE_EXAMPLES,
+    FIRE_HELP,
+    NEW_EXAMPLES,
+    NEW_HELP,
+    REPLAY_EXAMPLES,
+    REPLAY_HELP,
+    REPORT_EXAMPLES,
+    REPORT_HELP,
+    STABILITY_EXAMPLES,
+    STABILITY_HELP,
+    STUDY_EXAMPLES,
+    STUDY_HELP,
+)
 from weapons.hits import Hits
 from weapons.orders import Order, fire_order, order_from_json, orders_of
 from weapons.picture import picture_of_report
@@ -35,7 +54,6 @@ from weapons.versus import picture_of_difference
 
 __all__ = ["main"]
 
-DESCRIPTION = "What does a shot hit in a 2-D scene? Decided by pixels, exactly, and shown why."
 
 NAMED = 8
 """Objects that a line of output names."""
@@ -43,107 +61,13 @@ NAMED = 8
 USAGE_MAX = 300
 """Letters of a word that the command line does not take."""
 
-REPORT_HELP = """\
-Fire shots at a scene folder and write a picture, and the facts as JSON, that say what was hit and why.
-Without --weapon the shots of scene.json are fired.
-"""
-
-REPORT_EXAMPLES = """\
-examples:
-  hitplanes report fixtures/gallery
-  hitplanes report fixtures/gallery -o report.png --json report.json
-  hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
-  hitplanes report fixtures/gallery --weapon laser --at 100,167 --aim -4.5
-"""
-
-FIRE_HELP = """\
-Resolve a log of shots, of any length, in little memory: a line in, a line out, in the same order.
-
-A line of SHOTS.jsonl is a shot as in scene.json: {"weapon": "pistol", "at": [62, 86]}, and aim or toward, accept,
-exclude, seed. Shots are numbered by their line, from 0, unless they have "shot". Empty lines are refused.
-
-The first line of HITS.jsonl names the scene, the weapons, the columns of a row and the objects by id; then comes
-{"shot": 0, "of": checksum of the line (CRC-32), "rows": [[object, ...], ...], "verdicts": [empty, hit, ...]}.
-
-Answers are written to HITS.jsonl.part, which is renamed when it is complete. After an interrupt, a full disk or a bad
-line, mended, the same command goes on where it was.
-"""
-
-FIRE_EXAMPLES = """\
-examples:
-  hitplanes fire fixtures/gallery shots.jsonl -o hits.jsonl
-  zcat shots.jsonl.gz | hitplanes fire fixtures/gallery /dev/stdin -o hits.jsonl
-  hitplanes fire fixtures/gallery shots.jsonl --plan
-"""
-
-NEW_HELP = """\
-Write a small scene to start from: scene.json, and the images that it names. FOLDER must be new, or empty.
-"""
-
-NEW_EXAMPLES = """\
-examples:
-  hitplanes new range
-  hitplanes report range
-"""
-
-
-COMPARE_HELP = """\
-Say what differs between two reports, in words, and draw them side by side: what was hit in only one of them, in both.
-Exit code: 0 the same, 1 they differ, 2 bad input. Versions and plans are not compared.
-"""
-
-DEMO_HELP = """\
-Show a broad phase at work: objects that move, cells that split and merge with them, and a query in its two steps, to
-find the leaves, and to compare within them. It counts the tests that it makes beside those of brute force.
-"""
-
-DEMO_EXAMPLES = """\
-examples:
-  hitplanes demo quadtree
-  hitplanes demo grid -o grid.gif
-  hitplanes demo bvh -o frames
-"""
-
-REPLAY_HELP = """\
-Fire the shots of a record again, and tell the first that differs, and how. A record is written by
-weapons.ShotRecord, which a game fires with. Exit code: 0 all do the same, 1 one differs, 2 bad input.
-"""
-
-REPLAY_EXAMPLES = """\
-examples:
-  hitplanes replay fixtures/gallery match.jsonl
-"""
-
-STUDY_HELP = """\
-Measure error against run time: which test is fast, which accurate, which good enough? Pixel planes at each scale, all
-volumes, pre-filters and broad phases, rays by steps, fast movers by substeps, spread by pellets, and pymunk, pygame and
-shapely where they are installed, all on the objects of SCENE that can be hit; without SCENE, on a shape of each kind.
-
-Writes study.json, study.csv, study.md, and a diagram for each question (matplotlib: pip install 'hitplanes[study]').
-After an interrupt it keeps what was measured.
-"""
-
-STUDY_EXAMPLES = """\
-examples:
-  hitplanes study --quick
-  hitplanes study fixtures/gallery -o study --error 0.05
-"""
-
-COMPARE_EXAMPLES = """\
-examples:
-  hitplanes report fixtures/gallery --json before.json
-  hitplanes compare before.json after.json
-  hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
-  hitplanes compare before.json after.json -o diff.png --scene level/old --scene level/new
-"""
-
 
 SHOWN = ("quadtree", "grid", "bvh")
 """Structures that the demo has."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; exit codes: 0 done or the same, 1 reports differ, 2 bad input, 130 interrupted."""
+    """Run the command; exit codes: 0 done, 1 something differs or is wrong, 2 bad input, 130 interrupted."""
     arguments = parser().parse_args(argv)
     code = 0
     try:
@@ -247,6 +171,11 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
     told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
     one.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=told)
+    one = _word(words, stability, "count wrong decisions on hard input", STABILITY_HELP, STABILITY_EXAMPLES)
+    told = "a new folder, or that of an earlier run (default: stability)"
+    one.add_argument("-o", "--output", type=Path, default=Path("stability"), metavar="FOLDER", help=told)
+    one.add_argument("--quick", action="store_true", help="some hundred rows for each cell: seconds, not half an hour")
+    one.add_argument("--seed", type=int, default=0, metavar="N", help="of the questions (default: 0)")
     return top
 
 
@@ -454,3 +383,16 @@ def demo(arguments: argparse.Namespace) -> None:
     from weapons.demo import KINDS, write_demo  # no other word needs all structures
 
     _say(f"a {KINDS[arguments.kind].name} in motion is in {write_demo(arguments.kind, arguments.output)}")
+
+
+def stability(arguments: argparse.Namespace) -> int:
+    """Count wrong decisions, and tell by the exit code whether any is of hitplanes."""
+    from weapons.stability import FILES, run_stability, summary  # no other word needs all that can be decided
+    from weapons.tally import OURS
+
+    study = run_stability(arguments.output, arguments.seed, arguments.quick, sys.stderr)
+    for line in summary(study):
+        _say(line)
+    told = "" if (arguments.output / FILES[-1]).exists() else ", without a picture: matplotlib is not installed"
+    _say(f"the table, and the rest, is in {arguments.output}{told}")
+    return 1 if study.total(OURS).wrong else 0

@@ -13,7 +13,7 @@ from planes.image import write_bytes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FAINT", "INK", "looking_alike", "save_figure"]
+__all__ = ["FAINT", "HATCH", "INK", "PAPER", "looking_alike", "save_figure"]
 
 DPI = 160
 """A picture of 11 inches then is 1760 px wide, and is still read when it is shown at 1000."""

@@ -22,10 +22,11 @@ class Progress:
     Parameters
     ----------
     stream : where to draw, as stderr
+    what : is counted
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._draws = stream, stream.isatty()
+    def __init__(self, stream: TextIO, what: str = "shots") -> None:
+        self._stream, self._draws, self._what = stream, stream.isatty(), what
         self._size = 0
         self._begin = self._drawn = time.monotonic()
         self._before = (0, 0)
@@ -76,7 +77,7 @@ class Progress:
 
     def _text(self, shots: int, at: int, seconds: float) -> str:
         shots_before, at_before = self._before
-        told = [f"{shots:,} shots", f"{(shots - shots_before) / seconds:,.0f}/s"]
+        told = [f"{shots:,} {self._what}", f"{(shots - shots_before) / seconds:,.0f}/s"]
         if self._size:
             told.insert(1, f"{100 * at // self._size} %")
             rate = (at - at_before) / seconds

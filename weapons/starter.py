@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Bools, Floats, Image, InputError
+from planes.arrays import Bools, Floats, Image
 from planes.image import write_png, write_text
 from planes.scenefile import FILE_NAME, laid_out
 from planes.schema import Mask
+from weapons.folders import empty_folder
 
-__all__ = ["empty_folder", "write_starter"]
+__all__ = ["write_starter"]
 
 SCHEMAS = Path(__file__).parent / "schemas"
 
@@ -100,25 +101,6 @@ def write_starter(folder: Path) -> None:
             if made:
                 folder.rmdir()
         raise
-
-
-def empty_folder(folder: Path) -> bool:
-    """Make the folder, unless it is there and empty; tells whether it was made."""
-    try:
-        folder.mkdir()
-        return True
-    except FileExistsError:
-        if not folder.is_dir():
-            raise InputError(f"folder: expected a new folder, got the file {folder}") from None
-        try:
-            held = sorted(path.name for path in folder.iterdir())
-        except OSError as error:
-            raise InputError(f"folder: cannot read {folder}: {error.strerror}") from error
-        if held:
-            raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it") from None
-        return False
-    except OSError as error:
-        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
 
 
 def _grid(width: int, height: int) -> tuple[Floats, Floats]:

@@ -8,14 +8,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from planes.arrays import InputError
 from planes.image import write_text
 from planes.scene import Scene
+from weapons.folders import own_folder
 from weapons.progress import Progress
 from weapons.study import Effort, run_study
 from weapons.studywords import csv_of, markdown, places
 
-__all__ = ["NO_DIAGRAMS", "own_folder", "write_study"]
+__all__ = ["NO_DIAGRAMS", "write_study"]
 
 NO_DIAGRAMS = "the diagrams are left out: matplotlib is not installed (pip install 'hitplanes[study]')"
 QUESTIONS = ("areas", "rays", "movers", "spread")
@@ -67,23 +67,3 @@ def _write_told(study: Mapping[str, Any], folder: Path, error: float) -> list[st
     write_text(folder / FILES[1], csv_of(study))
     write_text(folder / FILES[2], markdown(study, error, drawn))
     return drawn
-
-
-def own_folder(folder: Path, names: tuple[str, ...]) -> None:
-    """Make the folder, or take one that holds nothing but files of these names.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made, or holds something else.
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-        held = sorted(path.name for path in folder.iterdir() if path.name not in names)
-    except FileExistsError:
-        raise InputError(f"--output: expected a folder, got the file {folder}") from None
-    except OSError as error:
-        raise InputError(f"--output: cannot make {folder}: {error.strerror}") from error
-    if held:
-        told = f"got {folder} with {held[0]!r} in it"
-        raise InputError(f"--output: expected a new folder, or that of an earlier run, {told}")

@@ -104,9 +104,8 @@ def is_convex(ring: Row) -> bool:
     n = len(ring)
     turns = {_sign(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n])) for k in range(n)}
     ahead = [tuple(q) > tuple(p) for p, q in _sides(ring)]
-    return (
-        len(turns) == 1 and turns != {0} and sum(p != q for p, q in zip(ahead, ahead[1:] + ahead[:1], strict=True)) == 2
-    )
+    returns = sum(p != q for p, q in zip(ahead, ahead[1:] + ahead[:1], strict=True))
+    return len(turns) == 1 and turns != {0} and returns == 2
 
 
 def is_simple(ring: Row) -> bool:
