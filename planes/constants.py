@@ -83,7 +83,10 @@ VIEW_MAX = 2048
 """A longer side of the world is not shown whole: a picture's view is then what the shots reach, px."""
 
 MARGIN_PX = 8
-"""How far `margins` shifts a pattern to look for a flip, px."""
+"""How far `margins` shifts a shot to look for a flip, px."""
+
+FRAGILE_PX = 1
+"""A verdict that a shift of this length turns over is fragile, px."""
 
 VARIANT_CACHE_BYTES = 64 * 2**20
 """Turned and scaled masks kept for the next who asks, bytes."""

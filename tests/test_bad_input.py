@@ -342,8 +342,8 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "why not, half": (lambda: shot().why_not(0.5), "shot: expected a whole number .*got 0.5"),  # type: ignore[arg-type]
     "blockers, a name": (
         lambda: shot().blockers("duck"), "shot: expected a whole number .*got 'duck'"),  # type: ignore[arg-type]
-    "margins, None": (
-        lambda: shot().margins(None), "shot: expected a whole number .*got None"),  # type: ignore[arg-type]
+    "margins, a name": (
+        lambda: shot().margins("duck"), "shot: expected a whole number .*got 'duck'"),  # type: ignore[arg-type]
     "samples, 5000 digits": (lambda: shot().samples_at(DIGITS), "shot: .*got a int that is too long to show"),
     "verdicts, deep": (
         lambda: shot().verdict_counts(DEEP), r"shot: expected a whole number .*got \[\[\["),  # type: ignore[arg-type]
@@ -519,7 +519,7 @@ FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
 }  # fmt: skip
 
 MAY_BE_NONE = {
-    "aim", "exclude", "shot", "order's aim", "order's toward", "add categories", "add owner",
+    "aim", "exclude", "shot", "order's aim", "order's toward", "hits.margins", "add categories", "add owner",
 }  # fmt: skip
 NO_LIMIT = {"aim", "add angle", "set angle"}
 

@@ -346,11 +346,14 @@ def test_margins(seed: int) -> None:
     for which in range(len(battle.volley.shots)):
         by_shift = hit_at_shifts(battle.volley, scene, which)
         still = by_shift[0, 0]
-        truth: dict[int, float] = {}
+        truth: dict[int, tuple[int, int, int]] = {}
         for (dx, dy), objects in by_shift.items():
             for item in objects ^ still:
-                truth[item] = min(truth.get(item, 99.0), math.sqrt(dx * dx + dy * dy))
-        assert hits.margins(which) == truth
+                truth[item] = min(truth.get(item, (99, 0, 0)), (dx * dx + dy * dy, dy, dx))
+        told = [(which, item, item in still, math.sqrt(n), (dx, dy)) for item, (n, dy, dx) in sorted(truth.items())]
+        assert hits.margins(which) == told
+        assert [margin.fragile for margin in hits.margins(which)] == [n <= 1 for _, (n, _, _) in sorted(truth.items())]
+    assert hits.margins() == [m for which in range(len(battle.volley.shots)) for m in hits.margins(which)]
 
 
 def test_margins_of_a_small_picture() -> None:
@@ -358,7 +361,7 @@ def test_margins_of_a_small_picture() -> None:
     scene = Scene()
     middle, near = scene.add(square(3), (-1, -1)), scene.add(square(1), (8, 0))
     scene.add(square(1), (0, 9))
-    assert fire(scene, Point(), (0, 0)).margins() == {middle: 2.0, near: 8.0}
+    assert fire(scene, Point(), (0, 0)).margins() == [(0, middle, True, 2.0, (0, -2)), (0, near, False, 8.0, (8, 0))]
 
 
 # Extremes
@@ -407,7 +410,7 @@ def test_margins_of_a_large_pattern_need_little_memory() -> None:
     hits = fire(scene, Disc(2**13), (2**13 + 12, 12))
     tracemalloc.start()
     try:
-        assert hits.margins() == {item: 3.0}
+        assert [margin[1:4] for margin in hits.margins()] == [(item, True, 3.0)]
         assert tracemalloc.get_traced_memory()[1] < 64 * 2**20
     finally:
         tracemalloc.stop()
@@ -462,7 +465,10 @@ def test_no_shots(weapon: Any, strategy: str) -> None:
     at = np.zeros((0, 2))
     hits = fire(scene, weapon, at, strategy=strategy)
     assert not hits and hits.starts.tolist() == [0] and hits.verdicts.shape == (0, 5) and hits.first_xy.shape == (0, 2)
-    assert list(hits) == hits.by_owner() == hits.shares() == [] and sum(hits.verdict_counts().values()) == 0
+    assert (
+        list(hits) == hits.by_owner() == hits.shares() == hits.margins() == []
+        and sum(hits.verdict_counts().values()) == 0
+    )
     assert json.loads(json.dumps(hits.to_dict()))["rows"] == []
     assert hits == fire(scene, weapon, at, toward=np.zeros((0, 2)), accept=[], exclude=np.zeros((0, 1)), shot=[])
     with pytest.raises(InputError, match="shot"):
@@ -483,7 +489,7 @@ def test_an_empty_scene(bounded: bool) -> None:
         for strategy in ("auto", "direct", *(["composed"] if bounded else [])):
             hits = fire(scene, Disc(3, pierce=True), [(4, 4), (0, 0)], strategy=strategy)
             assert not hits and hits.verdicts[:, 1:4].sum() == 0 and hits.fired.tolist() == [29, 29]
-            assert hits.margins() == {} and hits.why_not() == hits.blockers() == hits.shares() == []
+            assert hits.margins() == hits.why_not() == hits.blockers() == hits.shares() == []
 
 
 def test_a_pattern_of_no_pixel() -> None:
@@ -492,7 +498,7 @@ def test_a_pattern_of_no_pixel() -> None:
     for strategy in ("direct", "composed"):
         hits = fire(scene, Stencil([".."], falloff="linear"), (4, 4), strategy=strategy)
         assert not hits and hits.fired.tolist() == [0]
-        assert hits.why_not() == hits.shares() == [] and hits.margins() == {} and len(hits.samples_at().xy) == 0
+        assert hits.why_not() == hits.shares() == hits.margins() == [] and len(hits.samples_at().xy) == 0
 
 
 # The plan
@@ -667,7 +673,7 @@ def test_giants_need_little_memory() -> None:
     crowd = fire(noisy, Spread(Disc(20), 400, 150), (0, 0))
     tracemalloc.start()
     try:
-        assert giant.margins() == {item: 3.0}
+        assert [margin[1:4] for margin in giant.margins()] == [(item, True, 3.0)]
         assert fire(scene, Spread(Disc(2**16), 20, 3), (10, 10)).object.tolist() == [item]
         crowd.why_not()
         assert tracemalloc.get_traced_memory()[1] < 128 * 2**20

@@ -123,7 +123,7 @@ def derived(hits: Hits, shot: int) -> list[Any]:
     told = [samples, pixels, hits.verdict_counts(shot), hits.why_not(shot), hits.blockers(shot)]
     if isinstance(hits, RayHits):
         return [*told, hits.nearest_miss(shot)]
-    return [*told, hits.shares(shot), hits.margins(shot)]
+    return [*told, hits.shares(shot), [margin[1:] for margin in hits.margins(shot)]]
 
 
 def same_as_alone(history: History, weapon: Weapon, shots: dict[str, Any], ticks: list[float]) -> Hits:

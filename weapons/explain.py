@@ -1,10 +1,10 @@
-"""What is derived from a shot when it is asked for: each sample, shares, blockers, why not, margins."""
+"""What is derived from a shot when it is asked for: each sample, shares, blockers, why not."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -12,21 +12,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.constants import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, MARGIN_PX, NEAR_PX
+from planes.constants import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, NEAR_PX
 from planes.items import Stack
 from planes.sampling import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from planes.scene import Scene
 from planes.spans import Box, Spans, each_pixel
 from weapons.arsenal import pierces
-from weapons.candidates import Candidates, pairs_of, refused
-from weapons.plan import Plan
-from weapons.resolve import Sight, direct
+from weapons.candidates import pairs_of, refused
 from weapons.volley import Shots, Volley, volley_of
 from weapons.weapon import Weapon
 
 __all__ = [
     "REASONS", "Behind", "Blocked", "Detail", "Samples", "Share", "WhyNot", "blockers_of", "detail_of", "hit_spans",
-    "margins_of", "samples_of", "shares_of", "why_not_of",
+    "samples_of", "shares_of", "why_not_of",
 ]  # fmt: skip
 
 
@@ -214,41 +212,6 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
         if distance <= NEAR_PX:
             found.append(_why(detail, rank, distance))
     return sorted(found, key=lambda w: (w.distance, w.object))
-
-
-def margins_of(scene: Scene, weapon: Weapon, shot: Shots) -> dict[int, float]:
-    """Length of the shortest whole-pixel shift of the pattern that flips each object, looked for up to MARGIN_PX."""
-    side = np.arange(-MARGIN_PX, MARGIN_PX + 1)
-    shift = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    shift = shift[(shift**2).sum(axis=1) <= MARGIN_PX**2]
-    volley = volley_of(weapon, shot)
-    stack = scene.items.stack()
-    hit = np.zeros((len(shift), len(stack)), np.bool_)
-    placements = len(volley.shot)
-    sight = Sight(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
-    step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
-    for first in range(0, len(shift), step):
-        met = direct(_shifted(volley, shift[first : first + step]), shot, sight)
-        hit[first + met.placement // placements, met.rank] = True
-    length2 = (shift**2).sum(axis=1)
-    flips = hit != hit[length2 == 0]
-    shortest = np.where(flips, length2[:, None], MARGIN_PX**2 + 1).min(axis=0, initial=MARGIN_PX**2 + 1)
-    found = [(int(stack.ids[p]), math.sqrt(int(shortest[p]))) for p in np.flatnonzero(shortest <= MARGIN_PX**2)]
-    return dict(sorted(found))
-
-
-def _shifted(volley: Volley, shift: Ints) -> Volley:
-    """Place a volley once for each shift, with all placements as those of the first shot."""
-    n = len(shift)
-    return replace(
-        volley,
-        pattern=np.tile(volley.pattern, n),
-        xy=np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley.shot), axis=0),
-        origin_xy=np.tile(volley.origin_xy, (n, 1)),
-        shot=np.tile(volley.shot, n),
-        round=np.tile(volley.round, n),
-        pellet=np.tile(volley.pellet, n),
-    )
 
 
 def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:

@@ -22,11 +22,11 @@ from weapons.explain import (
     blockers_of,
     detail_of,
     hit_spans,
-    margins_of,
     samples_of,
     shares_of,
     why_not_of,
 )
+from weapons.margins import Margin, margins_of
 from weapons.plan import Plan
 from weapons.resolve import Met
 from weapons.volley import Shots, Volley
@@ -219,13 +219,16 @@ class Hits:
         """Occluders that ended samples of one shot, most samples first, and the objects behind them there."""
         return blockers_of(self._detail(shot))
 
-    def margins(self, shot: int = 0) -> dict[int, float]:
-        """How far the verdicts of one shot are from flipping.
+    def margins(self, shot: int | None = None) -> list[Margin]:
+        """How far the verdicts of one shot, or of all, are from flipping, by (shot, object).
 
-        For each object that a shift of up to 8 px turns from hit to not hit or back: the length of the shortest such
-        whole-pixel shift, px. One of 1 px is fragile.
+        For each object that a shift of up to 8 px turns from hit to not hit or back: the shortest such whole-pixel
+        shift of the pattern. One of 1 px is fragile.
         """
-        return margins_of(self.scene_of(shot), self.weapon, self._one(shot))
+        if self._scenes is None and shot is None:
+            return margins_of(self.scene_of(0), self.weapon, self.shots)
+        numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
+        return [margin for i in numbers for margin in margins_of(self.scene_of(i), self.weapon, self._one(i), i)]
 
     def _detail(self, shot: int) -> Detail:
         """One shot sample by sample; that of the last one asked for is kept."""

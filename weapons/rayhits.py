@@ -17,6 +17,7 @@ from weapons.arsenal import ray_parts_of
 from weapons.ends import Reason
 from weapons.explain import Blocked, Samples, Share, WhyNot
 from weapons.hits import HitRow, Hits, Rows
+from weapons.margins import Margin
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
@@ -99,7 +100,7 @@ class RayHits(Hits):
         """Rays have no shares."""
         raise InputError("hits: expected those of a weapon with a pattern, got those of rays: their passes tell more")
 
-    def margins(self, shot: int = 0) -> dict[int, float]:
+    def margins(self, shot: int | None = None) -> list[Margin]:
         """Rays have no margins."""
         raise InputError("hits: expected those of a weapon with a pattern, got those of rays: see nearest_miss")
 
