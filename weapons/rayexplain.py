@@ -291,7 +291,7 @@ def _gaps(detail: RayDetail, objects: list[int], part: Floats, most: float | Non
     begin = (rays.start_256 - SUB * origin) / SUB
     end = begin + part[:, None] * (rays.step_256 / SUB)
     wide = detail.lines.radius / SUB
-    boxes = _squares(stack.box_xyxy[objects], origin)
+    boxes = squares(stack.box_xyxy[objects], origin)
     least = np.full(len(objects), np.inf)
     for ray in range(len(rays)):
         least = np.minimum(least, gap(begin[ray], end[ray], boxes)[0])
@@ -301,7 +301,7 @@ def _gaps(detail: RayDetail, objects: list[int], part: Floats, most: float | Non
         if least[place] > limit:
             break
         spans = Spans.from_mask(stack.mask(objects[place]), tuple(stack.box_xyxy[objects[place], :2].tolist()))
-        runs = _squares(np.stack([spans.x_first, spans.y, spans.x_last, spans.y], axis=1), origin)
+        runs = squares(np.stack([spans.x_first, spans.y, spans.x_last, spans.y], axis=1), origin)
         near = [(*_nearest(*gap(begin[ray], end[ray], runs)), ray) for ray in range(len(rays))]
         distance, from_xy, to_xy, ray = min(near, key=lambda one: (one[0], one[3]))
         if distance <= limit:
@@ -311,7 +311,7 @@ def _gaps(detail: RayDetail, objects: list[int], part: Floats, most: float | Non
     return found
 
 
-def _squares(boxes_xyxy: Ints, origin: Ints) -> Floats:
+def squares(boxes_xyxy: Ints, origin: Ints) -> Floats:
     """Boxes of whole pixels as closed boxes about an origin."""
     return np.asarray(boxes_xyxy - np.concatenate([origin, origin]) + np.array([-0.5, -0.5, 0.5, 0.5]))
 
