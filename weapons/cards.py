@@ -15,7 +15,7 @@ from weapons import raywords
 from weapons.inset import CELL, COLUMNS, ROWS, Inset, inset_of
 from weapons.marks import MARKS, tiled_glyph
 from weapons.panel import CARD, FAINT, INK, LINE, Text, clipped, verdict_mark
-from weapons.words import NAME_MAX, percent, reason, short
+from weapons.words import NAME_MAX, fragile, percent, reason, short
 
 __all__ = ["Card", "batch_cards", "hit_now", "shot_card"]
 
@@ -119,6 +119,7 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     rays = shot.get("rays")
     hit = _hits(shot) if rays is None else raywords.table(shot)
     lines: list[Sequence[str]] = [*hit[: HIT_LINES + 1], *_rest(hit, HIT_LINES + 1, "")]
+    lines += _at_risk(shot["rows"])
     near = None if rays is None else raywords.missed(shot)
     if rays is not None:
         ends = raywords.ended(rays)
@@ -127,9 +128,11 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     lines += [*blockers[:NOT_LINES], *_rest(blockers, NOT_LINES, " block")]
     others = shot["why_not"]
     if near is not None:
-        lines.append(near)
-        others = [e for e in others if e["object"] != shot["nearest_miss"]["object"] or e["reason"] != "missed"]
-    lines += [(f"not {entry['name']}", reason(entry, NAME_MAX)) for entry in others[:NOT_LINES]]
+        same = [e["object"] == shot["nearest_miss"]["object"] and e["reason"] == "missed" for e in others]
+        risks = [fragile(e, "hits it") for e, own in zip(others, same, strict=True) if own]
+        lines.append((near[0], "; ".join([near[1], *filter(None, risks)])))
+        others = [e for e, own in zip(others, same, strict=True) if not own]
+    lines += [(f"not {entry['name']}", _why(entry, rays is not None)) for entry in others[:NOT_LINES]]
     lines += _rest(others, NOT_LINES, " near it")
     if now is not None:
         lines.append(("the same shot now", now))
@@ -137,6 +140,19 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
         lines.append([_tested(shot["tested"])])
     alone = rays[0] if rays is not None and len(rays) == 1 else None
     return Card(number, shot["weapon"], _fired(shot), shot["verdicts"], inset_of(shot, scene), lines, alone)
+
+
+def _at_risk(rows: Sequence[Mapping[str, Any]]) -> list[Sequence[str]]:
+    """Objects whose hit a shift of one pixel would lose."""
+    told = {row["name"]: fragile(row, "misses it") for row in rows}
+    lines = [(name, risk) for name, risk in told.items() if risk is not None]
+    return [*lines[:NOT_LINES], *_rest(lines, NOT_LINES, " fragile")]
+
+
+def _why(entry: Mapping[str, Any], of_ray: bool) -> str:
+    """Why an object was not hit, and whether one pixel would do; where a ray ended for a reason it would not."""
+    risk = None if of_ray and entry["reason"] != "missed" else fragile(entry, "hits it")
+    return reason(entry, NAME_MAX) + ("" if risk is None else f"; {risk}")
 
 
 def _hits(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:

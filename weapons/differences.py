@@ -42,7 +42,7 @@ ABOUT = {
 
 SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (
     ("at_xy", "samples", "nearest_miss"),
-    ("distance2", "shares"),
+    ("distance2", "shares", "margin"),
     ("shots_that_hit", "objects", "heat"),
 )
 """What follows from the rest of a shot, of its rows and of a batch: told only if nothing else has changed."""
@@ -141,11 +141,12 @@ def _shot(was: Entry, now: Entry) -> list[str]:
 def _chief(shot: Entry) -> dict[str, Any]:
     """A shot without what follows from the rest of it."""
     chief = {key: value for key, value in shot.items() if key not in SHOT_DERIVED}
-    if isinstance(shot.get("rows"), list | tuple):
-        chief["rows"] = [
-            {k: v for k, v in row.items() if k not in ROW_DERIVED} if isinstance(row, dict) else row
-            for row in shot["rows"]
-        ]
+    for told in ("rows", "why_not"):
+        if isinstance(shot.get(told), list | tuple):
+            chief[told] = [
+                {k: v for k, v in row.items() if k not in ROW_DERIVED} if isinstance(row, dict) else row
+                for row in shot[told]
+            ]
     return chief
 
 

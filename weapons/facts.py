@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -214,6 +214,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     shots = hits.shots
     accept = int(shots.accept[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
+    margins = _margins(hits, row)
     return {
         "shot": int(shots.number[row]),
         "weapon": weapon,
@@ -224,7 +225,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "accept": None if accept == ALL else scene.category_names(accept),
         "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
         "verdicts": hits.verdict_counts(row),
-        "rows": _rows(scene, hits, row),
+        "rows": _rows(scene, hits, row, margins),
         "why_not": [
             {
                 **item_told(scene, entry.object),
@@ -232,6 +233,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
                 "samples": entry.samples,
                 "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
                 "distance": round(entry.distance, 3),
+                **margins.get(entry.object, {}),
             }
             for entry in hits.why_not(row)
         ],
@@ -251,7 +253,17 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     }
 
 
-def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
+def _margins(hits: Hits, shot: int) -> dict[int, dict[str, Any]]:
+    """How far the verdict on each object is from flipping, if that is near and can be told."""
+    if isinstance(hits, RayHits) and not hits.has_margins:
+        return {}
+    return {
+        m.object: {"margin": {"distance": round(m.distance, 3), "shift_xy": [round(v, 3) for v in m.shift_xy]}}
+        for m in hits.margins(shot)
+    }
+
+
+def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows of a shot; those of rays have no shares."""
     pixels, rows = hits.pixels_at(shot), hits.of(shot)
     shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
@@ -266,6 +278,7 @@ def _rows(scene: Scene, hits: Hits, shot: int) -> list[dict[str, Any]]:
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
             **({} if share is None else {"shares": {k: round(value, 6) for k, value in share._asdict().items()}}),
+            **margins.get(row.object, {}),
             "runs": pixels[row.round, row.object].runs().tolist(),
         }
         for row, share in zip(rows, shares, strict=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from planes.constants import SUB, WEIGHT_FULL
-from weapons.words import short
+from weapons.words import SLANT, short
 
 __all__ = ["RAY_HEADER", "blocked", "ended", "missed", "table"]
 
@@ -15,9 +15,6 @@ RAY_HEADER = ("object hit", "in", "out", "material")
 """Along the ray: where it goes in and comes out, and how much of the object's own pixels lies between."""
 
 WHY = {"occluder": "occluder", "hits": "last hit", "budget": "budget used up", "range": "range"}
-
-SLANT = 1 + 2**0.5
-"""Tangent of 67.5 degrees: a miss is low or left alone within 22.5 degrees of straight, else both."""
 
 
 def table(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from planes.arrays import InputError, within
-from planes.constants import ITEMS_MAX, POSITION_MAX, REACH_MAX, SEED_MAX, TICK_MAX, VIEW_MAX
+from planes.constants import ITEMS_MAX, MARGIN_PX, POSITION_MAX, REACH_MAX, SEED_MAX, TICK_MAX, VIEW_MAX
 from planes.image import read_text, write_text
 from planes.index import STRUCTURES
 from planes.sampling import OF_PATTERNS, Verdict
@@ -89,7 +89,15 @@ ROW_TOLD: dict[str, Value] = {
     "runs": RUNS,
 }
 SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE})
-ROW = Within(Keys({**ROW_TOLD, "shares": SHARES}, tuple(ROW_TOLD)))
+MARGIN = _all({"distance": Number(0, MARGIN_PX), "shift_xy": Numbers((2,), MARGIN_PX)})
+ROW = Within(Keys({**ROW_TOLD, "shares": SHARES, "margin": MARGIN}, tuple(ROW_TOLD)))
+WHY_NOT: dict[str, Value] = {
+    **ITEM,
+    "reason": Word(REASONS),
+    "samples": COUNT,
+    "by": Rows(_all({**ITEM, "samples": COUNT})),
+    "distance": Number(0),
+}
 POINT = Numbers((2,), FARTHEST)
 NORMAL = Wholes((2,), -(2**10), 2**10)
 PASS = _all(
@@ -140,17 +148,7 @@ SHOT_TOLD: dict[str, Value] = {
     "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
     "verdicts": COUNTS,
     "rows": Rows(ROW),
-    "why_not": Rows(
-        _all(
-            {
-                **ITEM,
-                "reason": Word(REASONS),
-                "samples": COUNT,
-                "by": Rows(_all({**ITEM, "samples": COUNT})),
-                "distance": Number(0),
-            }
-        )
-    ),
+    "why_not": Rows(Within(Keys({**WHY_NOT, "margin": MARGIN}, tuple(WHY_NOT)))),
     "blockers": Rows(
         _all({**ITEM, "samples": COUNT, "blocked": Rows(_all({**ITEM, "samples": COUNT, "at_xy": PIXEL}))})
     ),

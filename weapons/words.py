@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from planes.constants import FRAGILE_PX
 from weapons.jsondiff import entries, shown
 
-__all__ = ["percent", "reason", "short", "unquoted"]
+__all__ = ["SLANT", "fragile", "percent", "reason", "short", "unquoted"]
 
 REASONS = {
     "category": "not an accepted category",
@@ -16,6 +17,9 @@ REASONS = {
     "inside": "it started inside of it",
     "tunnelled": "went through it between two tests",
 }
+
+SLANT = 1 + 2**0.5
+"""Tangent of 67.5 degrees: a way is told as straight within 22.5 degrees, else as one of two sides."""
 
 NAME_MAX = 24
 """Letters of a name on a label."""
@@ -32,6 +36,24 @@ def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
         names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
         return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
     return REASONS.get(str(told), shown(told))
+
+
+def fragile(entry: Mapping[str, Any], turned: str) -> str | None:
+    """What least shift turns a verdict over, if one pixel is enough; `turned` says into what."""
+    margin = entry.get("margin")
+    if margin is None or margin["distance"] > FRAGILE_PX:
+        return None
+    if not margin["distance"]:
+        return "! fragile: it only touches"
+    return f"! fragile: {margin['distance']:.2g} px {_way(margin['shift_xy'])} {turned}"
+
+
+def _way(shift_xy: Sequence[float]) -> str:
+    """Direction of a shift on the screen: straight within 22.5 degrees, else between."""
+    (x, wide), (y, high) = ((v, abs(v)) for v in shift_xy)
+    told = ["up" if y < 0 else "down"] * (high * SLANT >= wide)
+    told += ["left" if x < 0 else "right"] * (wide * SLANT >= high)
+    return " ".join(told)
 
 
 def short(name: str, most: int = NAME_MAX) -> str:
