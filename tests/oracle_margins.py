@@ -73,10 +73,10 @@ def touched_at(
 
 def disc_grid(radius: float) -> Floats:
     """Shifts of up to a length, px: on a grid, and on rings that come close to it."""
-    n = min(64, int(16 * radius) + 4)
+    n = min(40, int(16 * radius) + 4)
     side = np.linspace(-radius, radius, 2 * n + 1)
     x, y = (grid.ravel() for grid in np.meshgrid(side, side))
-    turns = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    turns = np.linspace(0, 2 * np.pi, 480, endpoint=False)
     ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     every = np.concatenate([np.stack([x, y], axis=1), *(radius * part * ring for part in (1, 0.999, 0.97, 0.5))])
     return np.asarray(every[(every**2).sum(axis=1) <= radius**2])

@@ -121,9 +121,8 @@ def derived(hits: Hits, shot: int) -> list[Any]:
     samples = [column.tolist() for column in hits.samples_at(shot)]
     pixels = {key: spans.pixels().tolist() for key, spans in hits.pixels_at(shot).items()}
     told = [samples, pixels, hits.verdict_counts(shot), hits.why_not(shot), hits.blockers(shot)]
-    if isinstance(hits, RayHits):
-        return [*told, hits.nearest_miss(shot)]
-    return [*told, hits.shares(shot), [margin[1:] for margin in hits.margins(shot)]]
+    told.append([margin[1:] for margin in hits.margins(shot)] if hits.has_margins else None)
+    return [*told, hits.nearest_miss(shot) if isinstance(hits, RayHits) else hits.shares(shot)]
 
 
 def same_as_alone(history: History, weapon: Weapon, shots: dict[str, Any], ticks: list[float]) -> Hits:

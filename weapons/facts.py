@@ -255,7 +255,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
 
 def _margins(hits: Hits, shot: int) -> dict[int, dict[str, Any]]:
     """How far the verdict on each object is from flipping, if that is near and can be told."""
-    if isinstance(hits, RayHits) and not hits.has_margins:
+    if not hits.has_margins:
         return {}
     return {
         m.object: {"margin": {"distance": round(m.distance, 3), "shift_xy": [round(v, 3) for v in m.shift_xy]}}

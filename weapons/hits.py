@@ -230,6 +230,11 @@ class Hits:
         numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
         return [margin for i in numbers for margin in margins_of(self.scene_of(i), self.weapon, self._one(i), i)]
 
+    @property
+    def has_margins(self) -> bool:
+        """Whether margins can be told: of all but some rays."""
+        return True
+
     def _detail(self, shot: int) -> Detail:
         """One shot sample by sample; that of the last one asked for is kept."""
         scene, row = self.scene_of(shot), self._checked(shot)

@@ -117,7 +117,7 @@ class RayHits(Hits):
 
     @property
     def has_margins(self) -> bool:
-        """Whether margins can be asked for."""
+        """Whether margins can be told: not of steps of a projectile, nor of very many rays."""
         return has_ray_margins(self._parts[2], len(self.stop) // max(len(self.shots), 1))
 
     def _rays(self, shot: int) -> RayDetail:
