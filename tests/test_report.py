@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from planes import InputError, Scene, Sprite, load_scene
-from weapons import Beam, Disc, Point, Spread, arsenal_of, fire
+from weapons import Beam, Disc, Laser, Point, Spread, arsenal_of, fire
+from weapons import Box as WeaponBox
 from weapons.cards import shot_card
+from weapons.differences import differences
 from weapons.facts import SHOTS_MAX, report_of
 from weapons.heat import heat_of
 from weapons.inset import CELL, COLUMNS, ROWS, inset_of
@@ -20,6 +22,7 @@ from weapons.marks import HEAT, MARKS
 from weapons.overlay import BADGE, LETTER, ROW, Overlay
 from weapons.panel import plain
 from weapons.picture import picture_of_report
+from weapons.words import fragile
 from weapons.world import World, heat_step
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
@@ -357,3 +360,62 @@ def test_numbers_of_many_shots_on_one_pixel_do_not_pile_up() -> None:
     assert len(at) == SHOTS_MAX
     apart = [max(abs(a[0] - b[0]), abs(a[1] - b[1])) for i, a in enumerate(at) for b in at[:i]]
     assert min(apart) >= 2 * BADGE
+
+
+def test_margins_are_told_and_fragile_ones_marked() -> None:
+    """What one pixel turns over has a sign, a word and a way, of hits and of misses; what more does has none."""
+    scene = Scene((60, 40), name="street")
+    scene.add(Sprite.box(4, 4), (20, 20), name="hit by an edge")
+    scene.add(Sprite.box(3, 3), (16, 10), name="missed by one")
+    scene.add(Sprite.box(3, 3), (9, 20), name="missed by two")
+    (shot,) = report_of(scene, [fire(scene, WeaponBox(7, 15), (15, 19))])["shots"]
+    told = {entry["name"]: entry.get("margin") for entry in [*shot["rows"], *shot["why_not"]]}
+    assert told == {
+        "hit by an edge": {"distance": 1.0, "shift_xy": [-1, 0]},
+        "missed by one": {"distance": 1.0, "shift_xy": [0, -1]},
+        "missed by two": {"distance": 2.0, "shift_xy": [-2, 0]},
+    }
+    lines = shot_card(shot, 0, scene).lines
+    assert ("hit by an edge", "! fragile: 1 px left misses it") in lines
+    assert ("not missed by one", "missed by 1.0 px; ! fragile: 1 px up hits it") in lines
+    assert ("not missed by two", "missed by 2.0 px") in lines
+
+
+def test_fragile_rays_are_marked() -> None:
+    """Rays tell a part of a px, and what only touches; what lies behind a wall is not near for them."""
+    scene = Scene((90, 40), name="street")
+    for x, y, name in ((10, 20, "hit"), (20, 26, "missed"), (30, 17, "touched"), (50, 20, "behind")):
+        scene.add(Sprite.box(5, 5), (x, y), name=name)
+    scene.add(Sprite.box(1, 9), (47, 20), role="occluder", layer=1, name="wall")
+    (shot,) = report_of(scene, [fire(scene, Laser(90), (0, 19.5), aim=0)])["shots"]
+    lines = [" | ".join(line) for line in shot_card(shot, 0, scene).lines]
+    assert "touched | ! fragile: it only touches" in lines
+    behind = next(entry for entry in shot["why_not"] if entry["name"] == "behind")
+    assert behind["margin"] == {"distance": 1.0, "shift_xy": [1.0, 0.0]}
+    assert not any("fragile" in line and ("behind" in line or line.startswith("hit")) for line in lines)
+    (shot,) = report_of(scene, [fire(scene, Laser(90), (0, 22.75), aim=0)])["shots"]
+    lines = [" | ".join(line) for line in shot_card(shot, 0, scene).lines]
+    assert "nearest hit | missed low by 0.2 px; ! fragile: 0.25 px up hits it" in lines
+    assert "not missed | missed by 0.8 px; ! fragile: 0.75 px down hits it" in lines
+
+
+def test_ways_have_words() -> None:
+    ways = {(1, 0): "right", (-1, 0.3): "left", (0.2, -1): "up", (0.4, 0.4): "down right", (-0.6, -0.5): "up left"}
+    for shift, words in ways.items():
+        told = fragile({"margin": {"distance": 0.5, "shift_xy": list(shift)}}, "hits it")
+        assert told == f"! fragile: 0.5 px {words} hits it"
+    assert fragile({}, "hits it") is None
+    assert fragile({"margin": {"distance": 1.001, "shift_xy": [1.001, 0]}}, "hits it") is None
+
+
+def test_a_margin_is_compared_when_nothing_else_has_changed() -> None:
+    scene = street()
+    report = report_of(scene, [fire(scene, Disc(6), (40, 20))])
+    changed = json.loads(json.dumps(report))
+    assert not differences(report, changed)
+    (entry,) = (e for e in changed["shots"][0]["why_not"] if "margin" in e)
+    entry["margin"]["distance"] += 1
+    assert len(differences(report, changed)) == 1
+    entry["reason"], entry["distance"] = "missed", 9.0
+    (line,) = differences(report, changed)
+    assert "margin" not in line
