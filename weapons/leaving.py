@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import product
 
 import numpy as np
 
@@ -23,6 +25,9 @@ GAP = 2.0**-30
 
 PARALLEL = 2.0**-40
 """Sine of the angle between edges that are taken for parallel: where they cross is beyond all that is looked at."""
+
+FEW, SMALL = 24, 2.0**-10
+"""Edges in a square of shifts of which all pairs are tried, and half the side of one that is not cut further, px."""
 
 AT_A_TIME = 2**19
 """Comparisons, or pairs of boundaries, that are worked on at a time."""
@@ -44,6 +49,28 @@ class Union:
     centre: Floats
     radius: float
 
+    def around(self, middle: Floats, half: float) -> Union | None:
+        """The shapes that may meet a square and a little around it; None if one of them contains it."""
+        reach = half + 4 * GAP
+        wide = np.abs(self.normal).sum(axis=2) * reach
+        at = self.normal[..., 0] * middle[0] + self.normal[..., 1] * middle[1] - self.offset
+        x, y = np.abs(self.centre - middle).T
+        far2, near2 = (np.maximum(x + k, 0) ** 2 + np.maximum(y + k, 0) ** 2 for k in (reach, -reach))
+        if (at + wide <= 0).all(axis=1).any() or (far2 <= self.radius**2).any():
+            return None
+        met = (at - wide <= 0).all(axis=1)
+        return Union(self.normal[met], self.offset[met], self.centre[near2 <= self.radius**2], self.radius)
+
+    def boundaries(self, middle: Floats, half: float) -> tuple[Floats, Floats]:
+        """Lines (n, 3) of edges, as normal and offset, and centres (m, 2) of circles that pass through a square."""
+        normal, offset = self.normal.reshape(-1, 2), self.offset.ravel()
+        passes = np.abs(normal[:, 0] * middle[0] + normal[:, 1] * middle[1] - offset) <= np.abs(normal).sum(axis=1) * (
+            half + GAP
+        )
+        apart = np.sqrt(((self.centre - middle) ** 2).sum(axis=1))
+        lines = np.concatenate([normal[passes], offset[passes, None]], axis=1)
+        return np.unique(lines, axis=0), self.centre[np.abs(apart - self.radius) <= 2 * (half + GAP)]
+
     def lacks(self, s: Floats) -> Bools:
         """Which points (n, 2) lie in none of the shapes."""
         out = np.ones(len(s), np.bool_)
@@ -61,20 +88,29 @@ class Union:
 def leaving(union: Union, most: float) -> tuple[float, float] | None:
     """Find the shortest shift, up to `most` px, to the edge of a union, beyond which there is nothing of it.
 
-    Of several the first by (y, x). From 0 on no such shift is longer than the way out.
+    Of several the first by (y, x). Squares of shifts are looked at from the nearest on: one that lies in a single shape
+    has no way out, one with many edges is cut into four.
     """
-    apart = np.sqrt((union.centre**2).sum(axis=1))
-    if (union.offset.min(axis=1, initial=np.inf) >= most).any() or (union.radius - apart >= most).any():
-        return None
-    lines = np.concatenate([union.normal.reshape(-1, 2), union.offset.reshape(-1, 1)], axis=1)
-    lines = np.unique(lines[np.abs(lines[:, 2]) <= most], axis=0)
-    circles = union.centre[np.abs(apart - union.radius) <= most]
-    best = _first_out(union, *_feet(lines, circles, union.radius), None, most)
-    reach = most if best is None else _length(best)
-    lines = lines[np.abs(lines[:, 2]) <= reach]
-    circles = circles[np.abs(np.sqrt((circles**2).sum(axis=1)) - union.radius) <= reach]
-    for at, outward in _crossings(lines, circles, union.radius):
-        best = _first_out(union, at, outward, best, most)
+    best: tuple[float, float] | None = None
+    squares = [(0.0, 0.0, 0.0, most, union)]
+    while squares:
+        near, y, x, half, shapes = heappop(squares)
+        if near > (most if best is None else _length(best)):
+            break
+        here = np.array([x, y])
+        some = shapes.around(here, half)
+        if some is None:
+            continue
+        lines, circles = some.boundaries(here, half)
+        if len(lines) + len(circles) > FEW and half > SMALL:
+            half /= 2
+            for j, i in product((y - half, y + half), (x - half, x + half)):
+                least = max(abs(i) - half, 0.0), max(abs(j) - half, 0.0)
+                heappush(squares, (_length(least), j, i, half, some))
+            continue
+        for at, outward in (_feet(lines, circles, union.radius), *_crossings(lines, circles, union.radius)):
+            inside = (np.abs(at - here) <= half + GAP).all(axis=1)
+            best = _first_out(some, at[inside], outward[inside], best, most)
     return best
 
 

@@ -86,7 +86,7 @@ class Way:
         """Length of the segment."""
         if not self.ray:
             return 0.0
-        return float(((self.end - self.begin) + self.part) @ (self.step / self.ray))
+        return float((((self.end - self.begin) + self.part) * (self.step / self.ray)).sum())
 
     @cached_property
     def across(self) -> Floats:
