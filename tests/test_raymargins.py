@@ -176,6 +176,52 @@ def test_a_gap_in_an_object_is_a_way_out() -> None:
     assert fire(scene, Laser(30, width=2), (0, 1.25), aim=0).margins() == [(0, item, True, 2.25, (0, -2.25))]
 
 
+def test_between_two_rims() -> None:
+    """The round end of a thick ray leaves two pixels at once where their rims cross; each alone were left sooner."""
+    scene = Scene()
+    item = scene.add(Sprite.from_mask(np.array([[1], [0], [1]], np.bool_), pivot_xy=(0, 0)), (10, -1))
+    (margin,) = fire(scene, Laser(9, width=4), (0, 0), aim=0).margins()
+    assert margin[:3] == (0, item, True) and margin.distance == pytest.approx(math.sqrt(3) - 1)
+    assert margin.shift_xy == pytest.approx((1 - math.sqrt(3), 0))
+
+
+def test_between_two_rims_that_touch() -> None:
+    """The way out begins where two discs touch from outside: nothing is so near a gap that it is none."""
+    assert check(some_battle(1079))["left"] >= 2
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_what_lies_at_the_end_of_a_ray_is_left_sideways_or_back(up: bool) -> None:
+    """Six rows are passed through, eight lie at its end: out by the corner between them."""
+    mask = np.zeros((8, 30), np.bool_)
+    mask[2:, :6] = mask[:, 23:26] = True
+    scene = Scene()
+    item = scene.add(Sprite.from_mask(mask if up else mask[::-1], pivot_xy=(0, 0)), (15, -2 if up else -4))
+    (margin,) = fire(scene, Laser(40), (0, 0.5), aim=0).margins()
+    side = -1 if up else 1
+    assert margin[:3] == (0, item, True) and margin.shift_xy == (-2.5, float(side))
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+@pytest.mark.parametrize("step", [(2**26 + 1, 2**25 + 5), (2**20 + 7, 2**27 - 1)])
+def test_the_rim_of_a_long_thick_ray(step: tuple[int, int], beyond: int) -> None:
+    """A centre lies just within the rim, or just beyond it: by less than floats of that size tell, and never by 0."""
+    (dx, dy), r = step, 700
+    length2 = dx * dx + dy * dy
+    cross = math.isqrt(r * r * length2) + beyond
+    p = pow(dy, -1, dx) * cross % dx
+    q = (p * dy - cross) // dx
+    pixel = round(p / 256), round(q / 256)
+    a = 256 * pixel[0] - p, 256 * pixel[1] - q
+    scene = Scene()
+    item = scene.add(Sprite.from_mask(np.ones((1, 1), np.bool_), pivot_xy=(0, 0)), pixel)
+    toward = ((a[0] + dx) / 256, (a[1] + dy) / 256)
+    (margin,) = fire(scene, Laser(None, width=2 * r / 256), (a[0] / 256, a[1] / 256), toward=toward).margins()
+    exactly = abs(Fraction(r * r * length2 - cross * cross)) / (2 * r * length2) / 256  # to the first order
+    assert (margin.object, margin.hit) == (item, not beyond) and margin.distance > 0
+    assert margin.distance == pytest.approx(float(exactly), rel=1e-6 if not beyond else 1e-3)
+
+
 def test_pellets_move_together() -> None:
     """One leaves where another comes in: all have to be out at once."""
     scene = world(((10, 0), (10, 0)))

@@ -26,6 +26,12 @@ GAP = 2.0**-30
 PARALLEL = 2.0**-40
 """Sine of the angle between edges that are taken for parallel: where they cross is beyond all that is looked at."""
 
+CUSP = 2.0**-12
+"""Between two boundaries that touch from outside, at so small an angle or less, it is looked so far along them, px."""
+
+TOUCHING = 1 + 2.0**-40
+"""Of distances that floats tell apart though they are the same."""
+
 FEW, SMALL = 24, 2.0**-10
 """Edges in a square of shifts of which all pairs are tried, and half the side of one that is not cut further, px."""
 
@@ -51,7 +57,7 @@ class Union:
 
     def around(self, middle: Floats, half: float) -> Union | None:
         """The shapes that may meet a square and a little around it; None if one of them contains it."""
-        reach = half + 4 * GAP
+        reach = half + 2 * CUSP
         wide = np.abs(self.normal).sum(axis=2) * reach
         at = self.normal[..., 0] * middle[0] + self.normal[..., 1] * middle[1] - self.offset
         x, y = np.abs(self.centre - middle).T
@@ -176,28 +182,31 @@ def _line_circle(lines: Floats, circles: Floats, radius: float) -> tuple[Floats,
     line, circle = (index.ravel() for index in np.indices((len(lines), len(circles))))
     normal, middle = lines[line, :2], circles[circle]
     across = lines[line, 2] - (normal * middle).sum(axis=1)
-    some = np.abs(across) <= radius
+    some = np.abs(across) <= radius * TOUCHING
     normal, middle, across = normal[some], middle[some], across[some, None]
-    return _both_sides(middle + normal * across, normal, np.sqrt(radius**2 - across**2), middle, None)
+    return _both_sides(middle + normal * across, normal, np.sqrt(np.maximum(radius**2 - across**2, 0)), middle, None)
 
 
 def _circle_circle(a: Floats, b: Floats, radius: float) -> tuple[Floats, Floats]:
     first, second = (index.ravel() for index in np.indices((len(a), len(b))))
     apart2 = ((b[second] - a[first]) ** 2).sum(axis=1)
-    some = (apart2 > 0) & (apart2 <= 4 * radius**2)
+    some = (apart2 > 0) & (apart2 <= 4 * radius**2 * TOUCHING)
     one, other, apart2 = a[first[some]], b[second[some]], apart2[some, None]
     along = (other - one) / np.sqrt(apart2)
-    return _both_sides((one + other) / 2, along, np.sqrt(radius**2 - apart2 / 4), one, other)
+    return _both_sides((one + other) / 2, along, np.sqrt(np.maximum(radius**2 - apart2 / 4, 0)), one, other)
 
 
 def _both_sides(
     foot: Floats, along: Floats, aside: Floats, middle: Floats, other: Floats | None
 ) -> tuple[Floats, Floats]:
     """Points of a circle on both sides of a foot, across a direction; out of it and of a second circle, or a line."""
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1) * aside
-    at = np.concatenate([foot + across, foot - across])
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    at = np.concatenate([foot + across * aside, foot - across * aside])
     second = np.tile(along, (2, 1)) if other is None else _unit(at - np.tile(other, (2, 1)))
-    return at, _unit(_unit(at - np.tile(middle, (2, 1))) + second)
+    between = _unit(at - np.tile(middle, (2, 1))) + second
+    cusp = (between**2).sum(axis=1) < CUSP**2
+    outward = np.where(cusp[:, None], np.concatenate([across, -across]) * (CUSP / GAP), _unit(between))
+    return at, outward
 
 
 def _unit(ways: Floats) -> Floats:
