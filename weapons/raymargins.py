@@ -30,7 +30,7 @@ from weapons.trace import DIAGONAL
 __all__ = ["RAYS_MAX", "has_ray_margins", "ray_margins"]
 
 RAYS_MAX = 1024
-"""Rays of a shot whose margins are looked for: all of them count at once, and their time grows with the square."""
+"""Rays of a shot whose margins are looked for: all of them count at once, and so many take some seconds."""
 
 NEARLY = 2.0**-20
 """How near to its rim a thick ray has a centre, px, for their distance to be worked out in Python integers."""
