@@ -24,6 +24,7 @@ from weapons.ends import Ends, Reason, ends_of
 from weapons.guns import Laser, Projectile, Traced
 from weapons.leaving import EDGES, Union, leaving
 from weapons.margins import Margin
+from weapons.plan import Plan
 from weapons.rayexplain import RayDetail, gap, squares
 from weapons.trace import DIAGONAL
 
@@ -148,7 +149,7 @@ def ray_margins(detail: RayDetail, scene: Scene, ray: Traced, shot: int, hit: Se
     accepted = ~stack.occluder & ~refused(stack, np.arange(len(stack)), detail.shots, none)
     if detail.ignores:
         accepted[detail.every.rank[detail.entered == 0]] = False
-    open_ends = ends_of(detail.met, detail.lines, stack, none, Laser(None))
+    open_ends = ends_of(detail.met, detail.lines, stack, none, Laser(None), Plan())
     touched = _touched(detail)
     velocity = scene.items.velocity_256[stack.ids] * isinstance(ray, Projectile)
     found = []
