@@ -63,6 +63,8 @@ def test_a_quick_study_writes_all_its_files(quick: Path) -> None:
                 assert 0 < us["least"] <= us["median"] <= us["most"] and point["runs"] >= 1 and point["setup_ms"] >= 0
                 assert point["kept_bytes"] >= 0 and point["run_bytes"] > 0
                 assert point["wrong_per_shot"] == (point["missed"] + point["false"]) / question["shots"]
+    assert study["plan"]["shots"] == 300 and "walk" in [stage["stage"] for stage in study["plan"]["ran"]]
+    assert {"stage": "occluders", "why": "the scene has none"} in study["plan"]["left_out"]
     rows = list(csv.DictReader(io.StringIO((quick / "study.csv").read_text())))
     assert len(rows) == sum(len(curve["points"]) for q in study["questions"] for curve in q["curves"])
     told = (quick / "study.md").read_text()
@@ -227,6 +229,8 @@ def test_errors_are_counted() -> None:
     assert (errors.missed, errors.false, errors.wrong) == (1, 1, 2) and sorted(errors.objects.tolist()) == [5, 9]
     assert errors.share == pytest.approx((0.0 + 1.0 + 0.5 + 0.25) / 4)
     assert errors.position == pytest.approx(math.hypot(2, 3) / 2)
+    untold = Decisions.of(found.shot, found.object)
+    assert errors_of(untold, truth)[:4] == (1, 1, None, None)
     none = Decisions.of(np.zeros(0, int), np.zeros(0, int))
     assert errors_of(none, none)[:4] == (0, 0, None, None) and errors_of(none, truth).missed == 3
 
@@ -259,6 +263,7 @@ def told_study(**curves: list[dict]) -> dict:
     return {
         "complete": True, "seed": 0, "kinds": {"round": 1}, "versions": {"numpy": "2"},
         "scene": {"name": "s", "objects": 1, "of": 1}, "questions": [{**question, "curves": told}],
+        "plan": {"shots": 7, "ran": [{"stage": "walk", "why": "so", "bytes": 12, "ns": 5000}], "left_out": []},
     }  # fmt: skip
 
 
@@ -289,6 +294,7 @@ def test_words_of_a_study() -> None:
     assert "| bounding box, oriented | 2 (1.5 us) | 3 (0.3 wrong) | nothing; nearest: round, 0.3 |" in told
     assert "Not complete" not in told and "Not complete" in markdown({**study, "complete": False}, 0.05)
     assert [setting_text(s) for s in (0.125, 2.0, 0.3, "grid", None)] == ["1/8", "2", "0.3", "grid", ""]
+    assert "7 discs in one call" in told and "walk   5.0 us     12  so" in told
     assert csv_of(study).splitlines()[1].startswith("areas,circle,,300,1,0,0.02,,,1,1,1,3,1.0,999999,12")
 
 
@@ -346,3 +352,18 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path, capsys) -> Non
     (tmp_path / "file").write_text("")
     assert main(["study", "-o", str(tmp_path / "file")]) == 2
     assert main(["study", "-o", str(tmp_path / "no" / "such")]) == 2
+
+
+def test_the_chapter_is_what_its_studies_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "fixtures" / "study"))
+    import chapter
+
+    assert (ROOT / "fixtures" / "study" / "README.md").read_text(encoding="utf-8") == chapter.chapter()
+    for name in chapter.SCENES:
+        folder = ROOT / "fixtures" / "study" / name
+        study = study_in(folder)
+        assert study["complete"] and (folder / "study.csv").read_text() == csv_of(study)
+        drawn = [question["name"] for question in study["questions"]]
+        assert (folder / "study.md").read_text() == markdown(study, chapter.ERROR, drawn)
+        for question, curve in (("rays", "supercover"), ("movers", "swept")):
+            assert points_of(study, question, curve)[0]["wrong_per_shot"] == 0

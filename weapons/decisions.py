@@ -85,7 +85,7 @@ def errors_of(found: Decisions, truth: Decisions) -> Errors:
     return Errors(
         int(missed.sum()),
         int(false.sum()),
-        _mean(np.abs(share[0] - share[1])),
+        None if len(found) and np.isnan(found.share).all() else _mean(np.abs(share[0] - share[1])),
         _mean(_lengths(apart)),
         pairs[missed | false] % objects,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,11 +26,13 @@ from weapons.explain import (
     shares_of,
     why_not_of,
 )
-from weapons.margins import Margin, margins_of
 from weapons.plan import Plan
 from weapons.resolve import Met
 from weapons.volley import Shots, Volley
 from weapons.weapon import Weapon
+
+if TYPE_CHECKING:
+    from weapons.margins import Margin
 
 __all__ = ["HitRow", "Hits", "OwnerRow", "Rows", "rows_of_met"]
 
@@ -225,6 +227,8 @@ class Hits:
         For each object that a shift of up to 8 px turns from hit to not hit or back: the shortest such whole-pixel
         shift of the pattern. One of 1 px is fragile.
         """
+        from weapons.margins import margins_of  # few ask
+
         if self._scenes is None and shot is None:
             return margins_of(self.scene_of(0), self.weapon, self.shots)
         numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,15 +17,16 @@ from weapons.arsenal import ray_parts_of
 from weapons.ends import Reason
 from weapons.explain import Blocked, Samples, Share, WhyNot
 from weapons.hits import HitRow, Hits, Rows
-from weapons.margins import Margin
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops
 from weapons.plan import Plan
 from weapons.rayexplain import Miss, RayDetail, blocked_rays, nearest_miss, pixels_of_rays, ray_detail, ray_why_not
-from weapons.raymargins import has_ray_margins, ray_margins
 from weapons.rays import Parts, Rays
 from weapons.volley import Shots
 from weapons.weapon import Weapon
+
+if TYPE_CHECKING:
+    from weapons.margins import Margin
 
 __all__ = ["RayHits", "Reason", "pixels_of", "rows_of_passes"]
 
@@ -107,6 +108,8 @@ class RayHits(Hits):
         All rays of a shot move together, by any shift. What they hit they leave: they go then as far as they would if
         no object ended them. What they did not hit they touch, from the muzzle to where each stopped.
         """
+        from weapons.raymargins import ray_margins  # few ask
+
         if self._scenes is None:
             self.scene_of(0)  # an old answer is refused, also an empty one
         found: list[Margin] = []
@@ -118,6 +121,8 @@ class RayHits(Hits):
     @property
     def has_margins(self) -> bool:
         """Whether margins can be told: not of steps of a projectile, nor of very many rays."""
+        from weapons.raymargins import has_ray_margins
+
         return has_ray_margins(self._parts[2], len(self.stop) // max(len(self.shots), 1))
 
     def _rays(self, shot: int) -> RayDetail:

@@ -16,9 +16,11 @@ from planes.arrays import Ints
 from planes.image import write_text
 from planes.scene import Scene
 from weapons.areapeers import area_peer_curves
+from weapons.arsenal import Disc
 from weapons.copies import copied
 from weapons.decisions import Curve, Errors, Method, Question, errors_of
-from weapons.discs import areas_question, discs_at
+from weapons.discs import Discs, areas_question, discs_at
+from weapons.firing import fire
 from weapons.kinds import kind_of
 from weapons.moverstudy import movers_question
 from weapons.planestudy import plane_curves
@@ -75,7 +77,8 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
         else ids
     )
     alone = copied(scene, some)
-    questions = _questions(alone, effort.shots, seed)
+    discs = discs_at(alone, effort.shots, seed)
+    questions = _questions(alone, discs, effort.shots, seed)
     kinds = [kind_of(alone, item) for item in range(len(alone))]
     study: dict[str, Any] = {
         "format": FORMAT,
@@ -84,6 +87,7 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
         "seed": seed,
         "versions": _versions(),
         "kinds": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
+        "plan": {"shots": effort.shots, **_plan(scene, discs)},
         "questions": [_told(question) for question in questions],
     }
     points = sum(len(curve.methods) for question in questions for curve in question.curves)
@@ -103,14 +107,20 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
     return study
 
 
-def _questions(alone: Scene, shots: int, seed: int) -> list[Question]:
-    discs = discs_at(alone, shots, seed)
+def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
     return [
         areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *area_peer_curves(discs)]),
         rays_question(alone, shots, seed),
         movers_question(alone, shots, seed),
         spread_question(alone, max(1, shots // SPREAD_PART), seed),
     ]
+
+
+def _plan(scene: Scene, discs: Discs) -> dict[str, Any]:
+    """What the discs cost in the scene as it is, stage by stage, and what it left out; after a call to warm up."""
+    weapon = Disc(discs.radius)
+    fire(scene, weapon, discs.at)
+    return fire(scene, weapon, discs.at).plan.timed()
 
 
 def _told(question: Question) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from weapons.plan import plan_lines
+
 __all__ = [
     "Place",
     "bound",
@@ -168,6 +170,13 @@ def _lines(study: Json, error: float, pictures: Sequence[str]) -> Iterator[str]:
         yield from _question(question, question["name"] in pictures)
     for question in study["questions"]:
         yield from _kinds(question)
+    yield "## What this scene pays for"
+    yield ""
+    yield f"{study['plan']['shots']} discs in one call at the scene as it is: what each stage cost, what was left out."
+    yield ""
+    yield "```text"
+    yield from plan_lines(study["plan"])
+    yield "```"
 
 
 def _question(question: Json, picture: bool) -> Iterator[str]:
