@@ -394,6 +394,20 @@ def test_a_peer_agrees_nearly_where_it_is_installed(peer: str) -> None:
     assert errors.wrong <= (0 if peer == "shapely" else 8) and errors.position < (0.01 if peer == "shapely" else 5)
 
 
+def test_a_swept_disc_of_pymunk_agrees_nearly_where_nothing_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pymunk")
+    scene = Scene()
+    for k in range(4):
+        scene.add(Sprite.circle(9 + k), (60 * k, 7 * k))
+    question = movers_question(scene, 100, 1)
+    (errors,) = errors_in(question, "pymunk")
+    assert len(question.truth) > 20 and errors.wrong <= 2 and errors.position < 2
+    scene.set(0, velocity_xy=(3, 0))
+    assert "objects move" in curve_of(movers_question(scene, 5, 1), "pymunk").left_out
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    assert curve_of(movers_question(scene, 5, 1), "pymunk").left_out == "pymunk is not installed"
+
+
 @pytest.mark.parametrize("peer", ["shapely", "pygame"])
 def test_a_peer_finds_the_nearest_of_what_lies_in_the_box_of_another(peer: str) -> None:
     pytest.importorskip(peer)

@@ -283,6 +283,8 @@ def study(arguments: argparse.Namespace) -> None:
     scene = kinds_scene() if arguments.scene is None else load_scene(arguments.scene)
     effort = Effort.quick() if arguments.quick else Effort()
     done, drawn = write_study(scene, arguments.output, seed, effort, error, Progress(sys.stderr))
+    for question in done["questions"]:
+        _say(f"{question['name']}: {question['asks']} Truth: {question['truth']}")
     for line in verdict(done, error):
         _say(line)
     _say(f"{'tables and diagrams are' if drawn else 'the tables are'} in {arguments.output}")

@@ -16,6 +16,7 @@ from weapons.firing import fire
 from weapons.guns import Projectile
 from weapons.movertruth import Flights, flown, impacts, touching
 from weapons.rayhits import RayHits
+from weapons.raypeers import Segments, mover_peer_curve
 from weapons.targets import ahead, checked_draw, drawn_places, only_hittable, size_of, targets_of, velocities_of
 
 __all__ = ["movers_question"]
@@ -53,7 +54,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
         shots,
         Decisions.of(first.flight, first.object, point),
         "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
-        _curves(alone, flights, start + way, speed),
+        (*_curves(alone, flights, start + way, speed), _peer(alone, flights)),
     )
 
 
@@ -67,6 +68,13 @@ def _curves(alone: Scene, flights: Flights, toward: Ints, speed: int) -> tuple[C
         Curve("substeps", "tests a frame", substeps, "a disc at each of them"),
         Curve("swept", "", (swept,)),
     )
+
+
+def _peer(alone: Scene, flights: Flights) -> Curve:
+    targets = targets_of(alone)
+    start, step = flights.start_256 / SUB, flights.step_256 / SUB
+    moving = bool(velocities_of(alone, targets).any())
+    return mover_peer_curve(targets, Segments(start, start + step), flights.radius_256 / SUB, moving)
 
 
 def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:

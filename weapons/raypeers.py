@@ -22,7 +22,7 @@ from weapons.peerworlds import (
 )
 from weapons.targets import Target
 
-__all__ = ["Segments", "peer_curves"]
+__all__ = ["Segments", "mover_peer_curve", "peer_curves"]
 
 
 class Segments(NamedTuple):
@@ -49,23 +49,56 @@ def _pymunk_curve(targets: list[Target], rays: Segments) -> Curve:
     if pymunk is None:
         return absent("pymunk")
 
-    def prepare() -> Callable[[], tuple[list[Any], dict[Any, int]]]:
-        space, item_of = hulls_in_pymunk(pymunk, targets)
-        ask, every, shots = space.segment_query_first, pymunk.ShapeFilter(), pairs(rays.start_xy, rays.end_xy)
-        return lambda: ([ask(start, end, 0, every) for start, end in shots], item_of)
+    def read(answer: FirstHits) -> Decisions:
+        shot, item, alpha = _along(answer)
+        return _entered(rays, shot, item, rays.start_xy[shot] + alpha[:, None] * (rays.end_xy - rays.start_xy)[shot])
 
-    def read(answer: tuple[list[Any], dict[Any, int]]) -> Decisions:
-        found, item_of = answer
-        hit = [(shot, item_of[one.shape], one.alpha) for shot, one in enumerate(found) if one is not None]
-        rows = np.array(hit, np.float64).reshape(-1, 3)
-        shot, item = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
-        # Of a hull in which a segment begins the alpha is 0, but the point that it tells is the segment's end.
-        way = rows[:, 2:] * (rays.end_xy - rays.start_xy)[shot]
-        return _entered(rays, shot, item, rays.start_xy[shot] + way)
+    note = "an easier question: convex hulls of the masks; in floats"
+    return Curve("pymunk", "", (Method(None, lambda: _first_hulls(pymunk, targets, rays, 0.0), read),), note)
 
-    return Curve(
-        "pymunk", "", (Method(None, prepare, read),), "an easier question: convex hulls of the masks; in floats"
-    )
+
+def mover_peer_curve(targets: list[Target], flights: Segments, radius: float, moving: bool) -> Curve:
+    """Discs that fly along segments against hulls in pymunk, whose thick segments are swept discs.
+
+    Parameters
+    ----------
+    moving : whether objects move: then there is no curve, as in a query of pymunk all stand still
+    """
+    pymunk = installed("pymunk")
+    if pymunk is None:
+        return absent("pymunk")
+    if moving:
+        return Curve("pymunk", left_out="objects move, and stand still during its queries")
+
+    def read(answer: FirstHits) -> Decisions:
+        shot, item, alpha = _along(answer)
+        way = flights.end_xy - flights.start_xy
+        return Decisions.of(shot, item, flights.start_xy[shot] + alpha[:, None] * way[shot])
+
+    note = "a thick segment, swept, against convex hulls of the masks; in floats"
+    return Curve("pymunk", "", (Method(None, lambda: _first_hulls(pymunk, targets, flights, radius), read),), note)
+
+
+FirstHits = tuple[list[Any], dict[Any, int]]
+"""What pymunk says of each segment, and the object of each shape."""
+
+
+def _first_hulls(pymunk: Any, targets: list[Target], rays: Segments, radius: float) -> Callable[[], FirstHits]:
+    """A run that asks for the first hull on each segment."""
+    space, item_of = hulls_in_pymunk(pymunk, targets)
+    ask, every, shots = space.segment_query_first, pymunk.ShapeFilter(), pairs(rays.start_xy, rays.end_xy)
+    return lambda: ([ask(start, end, radius, every) for start, end in shots], item_of)
+
+
+def _along(answer: FirstHits) -> tuple[Ints, Ints, Floats]:
+    """Segments that hit, what, and at which part of them.
+
+    Of a hull in which a segment begins that part is 0, but the point that pymunk tells is the segment's end.
+    """
+    found, item_of = answer
+    hit = [(shot, item_of[one.shape], one.alpha) for shot, one in enumerate(found) if one is not None]
+    rows = np.array(hit, np.float64).reshape(-1, 3)
+    return rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2]
 
 
 def _shapely_curve(targets: list[Target], rays: Segments) -> Curve:
