@@ -20,6 +20,7 @@ from weapons.raymarks import draw_rays
 from weapons.raywords import missed
 from weapons.signs import BADGE, BLUE, CROWDED, MINT, NEAR_MISS, ORANGE, SEVERAL, SIGNS, THROUGH, YELLOW, sign_mark
 from weapons.strokes import Strokes, within
+from weapons.words import apart
 from weapons.world import World
 
 FACTOR = 8
@@ -482,4 +483,13 @@ def test_the_legend_tells_what_is_drawn_of_rays() -> None:
         ["beyond its end", "near miss", "ray", THROUGH, "ends: occluder", "normal"],
         ["what it sweeps", "ray"],
         ["beyond its end", "ray", "ends: last hit"],
+    ]
+
+
+def test_a_miss_by_little_is_not_told_as_none() -> None:
+    assert [apart(distance) for distance in (0.001, 0.049, 0.05, 12.34)] == [
+        "< 0.1 px",
+        "< 0.1 px",
+        "0.1 px",
+        "12.3 px",
     ]

@@ -18,7 +18,7 @@ from planes.spans import Box, Spans
 from weapons.marks import MARKS
 from weapons.panel import INK, Text
 from weapons.signs import MINT, NEAR_MISS
-from weapons.words import NAME_MAX, short
+from weapons.words import NAME_MAX, apart, short
 from weapons.world import OUTLINES_MAX, World, enlarged, fill_runs
 
 __all__ = ["Overlay"]
@@ -135,7 +135,7 @@ class Overlay:
             x, y = np.rint(np.clip(ends.mean(axis=0), -FAR, max(self.image.shape) + FAR)).astype(np.int64).tolist()
             inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
             if inside and 0 < miss["distance"] <= NEAR_MISS:
-                self._label(f"{miss['distance']:.1f} px", (x - 4, y - 4, x + 5, y + 5), MINT, NEAR)
+                self._label(apart(miss["distance"]), (x - 4, y - 4, x + 5, y + 5), MINT, NEAR)
 
     def _label(
         self, text: str, box: Box, color: tuple[int, int, int], farthest: int, pixels: Ints | None = None

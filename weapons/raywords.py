@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from planes.constants import SUB, WEIGHT_FULL
-from weapons.words import SLANT, short
+from weapons.words import SLANT, apart, short
 
 __all__ = ["RAY_HEADER", "blocked", "ended", "missed", "table"]
 
@@ -62,7 +62,7 @@ def missed(shot: Mapping[str, Any]) -> tuple[str, str] | None:
     miss = shot["nearest_miss"]
     if miss is None or not miss["distance"]:
         return None
-    told = f"{miss['distance']:.1f} px"
+    told = apart(miss["distance"])
     if any(_short(ray, miss) for ray in shot["rays"]):
         return f"nearest {miss['name']}", f"ended {told} short of it"
     way = " and ".join(_sides(miss["ray_xy"], miss["object_xy"]))

@@ -8,7 +8,7 @@ from typing import Any
 from planes.constants import FRAGILE_PX
 from weapons.jsondiff import entries, shown
 
-__all__ = ["SLANT", "fragile", "percent", "reason", "short", "unquoted"]
+__all__ = ["SLANT", "apart", "fragile", "percent", "reason", "short", "unquoted"]
 
 REASONS = {
     "category": "not an accepted category",
@@ -20,6 +20,9 @@ REASONS = {
 
 SLANT = 1 + 2**0.5
 """Tangent of 67.5 degrees: a way is told as straight within 22.5 degrees, else as one of two sides."""
+
+LEAST_TOLD = 0.05
+"""Least distance that is not rounded to 0.0, px."""
 
 NAME_MAX = 24
 """Letters of a name on a label."""
@@ -36,6 +39,11 @@ def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
         names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
         return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
     return REASONS.get(str(told), shown(told))
+
+
+def apart(distance: float) -> str:
+    """A distance that is not 0, px: never told as if it were."""
+    return f"{distance:.1f} px" if distance >= LEAST_TOLD else "< 0.1 px"
 
 
 def fragile(entry: Mapping[str, Any], turned: str) -> str | None:
