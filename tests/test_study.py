@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from planes import Scene, Sprite
+from planes.arrays import InputError
 from weapons import study as study_module
 from weapons.cli import main
 from weapons.copies import copied, enlarged
-from weapons.decisions import Decisions, Method, errors_of
-from weapons.discs import areas_question, discs_at
+from weapons.decisions import Decisions, Method, Question, errors_of
+from weapons.discs import Discs, areas_question, discs_at
 from weapons.kinds import kind_of, kinds_scene
 from weapons.planestudy import plane_curves
 from weapons.shapetruth import Round, Straight, discs_on_shapes, placed_rings
@@ -100,10 +101,24 @@ def test_what_is_known_to_be_true_comes_out(quick: Path) -> None:
     assert kinds["long and thin"] < kinds["concave"] and set(kinds) == set(study["kinds"])
 
 
-def test_decisions_depend_on_the_seed_alone(tmp_path: Path) -> None:
+def studied(scene: Scene, seed: int, shots: int = 20) -> dict:
+    effort = Effort(shots=shots, runs=1, seconds=0, objects=2)
+    return run_study(scene, seed, effort, lambda *_: None, lambda _: None)
+
+
+@pytest.fixture
+def planes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Studies of pixel planes, and nothing else."""
+
+    def questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
+        return [areas_question(discs, plane_curves(discs)[:2])]
+
+    monkeypatch.setattr(study_module, "_questions", questions)
+
+
+def test_decisions_depend_on_the_seed_alone() -> None:
     def decided(seed: int) -> list:
-        effort = Effort(shots=20, runs=1, seconds=0, objects=2)
-        study = run_study(kinds_scene(), tmp_path, seed, effort, lambda *_: None)
+        study = studied(kinds_scene(), seed)
         points = [point for question in study["questions"] for curve in question["curves"] for point in curve["points"]]
         return [{name: value for name, value in point.items() if name not in TIMES} for point in points]
 
@@ -314,6 +329,61 @@ def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path, monkeypatch
     assert not (folder / "rays.png").exists() and len((folder / "study.csv").read_text().splitlines()) == 7
 
 
+def test_an_interrupt_before_anything_is_measured_leaves_the_last_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    for name in FILES:
+        (tmp_path / name).write_text("of before")
+    monkeypatch.setattr(study_module, "measured", interrupted)
+    assert main(["study", "-o", str(tmp_path), "--quick"]) == 130
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"of before"}
+
+
+@pytest.mark.parametrize(
+    ("sprite", "pose", "beyond"),
+    [
+        (Sprite.box(2000, 2000), {"scale": 1 / 256}, {0.125, 0.25, 0.5}),
+        (Sprite.circle(0.1), {"scale": 256}, {2, 4}),
+        (np.ones((2, 3), bool), {"position_xy": (2.0**40 - 64, 0)}, {2, 4}),
+    ],
+    ids=["small", "large", "far"],
+)
+def test_a_setting_beyond_a_limit_is_left_out_with_a_word(
+    planes_alone: None, sprite: object, pose: dict, beyond: set
+) -> None:
+    scene = Scene()
+    scene.add(sprite, **{"position_xy": (0, 0), **pose})
+    study = studied(scene, 1, shots=4)
+    (planes,) = (one for one in study["questions"][0]["curves"] if one["name"] == "pixel planes")
+    assert study["complete"] and {p["setting"] for p in planes["points"]} == {1 / 8, 1 / 4, 1 / 2, 1, 2, 4} - beyond
+    assert all(f"scale {scale:g} is left out: " in planes["note"] for scale in beyond) and "expected" in planes["note"]
+    assert "is left out: " in markdown(study, 0.1)
+
+
+def test_a_method_that_meets_a_limit_at_every_setting_is_left_out(
+    planes_alone: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(method: Method, runs: int, seconds: float) -> tuple:
+        if method.setting != "box":
+            raise InputError("scale: expected less, got more")
+        return measured(method, 1, 0)
+
+    monkeypatch.setattr(study_module, "measured", refused)
+    planes, filters = studied(kinds_scene(), 1, shots=2)["questions"][0]["curves"]
+    assert not planes["points"] and planes["left_out"].startswith("scale 0.125 is left out: scale: expected less")
+    assert [p["setting"] for p in filters["points"]] == ["box"] and not filters["left_out"]
+    assert "; pre-filter polygon is left out: scale: expected" in filters["note"]
+
+
+def test_kinds_that_no_shot_is_near_are_told_nothing_of(planes_alone: None) -> None:
+    study = studied(kinds_scene(), 1, shots=1)
+    by_kind = study["questions"][0]["curves"][0]["points"][0]["wrong_per_shot_by_kind"]
+    assert len(study["kinds"]) == 2 and len(by_kind) == 1
+
+
 def test_without_matplotlib_the_diagrams_are_left_out_with_a_word(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
@@ -328,6 +398,9 @@ def test_a_scene_without_targets_is_studied(tmp_path: Path) -> None:
     assert main(["study", str(ROOT / "fixtures" / "empty"), "-o", str(tmp_path / "study"), "--quick"]) == 0
     study = study_in(tmp_path / "study")
     assert study["complete"] and study["scene"]["objects"] == 0
+    assert {line.split(": ")[1] for line in verdict(study, 0.1)} == {
+        "no shot hits anything in truth, so it tells nothing"
+    }
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,16 @@
-"""Error against run time on a scene of the user's own: every method asked, measured, and written as it goes."""
+"""Error against run time on a scene of the user's own: every method asked, measured, and kept as it goes."""
 
 from __future__ import annotations
 
-import json
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from planes.arrays import Ints
-from planes.image import write_text
+from planes.arrays import InputError, Ints
 from planes.scene import Scene
 from weapons.areapeers import area_peer_curves
 from weapons.arsenal import Disc
@@ -32,13 +29,15 @@ from weapons.volumestudy import volume_curves
 __all__ = ["FORMAT", "Effort", "run_study"]
 
 FORMAT = "hitplanes-study/1"
-FILE_NAME = "study.json"
 
 SPREAD_PART = 5
 """Blasts of thousands of pellets take long: so many times fewer of them than other shots."""
 
 Show = Callable[[str, int, int], None]
 """Told what is measured next, how many points are done, and of how many."""
+
+Keep = Callable[[dict[str, Any]], None]
+"""Given the study as JSON, as far as it is."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +55,22 @@ class Effort:
         return cls(shots=300, runs=3, seconds=0.0, objects=40)
 
 
-def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show) -> dict[str, Any]:
-    """Measure all methods on the objects of a scene that can be hit, and write study.json after each curve.
+def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -> dict[str, Any]:
+    """Measure all methods on the objects of a scene that can be hit.
 
     Parameters
     ----------
-    folder : that is there; study.json in it is written anew
     seed : of the shots; the same seed gives the same decisions, and other times
     show : told how far it is
+    keep : given the study after each point, and when it is whole
 
     Returns
     -------
-    the study as JSON; `complete` is false in what an interrupt leaves in the file
+    the study as JSON; `complete` is false in what was kept before its end
     """
     ids = scene.ids("hittable")
     ids = ids[scene.items.size_wh[ids, 0] > 0]
-    some = (
-        ids[np.unique(np.linspace(0, len(ids) - 1, min(len(ids), effort.objects)).astype(np.int64))]
-        if len(ids)
-        else ids
-    )
+    some = _spread_over(ids, effort.objects)
     alone = copied(scene, some)
     discs = discs_at(alone, effort.shots, seed)
     questions = _questions(alone, discs, effort.shots, seed)
@@ -90,21 +85,46 @@ def run_study(scene: Scene, folder: Path, seed: int, effort: Effort, show: Show)
         "plan": {"shots": effort.shots, **_plan(scene, discs)},
         "questions": [_told(question) for question in questions],
     }
+    _measure(study, questions, kinds, effort, show, keep)
+    study["complete"] = True
+    keep(study)
+    return study
+
+
+def _spread_over(ids: Ints, most: int) -> Ints:
+    """At most so many of some ids, evenly from the first to the last."""
+    return ids[np.linspace(0, len(ids) - 1, most).astype(np.int64)] if len(ids) > most else ids
+
+
+def _measure(
+    study: dict[str, Any], questions: Sequence[Question], kinds: Sequence[str], effort: Effort, show: Show, keep: Keep
+) -> None:
+    """Add the points of all curves to a study; a setting at which a method meets a limit is left out with a word."""
     points = sum(len(curve.methods) for question in questions for curve in question.curves)
     done = 0
     for question, told in zip(questions, study["questions"], strict=True):
         for curve in question.curves:
-            told["curves"].append(_curve(curve))
+            row = _curve(curve)
+            told["curves"].append(row)
             for method in curve.methods:
                 show(f"{question.name}: {curve.name}", done, points)
-                answer, cost = measured(method, effort.runs, effort.seconds)
-                errors = errors_of(method.read(answer), question.truth)
-                told["curves"][-1]["points"].append(_point(method, question, errors, cost, kinds))
                 done += 1
-            write_text(folder / FILE_NAME, json.dumps(study, indent=1) + "\n")
-    study["complete"] = True
-    write_text(folder / FILE_NAME, json.dumps(study, indent=1) + "\n")
-    return study
+                try:
+                    answer, cost = measured(method, effort.runs, effort.seconds)
+                except InputError as error:
+                    _leave_out(row, method, error)
+                else:
+                    errors = errors_of(method.read(answer), question.truth)
+                    row["points"].append(_point(method, question, errors, cost, kinds))
+                keep(study)
+            if not row["points"] and not row["left_out"]:
+                row["left_out"], row["note"] = row["note"], ""
+
+
+def _leave_out(row: dict[str, Any], method: Method, error: InputError) -> None:
+    """Tell in a curve's note at which setting a limit was met."""
+    setting = "" if method.setting is None else f"{row['setting']} {method.setting} is left out: "
+    row["note"] = "; ".join([*filter(None, [row["note"]]), f"{setting}{error}"])
 
 
 def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
@@ -160,12 +180,12 @@ def _point(method: Method, question: Question, errors: Errors, cost: Cost, kinds
 
 
 def _by_kind(wrong: Ints, aimed: Ints | None, kinds: Sequence[str]) -> dict[str, float]:
-    """Wrong decisions on objects of a kind, for each shot near one of them."""
+    """Wrong decisions on objects of a kind, for each shot near one of them; not of kinds that no shot is near."""
     if aimed is None or not len(aimed):
         return {}
     of, count = np.bincount(wrong, minlength=len(kinds)), np.bincount(aimed, minlength=len(kinds))
     rows = {kind: np.array([k == kind for k in kinds]) for kind in dict.fromkeys(kinds)}
-    return {kind: float(of[some].sum() / max(count[some].sum(), 1)) for kind, some in rows.items()}
+    return {kind: float(of[some].sum() / count[some].sum()) for kind, some in rows.items() if count[some].any()}
 
 
 def _versions() -> dict[str, str]:

@@ -39,18 +39,25 @@ def write_study(
         After what was measured was kept.
     """
     own_folder(folder, FILES)
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
+    kept: dict[str, Any] = {}
+
+    def keep(study: dict[str, Any]) -> None:
+        if not kept:  # from here on the folder is that of this study
+            for name in FILES:
+                (folder / name).unlink(missing_ok=True)
+        kept.update(study)
+        write_text(folder / FILES[0], json.dumps(study, indent=1) + "\n")
+
     try:
-        study = run_study(scene, folder, seed, effort, progress.step)
+        run_study(scene, seed, effort, progress.step, keep)
     except KeyboardInterrupt:
         progress.clear()
-        if not (folder / FILES[0]).exists():
+        if not kept:
             raise
-        _write_told(json.loads((folder / FILES[0]).read_text(encoding="utf-8")), folder, error)
+        _write_told(kept, folder, error)
         raise KeyboardInterrupt(f"what was measured is in {folder}") from None
     progress.clear()
-    return study, _write_told(study, folder, error)
+    return kept, _write_told(kept, folder, error)
 
 
 def _write_told(study: Mapping[str, Any], folder: Path, error: float) -> list[str]:

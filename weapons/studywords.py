@@ -98,6 +98,8 @@ def verdict(study: Json, error: float) -> list[str]:
 
 def _verdict(question: Json, error: float) -> str:
     found = places(question)
+    if not question["hits"]:
+        return "no shot hits anything in truth, so it tells nothing"
     what = "of the share" if question["error"] == "share" else "wrong decisions a shot"
     good = [place for place in found if place.error <= error]
     if not found:
