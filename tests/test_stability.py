@@ -349,13 +349,25 @@ def test_a_library_that_fails_is_left_out_of_a_cell(few: None, tmp_path: Path, m
     assert load_study(tmp_path / "out" / "stability.json").to_json() == study.to_json()
 
 
-def test_a_failure_of_ours_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def fails(*_: Any) -> Any:
-        raise OverflowError("too far")
+def test_a_failure_of_ours_is_told_and_no_success(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    circles = named("circles")
+
+    def fails(*columns: Any) -> Any:
+        if np.abs(columns[0]).max() > 1e100:
+            raise InputError("center: expected less, got more")
+        return circles.ours(*columns)
 
     with_predicates(monkeypatch, named("circles", ours=fails))
-    with pytest.raises(OverflowError):
-        run_stability(tmp_path / "out", quick=True, stream=io.StringIO())
+    assert main(["stability", "--quick", "-o", str(tmp_path)]) == 1
+    assert "hitplanes: 0 wrong of 240; it failed in 1 cells, first by InputError: center" in capsys.readouterr().out
+    study = load_study(tmp_path / "stability.json")
+    assert study.complete and [c.family for c in study.cells if OURS in c.failed] == ["huge"]
+    assert "| failed |" in (tmp_path / "stability.md").read_text()
+    with_predicates(monkeypatch, named("circles", ours=lambda *_: 1 / 0))
+    assert main(["stability", "--quick", "-o", str(tmp_path)]) == 1
+    assert "hitplanes: 0 wrong of 0; it failed in 7 cells" in capsys.readouterr().out
 
 
 # The picture

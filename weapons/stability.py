@@ -85,8 +85,7 @@ def _ask(study: Study, progress: Progress) -> None:
         cell = Cell(predicate.name, family, asked)
         study.cells.append(cell)
         for rows in _blocks(predicate, family, cell, study):
-            done_here = done + weight * rows // asked
-            progress.show(sum(c.methods[OURS].cases for c in study.cells if OURS in c.methods), done_here)
+            progress.show(sum(c.rows for c in study.cells), done + weight * rows // asked)
         done += weight
 
 
@@ -107,9 +106,7 @@ def _blocks(predicate: Predicate, family: str, cell: Cell, study: Study) -> Iter
             try:
                 with np.errstate(all="ignore"):
                     counts[name].add(true, method(*columns))
-            except Exception as error:
-                if name not in PEERS:
-                    raise
+            except Exception as error:  # of whatever kind: it gave no answer
                 failed[name] = f"{type(error).__name__}: {error}"
         methods = {name: method for name, method in methods.items() if name not in failed}
         cell.methods = {name: counts[name] for name in methods}  # all of a block, or nothing of it
@@ -155,7 +152,7 @@ def markdown(study: Study) -> str:
             told += [f"## {method} {study.versions.get(method, '')}".rstrip(), ""]
             told += _table(study, asked, families, functools.partial(_entry, method))
     told += ["## Rows asked", ""]
-    told += _table(study, predicates, families, lambda cell: f"{cell.methods[OURS].cases:,}" if cell.methods else "0")
+    told += _table(study, predicates, families, lambda cell: f"{cell.rows:,}")
     return "\n".join(told)
 
 
@@ -191,7 +188,8 @@ def summary(study: Study) -> list[str]:
     told = []
     for method in study.methods:
         total = study.total(method)
-        if not total.cases:
+        failed = [cell for cell in study.cells if method in cell.failed]
+        if not total.cases and not failed:
             continue
         line = f"{method}: {total.wrong:,} wrong of {total.cases:,}"
         if total.wrong:
@@ -200,7 +198,6 @@ def summary(study: Study) -> list[str]:
             count = worst.methods[method]
             family = FAMILIES[worst.family]
             line += f"; most in {worst.predicate}, {family}: {100 * count.wrong / count.cases:.1f} %"
-        failed = [cell for cell in study.cells if method in cell.failed]
         if failed:
             line += f"; it failed in {len(failed)} cells, first by {failed[0].failed[method]}"
         told.append(line)

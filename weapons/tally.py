@@ -54,9 +54,14 @@ class Cell:
     failed: dict[str, str] = field(default_factory=dict)
 
     @property
+    def rows(self) -> int:
+        """Rows that were asked, and answered by any method."""
+        return max((count.cases for count in self.methods.values()), default=0)
+
+    @property
     def complete(self) -> bool:
         """Whether all rows were asked."""
-        return OURS in self.methods and self.methods[OURS].cases == self.asked
+        return self.rows == self.asked
 
 
 @dataclass
@@ -81,6 +86,11 @@ class Study:
     def cell(self, predicate: str, family: str) -> Cell | None:
         """One cell, if it has been asked."""
         return next((c for c in self.cells if (c.predicate, c.family) == (predicate, family)), None)
+
+    @property
+    def right(self) -> bool:
+        """Whether all that hitplanes was asked it answered, and rightly."""
+        return not self.total(OURS).wrong and not any(OURS in cell.failed for cell in self.cells)
 
     def total(self, method: str) -> Count:
         """All decisions of a method."""
