@@ -15,6 +15,7 @@ import pytest
 from planes import Scene, Sprite
 from planes.arrays import InputError
 from weapons import study as study_module
+from weapons import volumestudy
 from weapons.cli import main
 from weapons.copies import copied, enlarged
 from weapons.decisions import Decisions, Method, Question, errors_of
@@ -149,6 +150,22 @@ def test_a_plane_at_full_scale_is_the_truth_where_masks_are() -> None:
         for method in curve.methods:
             found = errors_of(method.read(method.prepare()()), question.truth)
             assert found.missed == 0 or curve.name in ("circle about the pivot", "box, re-boxed"), curve.name
+
+
+def test_the_share_of_a_volume_is_that_of_the_pixels_of_a_disc_or_of_a_lattice_of_them() -> None:
+    for radius, every in ((3, 1), (17, 1), (23, 2), (48, 4)):
+        side = np.arange(-radius, radius + 1, 1)
+        x, y = (grid.ravel() for grid in np.meshgrid(side, side))
+        inside = (x * x + y * y <= radius * radius) & (x % every == 0) & (y % every == 0)
+        found = volumestudy._looked_at(float(radius)).tolist()
+        assert sorted(found) == sorted(np.stack([x, y], axis=1)[inside].tolist()) and found[0] == [0, 0]
+    scene = Scene()
+    scene.add(Sprite.circle(300.5), (0.3, 0.2))
+    discs = discs_at(scene, 20, 1)
+    (circle, *_), truth = volume_curves(discs), areas_question(discs, []).truth
+    found = circle.methods[0].read(circle.methods[0].prepare()())
+    share = errors_of(found, truth).share
+    assert len(found) and share is not None and share < 0.02
 
 
 def test_enlarged_masks_are_squares_of_pixels() -> None:

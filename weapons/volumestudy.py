@@ -31,6 +31,9 @@ TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
 POINTS_AT_ONCE = 1 << 16
 """Points that are compared with volumes at once."""
 
+FINEST = 12
+"""Pixels from the middle of a disc to its rim that are looked at for its share: of a larger one every second or so."""
+
 Make = Callable[[Scene], list[Volumes]]
 """The volume of each object of a scene, in the world: one row each."""
 
@@ -140,9 +143,8 @@ def _touched(volumes: Volumes, low: Floats, high: Floats, discs: Discs) -> tuple
 
 
 def _decided(discs: Discs, volumes: Volumes, shot: Ints, item: Ints) -> Decisions:
-    """Decisions of a volume; its share and its nearest place are those of the centres of the disc's pixels."""
-    x, y = Disc(discs.radius).spans(1 << TRIG_BITS, 0).pixels().T
-    off = np.stack([x, y], axis=1)[np.lexsort((x, y, x * x + y * y))].astype(np.float64)
+    """Decisions of a volume; its share and its nearest place are those of the centres of the disc's pixels, or some."""
+    off = _looked_at(discs.radius)
     share, xy = np.zeros(len(shot)), np.full((len(shot), 2), np.nan)
     step = max(1, POINTS_AT_ONCE // len(off))
     for first in range(0, len(shot), step):
@@ -155,3 +157,10 @@ def _decided(discs: Discs, volumes: Volumes, shot: Ints, item: Ints) -> Decision
         nearest = points[np.arange(len(on)), on.argmax(axis=1)]
         xy[some] = np.where((share[some] > 0)[:, None], nearest, np.nan)
     return Decisions(shot, item, xy, share)
+
+
+def _looked_at(radius: float) -> Floats:
+    """Centres (n, 2) of a disc's pixels, the nearest first: of a large disc those of a lattice, as others cost much."""
+    xy = Disc(radius).spans(1 << TRIG_BITS, 0).pixels()
+    x, y = xy[(xy % max(1, round(radius / FINEST)) == 0).all(axis=1)].T
+    return np.stack([x, y], axis=1)[np.lexsort((x, y, x * x + y * y))].astype(np.float64)
