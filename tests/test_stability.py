@@ -281,6 +281,45 @@ def test_an_interrupt_keeps_what_was_asked(
     assert "not complete" in (folder / "stability.md").read_text() and (folder / "stability.png").exists()
 
 
+def test_a_run_is_kept_cell_by_cell(few: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Whatever ends it; before the first cell is done the folder is that of the run before."""
+
+    class KilledError(Exception):
+        pass
+
+    def killed(columns: Any, after: int = 2) -> Any:
+        seen.append(columns)
+        if len(seen) > after:
+            raise KilledError
+        return true(columns)
+
+    seen: list[Any] = []
+    circles = named("circles")
+    true = circles.true
+    for name in FILES:
+        (tmp_path / name).write_text("of before")
+    monkeypatch.setattr(Predicate, "true", lambda self, columns: killed(columns))
+    with_predicates(monkeypatch, circles)
+    with pytest.raises(KilledError):
+        run_stability(tmp_path, quick=True, stream=io.StringIO())
+    assert [path.name for path in tmp_path.iterdir()] == [FILES[0]]
+    study = load_study(tmp_path / FILES[0])
+    assert [cell.rows for cell in study.cells] == [ROWS] * 2 and not study.complete
+
+
+def test_an_interrupt_before_the_first_answer_leaves_the_last_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    for name in FILES:
+        (tmp_path / name).write_text("of before")
+    with_predicates(monkeypatch, named("circles", ours=interrupted))
+    assert main(["stability", "--quick", "-o", str(tmp_path)]) == 130
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"of before"}
+
+
 def test_a_line_tells_how_far_it_is(few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(io.StringIO):
         def isatty(self) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from planes.arrays import Ints
 from planes.constants import TRIG_BITS
 from weapons.arsenal import Disc, Stencil
+from weapons.byfire import fired_method
 from weapons.copies import copied, enlarged, scaled, unscaled
 from weapons.decisions import Curve, Decisions, Method
 from weapons.discs import Discs
@@ -40,13 +41,8 @@ def plane_curves(discs: Discs) -> list[Curve]:
 
 def _at_full_scale(discs: Discs, word: str, **how: str) -> Method:
     """A run of `fire` with something before it."""
-    every = np.arange(len(discs.scene))
-
-    def prepare() -> Callable[[], Fired]:
-        alone, weapon = copied(discs.scene, every), Disc(discs.radius, pierce=True)
-        return lambda: [(fire(alone, weapon, discs.at, **how), every)]
-
-    return Method(word, prepare, partial(_decided, scale=1))
+    every, weapon = np.arange(len(discs.scene)), Disc(discs.radius, pierce=True)
+    return fired_method(word, discs.scene, weapon, lambda hits: _decided([(hits, every)], 1), at=discs.at, **how)
 
 
 def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:

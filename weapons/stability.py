@@ -60,9 +60,11 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     study = Study(seed, quick, _versions())
     progress = Progress(stream, "decisions")
     try:
-        _ask(study, progress)
+        _ask(study, progress, lambda: _keep(study, folder))
     except KeyboardInterrupt:
         progress.clear()
+        if not any(cell.rows for cell in study.cells):
+            raise  # what an earlier run left is left
         _write(study, folder)
         raise KeyboardInterrupt(f"what was asked so far is in {folder}; it is not complete") from None
     progress.clear()
@@ -75,7 +77,7 @@ def _versions() -> dict[str, str]:
     return {name: version(name) for name in names}
 
 
-def _ask(study: Study, progress: Progress) -> None:
+def _ask(study: Study, progress: Progress, keep: Callable[[], None]) -> None:
     plan = [(p, family) for p in PREDICATES for family in p.families]
     weights = [p.cost * (p.quick if study.quick else p.rows) for p, _ in plan]
     progress.begin(sum(weights), 0, 0)
@@ -87,6 +89,7 @@ def _ask(study: Study, progress: Progress) -> None:
         for rows in _blocks(predicate, family, cell, study):
             progress.show(sum(c.rows for c in study.cells), done + weight * rows // asked)
         done += weight
+        keep()
 
 
 def _blocks(predicate: Predicate, family: str, cell: Cell, study: Study) -> Iterator[int]:
@@ -124,13 +127,20 @@ def _methods(predicate: Predicate, study: Study) -> dict[str, Method]:
     return methods
 
 
-def _write(study: Study, folder: Path) -> None:
-    """Keep a run: the picture last, for it may be missing."""
+def _keep(study: Study, folder: Path) -> None:
+    """Keep the cells so far; from the first on the folder is that of this run."""
+    if len(study.cells) == 1:
+        with suppress(OSError):
+            for name in FILES[1:]:
+                (folder / name).unlink(missing_ok=True)
     write_text(folder / FILES[0], json.dumps(study.to_json(), indent=1) + "\n")
+
+
+def _write(study: Study, folder: Path) -> None:
+    """Keep a run, with its tables, and its picture where one can be drawn."""
+    _keep(study, folder)
     write_text(folder / FILES[1], markdown(study))
     if find_spec("matplotlib") is None:
-        with suppress(OSError):
-            (folder / FILES[2]).unlink(missing_ok=True)  # that of another run would not be of this one
         return
     from weapons.figures import save_figure
     from weapons.heatfigure import heat_figure
