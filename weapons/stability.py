@@ -26,6 +26,7 @@ from weapons.folders import own_folder
 from weapons.peers import PEERS, installed, of_peer
 from weapons.predicates import PREDICATES, Method, Predicate
 from weapons.progress import Progress
+from weapons.studywords import markdown_table
 from weapons.tally import NAIVE, OURS, Cell, Count, Study
 
 __all__ = ["FILES", "markdown", "run_stability", "summary"]
@@ -178,12 +179,14 @@ def _head(study: Study) -> list[str]:
     return [told, "", asked, "", *(f"- {line}" for line in summary(study))]
 
 
-def _table(study: Study, predicates: Sequence[str], families: Sequence[str], entry: Callable[[Cell], str]) -> list[str]:
-    lines = [f"| predicate | {' | '.join(FAMILIES[f] for f in families)} |", f"| --- |{' ---: |' * len(families)}"]
+def _table(
+    study: Study, predicates: Sequence[str], families: Sequence[str], entry: Callable[[Cell], str]
+) -> Iterator[str]:
+    rows = []
     for predicate in predicates:
         cells = [study.cell(predicate, family) for family in families]
-        lines.append(f"| {predicate} | {' | '.join('-' if cell is None else entry(cell) for cell in cells)} |")
-    return [*lines, ""]
+        rows.append([predicate, *("-" if cell is None else entry(cell) for cell in cells)])
+    return markdown_table(["predicate", *(FAMILIES[f] for f in families)], rows, numbers=True)
 
 
 def _entry(method: str, cell: Cell) -> str:

@@ -226,10 +226,10 @@ def _kinds(question: Json) -> Iterator[str]:
     yield from markdown_table(["", *kinds], rows)
 
 
-def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Lines of a Markdown table."""
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: bool = False) -> Iterator[str]:
+    """Lines of a Markdown table, and an empty one; `numbers` are set right, in all columns but the first."""
     yield f"| {' | '.join(head)} |"
-    yield "|" + " --- |" * len(head)
+    yield "| --- |" + (" ---: |" if numbers else " --- |") * (len(head) - 1)
     yield from (f"| {' | '.join(row)} |" for row in rows)
     yield ""
 
