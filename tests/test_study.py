@@ -235,6 +235,15 @@ def test_truth_of_circles() -> None:
     assert found.share[2] == pytest.approx(lens / (math.pi * a * a), rel=1e-3)
 
 
+def test_truth_of_circles_that_only_touch() -> None:
+    """Whole vectors of whole length: the nearest point is rounded, the answer is not."""
+    for x, y, length in ((3, 4, 5), (5, 12, 13), (8, 15, 17), (20, 21, 29), (7, 24, 25), (12, 35, 37)):
+        for times in range(2, 30):
+            at = np.array([[x * times, y * times], [x * times + 1 / 256, y * times]]) + 0.25
+            found = discs_on_shapes(at, float(times), [Round(np.array([0.25, 0.25]), float(times * (length - 1)))])
+            assert found.shot.tolist() == [0], (x, y, times)
+
+
 def test_placed_rings_turn_clockwise_on_the_screen() -> None:
     ((ring,)) = placed_rings([np.array([(1.0, 0.0)])], "none", (2.0, 1.0), 90.0, np.array([5.0, 5.0]))
     assert np.allclose(ring, [(5, 7)])

@@ -44,6 +44,10 @@ class Round:
         """Corners of the box around it."""
         return self.center_xy - self.radius, self.center_xy + self.radius
 
+    def meets(self, at: Reals, radius: float) -> bool:
+        """Whether a disc touches it: by both centres, as its nearest point is rounded."""
+        return bool(((at - self.center_xy) ** 2).sum() <= (self.radius + radius) ** 2)
+
     def nearest(self, at: Reals) -> Reals:
         """Its point that is nearest to another."""
         away = at - self.center_xy
@@ -74,6 +78,10 @@ class Straight:
     def edges(self) -> tuple[Reals, Reals]:
         """Begins and ends of all edges."""
         return np.concatenate(self.rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in self.rings])
+
+    def meets(self, at: Reals, radius: float) -> bool:
+        """Whether a disc touches it."""
+        return bool(((self.nearest(at) - at) ** 2).sum() <= radius * radius)
 
     def nearest(self, at: Reals) -> Reals:
         """Its point that is nearest to another: the point itself if it lies inside, or one of an edge."""
@@ -120,9 +128,8 @@ def discs_on_shapes(at: Reals, radius: float, shapes: Sequence[Round | Straight]
     for k, shape in enumerate(shapes):
         low, high = shape.box
         for shot in np.flatnonzero(((at >= low - radius) & (at <= high + radius)).all(axis=1)).tolist():
-            nearest = shape.nearest(at[shot])
-            if float(((nearest - at[shot]) ** 2).sum()) <= radius * radius:
-                found.append((shot, k, *nearest.tolist(), _share(at[shot], radius, shape)))
+            if shape.meets(at[shot], radius):
+                found.append((shot, k, *shape.nearest(at[shot]).tolist(), _share(at[shot], radius, shape)))
     table = np.array(sorted(found), np.float64).reshape(-1, 5)
     return Found(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4])
 
