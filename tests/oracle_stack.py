@@ -92,7 +92,7 @@ def at_pixel(
         x_min, y_min, x_max, y_max = bounds
         if not (x_min <= pixel[0] <= x_max and y_min <= pixel[1] <= y_max):
             return Walk(verdict="outside")
-    covering = [item for item in front_to_back(items) if pixel in item.pixels]
+    covering = front_to_back([item for item in items if pixel in item.pixels])
     return walk(covering, accept=accept, exclude=exclude, pierce=pierce)
 
 

@@ -1,6 +1,8 @@
 """Bounding volumes hold the pixel squares of turned, scaled and flipped masks, in exact arithmetic."""
 
-from collections.abc import Iterator
+import itertools
+import math
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -14,8 +16,8 @@ from planes.parts import Parts
 from planes.sprite import Sprite, Variant, form_of, frame_pivot, variant_of
 from planes.volumes import Aabbs, Circles, Polygons, Volumes
 
-Point = tuple[Fraction, Fraction]
-HALF = Fraction(1, 2)
+Number = int | Fraction
+Point = tuple[Number, Number]
 EVERY = [Kind("circle"), Kind("oriented box"), Kind("boxes", 1), Kind("boxes", 5), Kind("polygon")]
 
 POSES = [
@@ -48,14 +50,15 @@ def outside(piece: list[Point], a: Point, b: Point) -> tuple[list[Point], list[P
         if s <= 0:
             outer.append(p)
         if s * t < 0:
-            cut = (p[0] + (q[0] - p[0]) * s / (s - t), p[1] + (q[1] - p[1]) * s / (s - t))
+            part = Fraction(s, s - t)
+            cut = (p[0] + (q[0] - p[0]) * part, p[1] + (q[1] - p[1]) * part)
             inner.append(cut)
             outer.append(cut)
     return inner, outer
 
 
-def area(piece: list[Point]) -> Fraction:
-    return sum((p[0] * q[1] - p[1] * q[0] for p, q in zip(piece, piece[1:] + piece[:1], strict=True)), Fraction(0))
+def area(piece: list[Point]) -> Number:
+    return sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(piece, piece[1:] + piece[:1], strict=True))
 
 
 def covered(square: list[Point], rings: list[list[Point]]) -> bool:
@@ -75,29 +78,41 @@ def covered(square: list[Point], rings: list[list[Point]]) -> bool:
     return not left
 
 
-def squares(mask: Bools) -> Iterator[list[Point]]:
-    """Pixel squares that have a neighbour missing: a convex part, or a union with none of them open, holds the rest."""
+def squares(mask: Bools, one: int) -> Iterator[list[Point]]:
+    """Pixel squares that have a neighbour missing: a convex part, or a union with none of them open, holds the rest.
+
+    In units of which an even number make a pixel.
+    """
     around = np.pad(mask, 1)
     inner = around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
     for y, x in np.argwhere(mask & ~inner).tolist():
-        low, high = (x - HALF, y - HALF), (x + HALF, y + HALF)
+        low, high = (x * one - one // 2, y * one - one // 2), (x * one + one // 2, y * one + one // 2)
         yield [low, (high[0], low[1]), high, (low[0], high[1])]
 
 
-def rings_of(volume: Volumes) -> list[list[Point]]:
+def whole(values: Sequence[float]) -> tuple[list[int], int]:
+    """Floats as whole numbers of a unit so small that all are exact, and how many of it make a pixel."""
+    one = math.lcm(2, *(v.as_integer_ratio()[1] for v in values))
+    return [int(Fraction(v) * one) for v in values], one
+
+
+def rings_of(volume: Volumes) -> tuple[list[list[Point]], int]:
+    """Convex rings in whole units, and the units of a pixel."""
     core = volume.parts.core() if isinstance(volume, Parts) else volume.core()
-    parts = np.split(core.points, core.starts[1:])
-    return [[(Fraction(x), Fraction(y)) for x, y in part.tolist()] for part in parts]
+    flat, one = whole(core.points.ravel().tolist())
+    points = list(zip(flat[::2], flat[1::2], strict=True))
+    starts = [*core.starts.tolist(), len(points)]
+    return [points[first:last] for first, last in itertools.pairwise(starts)], one
 
 
 def holds(volume: Volumes, mask: Bools) -> bool:
     """Whether the one row of a volume contains the pixel squares of a mask."""
     assert len(volume) == 1
     if isinstance(volume, Circles):
-        (x, y), r = map(Fraction, volume.center[0].tolist()), Fraction(volume.radius[0])
-        return all((p - x) ** 2 + (q - y) ** 2 <= r * r for square in squares(mask) for p, q in square)
-    rings = rings_of(volume)
-    return all(covered(square, rings) for square in squares(mask))
+        (x, y, r), one = whole([*volume.center[0].tolist(), float(volume.radius[0])])
+        return all((p - x) ** 2 + (q - y) ** 2 <= r * r for square in squares(mask, one) for p, q in square)
+    rings, one = rings_of(volume)
+    return all(covered(square, rings) for square in squares(mask, one))
 
 
 def variant(sprite: Sprite, pose: tuple[str, tuple[float, float], float], frame: int = 0) -> Variant:
@@ -231,8 +246,9 @@ def test_rows_are_those_of_one_at_a_time() -> None:
 
 def test_kinds() -> None:
     mask = np.ones((9, 40), np.bool_) & (np.hypot(*np.meshgrid(np.arange(40) / 2, np.arange(9))) < 12)
-    assert len(rings_of(fitted(Kind("polygon"), mask))[0]) <= CORNERS
-    assert len(rings_of(fitted(Kind("boxes", 6), mask))) == 6
+    (ring,), _ = rings_of(fitted(Kind("polygon"), mask))
+    assert len(ring) <= CORNERS
+    assert len(rings_of(fitted(Kind("boxes", 6), mask))[0]) == 6
     assert {kind.name for kind in EVERY} == set(KINDS)
 
 
@@ -340,9 +356,9 @@ def test_circles_far_away_hold_what_they_hold_here(position: float) -> None:
             continue
         circle = scene.volumes([item], "circle")
         assert isinstance(circle, Circles)
-        (cx, cy), r = map(Fraction, circle.center[0].tolist()), Fraction(circle.radius[0])
-        corners = (p for square in squares(seen) for p in square)
-        assert all((p + x - cx) ** 2 + (q + y - cy) ** 2 <= r * r for p, q in corners)
+        (cx, cy, r), one = whole([*circle.center[0].tolist(), float(circle.radius[0])])
+        corners = (p for square in squares(seen, one) for p in square)
+        assert all((p + x * one - cx) ** 2 + (q + y * one - cy) ** 2 <= r * r for p, q in corners)
         assert circle.radius[0] < np.hypot(*seen.shape) + 1
 
 
