@@ -7,6 +7,7 @@ import io
 import itertools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,18 +27,34 @@ from weapons.shapetruth import Round, Straight, discs_on_shapes, placed_rings
 from weapons.study import Effort, run_study
 from weapons.studyfiles import FILES
 from weapons.studywords import bound, csv_of, front, markdown, places, setting_text, verdict
-from weapons.timing import measured
+from weapons.timing import Cost, measured
 from weapons.volumestudy import volume_curves
 
 ROOT = Path(__file__).parents[1]
 TIMES = ("us_per_shot", "runs", "setup_ms", "kept_bytes", "run_bytes")
 
 
+FEWER = Effort(shots=150, runs=1, seconds=0, objects=40)
+FEWEST = Effort(shots=20, runs=1, seconds=0, objects=2)
+
+
+@pytest.fixture(scope="module", params=[FEWER, pytest.param(Effort.quick(), marks=pytest.mark.long)], ids=["", "quick"])
+def effort(request: pytest.FixtureRequest) -> Effort:
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def quick(effort: Effort, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("quick") / "study"
-    assert main(["study", "-o", str(folder), "--quick", "--seed", "3"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Effort, "quick", classmethod(lambda cls: effort))
+        assert main(["study", "-o", str(folder), "--quick", "--seed", "3"]) == 0
     return folder
+
+
+def run_once(method: Method, runs: int, seconds: float) -> tuple[object, Cost]:
+    """What a method decides, without the repetitions that measure it."""
+    return method.prepare()(), Cost(0.0, 1e-6, 1e-6, 1e-6, 1, 0, 1)
 
 
 def study_in(folder: Path) -> dict:
@@ -50,7 +67,7 @@ def points_of(study: dict, question: str, curve: str) -> list[dict]:
     return found["points"]
 
 
-def test_a_quick_study_writes_all_its_files(quick: Path) -> None:
+def test_a_quick_study_writes_all_its_files(quick: Path, effort: Effort) -> None:
     assert sorted(path.name for path in quick.iterdir()) == sorted(FILES)
     study = study_in(quick)
     assert study["format"] == "hitplanes-study/1" and study["complete"] and study["seed"] == 3
@@ -65,7 +82,7 @@ def test_a_quick_study_writes_all_its_files(quick: Path) -> None:
                 assert 0 < us["least"] <= us["median"] <= us["most"] and point["runs"] >= 1 and point["setup_ms"] >= 0
                 assert point["kept_bytes"] >= 0 and point["run_bytes"] > 0
                 assert point["wrong_per_shot"] == (point["missed"] + point["false"]) / question["shots"]
-    assert study["plan"]["shots"] == 300 and "walk" in [stage["stage"] for stage in study["plan"]["ran"]]
+    assert study["plan"]["shots"] == effort.shots and "walk" in [stage["stage"] for stage in study["plan"]["ran"]]
     assert {"stage": "occluders", "why": "the scene has none"} in study["plan"]["left_out"]
     rows = list(csv.DictReader(io.StringIO((quick / "study.csv").read_text())))
     assert len(rows) == sum(len(curve["points"]) for q in study["questions"] for curve in q["curves"])
@@ -103,8 +120,7 @@ def test_what_is_known_to_be_true_comes_out(quick: Path) -> None:
 
 
 def studied(scene: Scene, seed: int, shots: int = 20) -> dict:
-    effort = Effort(shots=shots, runs=1, seconds=0, objects=2)
-    return run_study(scene, seed, effort, lambda *_: None, lambda _: None)
+    return run_study(scene, seed, replace(FEWEST, shots=shots), lambda *_: None, lambda _: None)
 
 
 @pytest.fixture
@@ -117,7 +133,9 @@ def planes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study_module, "_questions", questions)
 
 
-def test_decisions_depend_on_the_seed_alone() -> None:
+def test_decisions_depend_on_the_seed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_module, "measured", run_once)
+
     def decided(seed: int) -> list:
         study = studied(kinds_scene(), seed)
         points = [point for question in study["questions"] for curve in question["curves"] for point in curve["points"]]
@@ -414,13 +432,16 @@ def test_without_matplotlib_the_diagrams_are_left_out_with_a_word(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     monkeypatch.setattr("weapons.studyfiles.find_spec", lambda name: None)
-    monkeypatch.setattr(Effort, "quick", classmethod(lambda cls: cls(shots=20, runs=1, seconds=0, objects=2)))
+    monkeypatch.setattr(study_module, "measured", run_once)
+    monkeypatch.setattr(Effort, "quick", classmethod(lambda cls: FEWEST))
     assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 0
     assert "matplotlib is not installed" in capsys.readouterr().out
     assert sorted(path.suffix for path in (tmp_path / "study").iterdir()) == [".csv", ".json", ".md"]
 
 
-def test_a_scene_without_targets_is_studied(tmp_path: Path) -> None:
+@pytest.mark.parametrize("effort", [FEWEST, pytest.param(Effort.quick(), marks=pytest.mark.long)], ids=["", "quick"])
+def test_a_scene_without_targets_is_studied(effort: Effort, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Effort, "quick", classmethod(lambda cls: effort))
     assert main(["study", str(ROOT / "fixtures" / "empty"), "-o", str(tmp_path / "study"), "--quick"]) == 0
     study = study_in(tmp_path / "study")
     assert study["complete"] and study["scene"]["objects"] == 0
