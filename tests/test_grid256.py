@@ -193,9 +193,19 @@ near_halves = st.builds(
 )
 
 
-@settings(max_examples=1500, deadline=None)
-@given(near_halves, st.sampled_from([0.0, 90.0, 180.0, -360.0, 720.0]))
+turns = st.sampled_from([0.0, 90.0, 180.0, -360.0, 720.0])
+
+
+@MANY
+@given(near_halves, turns)
 def test_unit_is_correctly_rounded_next_to_ties(degrees: float, more: float) -> None:
+    assert unit(degrees + more) == oracle.unit(degrees + more)
+
+
+@pytest.mark.long
+@settings(max_examples=5000, deadline=None)
+@given(near_halves, turns)
+def test_unit_is_correctly_rounded_next_to_many_ties(degrees: float, more: float) -> None:
     assert unit(degrees + more) == oracle.unit(degrees + more)
 
 
