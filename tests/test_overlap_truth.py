@@ -30,10 +30,16 @@ CLOSED = [
 ]  # fmt: skip
 MANY = [("obb", "obb"), ("polygon", "polygon"), ("obb", "polygon")]
 REST = [pair for pair in ALL_PAIRS if pair[:2] not in MANY and pair not in CLOSED]
-COUNT = 1200
+COUNT = 600
 FINITE = [name for name in adversarial.FAMILIES if name != "greatest"]
 
 Shape = tuple[Any, ...]
+
+
+@pytest.fixture(params=[COUNT, pytest.param(2 * COUNT, marks=pytest.mark.long)])
+def count(request: pytest.FixtureRequest) -> int:
+    """Cases of what is asked in no other long test."""
+    return request.param
 
 
 def starts_of(rows: list[Any]) -> list[int]:
@@ -143,8 +149,8 @@ def test_truth_by_arrays_is_the_slow_truth_and_its_pairs_are_hard(kind_a: str, k
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_points_of_volumes(kind: str) -> None:
-    cases = list(adversarial.cases("point", kind, COUNT, 13))
+def test_points_of_volumes(kind: str, count: int) -> None:
+    cases = list(adversarial.cases("point", kind, count, 13))
     points, volumes = [case[1] for case in cases], made(kind, [case[2] for case in cases])
     truth = [exact.contains_point(kind, shape, point) for _, point, shape in cases]
     assert contains_point(volumes, points).tolist() == truth
@@ -152,9 +158,9 @@ def test_points_of_volumes(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_bounds_hold(kind: str) -> None:
+def test_bounds_hold(kind: str, count: int) -> None:
     """Also where they reach beyond the floats."""
-    shapes = [case[1] for case in adversarial.cases(kind, "circle", COUNT, 14)]
+    shapes = [case[1] for case in adversarial.cases(kind, "circle", count, 14)]
     if kind in ("circle", "capsule"):
         far = (1.7e308, -1e308)
         shapes += [(*[far] * (len(shapes[0]) - 1), radius) for radius in (0.0, 1e290, 9e306, 9e307, 1.7e308)]
@@ -166,9 +172,9 @@ def test_bounds_hold(kind: str) -> None:
 
 
 @pytest.mark.parametrize(("kind_a", "kind_b"), HULL_PAIRS)
-def test_a_separating_axis_separates(kind_a: str, kind_b: str) -> None:
+def test_a_separating_axis_separates(kind_a: str, kind_b: str, count: int) -> None:
     """A line for exactly the rows that are apart: all of one hull on it or on one side, the other strictly beyond."""
-    cases = list(adversarial.cases(kind_a, kind_b, COUNT, 15))
+    cases = list(adversarial.cases(kind_a, kind_b, count, 15))
     line = separating_axis(made(kind_a, [case[1] for case in cases]), made(kind_b, [case[2] for case in cases]))
     for (family, a, b), (x0, y0, x1, y1) in zip(cases, line.tolist(), strict=True):
         if exact.meets(kind_a, a, kind_b, b):
@@ -187,14 +193,14 @@ def test_a_separating_axis_separates(kind_a: str, kind_b: str) -> None:
 # Sets of parts
 
 
-def test_box_sets() -> None:
+def test_box_sets(count: int) -> None:
     """Three boxes of three cases, of which each nearly touches its own circle, capsule or box."""
     for kind in ("circle", "capsule", "aabb", "polygon"):
-        cases = list(adversarial.cases("aabb", kind, COUNT, 16))
+        cases = list(adversarial.cases("aabb", kind, count, 16))
         lows, highs = ([case[1][k] for case in cases] for k in (0, 1))
-        sets = BoxSets(lows, highs, np.arange(0, COUNT, 3))
+        sets = BoxSets(lows, highs, np.arange(0, count, 3))
         for k in range(3):
-            others = [cases[i][2] for i in range(k, COUNT, 3)]
+            others = [cases[i][2] for i in range(k, count, 3)]
             truth = [any(exact.meets("aabb", cases[3 * i + j][1], kind, row) for j in range(3))
                      for i, row in enumerate(others)]  # fmt: skip
             assert overlap(sets, made(kind, others)).tolist() == truth
@@ -221,16 +227,16 @@ def meets_ring(ring: Shape, kind: str, other: Shape) -> bool:
 
 
 @pytest.mark.parametrize("kind", ["point", "circle", "capsule", "aabb", "polygon"])
-def test_concave_polygons(kind: str) -> None:
+def test_concave_polygons(kind: str, count: int) -> None:
     """Convex ones with a dent: to a point of the other volume, or to about their middle."""
     rows = []
-    for _, ring, other in adversarial.cases("polygon", kind, COUNT, 17, families=FINITE):
+    for _, ring, other in adversarial.cases("polygon", kind, count, 17, families=FINITE):
         first, *_ = exact.core(kind, other)[0]
         for place in (tuple(first), tuple(np.mean(ring, axis=0).tolist())):
             exact_ring, exact_place = exact.units(ring, place)
             if dented(exact_ring, exact_place) is not None:
                 rows.append(((ring[0], place, *ring[1:]), other))
-    assert len(rows) > COUNT / 4
+    assert len(rows) > count / 4
     sets = ConcavePolygons.from_concave([p for ring, _ in rows for p in ring], starts_of([ring for ring, _ in rows]))
     truth = [meets_ring(ring, kind, other) for ring, other in rows]
     assert 0.1 < np.mean(truth) < 0.95
