@@ -30,7 +30,7 @@ Row = tuple[int, int, int, int, int, int, int, Pixel, int]
 ONE = 2**30
 FAR = 10**9
 SCENES_IN_PART = 100
-PARTS, LONG_PARTS = 10, 90
+PARTS, LONG_PARTS = 5, 95
 PREFILTERS = ("box", "circle", "oriented box", "1 boxes", "3 boxes", "polygon", "swept")
 
 

@@ -239,7 +239,7 @@ QUIET: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck
 def test_a_changing_scene() -> None:
     """Fails at once, with the steps as they came; the long run takes minutes to make them few."""
     phases = [Phase.explicit, Phase.reuse, Phase.generate]
-    few = settings(max_examples=100, stateful_step_count=25, phases=phases, **QUIET)
+    few = settings(max_examples=50, stateful_step_count=25, phases=phases, **QUIET)
     run_state_machine_as_test(ChangingScene, settings=few)
 
 
