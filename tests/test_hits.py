@@ -8,6 +8,7 @@ import math
 import tracemalloc
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -279,10 +280,14 @@ def check_why_not(battle: Battle, scene: Scene, hits: Hits) -> Counter[str]:
     return reasons
 
 
+@cache
+def checked_reasons(seed: int) -> Counter[str]:
+    return check_why_not(*fired(seed)) + check_why_not(*wide(seed))
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_why_not(seed: int) -> None:
-    check_why_not(*fired(seed))
-    check_why_not(*wide(seed))
+    checked_reasons(seed)
 
 
 def test_why_not_behind_what_was_pierced() -> None:
@@ -299,7 +304,7 @@ def test_why_not_behind_what_was_pierced() -> None:
 
 
 def test_every_reason_comes_up() -> None:
-    reasons = sum((check_why_not(*fired(seed)) + check_why_not(*wide(seed)) for seed in SEEDS), Counter())
+    reasons = sum(map(checked_reasons, SEEDS), Counter())
     assert set(reasons) == {"missed", "category", "excluded", "behind", "outside"}
     assert min(reasons.values()) >= 5, reasons
 
