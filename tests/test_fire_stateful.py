@@ -352,22 +352,24 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
     assert scene.items.atlas.live == 0 and scene.items.atlas.used <= 17
 
 
+@pytest.fixture(scope="module")
+def in_whole_parts() -> list[tuple[Volley, Scene, str, Hits]]:
+    """Volleys, what they are fired at, how, and what they hit."""
+    battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 3))]
+    ways = [(v, s, how) for v, s in battles for how in (("direct", "composed") if s.bounds else ("direct",))]
+    return [(volley, scene, how, volley.fired(scene, strategy=how)) for volley, scene, how in ways]
+
+
 @pytest.mark.parametrize("samples, pairs", [(1, 1), (7, 10), (40, 3), (2**18, 1), (3, 2**21)])
-def test_the_size_of_the_parts_changes_no_row(samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = {}
-    battles = [(seed, battle, battle.scene()) for seed in range(0, 240, 3) if (battle := some_battle(seed))]
-    for part in ("whole", "small"):
-        for seed, battle, scene in battles:
-            for strategy in ("direct", "composed") if scene.bounds else ("direct",):
-                hits = battle.volley.fired(scene, strategy=strategy)
-                if part == "whole":
-                    whole[seed, strategy] = hits
-                else:
-                    assert hits == whole[seed, strategy], f"{seed=} {strategy}"
-        monkeypatch.setattr(weapons.firing, "CHUNK_SAMPLES", samples)
-        monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", pairs)
-        monkeypatch.setattr(weapons.resolve, "CHUNK_SAMPLES", samples)
-    assert sum(map(len, whole.values())) > 100
+def test_the_size_of_the_parts_changes_no_row(
+    in_whole_parts: list[tuple[Volley, Scene, str, Hits]], samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(weapons.firing, "CHUNK_SAMPLES", samples)
+    monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(weapons.resolve, "CHUNK_SAMPLES", samples)
+    for number, (volley, scene, how, whole) in enumerate(in_whole_parts):
+        assert volley.fired(scene, strategy=how) == whole, f"{number=} {how}"
+    assert sum(len(whole) for *_, whole in in_whole_parts) > 100
 
 
 def removed_owner() -> Scene:
