@@ -671,7 +671,7 @@ def long_log(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
     folder = tmp_path_factory.mktemp("long")
     log, output = folder / "shots.jsonl", folder / "hits.jsonl"
     names = ["pistol", "blast", "shotgun", "blast"]
-    shots = ({"weapon": names[i % 4], "at": [i * 7 % 480, i * 3 % 270], "seed": i} for i in range(24_000))
+    shots = ({"weapon": names[i % 4], "at": [i * 7 % 480, i * 3 % 270], "seed": i} for i in range(16_000))
     log.write_bytes(b"".join(map(line_of, shots)))
     run(log, output)
     return log, output.read_bytes()
@@ -702,7 +702,7 @@ def test_a_run_cut_short_goes_on_to_the_same_bytes(
     assert done.stderr == f"hitplanes: {part} answers {answered} shots: going on after them\n" and answered > 100
     assert output.read_bytes() == whole
     hit = sum(b'"rows":[]' not in line for line in whole.splitlines()[1:])
-    assert done.stdout == f"24000 shots, {hit} hit something, in {output}\n"
+    assert done.stdout == f"16000 shots, {hit} hit something, in {output}\n"
     assert names_in(tmp_path) == ["hits.jsonl"]
 
 
