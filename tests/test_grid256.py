@@ -203,7 +203,7 @@ def test_unit_is_correctly_rounded_next_to_ties(degrees: float, more: float) -> 
 
 
 @pytest.mark.long
-@settings(max_examples=5000, deadline=None)
+@settings(max_examples=1500, deadline=None)
 @given(near_halves, turns)
 def test_unit_is_correctly_rounded_next_to_many_ties(degrees: float, more: float) -> None:
     assert unit(degrees + more) == oracle.unit(degrees + more)
