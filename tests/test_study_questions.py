@@ -102,6 +102,30 @@ def test_truth_of_movers_is_that_of_fractions(radius: int, moving: bool) -> None
     assert 5 < len(rows) < 40
 
 
+@pytest.mark.parametrize("radius", [0, 128, 181, 182, 256, 700])
+def test_truth_of_movers_about_large_objects_is_that_of_fractions(radius: int) -> None:
+    rng, scene = np.random.default_rng(radius), Scene()
+    for k in range(3):
+        mask = np.ones((9, 11), np.bool_)
+        mask[tuple(rng.integers(1, 8, (2, 4)))] = False
+        scene.add(mask, (9 * k - 9, 4 * k - 4), layer=k % 2, velocity_xy=[(0, 0), (4, -3), (0, 0)][k])
+    targets, (start, step) = targets_of(scene), segments_of(radius, 40, spread=14)
+    found = impacts(Flights(start, step, radius), targets, velocities_of(scene, targets))
+    slow = [
+        oracle_impacts(tuple(a), tuple(v), radius, things_of(scene))
+        for a, v in zip(start.tolist(), step.tolist(), strict=True)
+    ]
+    told = [(k, one[0][1].id, one[0][2]) for k, one in enumerate(slow) if one]
+    pixels = map(tuple, found.pixel_xy.tolist())
+    assert list(zip(found.flight.tolist(), found.object.tolist(), pixels, strict=True)) == told
+    at_rest = [bool(oracle_impacts(tuple(a), (0, 0), radius, _still(scene))) for a in start.tolist()]
+    assert touching(start, radius, targets).tolist() == at_rest and 5 < sum(at_rest) < 35
+
+
+def _still(scene: Scene) -> list[Thing]:
+    return [Thing(thing.id, thing.pixels, layer=thing.layer) for thing in things_of(scene)]
+
+
 def things_of(scene: Scene) -> list[Thing]:
     """Objects of a scene as the slow reference takes them."""
     things = []
@@ -487,7 +511,7 @@ def test_no_mover_begins_on_an_object() -> None:
 
 @pytest.mark.parametrize(
     ("side", "px"),
-    [(10, (40, 2, 80, 5)), (3, (12, 1, 24, 2)), (301, (1000, 50, 2408, 150)), (1101, (1000, 184, 8808, 512))],
+    [(10, (40, 2, 80, 5)), (3, (12, 1, 24, 2)), (301, (1000, 32, 2408, 64)), (1101, (1000, 32, 8808, 64))],
 )
 def test_lengths_are_those_of_the_median_object(side: int, px: tuple[int, ...]) -> None:
     scene = Scene()

@@ -21,6 +21,9 @@ __all__ = ["Discs", "areas_question", "discs_at"]
 REACH = 8
 """Objects of the median size are so many times as large as the radius of the disc."""
 
+RADIUS_MAX = 32
+"""Largest radius of a disc, px: it is 128 px where the scale is 4, and each shot has 51,000 samples."""
+
 
 @dataclass(frozen=True, eq=False)
 class Discs:
@@ -53,7 +56,7 @@ def discs_at(alone: Scene, shots: int, seed: int) -> Discs:
     """
     targets, count = targets_of(alone), len(alone)
     exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
-    radius = max(1, round(size_of(targets) / REACH))
+    radius = min(max(1, round(size_of(targets) / REACH)), RADIUS_MAX)
     place, _, near = drawn_places(targets, shots, seed, 2 * SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = place / SUB if exact.any() else pixel(place).astype(np.float64)
     items = np.array([item for item, _, _ in targets] or [0])

@@ -23,11 +23,14 @@ __all__ = ["movers_question"]
 
 SUBSTEPS = tuple(2**k for k in range(1, 7))
 
+RADIUS_MAX = 32
+"""Largest radius of a disc, px: it is placed up to 64 times a frame, with all its samples."""
+
 
 def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     """Ask what flying discs hit first, while objects move by their velocities.
 
-    A disc flies eight median sizes of the objects in a frame; its radius is a sixth of one, 1 px at least; whole px.
+    A disc flies eight median sizes of the objects in a frame; its radius is a sixth of one, 1 to 32; whole px.
     Each begins about an object, at most half of its flight away: see `drawn_places`. None begins on an object.
 
     Parameters
@@ -40,7 +43,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     alone = only_hittable(scene)
     targets = targets_of(alone)
     size = size_of(targets)
-    radius, speed = max(1, round(size / 6)), min(max(1, round(8 * size)), REACH_MAX)
+    radius, speed = min(max(1, round(size / 6)), RADIUS_MAX), min(max(1, round(8 * size)), REACH_MAX)
     start, angle, _ = drawn_places(
         targets, shots, seed, SUB * speed // 2, lambda xy: touching(xy, SUB * radius, targets)
     )

@@ -102,19 +102,27 @@ def touching(points_256: Ints, radius_256: int, targets: Sequence[Target]) -> Bo
     """Whether discs that rest on points (N, 2) touch any target."""
     resting = Flights(points_256, np.zeros_like(points_256), radius_256)
     inside = np.zeros(len(points_256), np.bool_)
-    inside[impacts(resting, targets, np.zeros((len(targets), 2), np.int64)).flight] = True
+    for number, near in _nearby(resting, targets, np.zeros((len(targets), 2), np.int64)):
+        inside[number] = np.isfinite(_times(near, radius_256)).any()
     return inside
 
 
 def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Iterator[tuple[int, _Near]]:
-    """For each flight the pixels in the box around its way, as each target sees it."""
-    box = _boxes(targets)
+    """For each flight the pixels in the box around its way, as each target sees it, that it could touch first.
+
+    Those are the pixels about its start, and farther on those at a rim: a disc that comes to a pixel with all eight
+    neighbours has come to one of them before.
+    """
+    box, rims = _boxes(targets), [_rim(target) for target in targets]
     reach = max(flights.radius_256, HALF)
     for number, (start, step) in enumerate(zip(flights.start_256, flights.step_256, strict=True)):
         relative = step - velocity_256.reshape(-1, 2)
         low, high = start + np.minimum(relative, 0) - reach, start + np.maximum(relative, 0) + reach
         near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
-        pixels = [_between(targets[rank], low[rank], high[rank]) for rank in near.tolist()]
+        pixels = [
+            np.concatenate([_between(targets[k], start - reach, start + reach), _within(rims[k], low[k], high[k])])
+            for k in near.tolist()
+        ]
         if any(map(len, pixels)):
             xy, rank = np.concatenate(pixels), np.repeat(near, [len(some) for some in pixels])
             yield number, _Near(PX * xy - start, relative[rank], xy, rank)
@@ -130,15 +138,27 @@ def _between(target: Target, low: Ints, high: Ints) -> Ints:
     """Pixels (K, 2) of a mask whose centres lie between two corners."""
     _, mask, corner = target
     x, y = np.maximum(-(-low // PX) - corner, 0)
-    x_end, y_end = high // PX - corner + 1
+    x_end, y_end = np.maximum(high // PX - corner + 1, 0)
     return np.asarray(np.argwhere(mask[y:y_end, x:x_end])[:, ::-1] + (x, y) + corner)
+
+
+def _rim(target: Target) -> Ints:
+    """Pixels (K, 2) of the world that lack one of their eight neighbours."""
+    _, mask, corner = target
+    h, w = mask.shape
+    wide = np.pad(mask, 1)
+    inner = np.all([wide[y : y + h, x : x + w] for y in range(3) for x in range(3)], axis=0)
+    return np.asarray(np.argwhere(mask & ~inner)[:, ::-1] + corner)
+
+
+def _within(xy: Ints, low: Ints, high: Ints) -> Ints:
+    """Pixels whose centres lie between two corners."""
+    return xy[((PX * xy >= low) & (PX * xy <= high)).all(axis=1)]
 
 
 def _first(near: _Near, radius: int) -> tuple[float, int] | None:
     """When the first pixel is touched, and its row; None if none is."""
-    about = _disc_times(near, radius)
-    if radius * radius < 2 * HALF * HALF:  # a larger disc has the centre of each square in which its own centre lies
-        about = np.minimum(about, _square_times(near))
+    about = _times(near, radius)
     if not np.isfinite(about).any():
         return None
     length = np.maximum(np.sqrt((near.step.astype(np.float64) ** 2).sum(axis=1)), 1)
@@ -151,6 +171,14 @@ def _first(near: _Near, radius: int) -> tuple[float, int] | None:
         key=lambda row: (*near.xy[row, ::-1].tolist(), int(near.rank[row])),
     )
     return float(least), row
+
+
+def _times(near: _Near, radius: int) -> Floats:
+    """When the disc comes to pixels, in floats; infinite, exactly, for those it does not come to."""
+    about = _disc_times(near, radius)
+    if radius * radius < 2 * HALF * HALF:  # a larger disc has the centre of each square in which its own centre lies
+        about = np.minimum(about, _square_times(near))
+    return about
 
 
 def _disc_times(near: _Near, radius: int) -> Floats:

@@ -19,14 +19,14 @@ __all__ = ["spread_question"]
 
 PELLETS = tuple(2**k for k in range(2, 13))
 
-RADIUS_MAX = 512
+RADIUS_MAX = 64
 """Largest radius of a blast, px: the truth looks at each of its pixels for each shot and object."""
 
 
 def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     """Ask how much of blasts lies on each object, whatever lies in front of it.
 
-    Blasts have a radius of half the median size of the objects, whole px, at most 512. Each has its centre in the box
+    Blasts have a radius of half the median size of the objects, whole px, at most 64. Each has its centre in the box
     of an object that is grown by the radius: see `drawn_places`.
 
     Parameters
