@@ -428,6 +428,24 @@ def test_kinds_that_no_shot_is_near_are_told_nothing_of(planes_alone: None) -> N
     assert len(study["kinds"]) == 2 and len(by_kind) == 1
 
 
+def test_a_second_interrupt_leaves_the_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("weapons.diagram.work_precision", interrupted)
+    monkeypatch.setattr("weapons.studyfiles.run_study", kept_of_another)
+    assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 130
+    assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["study.csv", "study.json", "study.md"]
+    assert ".png" not in (tmp_path / "study" / "study.md").read_text()
+
+
+def kept_of_another(*arguments: object) -> None:
+    """Stand for a study that was interrupted after its first curve."""
+    *_, keep = arguments
+    keep({**told_study(circle=[point(0.02, 1)]), "complete": False})
+    raise KeyboardInterrupt
+
+
 def test_without_matplotlib_the_diagrams_are_left_out_with_a_word(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:

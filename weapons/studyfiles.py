@@ -61,8 +61,10 @@ def write_study(
 
 
 def _write_told(study: Mapping[str, Any], folder: Path, error: float) -> list[str]:
-    """Write tables, and diagrams where they can be drawn."""
-    drawn = []
+    """Write tables, and diagrams where they can be drawn: last, for an interrupt or a full disk may come first."""
+    drawn: list[str] = []
+    write_text(folder / FILES[1], csv_of(study))
+    write_text(folder / FILES[2], markdown(study, error))
     if find_spec("matplotlib") is not None:
         from weapons.diagram import work_precision
         from weapons.figures import save_figure
@@ -71,6 +73,5 @@ def _write_told(study: Mapping[str, Any], folder: Path, error: float) -> list[st
             if places(question):
                 save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
                 drawn.append(question["name"])
-    write_text(folder / FILES[1], csv_of(study))
-    write_text(folder / FILES[2], markdown(study, error, drawn))
+                write_text(folder / FILES[2], markdown(study, error, drawn))
     return drawn
