@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from weapons.figures import FAINT, INK, looking_alike
+from weapons.figures import FAINT, INK, PAPER, looking_alike
 from weapons.studywords import Place, bound, front, places, setting_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import AbstractPathEffect
 
 __all__ = ["work_precision"]
 
@@ -91,7 +92,10 @@ def work_precision(question: Mapping[str, Any], title: str) -> Figure:
 def _draw_axes(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
     """Scales, labels with their units, and a grid."""
     plot.set(
-        xscale="log", yscale="log", xlabel="time a shot, microseconds (least of all runs)", ylabel=_asked(question)
+        xscale="log",
+        yscale="log",
+        xlabel="time a shot, microseconds (least of all runs); better is lower, and farther left",
+        ylabel=_asked(question),
     )
     plot.set_ylim(bottom=floor / 1.8)
     plot.grid(which="major", color="#dde2e7", linewidth=0.8)
@@ -119,7 +123,7 @@ def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, fl
     """A curve, with its settings beside the points; those that are words are not joined."""
     x, y = [place.us for place in own], [place.error or floor for place in own]
     joined = all(isinstance(place.setting, int | float) for place in own)
-    label = own[0].curve + (f" ({setting})" if setting and joined else "")
+    label = own[0].curve + (f" ({setting})" if joined and setting not in ("", own[0].curve) else "")
     plot.plot(
         x, y, linestyle="-" if joined else "", color=style.color, marker=style.mark, label=label,
         markersize=10 if style.mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4,
@@ -128,7 +132,14 @@ def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, fl
     for place, left, low in zip(own, x, y, strict=True):
         if joined and place.setting is not None:
             plot.annotate(setting_text(place.setting), (left, low), (5, 3), textcoords="offset points",
-                          fontsize=7.5, color=style.color)  # fmt: skip
+                          fontsize=7.5, color=style.color, path_effects=_halo(), zorder=4)  # fmt: skip
+
+
+def _halo() -> list[AbstractPathEffect]:
+    """Paper about letters, by which they are read on lines and marks."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2, foreground=PAPER)]
 
 
 def _write_words(plot: Axes, found: Sequence[Place], floor: float) -> None:
@@ -140,7 +151,8 @@ def _write_words(plot: Axes, found: Sequence[Place], floor: float) -> None:
     for x, y, word in [*words, (float("inf"), 0.0, "")]:
         if near and (x > near[0][0] * CLOSE or y != near[0][1]):
             told = ", ".join(dict.fromkeys(word for _, _, word in near))
-            plot.annotate(told, near[0][:2], (2, 8), textcoords="offset points", fontsize=7.5, rotation=90, color=INK)
+            plot.annotate(told, near[0][:2], (0, 8), textcoords="offset points", fontsize=7.5, rotation=90, color=INK,
+                          ha="center", va="bottom", path_effects=_halo(), zorder=4)  # fmt: skip
             near = []
         near.append((x, y, word))
 

@@ -50,11 +50,11 @@ def volume_curves(discs: Discs) -> list[Curve]:
         curve("box, re-boxed", "", {None: _reboxed}),
         curve("box, refitted", "", {None: _fit(fit.box)}),
         curve("oriented box", "", {None: _fit(fit.oriented_box)}),
-        curve("boxes", "boxes an object", {k: _fit(partial(fit.boxes, k=k)) for k in BOXES}),
+        curve("boxes", "for an object", {k: _fit(partial(fit.boxes, k=k)) for k in BOXES}),
         curve("convex polygon", "corners", {n: _fit(partial(fit.convex, n=n)) for n in CORNERS}),
         curve("hull", "", {None: _fit(fit.hull)}),
-        curve("polygon", "tolerance, px", {t: _fit(partial(_concave, tolerance=t)) for t in TOLERANCES}),
-        curve("triangles", "tolerance, px", {t: _fit(partial(_triangles, tolerance=t)) for t in TOLERANCES}),
+        curve("polygon", "px of tolerance", {t: _fit(partial(_concave, tolerance=t)) for t in TOLERANCES}),
+        curve("triangles", "px of tolerance", {t: _fit(partial(_triangles, tolerance=t)) for t in TOLERANCES}),
     ]
 
 
