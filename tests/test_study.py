@@ -21,12 +21,15 @@ from weapons.cli import main
 from weapons.copies import copied, enlarged
 from weapons.decisions import Decisions, Method, Question, errors_of
 from weapons.discs import Discs, areas_question, discs_at
+from weapons.folders import cleared
 from weapons.kinds import kind_of, kinds_scene
 from weapons.planestudy import plane_curves
 from weapons.shapetruth import Round, Straight, discs_on_shapes, placed_rings
+from weapons.stability import summary
 from weapons.study import Effort, run_study
 from weapons.studyfiles import FILES
 from weapons.studywords import bound, csv_of, front, markdown, places, setting_text, verdict
+from weapons.tally import load_study
 from weapons.timing import Cost, measured
 from weapons.volumestudy import volume_curves
 
@@ -492,11 +495,19 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path, capsys) -> Non
     assert main(["study", "-o", str(tmp_path / "no" / "such")]) == 2
 
 
+def test_what_cannot_be_removed_is_named(tmp_path: Path) -> None:
+    (tmp_path / "study.md").mkdir()
+    with pytest.raises(InputError, match=r"--output: cannot remove .*study\.md: "):
+        cleared(tmp_path, ["study.json", "study.md"])
+
+
 def test_the_chapter_is_what_its_studies_say(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "fixtures" / "study"))
     import chapter
 
     assert (ROOT / "fixtures" / "study" / "README.md").read_text(encoding="utf-8") == chapter.chapter()
+    told = "\n".join(summary(load_study(ROOT / "fixtures" / "study" / "stability" / "stability.json")))
+    assert f"```text\n{told}\n```" in (ROOT / "README.md").read_text(encoding="utf-8")
     for name in chapter.SCENES:
         folder = ROOT / "fixtures" / "study" / name
         study = study_in(folder)

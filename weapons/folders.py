@@ -7,7 +7,7 @@ from pathlib import Path
 
 from planes.arrays import InputError
 
-__all__ = ["empty_folder", "own_folder"]
+__all__ = ["cleared", "empty_folder", "own_folder"]
 
 
 def empty_folder(folder: Path) -> bool:
@@ -47,3 +47,18 @@ def own_folder(folder: Path, names: Sequence[str]) -> None:
     if held:
         told = f"got {folder} with {held[0]!r} in it"
         raise InputError(f"--output: expected a new folder, or that of an earlier run, {told}")
+
+
+def cleared(folder: Path, names: Sequence[str]) -> None:
+    """Remove files of these names, where there are any.
+
+    Raises
+    ------
+    InputError
+        If one cannot be removed.
+    """
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"--output: cannot remove {folder / name}: {error.strerror}") from error

@@ -10,7 +10,6 @@ import functools
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +21,7 @@ from planes.arrays import integer
 from planes.constants import SEED_MAX
 from planes.image import write_text
 from weapons.families import FAMILIES
-from weapons.folders import own_folder
+from weapons.folders import cleared, own_folder
 from weapons.peers import PEERS, installed, of_peer
 from weapons.predicates import PREDICATES, Method, Predicate
 from weapons.progress import Progress
@@ -131,9 +130,7 @@ def _methods(predicate: Predicate, study: Study) -> dict[str, Method]:
 def _keep(study: Study, folder: Path) -> None:
     """Keep the cells so far; from the first on the folder is that of this run."""
     if len(study.cells) == 1:
-        with suppress(OSError):
-            for name in FILES[1:]:
-                (folder / name).unlink(missing_ok=True)
+        cleared(folder, FILES[1:])
     write_text(folder / FILES[0], json.dumps(study.to_json(), indent=1) + "\n")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from planes.image import write_text
 from planes.scene import Scene
-from weapons.folders import own_folder
+from weapons.folders import cleared, own_folder
 from weapons.progress import Progress
 from weapons.study import Effort, run_study
 from weapons.studywords import csv_of, markdown, places
@@ -43,8 +43,7 @@ def write_study(
 
     def keep(study: dict[str, Any]) -> None:
         if not kept:  # from here on the folder is that of this study
-            for name in FILES:
-                (folder / name).unlink(missing_ok=True)
+            cleared(folder, FILES)
         kept.update(study)
         write_text(folder / FILES[0], json.dumps(study, indent=1) + "\n")
 

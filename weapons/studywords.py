@@ -40,18 +40,22 @@ COLUMNS = (
 
 
 class Place(NamedTuple):
-    """A point of a diagram: its curve, setting, error, microseconds a shot, and the point whole."""
+    """A point of a diagram: its curve, setting, error, microseconds a shot, the point whole, and the setting's unit."""
 
     curve: str
     setting: float | str | None
     error: float
     us: float
     point: Json
+    unit: str = ""
 
     @property
     def name(self) -> str:
-        """The method and its setting."""
-        return self.curve if self.setting is None else f"{self.curve} {setting_text(self.setting)}"
+        """The method, its setting, and the unit of it."""
+        if self.setting is None:
+            return self.curve
+        unit = f" ({self.unit})" if self.unit not in ("", self.curve) and not isinstance(self.setting, str) else ""
+        return f"{self.curve} {setting_text(self.setting)}{unit}"
 
 
 def setting_text(setting: float | str | None) -> str:
@@ -65,7 +69,7 @@ def places(question: Json) -> list[Place]:
     """All points of a question whose error is known."""
     key = "share_error" if question["error"] == "share" else "wrong_per_shot"
     return [
-        Place(curve["name"], point["setting"], point[key], point["us_per_shot"]["least"], point)
+        Place(curve["name"], point["setting"], point[key], point["us_per_shot"]["least"], point, curve["setting"])
         for curve in question["curves"]
         for point in curve["points"]
         if point[key] is not None
@@ -163,6 +167,8 @@ def _lines(study: Json, error: float, pictures: Sequence[str]) -> Iterator[str]:
     yield ""
     yield from (f"- {line}" for line in verdict(study, error))
     yield ""
+    yield "Pixels, supercover, swept, every pixel and pellets are what `fire` does; volumes are tested by `overlap`."
+    yield ""
     table = ranks(study, error)
     if table:
         yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:"
@@ -191,7 +197,10 @@ def _question(question: Json, picture: bool) -> Iterator[str]:
         yield ""
     head = ["method", "setting", "wrong a shot", "missed", "false", "error of share", "of place, px", "us a shot"]
     rows = [_row(curve, point, question) for curve in question["curves"] for point in curve["points"]]
-    yield from markdown_table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows)
+    yield from markdown_table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows, numbers=True)
+    yield "Of place: mean distance from where it truly hit. Us a shot: the least of all runs of a batch, then the"
+    yield "median and the most. Kept: what stays between runs; a run needs: the most at once."
+    yield ""
     for curve in question["curves"]:
         if curve["left_out"] or curve["note"]:
             yield f"- {curve['name']}: {'left out: ' + curve['left_out'] if curve['left_out'] else curve['note']}"
