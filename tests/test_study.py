@@ -347,6 +347,21 @@ def test_front_has_none_that_is_slower_and_as_wrong() -> None:
     assert bound(study["questions"][0]) == 0.01
 
 
+def test_a_diagram_has_a_floor_where_a_method_is_never_wrong() -> None:
+    pytest.importorskip("matplotlib")
+    from weapons.diagram import work_precision
+
+    def texts(error: float) -> list[str]:
+        (question,) = told_study(fast=[point(0.2, 1, 4)], other=[point(error, 3, 8)])["questions"]
+        (plot,) = work_precision(question, "a scene").axes
+        assert plot.get_xlabel().startswith("time a shot, microseconds") and plot.get_ylabel().startswith("wrong")
+        assert (plot.get_xscale(), plot.get_yscale()) == ("log", "log")
+        return [text.get_text() for text in plot.texts]
+
+    assert "none wrong in 300 shots: under 3/n = 0.01" in texts(0.0) and "3/n" in texts(0.02)
+    assert not any("none wrong" in text for text in texts(0.02)) and {"4", "8"} <= set(texts(0.02))
+
+
 def test_words_of_a_study() -> None:
     study = told_study(
         **{"circle": [point(0.02, 1)], "box, refitted": [point(0.2, 2)], "oriented box": [point(0.3, 1.5)]}

@@ -65,8 +65,8 @@ OTHERS = (
 def work_precision(question: Mapping[str, Any], title: str) -> Figure:
     """Draw a question of a study, given as JSON.
 
-    Points without an error lie on a floor of their own, with the bound that the number of shots allows; the Pareto
-    front goes through those than which none is both faster and less wrong.
+    Points without an error lie on a floor of their own, if there are any, with the bound that the number of shots
+    allows; the Pareto front goes through those than which none is both faster and less wrong.
     """
     from matplotlib.figure import Figure
 
@@ -82,14 +82,17 @@ def work_precision(question: Mapping[str, Any], title: str) -> Figure:
             if own:
                 _draw_curve(plot, own, curve["setting"], STYLES.get(curve["name"]) or next(others), floor)
         _write_words(plot, found, floor)
-        _draw_floor(plot, question, floor)
-        _draw_axes(plot, question, floor)
+        _draw_axes(plot, question)
+        if question["error"] == "wrong":
+            _draw_bound(plot, question)
+        if any(place.error == 0 for place in found):
+            _draw_floor(plot, question, floor)
         plot.set_title(f"{title}\n{question['asks']}", loc="left", weight="bold", size=11)
         figure.legend(loc="outside right upper", frameon=False, fontsize=9, title="method", alignment="left")
     return figure
 
 
-def _draw_axes(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
+def _draw_axes(plot: Axes, question: Mapping[str, Any]) -> None:
     """Scales, labels with their units, and a grid."""
     plot.set(
         xscale="log",
@@ -97,7 +100,6 @@ def _draw_axes(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
         xlabel="time a shot, microseconds (least of all runs); better is lower, and farther left",
         ylabel=_asked(question),
     )
-    plot.set_ylim(bottom=floor / 1.8)
     plot.grid(which="major", color="#dde2e7", linewidth=0.8)
     plot.set_axisbelow(True)
     plot.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -164,15 +166,20 @@ def _draw_front(plot: Axes, best: Sequence[Place], floor: float) -> None:
     plot.plot(x, y, color="#c3c9d0", linewidth=7, alpha=0.8, drawstyle="steps-post", label=told, zorder=1)
 
 
+def _draw_bound(plot: Axes, question: Mapping[str, Any]) -> None:
+    """What so many shots can tell at the least."""
+    least = bound(question)
+    plot.axhline(least, color=FAINT, linewidth=0.8, linestyle=(0, (6, 3)), zorder=0)
+    plot.annotate("3/n", (1.0, least), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                  va="center", fontsize=7.5, color=FAINT)  # fmt: skip
+
+
 def _draw_floor(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
     """The line of points without an error, and what it means."""
     plot.axhline(floor, color=FAINT, linewidth=1, linestyle=(0, (2, 3)), zorder=0)
+    plot.set_ylim(bottom=floor / 1.8)
     told = "no error"
     if question["error"] == "wrong":
-        least = bound(question)
-        told = f"none wrong in {question['shots']} shots: under 3/n = {least:.2g}"
-        plot.axhline(least, color=FAINT, linewidth=0.8, linestyle=(0, (6, 3)), zorder=0)
-        plot.annotate("3/n", (1.0, least), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
-                      va="center", fontsize=7.5, color=FAINT)  # fmt: skip
+        told = f"none wrong in {question['shots']} shots: under 3/n = {bound(question):.2g}"
     plot.annotate(told, (0.01, floor), (0, -11), xycoords=("axes fraction", "data"), textcoords="offset points",
                   fontsize=8, color=INK)  # fmt: skip
