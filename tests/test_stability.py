@@ -359,6 +359,13 @@ def test_without_matplotlib_there_is_no_picture(few: None, tmp_path: Path, capsy
     assert "without a picture: matplotlib is not installed" in capsys.readouterr().out
 
 
+def test_fewer_rows_than_were_asked_are_told() -> None:
+    methods = {OURS: Count(10, 0, 0), NAIVE: Count(4, 0, 0)}
+    told = markdown(Study(0, False, {OURS: "9.9"}, [Cell("circles", "near", 10, methods)]))
+    ours, naive_rows = (told.split(f"## {name}")[1] for name in (OURS, NAIVE))
+    assert "| circles | 0 |" in ours and "| circles | 0 of 4 |" in naive_rows
+
+
 def test_without_other_libraries_two_are_asked(few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stability, "installed", lambda peer: False)
     study = run_stability(tmp_path / "out", quick=True, stream=io.StringIO())

@@ -391,7 +391,8 @@ def stability(arguments: argparse.Namespace) -> int:
     """Count wrong decisions, and tell by the exit code whether any is of hitplanes."""
     from weapons.stability import FILES, run_stability, summary  # no other word needs all that can be decided
 
-    study = run_stability(arguments.output, arguments.seed, arguments.quick, sys.stderr)
+    seed = integer("--seed", arguments.seed, 0, SEED_MAX)
+    study = run_stability(arguments.output, seed, arguments.quick, sys.stderr)
     for line in summary(study):
         _say(line)
     told = "" if (arguments.output / FILES[-1]).exists() else ", without a picture: matplotlib is not installed"

@@ -190,7 +190,9 @@ def _entry(method: str, cell: Cell) -> str:
     count = cell.methods.get(method)
     if count is None:
         return "failed" if method in cell.failed else "-"
-    return f"{count.missed:,} + {count.false:,} of {count.cases:,}" if count.wrong else "0"
+    if count.wrong:
+        return f"{count.missed:,} + {count.false:,} of {count.cases:,}"
+    return "0" if count.cases == cell.asked else f"0 of {count.cases:,}"
 
 
 def summary(study: Study) -> list[str]:
