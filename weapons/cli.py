@@ -158,6 +158,15 @@ def parser() -> argparse.ArgumentParser:
         words, replay, "fire a record of shots again, and tell the first that differs", REPLAY_HELP, REPLAY_EXAMPLES
     )
     one.add_argument("record", type=Path, metavar="RECORD.jsonl", help="a file of weapons.ShotRecord")
+    _add_measurements(words)
+    one = _word(words, demo, "show a quadtree, a grid or a BVH in motion", DEMO_HELP, DEMO_EXAMPLES)
+    one.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
+    told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
+    one.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=told)
+    return top
+
+
+def _add_measurements(words: Any) -> None:
     one = _word(words, study, "measure error against run time of all tests", STUDY_HELP, STUDY_EXAMPLES)
     told = "folder with scene.json and its images (default: a shape of each kind)"
     one.add_argument("scene", type=Path, metavar="SCENE", nargs="?", help=told)
@@ -167,16 +176,11 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--error", type=float, default=0.01, metavar="E", help=told)
     one.add_argument("--quick", action="store_true", help="fewer shots and runs: under half a minute")
     one.add_argument("--seed", type=int, default=0, metavar="N", help="of the shots (default: 0)")
-    one = _word(words, demo, "show a quadtree, a grid or a BVH in motion", DEMO_HELP, DEMO_EXAMPLES)
-    one.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
-    told = "a name that ends in .gif, or a new folder for PNG files (default: demo.gif)"
-    one.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=told)
     one = _word(words, stability, "count wrong decisions on hard input", STABILITY_HELP, STABILITY_EXAMPLES)
     told = "a new folder, or that of an earlier run (default: stability)"
     one.add_argument("-o", "--output", type=Path, default=Path("stability"), metavar="FOLDER", help=told)
     one.add_argument("--quick", action="store_true", help="some hundred rows for each cell: seconds, not half an hour")
     one.add_argument("--seed", type=int, default=0, metavar="N", help="of the questions (default: 0)")
-    return top
 
 
 def _add_report(words: Any) -> None:

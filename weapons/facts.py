@@ -226,17 +226,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
         "verdicts": hits.verdict_counts(row),
         "rows": _rows(scene, hits, row, margins),
-        "why_not": [
-            {
-                **item_told(scene, entry.object),
-                "reason": entry.reason,
-                "samples": entry.samples,
-                "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
-                "distance": round(entry.distance, 3),
-                **margins.get(entry.object, {}),
-            }
-            for entry in hits.why_not(row)
-        ],
+        "why_not": _why_not(scene, hits, row, margins),
         "blockers": [
             {
                 **item_told(scene, entry.occluder),
@@ -251,6 +241,21 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "plan": hits.plan.to_dict(),
         **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
+
+
+def _why_not(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Objects near a shot that it did not hit, as JSON."""
+    return [
+        {
+            **item_told(scene, entry.object),
+            "reason": entry.reason,
+            "samples": entry.samples,
+            "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
+            "distance": round(entry.distance, 3),
+            **margins.get(entry.object, {}),
+        }
+        for entry in hits.why_not(shot)
+    ]
 
 
 def _margins(hits: Hits, shot: int) -> dict[int, dict[str, Any]]:
