@@ -203,7 +203,7 @@ def test_a_run_is_told_in_three_forms(
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == f"hitplanes: 0 wrong of {ROWS * 23:,}" and shown[1].startswith("naive float64: ")
     picture = cv2.imread(str(folder / "stability.png"))
-    assert picture.shape[1] == 1760 and 800 < picture.shape[0] < 2400 and picture.std() > 20
+    assert picture.shape[1] == 1760 and 600 < picture.shape[0] < 2400 and picture.std() > 20
     assert load_study(folder / "stability.json").to_json() == data
 
 
