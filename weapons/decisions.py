@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planes.arrays import Floats, Ints
+from weapons.columns import Columns
 
 __all__ = ["Curve", "Decisions", "Errors", "Method", "Question", "errors_of"]
 
 
 @dataclass(frozen=True, eq=False)
-class Decisions:
+class Decisions(Columns):
     """Pairs (shot, object) that are hit; a pair that is not there is not hit.
 
     Parameters
@@ -24,7 +25,6 @@ class Decisions:
     share : (K,) float: how much of the shot lies on the object, 0 to 1; NaN where the method tells nothing
     """
 
-    shot: Ints
     object: Ints
     xy: Floats
     share: Floats
@@ -39,14 +39,6 @@ class Decisions:
             np.full((n, 2), np.nan) if xy is None else xy,
             np.full(n, np.nan) if share is None else share,
         )
-
-    def __len__(self) -> int:
-        return len(self.shot)
-
-    @classmethod
-    def joined(cls, parts: Sequence[Decisions]) -> Decisions:
-        """All pairs of one or more."""
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("shot", "object", "xy", "share")))
 
 
 class Errors(NamedTuple):
