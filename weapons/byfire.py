@@ -18,17 +18,10 @@ __all__ = ["fired_method"]
 def fired_method(
     setting: float | str | None, scene: Scene, weapon: Weapon, read: Callable[[Any], Decisions], **arguments: Any
 ) -> Method:
-    """A batch in one call; `arguments` are those of `fire`.
-
-    To set up is to copy the scene and to fire the first shot alone: what is kept is made then.
-    """
+    """A batch in one call; `arguments` are those of `fire`. Set-up copies the scene; the first run makes the rest."""
 
     def prepare() -> Callable[[], Hits]:
         own = only_hittable(scene)
-        first: dict[str, Any] = {
-            name: one if isinstance(one, str | int) else one[:1] for name, one in arguments.items()
-        }
-        fire(own, weapon, **first)
         return lambda: fire(own, weapon, **arguments)
 
     return Method(setting, prepare, read)

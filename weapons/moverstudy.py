@@ -89,7 +89,6 @@ def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int
         ids = own.ids()
         moving = ids[own.items.velocity_256[ids].any(axis=1)]
         place, velocity = (getattr(own.items, name)[moving] / SUB for name in ("position_256", "velocity_256"))
-        fire(own, disc, start[:1])
 
         def run() -> list[Decisions]:
             live, found = np.arange(len(start)), []
