@@ -92,7 +92,8 @@ class Straight:
         if (crossing > at[0]).sum() % 2:
             return at
         along = end - begin
-        part = ((at - begin) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
+        square = (along**2).sum(axis=1)
+        part = ((at - begin) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
         foot = begin + along * np.clip(part, 0, 1)[:, None]
         nearest: Reals = foot[((foot - at) ** 2).sum(axis=1).argmin()]
         return nearest
