@@ -27,11 +27,11 @@ ORDER = {
         "panel", "overlay", "raymarks", "inset", "cards", "picture", "raychanges", "differences",
         "versus", "goldfile", "goldshow", "goldpage", "goldcheck", "goldstale", "golden", "shotlog",
         "part", "progress", "stream", "folders", "starter", "animation", "decisions", "timing",
-        "targets", "peerworlds", "byfire", "raytruth", "raypeers", "raystudy", "movertruth",
-        "moverstudy", "pixeltruth", "spreadstudy", "shapetruth", "copies", "discs", "planestudy",
-        "volumestudy", "areapeers", "kinds", "study", "studywords", "figures", "diagram", "studyfiles",
-        "demo", "truth", "families", "pointfamilies", "shotfamilies", "naive", "peers", "predicates",
-        "tally", "heatfigure", "stability", "helptexts", "cli", "__main__",
+        "targets", "peerworlds", "byfire", "pixeltruth", "raypeers", "raystudy", "moverstudy",
+        "spreadstudy", "shapetruth", "copies", "discs", "planestudy", "volumestudy", "areapeers",
+        "kinds", "study", "studywords", "figures", "diagram", "studyfiles", "demo", "truth", "families",
+        "pointfamilies", "shotfamilies", "naive", "peers", "predicates", "tally", "heatfigure",
+        "stability", "helptexts", "cli", "__main__",
     ),
 }  # fmt: skip
 """Each module imports only from those before it, here or in the package above."""

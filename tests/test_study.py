@@ -271,7 +271,7 @@ def test_placed_rings_turn_clockwise_on_the_screen() -> None:
 
 
 def test_truth_shares_no_code_with_what_it_judges() -> None:
-    for name in ("shapetruth", "pixeltruth", "raytruth", "movertruth"):
+    for name in ("shapetruth", "pixeltruth"):
         text = (ROOT / "weapons" / f"{name}.py").read_text()
         assert "from planes" not in text and "from weapons" not in text and "import planes" not in text
 

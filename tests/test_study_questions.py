@@ -16,12 +16,9 @@ from planes import InputError, Scene, Sprite, load_scene
 from weapons import Pistol, Projectile, fire
 from weapons.decisions import Curve, Decisions, Errors, Method, Question, errors_of
 from weapons.moverstudy import movers_question
-from weapons.movertruth import Flights, flown, impacts, touching
-from weapons.pixeltruth import parts_of_discs
+from weapons.pixeltruth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 from weapons.raypeers import Segments, peer_curves
 from weapons.raystudy import rays_question
-from weapons.raytruth import first_pixels
-from weapons.raytruth import touching as in_pixels
 from weapons.spreadstudy import spread_question
 from weapons.targets import ahead, drawn_places, only_hittable, size_of, targets_of, velocities_of
 
@@ -167,12 +164,12 @@ def test_truth_tells_who_starts_inside() -> None:
     target = [(3, np.ones((1, 1), np.bool_), (5, 7))]
     points = np.array([(5 * SUB + x, 7 * SUB + y) for x in (-129, -128, 0, 128, 129) for y in (0, 128, 129)])
     inside = (np.abs(points - (5 * SUB, 7 * SUB)) <= 128).all(axis=1)
-    assert np.array_equal(in_pixels(points, target), inside)
+    assert np.array_equal(first_pixels(points, np.zeros_like(points), target)[0], np.flatnonzero(inside))
     assert np.array_equal(touching(points, 0, target), inside)
     assert touching(points, 400, target).all() and not touching(points + 600, 400, target).any()
 
 
-@pytest.mark.parametrize("name", ["raytruth", "movertruth", "pixeltruth"])
+@pytest.mark.parametrize("name", ["shapetruth", "pixeltruth"])
 def test_truth_shares_nothing_with_what_it_judges(name: str) -> None:
     tree = ast.parse((ROOT / "weapons" / f"{name}.py").read_text())
     modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
@@ -247,7 +244,7 @@ def test_fixed_steps_are_the_pixels_of_points_along_the_ray() -> None:
     question = rays_question(scene, 40, 1)
     targets = targets_of(only_hittable(scene))
     length = round(4 * size_of(targets))
-    start, angle, _ = drawn_places(targets, 40, 1, SUB * length // 2, lambda xy: in_pixels(xy, targets))
+    start, angle, _ = drawn_places(targets, 40, 1, SUB * length // 2, lambda xy: touching(xy, 0, targets))
     step = ahead(length, angle)
     for method in curve_of(question, "fixed step").methods[::3]:
         expected = {}

@@ -14,7 +14,7 @@ from weapons.byfire import fired_method
 from weapons.decisions import Curve, Decisions, Method, Question
 from weapons.firing import fire
 from weapons.guns import Projectile
-from weapons.movertruth import Flights, flown, impacts, touching
+from weapons.pixeltruth import Flights, flown, impacts, touching
 from weapons.rayhits import RayHits
 from weapons.raypeers import Segments, mover_peer_curve
 from weapons.targets import ahead, checked_draw, drawn_places, only_hittable, size_of, targets_of, velocities_of

@@ -14,9 +14,9 @@ from planes.scene import Scene
 from weapons.byfire import fired_method
 from weapons.decisions import Curve, Decisions, Method, Question
 from weapons.guns import Pistol
+from weapons.pixeltruth import first_pixels, touching
 from weapons.rayhits import RayHits
 from weapons.raypeers import Segments, peer_curves
-from weapons.raytruth import first_pixels, touching
 from weapons.targets import ahead, checked_draw, drawn_places, only_hittable, size_of, targets_of
 
 __all__ = ["rays_question"]
@@ -45,7 +45,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     alone = only_hittable(scene)
     targets = targets_of(alone)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
-    start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, targets))
+    start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, 0, targets))
     step = ahead(length, angle)
     shot, item, pixel_xy = first_pixels(start, step, targets)
     return Question(
