@@ -7,9 +7,7 @@ origin does not return. pymunk's circles and capsules count touching as a miss, 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -17,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools
+from weapons.peerworlds import module_of
 
 __all__ = ["PEERS", "installed", "of_peer"]
 
@@ -42,76 +41,71 @@ def of_peer(peer: str, predicate: str) -> Method | None:
     return TABLE[peer].get(predicate)
 
 
-def _module(name: str) -> Any:
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    return import_module(name)
-
-
 # shapely: whole columns
 
 
 def _shapely_circles(center_a: Array, radius_a: Array, center_b: Array, radius_b: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.dwithin(s.points(center_a), s.points(center_b), radius_a + radius_b))
 
 
 def _shapely_boxes(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.intersects(s.box(*low_a.T, *high_a.T), s.box(*low_b.T, *high_b.T)))
 
 
 def _shapely_capsule(a: Array, b: Array, radius: Array, center: Array, radius_c: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.dwithin(s.linestrings(np.stack([a, b], axis=1)), s.points(center), radius + radius_c))
 
 
 def _shapely_point_polygon(rings: Array, points: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.intersects(_shapely_polygons(rings), s.points(points)))
 
 
 def _shapely_circle_polygon(rings: Array, center: Array, radius: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.dwithin(_shapely_polygons(rings), s.points(center), radius))
 
 
 def _shapely_polygon_pair(a: Array, b: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.intersects(_shapely_polygons(a), _shapely_polygons(b)))
 
 
 def _shapely_polygons(rings: Array) -> Any:
-    s = _module("shapely")
+    s = module_of("shapely")
     return s.polygons(s.linearrings(rings))
 
 
 def _shapely_ray(start: Array, end: Array, cells: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.intersects(_shapely_lines(start / 256, end / 256), _shapely_squares(cells)))
 
 
 def _shapely_lines(a: Array, b: Array) -> Any:
-    return _module("shapely").linestrings(np.stack([a, b], axis=1))
+    return module_of("shapely").linestrings(np.stack([a, b], axis=1))
 
 
 def _shapely_squares(cells: Array) -> Any:
-    return _module("shapely").box(*(cells - 0.5).T, *(cells + 0.5).T)
+    return module_of("shapely").box(*(cells - 0.5).T, *(cells + 0.5).T)
 
 
 def _shapely_flight(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     lines = _shapely_lines(start / 256, (start + unit * times[:, None] - velocity) / 256)
     near = s.dwithin(lines, s.points(cells.astype(float)), radius / 256)
     return np.asarray(near | s.intersects(lines, _shapely_squares(cells)))
 
 
 def _shapely_disc(radius: Array, cells: Array, places: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     return np.asarray(s.dwithin(s.points(places.astype(float)), s.points((cells + places).astype(float)), radius / 256))
 
 
 def _shapely_beam(unit: Array, times: Array, radius: Array, cells: Array, places: Array) -> Bools:
-    s = _module("shapely")
+    s = module_of("shapely")
     lines = _shapely_lines(places.astype(float), places + unit * times[:, None] / 256)
     at = cells + places
     near = s.dwithin(lines, s.points(at.astype(float)), radius / 256)
@@ -133,7 +127,7 @@ def _pymunk_pairs(make_a: Callable[..., Any], make_b: Callable[..., Any], taken:
     """Two shapes a row, from the first columns and the rest."""
 
     def method(*columns: Array) -> Bools:
-        body = _module("pymunk").Body(body_type=_module("pymunk").Body.STATIC)
+        body = module_of("pymunk").Body(body_type=module_of("pymunk").Body.STATIC)
         found = []
         for row in _rows(columns):
             one, other = make_a(body, *row[:taken]), make_b(body, *row[taken:])
@@ -154,19 +148,19 @@ def _collide(one: Any, other: Any) -> bool:
 
 
 def _pymunk_circle(body: Any, center: Any, radius: float) -> Any:
-    return _module("pymunk").Circle(body, radius, tuple(center))
+    return module_of("pymunk").Circle(body, radius, tuple(center))
 
 
 def _pymunk_segment(body: Any, a: Any, b: Any, radius: float) -> Any:
-    return _module("pymunk").Segment(body, tuple(a), tuple(b), radius)
+    return module_of("pymunk").Segment(body, tuple(a), tuple(b), radius)
 
 
 def _pymunk_poly(body: Any, ring: Any) -> Any:
-    return _module("pymunk").Poly(body, [tuple(p) for p in ring])
+    return module_of("pymunk").Poly(body, [tuple(p) for p in ring])
 
 
 def _pymunk_boxes(*columns: Array) -> Bools:
-    box = _module("pymunk").BB
+    box = module_of("pymunk").BB
     return np.array([box(*a, *b).intersects(box(*c, *d)) for a, b, c, d in _rows(columns)], np.bool_)
 
 
@@ -176,7 +170,7 @@ def _pymunk_square(body: Any, cell: Any) -> Any:
 
 
 def _pymunk_ray(start: Array, end: Array, cells: Array) -> Bools:
-    body = _module("pymunk").Body(body_type=_module("pymunk").Body.STATIC)
+    body = module_of("pymunk").Body(body_type=module_of("pymunk").Body.STATIC)
     found = []
     for a, b, cell in _rows((start / 256, end / 256, cells)):
         square = _pymunk_square(body, cell)
@@ -190,7 +184,7 @@ def _pymunk_ray(start: Array, end: Array, cells: Array) -> Bools:
 
 
 def _pygame_circles(*columns: Array) -> Bools:
-    circle = _module("pygame.geometry").Circle
+    circle = module_of("pygame.geometry").Circle
     found = []
     for a, ra, b, rb in _rows(columns):
         try:

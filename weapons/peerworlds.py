@@ -15,17 +15,31 @@ from planes.spans import Spans
 from weapons.decisions import Curve
 from weapons.targets import Target
 
-__all__ = ["PYGAME_MOST", "absent", "hulls_in_pymunk", "installed", "masks_in_pygame", "pairs", "squares_in_shapely"]
+__all__ = [
+    "PYGAME_MOST",
+    "absent",
+    "hulls_in_pymunk",
+    "installed",
+    "masks_in_pygame",
+    "module_of",
+    "pairs",
+    "squares_in_shapely",
+]
 
 PYGAME_MOST = 2**30
 """Rectangles of pygame hold C ints: places within this, and twice it for a sum."""
 
 
+def module_of(name: str) -> Any:
+    """A module, imported quietly."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    return import_module(name)
+
+
 def installed(name: str) -> Any:
     """A module, or None where it is not installed."""
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
-        return import_module(name)
+        return module_of(name)
     except ImportError:
         return None
 
