@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from planes.scene import Scene as Scene
     from planes.spans import Spans as Spans
     from planes.sprite import Sprite as Sprite
+    from planes.twins import use_jit as use_jit
 
 _HOME = {
     "ALL": "constants",
@@ -31,12 +32,13 @@ _HOME = {
     "Sprite": "sprite",
     "load_scene": "loading",
     "read_png": "image",
+    "use_jit": "twins",
     "write_png": "image",
 }
 
 __all__ = [
     "ALL", "History", "InputError", "PastScene", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene",
-    "read_png", "write_png",
+    "read_png", "use_jit", "write_png",
 ]  # fmt: skip
 
 

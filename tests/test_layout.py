@@ -12,11 +12,11 @@ ROOT = Path(__file__).parent.parent
 
 ORDER = {
     "planes": (
-        "constants", "arrays", "schema", "exact", "grid256", "spans", "rasterise", "rings", "volumes",
-        "parts", "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles",
-        "slabs", "image", "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "items",
-        "index", "compose", "labels", "poses", "scenefile", "scene", "loading", "history", "render",
-        "sampling",
+        "constants", "arrays", "twins", "schema", "exact", "grid256", "spans", "rasterise", "rings",
+        "volumes", "parts", "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase",
+        "triangles", "slabs", "image", "kept", "sprite", "hull", "cover", "outline", "fit", "bounding",
+        "items", "index", "compose", "labels", "poses", "scenefile", "scene", "loading", "history",
+        "render", "sampling",
     ),
     "weapons": (
         "draws", "weapon", "columns", "pattern", "guns", "arsenal", "volley", "rays", "trace", "narrow",
