@@ -50,7 +50,7 @@ class PastItems(Items):
         before = Items() if earlier is None else earlier
         self.count = items.count
         self.version = self._forgotten = items.version
-        self._bounds = items._bounds  # by mask, whoever uses it
+        self._bounds, self._tiles = items._bounds, items._tiles  # by mask, whoever uses it
         with items._lock:  # a thread that reads the stack may lay the masks out anew
             if items.atlas.wasteful:
                 items._compact()

@@ -23,6 +23,7 @@ from planes.sprite import Form, Sprite, Variant, variant_of
 
 if TYPE_CHECKING:
     from planes.bounding import Bounds, Kind
+    from planes.tiles import TileAtlas, Tiles
     from planes.volumes import Volumes
 
 __all__ = ["Items", "MaskAtlas", "Role", "Stack", "boxes_in", "clipped"]
@@ -199,6 +200,7 @@ class Items:
         self._forgotten = 0
         self._stack: tuple[int, Stack] | None = None
         self._bounds: dict[Kind, Bounds] = {}
+        self._tiles: list[TileAtlas] = []
         self._lock = threading.Lock()
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
@@ -334,6 +336,17 @@ class Items:
             ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat,
             layered,
         )  # fmt: skip
+
+    def tiles(self) -> Tiles:
+        """Bit rows of the masks of the stack."""
+        from planes.tiles import TileAtlas  # what nothing is fired at needs none
+
+        stack = self.stack()
+        with self._lock:
+            if not self._tiles:
+                self._tiles.append(TileAtlas())
+            used = ((variant.uid, variant.mask) for variant in self.variants)
+            return self._tiles[0].tiles(used, self.mask[stack.ids])
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""

@@ -24,6 +24,7 @@ from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
 if TYPE_CHECKING:
+    from planes.visible import Compositions
     from planes.volumes import Volumes
 
 __all__ = ["Scene"]
@@ -75,6 +76,7 @@ class Scene:
         self.shots: list[Any] = []
         self._code_plane: CodePlane | None = None
         self._indexes: dict[str, Index] = {}
+        self._compositions: Compositions | None = None
 
     @classmethod
     def from_planes(
@@ -310,6 +312,14 @@ class Scene:
         if self._code_plane is None and self.bounds is not None and plane_fits(self.bounds):
             self._code_plane = CodePlane(self.bounds)
         return self._code_plane
+
+    def compositions(self) -> Compositions:
+        """What can be seen of the objects, for those who fire at many of them."""
+        if self._compositions is None:
+            from planes.visible import Compositions  # what nothing is fired at needs none
+
+            self._compositions = Compositions()
+        return self._compositions
 
     def index(self, structure: str) -> Index:
         """The broad phase of the items that decide, "none", "grid", "quadtree" or "bvh"; it follows the scene."""

@@ -14,18 +14,26 @@ from planes.constants import SUB
 __all__ = ["Words", "disc_offsets", "mix64"]
 
 Words = npt.NDArray[np.uint64]
+ROWS_AT_ONCE = 2**13
+"""Draws made at a time: 64 KB for each of their arrays, which stay in the level-2 cache."""
+
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 def mix64(words: Words) -> Words:
     """Mix 64 bits: the finaliser of splitmix64 (Steele, Lea, Flood 2014; constants by Stafford, variant 13)."""
     z = np.atleast_1d(np.asarray(words, np.uint64)).copy()
+    _mix(z)
+    return z
+
+
+def _mix(z: Words) -> None:
+    """Mix words in place."""
     z ^= z >> np.uint64(30)
     z *= np.uint64(0xBF58476D1CE4E5B9)
     z ^= z >> np.uint64(27)
     z *= np.uint64(0x94D049BB133111EB)
     z ^= z >> np.uint64(31)
-    return z
 
 
 def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
@@ -38,19 +46,31 @@ def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, p
     shot, round_, pellet : (n,) int64; a row depends on its seed and its own three numbers only
     """
     rows = np.broadcast_arrays(shot, round_, pellet)
-    key = mix64(np.broadcast_to(np.asarray(seed, np.uint64), rows[0].shape))
-    for word in rows:
-        key = mix64((key ^ word.astype(np.uint64)) + GOLDEN)
+    seeds = np.broadcast_to(np.asarray(seed, np.uint64), rows[0].shape)
     reach = radius_256 // SUB
+    offsets = np.empty((len(seeds), 2), np.int64)
+    for first in range(0, len(seeds), ROWS_AT_ONCE):
+        now = slice(first, first + ROWS_AT_ONCE)
+        key = mix64(seeds[now])
+        for word in rows:
+            key ^= word[now].astype(np.uint64)
+            key += GOLDEN
+            _mix(key)
+        offsets[now] = _in_disc(key, reach, radius_256**2)
+    return offsets
+
+
+def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
+    """Offsets (n, 2) within a disc: draw after draw of each state until one is."""
     bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
-    offsets = np.zeros((len(key), 2), np.int64)
-    pending = np.arange(len(key))
-    state = key.copy()
+    offsets = np.empty((len(state), 2), np.int64)
+    pending = np.arange(len(state))
     while len(pending):
-        state[pending] += GOLDEN
-        drawn = mix64(state[pending])
-        pair = np.stack([drawn & bits, (drawn >> np.uint64(32)) & bits], axis=1).astype(np.int64) - reach
-        good = (pair <= reach).all(axis=1) & (((SUB * pair) ** 2).sum(axis=1) <= radius_256**2)
-        offsets[pending[good]] = pair[good]
-        pending = pending[~good]
+        state += GOLDEN
+        drawn = mix64(state)
+        x = (drawn & bits).astype(np.int64) - reach
+        y = ((drawn >> np.uint64(32)) & bits).astype(np.int64) - reach
+        good = (x <= reach) & (y <= reach) & (SUB * SUB * (x * x + y * y) <= radius2)
+        offsets[pending[good], 0], offsets[pending[good], 1] = x[good], y[good]
+        pending, state = pending[~good], state[~good]
     return offsets

@@ -7,21 +7,19 @@ Shots of rays go on in `rayfire`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planes.arrays import InputError, Ints, choice, each, reals, shown
-from planes.constants import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
-from planes.sampling import OF_PATTERNS
+from planes.constants import ALL
 from planes.scene import Scene
-from weapons.arsenal import pierces, ray_parts_of
-from weapons.candidates import Candidates, may_refuse
-from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, read_stack, sweep_pays
-from weapons.resolve import Sight, composed, direct
-from weapons.volley import Shots, Volley, checked_shots, volley_of
+from weapons.arsenal import ray_parts_of
+from weapons.bitfire import counts, fired_by_bits
+from weapons.hits import Hits
+from weapons.plan import Plan, read_stack
+from weapons.runfire import fired_by_runs
+from weapons.volley import Shots, checked_shots, volley_of
 from weapons.weapon import Weapon
 
 if TYPE_CHECKING:  # most shots are of patterns, at the present: rays and the past are loaded when they are asked for
@@ -140,39 +138,9 @@ def fired(
         return fired_rays(scene, weapon, parts, shots, prefilter, broadphase, plan)
     stack = read_stack(scene, plan)
     first = volley_of(weapon, shots.take(0, 1))
-    plan.run("patterns", "" if len(shots) else "no shots", first.nbytes)
-    placements = len(first.shot) * len(shots)
-    name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
-    asked = placements if name == "direct" or pierces(weapon) or shots.choosy else 0
-    swept = sweep_pays(stack, first.table, asked)
-    candidates = chosen_candidates(prefilter, broadphase, scene, stack, swept, asked)
-    sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
-    drawn = None
-    plan.run("plan", f"{name}: {why}")
-    if name == "composed" and (plane := scene.code_plane()):
-        drawn = plane.read(scene.items), plane.box_xyxy
-        plan.run("code plane", f"{plane.redrawn} px drawn anew; {why}", plane.redrawn * drawn[0].itemsize)
-    rows, verdicts = [], [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for begin, part in _parts(shots, first, candidates):
-        volley = first if len(shots) == 1 else volley_of(weapon, part)
-        _tell_patterns(plan, volley, 0 if volley is first else volley.nbytes)
-        met = composed(volley, part, sight, *drawn) if drawn else direct(volley, part, sight)
-        rows.append(rows_of_met(met, volley, stack.ids, begin))
-        plan.run("rows", "", rows[-1].nbytes)
-        verdicts.append(met.counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
-        plan.run("verdicts", "", verdicts[-1].nbytes)
-    hits = Hits(Rows.joined(rows or [Rows.none()]), np.concatenate(verdicts), scene, weapon, shots, plan)
-    plan.run("rows", "")
-    leave_out_unused(plan, scene, candidates, first.table, may_refuse(stack, shots), why)
-    plan.run("plan", "")
-    return hits
-
-
-def _tell_patterns(plan: Plan, volley: Volley, made: int) -> None:
-    """Record the patterns of a part of the shots, and their weights."""
-    plan.run("patterns", f"{len(volley.table.count)} distinct", made)
-    if volley.table.prefix is not None:
-        plan.run("weights", "falloff of the hit pixels, by prefix sums", volley.table.prefix.nbytes)
+    how = (prefilter, broadphase, strategy)
+    fired_by = fired_by_bits if counts(weapon, first) else fired_by_runs
+    return fired_by(scene, weapon, shots, stack, first, how, plan)
 
 
 def _bits(scene: Scene, accept: object) -> object:
@@ -180,20 +148,3 @@ def _bits(scene: Scene, accept: object) -> object:
     if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
         return scene.category_bits(*accept)
     return accept
-
-
-def _parts(shots: Shots, first: Volley, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
-    """Cut a batch so that the samples and pairs of a part stay within their chunks.
-
-    All shots of a call have the weapon of the first, and patterns of about its size. With a broad phase parts grow as
-    long as placements meet few items.
-    """
-    placements = max(len(first.shot), 1)
-    most = max(1, CHUNK_SAMPLES // max(int(first.count.sum()), placements))
-    step = max(1, min(most, CHUNK_PAIRS // (placements * max(len(candidates.stack), 1))))
-    begin = 0
-    while begin < len(shots):
-        yield begin, shots.take(begin, min(begin + step, len(shots)))
-        begin += step
-        if candidates.index is not None:
-            step = max(1, min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1)))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -104,21 +105,21 @@ class Hits:
     weapon, shots : what was fired
     """
 
-    def __init__(self, rows: Rows, verdicts: Ints, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
+    def __init__(
+        self, rows: Rows, counted: Callable[[], Ints], scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+    ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self._verdicts = verdicts
-        verdicts.flags.writeable = False
+        self._counted = counted
 
     def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self.shot, self.round, self.object = rows.shot, rows.round, rows.object
         self.samples, self.pixels, self.weight = rows.samples, rows.pixels, rows.weight
         self.pellets, self.first_xy, self.distance2 = rows.pellets, rows.first_xy, rows.distance2
-        self.starts = np.searchsorted(rows.shot, np.arange(len(shots) + 1))
         self.weapon, self.shots, self.plan = weapon, shots, plan
         self.scene, self.version = scene, scene.version
         self._scenes: list[Scene] | None = None
         self._walked: tuple[int, Any] | None = None
-        for name in (*HitRow._fields, "starts"):
+        for name in HitRow._fields:
             getattr(self, name).flags.writeable = False
 
     @property
@@ -126,10 +127,19 @@ class Hits:
         """Bytes of the columns."""
         return sum(int(getattr(self, name).nbytes) for name in HitRow._fields)
 
-    @property
+    @cached_property
+    def starts(self) -> Ints:
+        """The rows of shot i are starts[i] .. starts[i + 1] - 1."""
+        starts = np.searchsorted(self.shot, np.arange(len(self.shots) + 1))
+        starts.flags.writeable = False
+        return starts
+
+    @cached_property
     def verdicts(self) -> Ints:
-        """Samples of each shot by verdict."""
-        return self._verdicts
+        """Samples of each shot by verdict, counted when they are first asked for."""
+        verdicts = self._counted()
+        verdicts.flags.writeable = False
+        return verdicts
 
     @property
     def fired(self) -> Ints:
@@ -275,10 +285,10 @@ class Hits:
         ----------
         parts, rows : hits of some of the shots, and which those are
         """
-        verdicts = np.concatenate([part.verdicts for part in parts])[np.argsort(np.concatenate(rows))]
+        order = np.argsort(np.concatenate(rows))
         found = cls(
             cls._gathered_rows(parts, rows),
-            verdicts,
+            lambda: np.concatenate([part.verdicts for part in parts])[order],
             parts[0].scene,
             parts[0].weapon,
             shots,

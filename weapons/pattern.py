@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +22,9 @@ __all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "m
 
 Swept = tuple[Ints, Ints, int]
 """Ends (2,) of a segment and a radius, in 1/256 px."""
+
+DISC_MOST = 2**10
+"""Radius of the largest pattern that is looked at for being a disc, px."""
 
 FALLOFFS = ("linear", "smooth")
 _DOUBT = 2.0**-30  # the float below is right to 2**-34; nearer to a whole number than this, integers decide
@@ -43,6 +48,16 @@ class Pattern:
         if name not in self._volumes:
             self._volumes[name] = fitted(self)
         return self._volumes[name]
+
+    @cached_property
+    def is_disc(self) -> bool:
+        """Whether it holds all pixels that are nearer to the origin than one of its own, or as near."""
+        if not self.spans.count or max(map(abs, self.spans.box_xyxy or ())) > DISC_MOST:
+            return False
+        farthest = int((self.spans.pixels() ** 2).sum(axis=1).max())
+        x = np.array([math.isqrt(farthest - y * y) for y in range(math.isqrt(farthest) + 1)])
+        row = 2 * x + 1
+        return self.spans.count == int(row[0] + 2 * row[1:].sum())
 
     @property
     def nbytes(self) -> int:

@@ -15,6 +15,7 @@ from planes.constants import SUB
 from planes.index import STRUCTURES
 from planes.items import Role, Stack
 from planes.scene import Scene
+from planes.visible import View
 from weapons.candidates import BOX, Candidates, prefilter_of
 from weapons.pattern import PatternTable
 
@@ -25,9 +26,11 @@ __all__ = [
     "PlanSum",
     "Stage",
     "chosen_candidates",
+    "chosen_form",
     "chosen_strategy",
     "leave_out_absent",
     "leave_out_imagery",
+    "leave_out_uncounted",
     "leave_out_unused",
     "plan_lines",
     "read_stack",
@@ -41,6 +44,8 @@ DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
 COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
 REDRAW_PIXEL_NS = 0.5
 SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
+DIRECT_CALL_NS, DIRECT_SHOT_NS, DIRECT_BOX_NS = 150_000.0, 500.0, 1.0
+COMPOSE_NS, COMPOSE_ITEM_NS = 500_000.0, 8000.0
 BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 """Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
 ratios only."""
@@ -225,6 +230,34 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
     return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
 
 
+def chosen_form(
+    strategy: str, how: tuple[str, str], scene: Scene, stack: Stack, view: View | None, point: bool, placements: int
+) -> tuple[str, str]:
+    """Strategy of a call that is counted by bit rows, and why: the one asked for, or the cheaper by the cost model.
+
+    Parameters
+    ----------
+    how : pre-filter and broad phase that were asked for: they are of the direct strategy
+    view : what all shots accept; None if they differ in it
+    point : whether one read of the code plane tells what a placement hits
+    """
+    choice("strategy", strategy, STRATEGIES)
+    if view is None:
+        return "direct", "shots accept different items"
+    if strategy != "auto":
+        return strategy, "asked for"
+    if how != ("auto", "auto"):
+        return "direct", "a pre-filter was asked for"
+    plane = scene.code_plane() if point else None
+    known = scene.compositions()
+    if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
+        return "composed", "it is there"
+    lost = DIRECT_CALL_NS + placements * (DIRECT_SHOT_NS + len(stack) * DIRECT_BOX_NS)
+    cost = plane.cost(scene.items) * REDRAW_PIXEL_NS if plane else COMPOSE_NS + len(stack) * COMPOSE_ITEM_NS
+    told = f"about {cost / 1e3:.0f} us to compose, {lost / 1e3:.0f} us more without it"
+    return "composed" if known.pays(view, scene.version, lost, cost) else "direct", told
+
+
 def chosen_candidates(
     prefilter: object, broadphase: object, scene: Scene, stack: Stack, swept: bool, asked: int
 ) -> Candidates:
@@ -335,6 +368,20 @@ def leave_out_unused(
         plan.leave_out("pre-filter", idle)
     if not plan.has_run("walk"):
         plan.leave_out("walk", "no sample lay where it needed one")
+    leave_out_imagery(plan, scene)
+
+
+def leave_out_uncounted(plan: Plan, scene: Scene, candidates: Candidates, choosy: bool, name: str, why: str) -> None:
+    """Complete a plan of a call that was counted by bit rows with what it did not need."""
+    composed = name == "composed"
+    if not plan.has_run("broad phase"):
+        plan.leave_out("broad phase", "composed: cells" if composed else candidates.why_unindexed)
+    if not plan.has_run("volumes"):
+        plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
+    leave_out_absent(plan, scene, candidates.stack, weighted=False, choosy=choosy)
+    plan.leave_out("verdicts", "counted when asked for")
+    if not composed:
+        plan.leave_out("composition", f"direct: {why}")
     leave_out_imagery(plan, scene)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -138,14 +139,13 @@ class RayHits(Hits):
         assert parts is not None  # it was fired as one
         return parts
 
-    @property
+    @cached_property
     def verdicts(self) -> Ints:
         """Cells of each shot by verdict, counted when they are first asked for."""
-        if not hasattr(self, "_verdicts"):
-            none = np.zeros((0, len(Verdict)), np.int64)
-            self._verdicts = np.concatenate([none, *(self._rays(i).counts() for i in range(len(self.shots)))])
-            self._verdicts.flags.writeable = False
-        return self._verdicts
+        none = np.zeros((0, len(Verdict)), np.int64)
+        verdicts = np.concatenate([none, *(self._rays(i).counts() for i in range(len(self.shots)))])
+        verdicts.flags.writeable = False
+        return verdicts
 
     @classmethod
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:

@@ -29,7 +29,7 @@ from weapons.candidates import Candidates, kinds, may_refuse, refused
 from weapons.plan import Plan
 from weapons.volley import Shots, Volley
 
-__all__ = ["Met", "Sight", "composed", "direct"]
+__all__ = ["Met", "Sight", "composed", "direct", "near_pairs"]
 
 SPARSE = 4
 """Items that fill less than one part in so many of the box around them are laid under one by one."""
@@ -136,7 +136,13 @@ def _look_behind(volley: Volley, runs: Runs, shots: Shots, sight: Sight, counts:
 
 
 def _candidates(volley: Volley, placements: Ints, boxes: Ints, shots: Shots, sight: Sight) -> Pairs:
-    """Items that placements may touch, and the record of how they were found."""
+    """Items that placements may touch, and what they do to samples."""
+    placement, rank = near_pairs(volley, placements, boxes, sight)
+    return Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, sight))
+
+
+def near_pairs(volley: Volley, placements: Ints, boxes: Ints, sight: Sight) -> tuple[Ints, Ints]:
+    """Placements and ranks of the items that they may touch, sorted, and the record of how they were found."""
     candidates, plan = sight.candidates, sight.plan
     row, rank = candidates.meeting(boxes)
     placement = placements[row]
@@ -151,7 +157,7 @@ def _candidates(volley: Volley, placements: Ints, boxes: Ints, shots: Shots, sig
         plan.run("volumes", str(candidates.prefilter), near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
         made = 0
     plan.run("pre-filter", candidates.why, made, (len(rank), len(placements) * len(sight.stack)))
-    return Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, sight))
+    return placement, rank
 
 
 def _kinds(rank: Ints, shot: Ints, shots: Shots, sight: Sight) -> Kinds:

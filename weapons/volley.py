@@ -12,7 +12,7 @@ from planes.arrays import InputError, Ints, array_of, each, integer, integers, r
 from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
 from planes.poses import points
-from weapons.arsenal import has_no_range, parts_of, pattern_of
+from weapons.arsenal import Plain, has_no_range, parts_of, pattern_of
 from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
@@ -111,6 +111,16 @@ class Volley:
         """Samples (P,) of each."""
         return self.table.count[self.pattern]
 
+    @property
+    def rounds(self) -> int:
+        """Rounds of a shot."""
+        return int(self.round.max(initial=0)) + 1
+
+    @property
+    def scattered(self) -> bool:
+        """Whether a round has several pellets."""
+        return self.xy is not self.origin_xy
+
 
 def checked_shots(
     weapon: Weapon,
@@ -123,52 +133,87 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    single = array_of("at", at).shape == (2,)
-    at_256 = snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2)
+    at_256, single = _places(at)
     n = len(at_256)
-    numbers = np.arange(n) if shot is None else shot
+    numbers = np.arange(n)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
     return Shots(
         at_256,
         _directions(n, aim, offset),
         offset,
-        integers("accept", each("accept", accept, n), (n,), 0, ALL),
+        _accepted(accept, n),
         _owners(exclude, n, single),
-        integers("shot", each("shot", numbers, n), (n,), 0, 2**63 - 1),
+        numbers if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
-        np.arange(n),
+        numbers,
     )
+
+
+def _places(at: object) -> tuple[Ints, bool]:
+    """Positions (N, 2) in 1/256 px, and whether it was one shot's alone (2,)."""
+    plain = at if type(at) is np.ndarray and at.dtype == np.float64 and at.shape[1:] == (2,) else None
+    if plain is not None and (np.abs(plain) <= POSITION_MAX).all():  # NaN is not
+        return snap(plain), False
+    single = array_of("at", at).shape == (2,)
+    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+
+
+def _accepted(accept: object, n: int) -> Ints:
+    """Category bits (n,)."""
+    if accept is ALL:
+        return _spread(np.int64(ALL), n)
+    return integers("accept", each("accept", accept, n), (n,), 0, ALL)
+
+
+def _spread(value: np.int64 | int | Ints, n: int) -> Ints:
+    """One value, or one row of values, for all of n shots: read-only, and no larger than one."""
+    one = np.asarray(value)
+    return np.broadcast_to(one, (n, *one.shape))
 
 
 def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
+    if not burst and not spread:
+        xy, none = pixel(shots.at_256), _spread(0, len(shots))
+        table, pattern = _patterns(plain, shots.direction)
+        return Volley(table, pattern, xy, xy, np.arange(len(shots)), none, none)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
     round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
     pellet = np.tile(np.arange(pellets), len(shots) * rounds)
     origin = shots.at_256[shot]
-    direction = shots.direction[shot]
+    direction = shots.direction[shot] if plain.directed else _spread(np.zeros(2, np.int64), len(shot))
     if burst:
         origin = origin + round_[:, None] * snap(burst.recoil_xy)
-        direction = recoiled(direction, round_, burst.recoil_deg)
+        direction = recoiled(direction, round_, burst.recoil_deg) if plain.directed else direction
     origin_xy = pixel(origin)
     xy = origin_xy
     if spread:
-        seed, number = shots.seed[shot], shots.number[shot]
-        xy = origin_xy + disc_offsets(int(snap(spread.radius)), seed, number, round_, pellet)
-    if not plain.directed:
-        table = PatternTable([pattern_of(plain, ONE, 0)])
-        return Volley(table, np.zeros(len(shot), np.int64), xy, origin_xy, shot, round_, pellet)
-    distinct, which = np.unique(direction, axis=0, return_inverse=True)
-    table = PatternTable([pattern_of(plain, c, s) for c, s in distinct.tolist() or [(ONE, 0)]])
-    return Volley(table, which.reshape(-1), xy, origin_xy, shot, round_, pellet)
+        offsets = disc_offsets(int(snap(spread.radius)), shots.seed[shot], shots.number[shot], round_, pellet)
+        xy = origin_xy + offsets
+    table, pattern = _patterns(plain, direction)
+    return Volley(table, pattern, xy, origin_xy, shot, round_, pellet)
+
+
+def _patterns(plain: Plain, direction: Ints) -> tuple[PatternTable, Ints]:
+    """Distinct patterns of directions (P, 2), and which is whose."""
+    if not plain.directed or not direction.strides[0] or not len(direction):
+        c, s = direction[0].tolist() if plain.directed and len(direction) else (ONE, 0)
+        return PatternTable([pattern_of(plain, c, s)]), _spread(0, len(direction))
+    number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
+    c = (number + 2 * ONE) // (4 * ONE)
+    pairs = zip(c.tolist(), (number - c * (4 * ONE)).tolist(), strict=True)
+    return PatternTable([pattern_of(plain, c, s) for c, s in pairs]), which
 
 
 def _directions(n: int, aim: object, offset: Ints | None) -> Ints:
+    if offset is None and (aim is None or isinstance(aim, int | float)):
+        c, s = (ONE, 0) if aim is None else unit(reals("aim", aim, ()))
+        return _spread(np.array([int(c), int(s)]), n)
     if offset is None:
-        return np.stack(unit(reals("aim", each("aim", 0.0 if aim is None else aim, n), (n,))), axis=1)
+        return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
     return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
 
 
@@ -210,9 +255,11 @@ def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
 def _seeds(seed: object, n: int) -> Words:
     """Seeds (n,): one for all, or one for each."""
     # As objects: numpy would make float64 of a list with numbers on both sides of 2**63, and lose their last bits.
+    if type(seed) is int and 0 <= seed <= SEED_MAX:
+        return np.broadcast_to(np.uint64(seed), (n,))
     given = seed if isinstance(seed, np.ndarray) else array_of("seed", seed, dtype=object)
     if given.ndim == 0:
-        return np.full(n, integer("seed", given.item(), 0, SEED_MAX), np.uint64)
+        return np.broadcast_to(np.uint64(integer("seed", given.item(), 0, SEED_MAX)), (n,))
     if given.shape != (n,):
         raise InputError(f"seed: expected one, or one for each of {n} shots, got shape {given.shape}")
     if given.dtype.kind != "u":

@@ -1,0 +1,221 @@
+"""What of each object can be seen by a shot: its bit rows without those of the items in front.
+
+A shot that accepts all items hits the front item of a pixel and nothing else, so what it hits of an object is what it
+covers of the object's visible pixels; one that pierces hits all that no occluder hides. What is visible hangs on no
+shot: it is worked out once for a version of a scene, or only for the objects that shots come near.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planes import bitrows, cells
+from planes.arrays import Bools, Ints
+from planes.bitrows import PAD, WORD, Beside, Seen, Words, beside_of
+from planes.cells import Cells
+from planes.items import Items, Stack
+from planes.spans import Box, meets
+from planes.tiles import Tiles
+from planes.twins import kernels_of
+
+__all__ = ["Composition", "Compositions", "View", "cropped", "in_front", "seen_of"]
+
+FRONT_BITS = 6
+"""Of the side of the cells in which tiles in front are looked for: that of a tile."""
+
+VIEWS_MOST = 4
+"""Compositions that a scene keeps: shots that accept other items see others."""
+
+REACHES_MOST = 8
+"""Boxes of patterns for which a composition keeps cells."""
+
+SHOT_BITS = 4
+"""Of the side of the cells of shot positions: 16 px; in larger ones more boxes are listed that no pattern meets."""
+
+TILES_AT_ONCE = 2**13
+"""Tiles for which those in front are looked for at a time."""
+
+
+class View(NamedTuple):
+    """What shots that see alike accept: whether they pierce, category bits, and owners that are passed over."""
+
+    pierce: bool
+    accept: int
+    exclude: tuple[int, ...]
+
+    def accepts(self, stack: Stack) -> Bools:
+        """Which items (M,) of a stack are there at all for such shots."""
+        there = (stack.categories & self.accept) != 0
+        for owner in self.exclude:
+            there &= stack.owner != owner
+        return np.asarray(there)
+
+
+class Composition:
+    """All that can be seen of the objects of one version of a scene, and where to look for it; it never changes.
+
+    Parameters
+    ----------
+    stack, tiles : of the version
+    bounds : of the scene
+    view : of the shots
+    """
+
+    def __init__(self, stack: Stack, tiles: Tiles, bounds: Box | None, view: View) -> None:
+        there = view.accepts(stack)
+        boxes = tiles.boxes(stack.box_xyxy)
+        objects = np.flatnonzero((there & ~stack.occluder)[tiles.rank])
+        blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
+        self.seen = cropped(seen_of(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks)))
+        self._cells: dict[tuple[int, ...], Cells] = {}
+
+    @cached_property
+    def beside(self) -> Beside:
+        """Distances along the rows of what is seen: with them the nearest pixel to the origin of a disc is found."""
+        return beside_of(self.seen)
+
+    def cells(self, reach_xyxy: Ints) -> Cells:
+        """What patterns of a box may meet, by where they are placed; those of the last few boxes are kept."""
+        reach = tuple(reach_xyxy.tolist())
+        if reach not in self._cells:
+            made = kernels_of(cells).cells_of(self.seen.box_xyxy, reach_xyxy, SHOT_BITS)
+            self._cells = dict([*self._cells.items(), (reach, made)][-REACHES_MOST:])
+        return self._cells[reach]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of what is seen and of the cells."""
+        seen = self.seen
+        columns = (seen.rank, seen.box_xyxy, seen.begin, seen.words)
+        return sum(int(column.nbytes) for column in (*columns, *(c.listed for c in self._cells.values())))
+
+
+class Compositions:
+    """Compositions of a scene for the last few views, and what those who did without them lost.
+
+    Threads may ask for those of a scene that none of them changes.
+    """
+
+    def __init__(self) -> None:
+        self._version = -1
+        self._kept: dict[View, Composition] = {}
+        self._missed: dict[View, float] = {}
+        self._lock = threading.Lock()
+
+    def kept(self, view: View, version: int) -> Composition | None:
+        """The composition of a version, if it is there."""
+        with self._lock:
+            self._forget(version)
+            return self._kept.get(view)
+
+    def pays(self, view: View, version: int, lost: float, cost: float) -> bool:
+        """Whether a view has lost as much as a composition costs, with what it would lose now.
+
+        So the cost is never more than twice that of the better choice (Karlin et al., "Competitive snoopy caching",
+        1988).
+        """
+        with self._lock:
+            self._forget(version)
+            self._missed[view] = self._missed.get(view, 0.0) + max(lost, 0.0)
+            return self._missed[view] > cost
+
+    def read(self, view: View, items: Items, bounds: Box | None) -> Composition:
+        """The composition of the items as they are now, within the bounds of the scene."""
+        found = self.kept(view, items.version)
+        if found is None:
+            found = Composition(items.stack(), items.tiles(), bounds, view)
+            with self._lock:
+                self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
+        return found
+
+    def _forget(self, version: int) -> None:
+        if self._version != version:
+            self._version, self._kept, self._missed = version, {}, {}
+
+
+def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:
+    """Pairs of some tiles and those in front of them whose boxes meet, as (place in `tiles`, tile), sorted.
+
+    Parameters
+    ----------
+    boxes_xyxy : (T, 4) of all tiles, front to back
+    tiles : (n,) those asked for
+    blocks : (T,) which can cover another
+    """
+    front = np.flatnonzero(blocks)
+    boxes, kernels = boxes_xyxy[front], kernels_of(cells)
+    listed = kernels.cells_of(boxes, np.array([0, 0, WORD - 1, WORD - 1]), FRONT_BITS)
+    parts = [(np.zeros(0, np.int64),) * 2]
+    for first in range(0, len(tiles), TILES_AT_ONCE):
+        some = tiles[first : first + TILES_AT_ONCE]
+        asked = boxes_xyxy[some]
+        place, other = kernels.listed_at(listed, asked[:, 0], asked[:, 1])
+        met = ((front[other] < some[place]) & meets(asked[place], boxes[other])).nonzero()[0]
+        parts.append((place[met] + first, front[other[met]]))
+    place, other = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return place, other
+
+
+def seen_of(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Seen:
+    """Visible pixels of some tiles, one row for each.
+
+    Parameters
+    ----------
+    boxes_xyxy : (T, 4) of all tiles
+    bounds : of the scene; beyond them nothing can be hit
+    which : (V,) those asked for
+    of, front : (n,) which of those, sorted, is covered by which tile
+    """
+    height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
+    boxes = boxes_xyxy[which]
+    right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
+    rows = kernels_of(bitrows).visible(tiles.words, height, tiles.begin[which], of, tiles.begin[front] - down, right)
+    if bounds is not None:
+        _cut_off(rows, boxes, bounds)
+    return _laid_out(tiles.rank[which], boxes, rows)
+
+
+def _cut_off(rows: Words, boxes_xyxy: Ints, bounds: Box) -> None:
+    """Take away what of tiles (V, height) in boxes lies beyond the bounds."""
+    x, y, x_max, y_max = bounds
+    over = np.flatnonzero((boxes_xyxy[:, :2] < (x, y)).any(axis=1) | (boxes_xyxy[:, 2:] > (x_max, y_max)).any(axis=1))
+    if not len(over):
+        return
+    left, top = boxes_xyxy[over, :2].T
+    full = np.uint64(2**64 - 1)
+    first, last = (np.clip(edge - left, 0, WORD).astype(np.uint64) for edge in (x, x_max + 1))
+    columns = (full << first) & ~(full << last)
+    row = top[:, None] + np.arange(rows.shape[1])
+    rows[over] &= np.where((row >= y) & (row <= y_max), columns[:, None], np.uint64(0))
+
+
+def cropped(seen: Seen) -> Seen:
+    """The same without tiles of which no pixel can be seen, each in the box of what can."""
+    rows = bitrows.rows_of(seen.words, seen.height, seen.begin)
+    some = rows != 0
+    kept = np.flatnonzero(some.any(axis=1))
+    some, rows = some[kept], rows[kept]
+    top, bottom = some.argmax(axis=1), seen.height - 1 - some[:, ::-1].argmax(axis=1)
+    columns = np.bitwise_or.reduce(rows, axis=1)
+    left = np.bitwise_count(~columns & (columns - np.uint64(1))).astype(np.int64)
+    right = np.array([word.bit_length() - 1 for word in columns.tolist()], np.int64)
+    height = -(-int((bottom - top).max(initial=0) + 1) // 8) * 8
+    row = top[:, None] + np.arange(height)
+    inside = row <= bottom[:, None]
+    rows = np.take_along_axis(rows, np.where(inside, row, 0), axis=1) >> left.astype(np.uint64)[:, None]
+    rows[~inside] = 0
+    x, y = seen.box_xyxy[kept, 0], seen.box_xyxy[kept, 1]
+    return _laid_out(seen.rank[kept], np.stack([x + left, y + top, x + right, y + bottom], axis=1), rows)
+
+
+def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> Seen:
+    """Rows (V, height) one tile after another, with empty ones around each."""
+    count, height = rows.shape
+    stride = height + PAD
+    words = np.zeros(count * stride + PAD, np.uint64)
+    words[PAD:].reshape(count, stride)[:, :height] = rows
+    return Seen(rank, boxes_xyxy, np.arange(count) * stride + PAD, words, height)

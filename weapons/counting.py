@@ -1,0 +1,125 @@
+"""What placed patterns hit, counted by bit rows, as rows.
+
+What they can hit of each object is `planes.visible`; what they cover of it is `planes.bitrows`.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+
+from planes.arrays import Bools, Ints
+from planes.bitrows import Beside, Codes, Found, Placed, Seen, Windows
+from planes.constants import WEIGHT_FULL
+from planes.spans import Box, ragged
+from weapons.hits import Rows
+from weapons.volley import Volley
+
+__all__ = ["counted", "points"]
+
+
+def counted(
+    volley: Volley,
+    windows: Windows,
+    placement: Ints,
+    near: Ints,
+    seen: Seen,
+    beside: Beside,
+    ids: Ints,
+    kernels: ModuleType,
+) -> Rows:
+    """Rows of what placements hit of the tiles near them.
+
+    Parameters
+    ----------
+    placement, near : (n,) pairs of placements and seen tiles that may meet, sorted
+    beside : of the seen tiles, or empty, as `bitrows.found` takes it
+    ids : (M,) of the items of the stack
+    kernels : `planes.bitrows` or its twin
+    """
+    placed = Placed(volley.pattern, *volley.xy.T, *volley.origin_xy.T)
+    found: Found = kernels.found(placed, windows, seen, placement, near, beside)
+    rank, samples = seen.rank[found.seen], found.samples
+    turn = volley.shot[found.placement] * volley.rounds + volley.round[found.placement]
+    pixels, pellets = samples, np.ones_like(samples)
+    if volley.scattered or not _rising(seen.rank):
+        order = kernels.row_order(turn, rank, found.seen, found.placement, np.zeros_like(rank))
+        found, rank, turn = Found(*(column[order] for column in found)), rank[order], turn[order]
+        first = np.flatnonzero((np.diff(turn, prepend=-1) != 0) | (np.diff(rank, prepend=-1) != 0))
+        samples = pixels = _sums(found.samples, first)
+        if volley.scattered:
+            pellets, pixels = _distinct(placed, windows, seen, found, first, kernels)
+        best = _nearest(found, first, kernels)
+        found, rank, turn = Found(*(column[best] for column in found)), rank[best], turn[best]
+        pellets = pellets[: len(best)]
+    order = kernels.row_order(turn, found.distance2, found.y, found.x, rank)
+    placement, samples = found.placement[order], samples[order]
+    xy = volley.origin_xy[placement]
+    xy[:, 0] += found.x[order]
+    xy[:, 1] += found.y[order]
+    return Rows(
+        volley.shot[placement], volley.round[placement], ids[rank[order]], samples,
+        pixels[order] if volley.scattered else samples, samples * WEIGHT_FULL, pellets[order], xy,
+        found.distance2[order],
+    )  # fmt: skip
+
+
+def points(
+    volley: Volley, windows: Windows, codes: Codes, plane_xyxy: Box, objects: Bools, kernels: ModuleType
+) -> Rows:
+    """Rows of placements of one pixel: what the code plane tells of it.
+
+    Parameters
+    ----------
+    objects : by id, whether it can be hit
+    """
+    x, y = windows.box_xyxy[0, :2].tolist()
+    at = np.add(volley.xy, (x, y)) if x or y else volley.xy
+    place, item = kernels.front_at(codes, plane_xyxy, at[:, 0], at[:, 1], objects)
+    ones = np.broadcast_to(np.int64(1), len(place))
+    xy = at[place]
+    offset = xy - volley.origin_xy[place] if at is not volley.origin_xy else None
+    distance2 = (offset**2).sum(axis=1) if offset is not None else np.broadcast_to(np.int64(0), len(place))
+    shot, round_ = volley.shot[place], volley.round[place]
+    return Rows(shot, round_, item, ones, ones, ones * WEIGHT_FULL, ones, xy, distance2)
+
+
+def _sums(values: Ints, first: Ints) -> Ints:
+    """Sums of groups that begin at `first`."""
+    return np.add.reduceat(values, first) if len(first) else np.zeros(0, np.int64)
+
+
+def _nearest(found: Found, first: Ints, kernels: ModuleType) -> Ints:
+    """The pair of each group whose pixel is nearest to the origin."""
+    begins = np.zeros(len(found.seen), np.int64)
+    begins[first] = 1
+    group = np.cumsum(begins)
+    return np.asarray(kernels.row_order(group, found.distance2, found.y, found.x, found.seen)[first])
+
+
+def _distinct(
+    placed: Placed, windows: Windows, seen: Seen, found: Found, first: Ints, kernels: ModuleType
+) -> tuple[Ints, Ints]:
+    """Pellets that hit, and pixels counted once, of each group; its pairs are sorted by (tile, placement)."""
+    begins = np.diff(found.seen, prepend=-1) != 0
+    begins[first] = True
+    tile = np.flatnonzero(begins)
+    together = _sums(found.samples, tile)
+    several = np.flatnonzero(np.diff(tile, append=len(begins)) > 1)
+    if len(several):
+        length = np.diff(tile, append=len(begins))[several]
+        group, place = ragged(length)
+        pair = tile[several][group] + place
+        first_of = np.cumsum(length) - length
+        together[several] = kernels.union(placed, windows, seen, found.placement[pair], found.seen[pair], first_of)
+    group = np.searchsorted(first, np.arange(len(begins)), side="right") - 1
+    order = kernels.row_order(group, found.placement, group, group, group)
+    new = np.diff(found.placement[order], prepend=-1) != 0
+    new[first] = True
+    return _sums(new.astype(np.int64), first), _sums(together, np.searchsorted(tile, first))
+
+
+def _rising(rank: Ints) -> bool:
+    """Whether no item has two tiles."""
+    return not (rank[1:] == rank[:-1]).any()

@@ -1,0 +1,74 @@
+"""Patterns as bit rows: the windows of 64 columns in which tiles meet them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planes.bitrows import WORD, Windows, Words
+from planes.kept import Kept
+from planes.spans import Spans
+from weapons.pattern import Pattern
+
+__all__ = ["fits", "windows_of"]
+
+TABLE_BYTES_MOST = 2**22
+"""All shifts of a pattern are not made beyond it: in a larger table each window is a miss of the cache."""
+
+PATTERN_BYTES_MOST, PATTERNS_BYTES_MOST = 2**22, 2**26
+"""A pattern whose rows of words would be larger, or all of a call, are counted run by run."""
+
+WINDOW_CACHE_BYTES = 2**26
+"""Windows kept for the next call, bytes."""
+
+_kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
+    WINDOW_CACHE_BYTES, lambda windows: windows.words.nbytes + windows.box_xyxy.nbytes
+)
+
+
+def fits(patterns: Sequence[Pattern]) -> bool:
+    """Whether windows of patterns, all at once, may be made."""
+    sizes = [_bytes_of(pattern.spans) for pattern in patterns]
+    return max(sizes, default=0) <= PATTERN_BYTES_MOST and sum(sizes) <= PATTERNS_BYTES_MOST
+
+
+def windows_of(patterns: Sequence[Pattern], often: bool) -> Windows:
+    """Windows of patterns; those of the last calls are kept.
+
+    Parameters
+    ----------
+    often : whether many more windows will be read than there are
+    """
+    often = often and len(patterns) == 1 and _bytes_of(patterns[0].spans) * WORD <= TABLE_BYTES_MOST
+    return _kept.get((tuple(patterns), often), lambda: _made([pattern.spans for pattern in patterns], often))
+
+
+def _bytes_of(spans: Spans) -> int:
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
+    return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
+
+
+def _made(patterns: Sequence[Spans], often: bool) -> Windows:
+    boxes = [spans.box_xyxy or (0, 0, -1, -1) for spans in patterns]
+    columns = [_columns(spans) for spans in patterns]
+    rows = np.array([words.shape[1] for words in columns])
+    if often:
+        words = columns[0]
+        shifts = np.arange(WORD, dtype=np.uint64)[:, None, None]
+        table = (words[:-1] >> shifts) | (words[1:] << (np.uint64(WORD) - shifts))
+        return Windows(np.array(boxes), np.array([WORD]), rows, table.reshape(-1), int(words[:-1].size))
+    first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
+    return Windows(np.array(boxes), first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0)
+
+
+def _columns(spans: Spans) -> Words:
+    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows around it."""
+    mask, _ = spans.to_mask()
+    height, width = mask.shape
+    words = (WORD - 2 + width) // WORD + 2
+    padded = np.zeros((height, words * WORD), np.bool_)
+    padded[:, WORD - 1 : WORD - 1 + width] = mask
+    made = np.zeros((words, height + 2 * WORD), np.uint64)
+    made[:, WORD : WORD + height] = np.packbits(padded, axis=1, bitorder="little").view("<u8").T
+    return made
