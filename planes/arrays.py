@@ -6,6 +6,7 @@ import difflib
 import itertools
 import math
 import reprlib
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 __all__ = [
     "Bools", "Floats", "Image", "InputError", "Ints", "array_of", "bools", "choice", "each", "flag", "integer",
-    "integers", "listed", "real", "reals", "shown", "within",
+    "integers", "listed", "real", "reals", "rising", "shown", "within",
 ]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
@@ -26,6 +27,8 @@ Shape = tuple[int | None, ...]
 
 SHOWN = 60
 """Characters of a value that an error shows."""
+
+FLOAT_MAX = sys.float_info.max
 
 FLOAT_BITS = 1023
 """Whole numbers of so many bits are floats, too."""
@@ -90,8 +93,9 @@ def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> 
         If it is not numeric, not finite, of another shape, or beyond the limit.
     """
     array = _float64(_numeric(field, values, shape, "iuf"))
-    _first_bad(field, array, np.isfinite(array), "a finite number")
-    _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
+    if not _all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):
+        _first_bad(field, array, np.isfinite(array), "a finite number")
+        _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
     return array
 
 
@@ -102,8 +106,16 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     if array.dtype.kind == "f":
         array = _float64(array)
         _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
-    _first_bad(field, array, (array >= low) & (array <= high), whole)
+    if not _all_within(array, low, high):
+        _first_bad(field, array, (array >= low) & (array <= high), whole)
     return array.astype(np.int64)
+
+
+def rising(array: Ints, count: int) -> bool:
+    """Whether rows (n,) are strictly rising numbers from 0 to count - 1: then each is there once."""
+    if not len(array):
+        return True
+    return bool(array[0] >= 0 and array[-1] < count and (array[1:] > array[:-1]).all())
 
 
 def bools(field: str, values: object, shape: Shape) -> Bools:
@@ -205,8 +217,15 @@ def _refuse_changed(field: str, values: object, booleans: bool) -> None:
 
 def _float64(array: npt.NDArray[Any]) -> Floats:
     """Float64 of an array of any kind of number; long doubles that it cannot hold are infinite, and refused as such."""
+    if array.dtype.itemsize <= 8:
+        return array.astype(np.float64)
     with np.errstate(over="ignore"):
         return array.astype(np.float64)
+
+
+def _all_within(array: npt.NDArray[Any], low: float, high: float) -> bool:
+    """Whether all numbers are from low to high, by their least and greatest alone; never where one is not a number."""
+    return not array.size or bool(array.min() >= low and array.max() <= high)
 
 
 def _first_bad(field: str, array: npt.NDArray[Any], good: Bools | np.bool_, expected: str) -> None:

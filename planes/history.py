@@ -20,7 +20,7 @@ import numpy as np
 from planes.arrays import Bools, InputError, Ints, flag, integer, real, shown, within
 from planes.constants import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from planes.grid256 import quarter_turns, rounded_div
-from planes.items import COLUMNS, Items, MaskAtlas
+from planes.items import ARRANGEMENTS, COLUMNS, NEVER, NO_BOXES, UNARRANGED, Items, MaskAtlas
 from planes.scene import Scene
 from planes.spans import Box
 from planes.sprite import variant_of
@@ -54,10 +54,19 @@ class PastItems(Items):
         with items._lock:  # a thread that reads the stack may lay the masks out anew
             if items.atlas.wasteful:
                 items._compact()
+            kept = before.arrangement == items.arrangement
             for name in COLUMNS:
-                setattr(self, name, _column(getattr(items, name)[: self.count], getattr(before, name)))
-            flat = items.atlas.flat
+                changed = not kept or name in UNARRANGED
+                now = getattr(items, name)[: self.count] if changed else getattr(before, name)
+                setattr(self, name, _column(now, getattr(before, name)) if changed else now)
+            flat, self.arrangement = items.atlas.flat, items.arrangement
+            if items._stack is not None and items._stack[1].forms == items.arrangement:
+                self._stack = (NEVER, items._stack[1].placed(NO_BOXES))  # the order is kept, the boxes are made anew
         self.atlas = before.atlas if flat is before.atlas.flat else _full(flat)
+        if kept:
+            self.sprites, self.names, self.angles = before.sprites, before.names, before.angles
+            self.variants, self.forms = before.variants, before.forms
+            return
         self.sprites = _shared(items.sprites, before.sprites)
         self.names = _shared(items.names, before.names)
         self.angles = _shared(items.angles, before.angles)
@@ -86,10 +95,14 @@ class PastItems(Items):
             out._turn({i: self.angles[i] + turn * (part / parts) for i, turn in turns.items() if turn})
         return out
 
+    def _boxes_in_order(self, ids: Ints) -> Ints:
+        return self.boxes(ids)
+
     def _turn(self, angles: Mapping[int, float]) -> None:
         """Give some items other angles, and the masks that belong to them."""
         if not angles:
             return
+        self.arrangement = next(ARRANGEMENTS)
         for name in COLUMNS:
             setattr(self, name, getattr(self, name).copy())
         self.atlas = _full(self.atlas.flat)

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import threading
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
-from itertools import takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Floats, InputError, Ints, choice
-from planes.constants import ATLAS_SLACK_BYTES, BOXES_MAX, ITEMS_MAX, JOURNAL_ROWS
+from planes.arrays import Bools, InputError, Ints, choice
+from planes.constants import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURNAL_ROWS, SUB
 from planes.grid256 import pixel
 from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
+from planes.stack import Stack, clipped
 
 if TYPE_CHECKING:
     from planes.bounding import Bounds, Kind
@@ -40,8 +40,19 @@ class Role(Enum):
 
 
 ROLES = tuple(Role)
-HITTABLE, OCCLUDER = ROLES.index(Role.HITTABLE), ROLES.index(Role.OCCLUDER)
+DECIDING = Role.HITTABLE, Role.OCCLUDER
+HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
 NOWHERE = (0, 0, -1, -1)
+Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
+"""A version, the items that changed then, and their deciding boxes before and after it: of one item, plain numbers."""
+
+NEVER = -1
+"""A version before all others."""
+
+NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
+
+ARRANGEMENTS = itertools.count(1)
+"""Every arrangement of the items of any scene has its own number."""
 
 
 def boxes_in(field: str, name: object) -> int | None:
@@ -53,73 +64,6 @@ def boxes_in(field: str, name: object) -> int | None:
     if not 1 <= k <= BOXES_MAX:
         raise InputError(f"{field}: expected 1 to {BOXES_MAX} boxes, got {k}")
     return k
-
-
-@dataclass(frozen=True, eq=False)
-class Stack:
-    """The items that decide hits, front to back, as columns; a view of one version of a scene.
-
-    Parameters
-    ----------
-    ids, categories, owner : (M,) int64
-    occluder : (M,) bool
-    box_xyxy : (M, 4) int64, inclusive, px
-    offset : (M,) where the item's mask begins in `masks`, row by row
-    masks : flat booleans of all masks in use
-    layered : whether the items lie on more layers than one
-    """
-
-    ids: Ints
-    occluder: Bools
-    categories: Ints
-    owner: Ints
-    box_xyxy: Ints
-    offset: Ints
-    masks: Bools
-    layered: bool
-
-    def __len__(self) -> int:
-        return len(self.ids)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns; the masks are those of the scene."""
-        columns = (self.ids, self.occluder, self.categories, self.owner, self.box_xyxy, self.offset)
-        return sum(column.nbytes for column in columns)
-
-    @cached_property
-    def has_occluders(self) -> bool:
-        """Whether any item is an occluder."""
-        return bool(self.occluder.any())
-
-    @cached_property
-    def has_unmet(self) -> bool:
-        """Whether any item is of no category, so that every shot refuses it."""
-        return not self.categories.all()
-
-    @property
-    def width(self) -> Ints:
-        """Pixels in a row of each mask."""
-        return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
-
-    @cached_property
-    def sizes(self) -> tuple[Floats, Floats]:
-        """Mean width and height of the items, and width and height of the box around all of them, px."""
-        x, y, x_max, y_max = np.ascontiguousarray(self.box_xyxy.T)
-        mean = np.array([(x_max - x).mean(), (y_max - y).mean()]) + 1
-        return mean, np.array([x_max.max() - x.min(), y_max.max() - y.min()], np.float64) + 1
-
-    def mask(self, rank: int) -> Bools:
-        """Mask (h, w) of the item of a rank, 0 in front."""
-        x, y, x_max, y_max = self.box_xyxy[rank].tolist()
-        size = (x_max - x + 1) * (y_max - y + 1)
-        return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
-
-
-def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
-    """Cut inclusive boxes (n, 4) to a box; what lies outside of it ends before it begins."""
-    low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
-    return np.concatenate([low, high], axis=1)
 
 
 @dataclass
@@ -169,6 +113,9 @@ COLUMNS: dict[str, tuple[int, ...]] = {
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
+UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))
+"""Columns that change neither the order of the items nor what they are."""
+
 
 class Items:
     """Columns by id; ids count up from 0 and are never used again."""
@@ -195,7 +142,8 @@ class Items:
         self.angles: list[float] = []
         self.variants: list[Variant] = []
         self.names: list[str] = []
-        self._journal: deque[tuple[int, Ints, Ints, Ints]] = deque()
+        self.arrangement = next(ARRANGEMENTS)
+        self._journal: deque[Change] = deque()
         self._journal_rows = 0
         self._forgotten = 0
         self._stack: tuple[int, Stack] | None = None
@@ -204,6 +152,9 @@ class Items:
         self._lock = threading.Lock()
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
+        self._box = np.tile(np.array(NOWHERE), (16, 1))
+        self._edge = np.zeros((16, 4), np.int64)
+        self._some_idle = False
 
     def add(self, sprite: Sprite, form: Form, angle: float, name: str, values: dict[str, object]) -> int:
         """Append an item; `values` are its columns."""
@@ -223,7 +174,7 @@ class Items:
         self.alive[item] = 1
         self._use(item, variant)
         ids = np.array([item])
-        self.record(ids, np.array([NOWHERE]))
+        self.record(ids)
         return item
 
     def skip_to(self, item: int) -> None:
@@ -240,14 +191,14 @@ class Items:
         self.variants += [blank] * missing
         self.names += [""] * missing
         self.count = item
+        self.arrangement = next(ARRANGEMENTS)
 
     def remove(self, ids: Ints) -> None:
         """Take items away; their ids stay unused."""
-        before = self.deciding_boxes(ids)
         self.alive[ids] = 0
         for item in ids.tolist():
             self.atlas.drop(self.variants[item])
-        self.record(ids, before)
+        self.record(ids)
 
     def reform(self, ids: Sequence[int], forms: Sequence[Form]) -> None:
         """Give items another form; all masks are made, or found, before any item changes."""
@@ -257,34 +208,75 @@ class Items:
             self.forms[item], self.variants[item] = form, variant
             self._use(item, variant)
 
-    def record(self, ids: Ints, before: Ints) -> None:
-        """Note that items changed; `before` are their deciding boxes before it."""
+    def record(self, ids: Ints, arranged: bool = False) -> None:
+        """Note that items changed; nothing but where they are, what they cost and how they fly if `arranged` still."""
+        before, after = self._box[ids], self.deciding_boxes(ids)
+        low = HALF - self.pivot_256[ids]
+        self._edge[ids] = np.concatenate([low, low + SUB * (self.size_wh[ids] - 1)], axis=1)
+        self._box[ids] = after
+        self._some_idle |= bool((after[:, 0] > after[:, 2]).any())
+        if not arranged:
+            self.arrangement = next(ARRANGEMENTS)
+        self._note(ids, before, after, len(ids))
+
+    def move(self, ids: Ints, position_256: Ints) -> None:
+        """Place items, each once (n,), at new positions (n, 2): their masks and their order stay."""
+        n, position_256 = len(ids), np.ascontiguousarray(position_256)
+        after = np.repeat(position_256.view(np.complex128), 2).view(np.int64).reshape(n, 4)  # x, y, x, y: whole pairs
+        some: Ints | slice = ids
+        if n > 1 and ids[-1] - ids[0] == n - 1 and (ids[1:] > ids[:-1]).all():
+            some = slice(int(ids[0]), int(ids[-1]) + 1)
+            after += self._edge[some]
+        else:
+            after += self._edge.take(ids, axis=0)
+        after >>= 8
+        before = self._box.take(ids, axis=0)
+        if self._some_idle:
+            after[before[:, 0] > before[:, 2]] = NOWHERE
+        self.position_256[some], self._box[some] = position_256, after
+        self._note(ids, before, after, n)
+
+    def move_one(self, item: int, x_256: int, y_256: int) -> None:
+        """Place one item at a new position: as `move`, without an array."""
+        before = x, y, x_max, y_max = tuple(self._box[item].tolist())
+        if x > x_max:
+            after = before
+        else:
+            variant = self.variants[item]
+            left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
+            after = (left, top, left + x_max - x, top + y_max - y)
+            self._box[item] = after
+        self.position_256[item] = x_256, y_256
+        self._note(item, before, after, 1)
+
+    def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
+        """Write n changes into the journal, as a new version."""
         self.version += 1
-        self._journal.append((self.version, ids, before, self.deciding_boxes(ids)))
-        self._journal_rows += len(ids)
+        self._journal.append((self.version, ids, before, after))
+        self._journal_rows += n
         while self._journal_rows > JOURNAL_ROWS:
             version, old, _, _ = self._journal.popleft()
-            self._journal_rows -= len(old)
+            self._journal_rows -= np.size(old)
             self._forgotten = version
 
     def changed_boxes(self, version: int) -> Ints | None:
         """Boxes (n, 4) where deciding items were or are, changed after a version; None if that is forgotten."""
-        changes = self._since(version)
+        changes = self.changes(version)
         if changes is None:
             return None
-        every = np.concatenate([np.zeros((0, 4), np.int64), *(box for _, *both in changes for box in both)])
+        every = np.concatenate([NO_BOXES, *(np.reshape(box, (-1, 4)) for _, _, *both in changes for box in both)])
         return every[every[:, 0] <= every[:, 2]]
 
     def changed_ids(self, version: int) -> Ints | None:
         """Items changed after a version, each once, sorted; None if that is forgotten."""
-        changes = self._since(version)
-        return None if changes is None else np.unique(np.concatenate([np.zeros(0, np.int64), *(c[0] for c in changes)]))
+        changes = self.changes(version)
+        return None if changes is None else np.unique(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
 
-    def _since(self, version: int) -> list[tuple[Ints, Ints, Ints]] | None:
-        """Journal (ids, boxes before, boxes after) after a version, the last first."""
+    def changes(self, version: int) -> list[Change] | None:
+        """Journal after a version, the last first; None if that is forgotten."""
         if version < self._forgotten:
             return None
-        return [entry[1:] for entry in takewhile(lambda entry: entry[0] > version, reversed(self._journal))]
+        return list(itertools.takewhile(lambda change: change[0] > version, reversed(self._journal)))
 
     def boxes(self, ids: Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of items; x_max < x_min where nothing is there to be met."""
@@ -312,11 +304,20 @@ class Items:
     def stack(self) -> Stack:
         """Items that decide, front to back: greater layer; occluders before objects; then the later added."""
         with self._lock:
-            if self._stack is None or not self.has_stack:
+            if self._stack is None or self._stack[0] != self.version:
                 if self.atlas.wasteful:
                     self._compact()
-                self._stack = (self.version, self.stack_of(Role.HITTABLE, Role.OCCLUDER))
+                last = None if self._stack is None else self._stack[1]
+                if last is not None and last.forms == self.arrangement:
+                    stack = last.placed(self._boxes_in_order(last.ids))
+                else:
+                    stack = self.stack_of(*DECIDING)
+                self._stack = (self.version, stack)
             return self._stack[1]
+
+    def _boxes_in_order(self, ids: Ints) -> Ints:
+        """Boxes of all that decides."""
+        return self._box.take(ids, axis=0)
 
     def stack_of(self, *roles: Role) -> Stack:
         """Items of some roles, front to back."""
@@ -334,7 +335,7 @@ class Items:
         ids, occluder = ids[order], occluder[order]
         return Stack(
             ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat,
-            layered,
+            layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
         )  # fmt: skip
 
     def tiles(self) -> Tiles:
@@ -384,13 +385,17 @@ class Items:
         for item in np.flatnonzero(self.alive[: self.count]).tolist():
             offset[item] = atlas.take(self.variants[item])
         self.atlas, self.offset = atlas, offset
+        self.arrangement = next(ARRANGEMENTS)
 
     def _reserve(self, count: int) -> None:
         size = len(self.alive)
         if count <= size:
             return
+        more = max(count - size, size)
+        self._box = np.concatenate([self._box, np.tile(np.array(NOWHERE), (more, 1))])
+        self._edge = np.concatenate([self._edge, np.zeros((more, 4), np.int64)])
         for name in COLUMNS:
             old: npt.NDArray[np.int64] = getattr(self, name)
-            grown = np.zeros((max(count, 2 * size), *old.shape[1:]), np.int64)
+            grown = np.zeros((size + more, *old.shape[1:]), np.int64)
             grown[:size] = old
             setattr(self, name, grown)

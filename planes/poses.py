@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, within
-from planes.constants import POSITION_MAX, SCALE_BITS
+from planes.constants import POSITION_MAX, SCALE_BITS, SUB
 from planes.items import Items
 from planes.sprite import Form, form_of
 
-__all__ = ["changed_forms", "points", "scale_pair"]
+__all__ = ["changed_forms", "one_place", "points", "scale_pair"]
 
 ONE = 1 << SCALE_BITS
+NUMBERS = frozenset((int, float, np.float64))
 
 
 def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> Floats:
@@ -19,6 +20,19 @@ def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> F
     if array_of(field, values).shape == (2,):
         return np.broadcast_to(reals(field, values, (2,), limit), (n, 2))
     return reals(field, values, (n, 2), limit)
+
+
+def one_place(xy: object) -> tuple[int, int] | None:
+    """One position in range on the 1/256-px grid, rounded as `snap` does; None of anything else, bad or good."""
+    if isinstance(xy, np.ndarray) and xy.shape == (2,) and xy.dtype == np.float64 and type(xy) is np.ndarray:
+        x, y = xy.tolist()
+    elif isinstance(xy, tuple | list) and len(xy) == 2 and type(xy[0]) in NUMBERS and type(xy[1]) in NUMBERS:
+        x, y = xy
+    else:
+        return None
+    if not (-POSITION_MAX <= x <= POSITION_MAX and -POSITION_MAX <= y <= POSITION_MAX):
+        return None
+    return round(x * SUB), round(y * SUB)
 
 
 def scale_pair(scale: object) -> tuple[float, float]:

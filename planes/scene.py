@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals
+from planes.arrays import Bools, InputError, Ints, array_of, choice, each, integer, integers, listed, reals, rising
 from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.index import Index
-from planes.items import ROLES, Items, Role
+from planes.items import ROLES, UNARRANGED, Items, Role
 from planes.labels import Planes, plane_objects, plane_size
-from planes.poses import changed_forms, points, scale_pair
+from planes.poses import changed_forms, one_place, points, scale_pair
 from planes.scenefile import FileObject, SceneFile, folder_of, write_scene
 from planes.schema import Text, typed
 from planes.spans import Box
@@ -189,7 +189,12 @@ class Scene:
 
     def move(self, ids: int | Sequence[int] | Ints, xy: object) -> None:
         """Place objects at new positions: ids (n,) and xy (n, 2), or one position for all of them, px."""
-        self.set(ids, position_xy=xy)
+        one = one_place(xy) if isinstance(ids, int | np.integer) and not isinstance(ids, bool) else None
+        if one is not None and 0 <= ids < self.items.count and self.items.alive[ids]:  # type: ignore[operator]
+            self.items.move_one(int(ids), *one)  # type: ignore[arg-type]
+            return
+        rows = self._existing(ids)
+        self.items.move(rows, snap(points("position_xy", xy, len(rows))))
 
     def set(
         self,
@@ -229,14 +234,13 @@ class Scene:
         if role is not None:
             columns = self._of_role(rows, _role(role)) | columns
         angles, forms = changed_forms(self.items, rows, angle, scale, flip, frame)
-        before = self.items.deciding_boxes(rows)
         if forms is not None:
             self.items.reform(rows.tolist(), forms)
             for item, value in zip(rows.tolist(), angles, strict=True):
                 self.items.angles[item] = value
         for name, values in columns.items():
             getattr(self.items, name)[rows] = values
-        self.items.record(rows, before)
+        self.items.record(rows, arranged=forms is None and columns.keys() <= UNARRANGED)
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role: what has the categories that its old role gave it gets those of the new one."""
@@ -392,7 +396,12 @@ class Scene:
 
     def _existing(self, ids: object) -> Ints:
         """Ids that are in the scene, each once."""
-        given = np.atleast_1d(array_of("ids", ids))
+        given = array_of("ids", ids)
+        if given.ndim == 1 and given.dtype == np.int64 and rising(given, self.items.count):
+            rows = given.copy()
+            if self.items.alive.take(rows).all():
+                return rows
+        given = np.atleast_1d(given)
         rows = integers("ids", given, (None,), 0, self.items.count - 1)
         gone = rows[self.items.alive[rows] == 0]
         if len(gone):

@@ -1,0 +1,99 @@
+"""What decides hits, front to back, as columns: a view of one version of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planes.arrays import Bools, Floats, Ints
+from planes.spans import Box
+
+__all__ = ["Stack", "clipped"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The items that decide hits, front to back, as columns; a view of one version of a scene.
+
+    Parameters
+    ----------
+    ids, categories, owner : (M,) int64
+    occluder : (M,) bool
+    box_xyxy : (M, 4) int64, inclusive, px
+    offset : (M,) where the item's mask begins in `masks`, row by row
+    masks : flat booleans of all masks in use
+    layered : whether the items lie on more layers than one
+    forms : a number of what the items are and of their order: stacks that have the same number differ only in boxes
+    count : of the ids of the scene, with those that are not in the stack
+    """
+
+    ids: Ints
+    occluder: Bools
+    categories: Ints
+    owner: Ints
+    box_xyxy: Ints
+    offset: Ints
+    masks: Bools
+    layered: bool
+    forms: int
+    count: int
+
+    def placed(self, box_xyxy: Ints) -> Stack:
+        """The same items in the same order at other places; this one keeps its own, and both share the rest."""
+        stack = object.__new__(Stack)
+        kept = {name: value for name, value in vars(self).items() if name != "sizes"}
+        vars(stack).update(kept, box_xyxy=box_xyxy)
+        return stack
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns; the masks are those of the scene."""
+        columns = (self.ids, self.occluder, self.categories, self.owner, self.box_xyxy, self.offset)
+        return sum(column.nbytes for column in columns)
+
+    @cached_property
+    def rank_of(self) -> Ints:
+        """Place in the stack of each id of the scene (count,), 0 in front; -1 of what is not in it."""
+        ranks = np.full(self.count, -1)
+        ranks[self.ids] = np.arange(len(self.ids))
+        ranks.flags.writeable = False
+        return ranks
+
+    @cached_property
+    def has_occluders(self) -> bool:
+        """Whether any item is an occluder."""
+        return bool(self.occluder.any())
+
+    @cached_property
+    def has_unmet(self) -> bool:
+        """Whether any item is of no category, so that every shot refuses it."""
+        return not self.categories.all()
+
+    @property
+    def width(self) -> Ints:
+        """Pixels in a row of each mask."""
+        return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    @cached_property
+    def sizes(self) -> tuple[Floats, Floats]:
+        """Mean width and height of the items, and width and height of the box around all of them, px."""
+        x, y, x_max, y_max = np.ascontiguousarray(self.box_xyxy.T)
+        mean = np.array([(x_max - x).mean(), (y_max - y).mean()]) + 1
+        return mean, np.array([x_max.max() - x.min(), y_max.max() - y.min()], np.float64) + 1
+
+    def mask(self, rank: int) -> Bools:
+        """Mask (h, w) of the item of a rank, 0 in front."""
+        x, y, x_max, y_max = self.box_xyxy[rank].tolist()
+        size = (x_max - x + 1) * (y_max - y + 1)
+        return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
+
+
+def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
+    """Cut inclusive boxes (n, 4) to a box; what lies outside of it ends before it begins."""
+    low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
+    return np.concatenate([low, high], axis=1)

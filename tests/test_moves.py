@@ -1,0 +1,214 @@
+"""Moves: stacks that follow them are those made anew, what was handed out stays, and every check is made."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_compose import MASKS, add_one, change, front_to_back, random_scene
+
+from planes import History, InputError, Scene
+from planes.items import Stack
+
+COLUMNS = ("ids", "occluder", "categories", "owner", "box_xyxy", "layered")
+
+
+def told(stack: Stack) -> list[Any]:
+    """All that a stack says, with its masks."""
+    columns = [np.array(getattr(stack, name)).tolist() for name in COLUMNS]
+    ranks = stack.rank_of.tolist()
+    return [*columns, [stack.mask(rank).tolist() for rank in range(len(stack))], ranks, stack.count]
+
+
+def said_of(scene: Scene) -> list[Any]:
+    """The same of a scene, one item at a time."""
+    items = scene.items
+    ids = [i for i in front_to_back(scene) if scene.mask(i)[0].size]
+    masks = {i: scene.mask(i) for i in ids}
+    boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for mask, (x, y) in masks.values()]
+    occluder = [i in scene.ids("occluder") for i in ids]
+    categories, owner = ([int(column[i]) for i in ids] for column in (items.categories, items.owner))
+    ranks = [ids.index(i) if i in ids else -1 for i in range(items.count)]
+    layered = len({int(items.layer[i]) for i in ids}) > 1
+    return [ids, occluder, categories, owner, boxes, layered, [masks[i][0].tolist() for i in ids], ranks, items.count]
+
+
+def moved(scene: Scene, rng: np.random.Generator) -> None:
+    """Move one, some, all or a run of the objects, in any order."""
+    ids = scene.ids()
+    if not len(ids):
+        return
+    begin = int(rng.integers(len(ids)))
+    some: list[Any] = [
+        int(rng.choice(ids)), [rng.choice(ids)], ids, rng.permutation(ids), ids[begin : begin + 3], ids[begin::-1],
+    ]  # fmt: skip
+    chosen = some[rng.integers(len(some))]
+    n = np.size(chosen)
+    xy = rng.uniform(-30, 30, (n, 2)) if n > 1 or rng.random() < 0.5 else np.array([rng.integers(-9, 9) + 0.5] * 2)
+    scene.move(chosen, xy if n > 1 else xy.reshape(2))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 12))
+def test_the_stack_after_any_change_is_the_one_made_anew(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, count)
+    if rng.random() < 0.5:
+        scene.add(np.zeros((3, 2), np.bool_))  # never in the stack
+    old: list[tuple[Stack, list[Any]]] = []
+    for _ in range(12):
+        (moved if rng.random() < 0.7 else change)(scene, rng)
+        if rng.random() < 0.2:
+            scene.set(scene.ids(), cost=int(rng.integers(9)), velocity_xy=(1, 2))
+        stack = scene.items.stack()
+        assert told(stack) == said_of(scene)
+        old.append((stack, told(stack)))
+    for stack, before in old:
+        assert told(stack) == before, "a stack that was handed out changed"
+    alike = {told_forms(stack) for stack, _ in old}
+    assert len(alike) == len({number for number, _ in alike})
+
+
+def told_forms(stack: Stack) -> tuple[int, str]:
+    """The number of its forms, and what it says beside the places."""
+    all_but_boxes = told(stack)
+    del all_but_boxes[COLUMNS.index("box_xyxy")]
+    return stack.forms, repr([*all_but_boxes, [b - a for a, b in zip(*sides(stack), strict=True)]])
+
+
+def sides(stack: Stack) -> tuple[list[int], list[int]]:
+    box = stack.box_xyxy
+    return box[:, :2].ravel().tolist(), box[:, 2:].ravel().tolist()
+
+
+def test_moves_keep_the_number_of_the_forms_and_share_all_but_the_boxes() -> None:
+    scene = random_scene(np.random.default_rng(1), 20)
+    first = scene.items.stack()
+    assert first.rank_of is first.rank_of and not first.rank_of.flags.writeable
+    ids = scene.ids()
+    for act in (
+        lambda: scene.move(int(ids[3]), (5, 5)),
+        lambda: scene.move(ids, (0, 0)),
+        lambda: scene.set(ids[2:5], position_xy=(7, 7)),
+        lambda: scene.set(ids[2:5], cost=4),
+        lambda: scene.set(ids, velocity_xy=(3, 0), position_xy=(1, 1)),
+    ):
+        act()
+        stack = scene.items.stack()
+        assert stack is not first and stack.forms == first.forms
+        for name in ("ids", "occluder", "categories", "owner", "offset", "masks", "rank_of"):
+            assert getattr(stack, name) is getattr(first, name), name
+    seen = {first.forms}
+    for values in ({"layer": 1}, {"angle": 40}, {"categories": 5}, {"owner": 0}, {"role": "mover"}, {"scale": 2}):
+        scene.set(int(ids[-1]), **values)  # type: ignore[arg-type]
+        seen.add(scene.items.stack().forms)
+    scene.remove(int(ids[-1]))
+    seen.add(scene.items.stack().forms)
+    add_one(scene, np.random.default_rng(2))
+    seen.add(scene.items.stack().forms)
+    assert len(seen) == 9
+    assert Scene().items.stack().forms not in seen
+
+
+def test_the_sizes_of_a_stack_are_its_own() -> None:
+    """They depend on where items are."""
+    scene = Scene((99, 99))
+    ids = [scene.add(np.ones((3, 3), np.bool_), (x, 5)) for x in (4, 9)]
+    assert scene.items.stack().sizes[1].tolist() == [8, 3]
+    scene.move(ids[1], (24, 15))
+    assert scene.items.stack().sizes[1].tolist() == [23, 13]
+
+
+NAN, INF, FAR = float("nan"), float("inf"), 2.0**40
+BAD: list[tuple[Any, Any]] = [
+    (7, (1, 1)), (-1, (1, 1)), (3, (1, 1)), (True, (1, 1)), (1.5, (1, 1)), (None, (1, 1)), ("a", (1, 1)),
+    ([0, 0], (1, 1)), ([0, 3], (1, 1)), ([0, 9], (1, 1)), ([0, -1], (1, 1)), ([[0]], (1, 1)), ([1, 0, 1], (1, 1)),
+    (np.array([0, 1, 1]), (1, 1)), (np.array([0, 2, 3]), (1, 1)), (np.array([-1, 0]), (1, 1)), (np.array([2, 9]), 1),
+    (0, (NAN, 1)), (0, (1, INF)), (0, (1, 2 * FAR)), (0, (-2 * FAR, 1)), (0, (1, 2, 3)), (0, (True, 1)), (0, "ab"),
+    (0, ("1", 1)), (0, 5), (0, np.array([NAN, 1])), (0, np.array([1, -INF])), (0, np.array([1, 1 + FAR])),
+    (0, np.ma.masked_array([1.0, 2.0], [True, False])), ([0, 1], [[1, 1], [1, NAN]]), ([0, 1], [[1, 1], [INF, 1]]),
+    ([0, 1], [[1, 1], [-INF, 1]]), ([0, 1], [[1, 1], [1, 1 + FAR]]), ([0, 1], [[1, 1], [-FAR - 1, 1]]),
+    ([0, 1], [[1, 1]] * 3), ([0, 1], [1, 1, 1]), ([0, 1], [[1, 1j], [1, 1]]), (0, (10**400, 1)), (0, (1, 2**60)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(len(BAD)))
+def test_a_move_is_refused_as_a_change_of_position_is(number: int) -> None:
+    ids, xy = BAD[number]
+    scene = Scene((20, 20))
+    for place in range(5):
+        scene.add(np.ones((2, 2), np.bool_), (place, place))
+    scene.remove(3)
+    before, version = said_of(scene), scene.version
+    refusals = []
+    for act in (lambda: scene.move(ids, xy), lambda: scene.set(ids, position_xy=xy)):
+        with pytest.raises(InputError) as refused:
+            act()
+        refusals.append(str(refused.value))
+        assert (said_of(scene), scene.version) == (before, version)
+    assert refusals[0] == refusals[1]
+
+
+def test_a_move_to_nowhere_is_refused() -> None:
+    scene = random_scene(np.random.default_rng(4), 2)
+    for ids in (0, [0, 1]):
+        with pytest.raises(InputError, match="position_xy: expected numbers, got None"):
+            scene.move(ids, None)
+
+
+ties = st.integers(-(2**20), 2**20).map(lambda k: k / 512)
+places = st.one_of(ties, st.floats(-FAR, FAR), st.integers(-(2**40), 2**40))
+
+
+@given(places, places, st.sampled_from([tuple, list, np.array, lambda pair: tuple(map(np.float64, pair))]))
+def test_one_object_is_placed_as_many_are(x: float, y: float, kind: Any) -> None:
+    scene = Scene()
+    for mask in (MASKS[5], MASKS[5]):
+        scene.add(mask, (3, 4))
+    scene.move(0, kind((x, y)))
+    scene.move([1], [[x, y]])
+    assert scene.items.position_256[0].tolist() == scene.items.position_256[1].tolist()
+    assert scene.mask(0)[1] == scene.mask(1)[1]
+    boxes = scene.items.stack().box_xyxy.tolist()
+    assert boxes[0] == boxes[1] and boxes[0][:2] == list(scene.mask(0)[1])
+
+
+def test_the_arrays_of_a_caller_are_not_kept() -> None:
+    """Neither the ids nor the positions: what the caller does with them later changes nothing."""
+    scene = random_scene(np.random.default_rng(4), 9)
+    ids, xy, start = scene.ids(), np.full((9, 2), 3.0), scene.version
+    scene.move(ids, xy)
+    before = said_of(scene)
+    ids[:], xy[:] = 0, 9
+    assert scene.items.changed_ids(start).tolist() == list(range(9))  # type: ignore[union-attr]
+    assert said_of(scene) == before == told(scene.items.stack())
+
+
+def test_what_decides_nothing_is_moved_without_a_box() -> None:
+    scene = Scene((20, 20))
+    ids = [scene.add(np.ones((2, 2), np.bool_), role=role) for role in ("mover", "hittable", "hud")]
+    ids.append(scene.add(np.zeros((2, 2), np.bool_)))
+    start = scene.version
+    scene.move(ids, [[5, 5]] * 4)
+    scene.move(ids[0], (7, 7))
+    boxes = scene.items.changed_boxes(start)
+    assert boxes is not None and boxes.tolist() == [[0, 0, 1, 1], [5, 5, 6, 6]]
+    assert scene.items.position_256[ids[0]].tolist() == [7 * 256, 7 * 256]
+    assert len(scene.items.stack()) == 1
+
+
+def test_the_stacks_of_the_past_are_those_of_their_time() -> None:
+    """Whether the order was known when they were recorded, or not."""
+    rng = np.random.default_rng(6)
+    scene = random_scene(rng, 12)
+    history, then = History(scene), []
+    for tick in range(30):
+        (moved if tick % 5 else change)(scene, rng)
+        if tick % 3:
+            scene.items.stack()
+        history.record(tick)
+        then.append(said_of(scene))
+    assert [told(history.at(tick).items.stack()) for tick in history.ticks] == then
+    forms = {history.at(tick).items.stack().forms for tick in history.ticks}
+    assert len(forms) < 15, "what only moved keeps its forms"
