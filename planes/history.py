@@ -60,7 +60,7 @@ class PastItems(Items):
                 now = getattr(items, name)[: self.count] if changed else getattr(before, name)
                 setattr(self, name, _column(now, getattr(before, name)) if changed else now)
             flat, self.arrangement = items.atlas.flat, items.arrangement
-            if items._stack is not None and items._stack[1].forms == items.arrangement:
+            if items._stack is not None:
                 self._stack = (NEVER, items._stack[1].placed(NO_BOXES))  # the order is kept, the boxes are made anew
         self.atlas = before.atlas if flat is before.atlas.flat else _full(flat)
         if kept:

@@ -153,8 +153,9 @@ class Items:
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
         self._box = np.tile(np.array(NOWHERE), (16, 1))
-        self._edge = np.zeros((16, 4), np.int64)
-        self._some_idle = False
+        self._edge = np.zeros(
+            (16, 4), np.int64
+        )  # what a position lacks of the first and last pixel of the box, 1/256 px
 
     def add(self, sprite: Sprite, form: Form, angle: float, name: str, values: dict[str, object]) -> int:
         """Append an item; `values` are its columns."""
@@ -173,8 +174,7 @@ class Items:
             getattr(self, column)[item] = value
         self.alive[item] = 1
         self._use(item, variant)
-        ids = np.array([item])
-        self.record(ids)
+        self.record(np.array([item]))
         return item
 
     def skip_to(self, item: int) -> None:
@@ -212,9 +212,8 @@ class Items:
         """Note that items changed; nothing but where they are, what they cost and how they fly if `arranged` still."""
         before, after = self._box[ids], self.deciding_boxes(ids)
         low = HALF - self.pivot_256[ids]
-        self._edge[ids] = np.concatenate([low, low + SUB * (self.size_wh[ids] - 1)], axis=1)
+        self._edge[ids] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
         self._box[ids] = after
-        self._some_idle |= bool((after[:, 0] > after[:, 2]).any())
         if not arranged:
             self.arrangement = next(ARRANGEMENTS)
         self._note(ids, before, after, len(ids))
@@ -231,22 +230,16 @@ class Items:
             after += self._edge.take(ids, axis=0)
         after >>= 8
         before = self._box.take(ids, axis=0)
-        if self._some_idle:
-            after[before[:, 0] > before[:, 2]] = NOWHERE
         self.position_256[some], self._box[some] = position_256, after
         self._note(ids, before, after, n)
 
     def move_one(self, item: int, x_256: int, y_256: int) -> None:
         """Place one item at a new position: as `move`, without an array."""
         before = x, y, x_max, y_max = tuple(self._box[item].tolist())
-        if x > x_max:
-            after = before
-        else:
-            variant = self.variants[item]
-            left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
-            after = (left, top, left + x_max - x, top + y_max - y)
-            self._box[item] = after
-        self.position_256[item] = x_256, y_256
+        variant = self.variants[item]
+        left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
+        after = (left, top, left + x_max - x, top + y_max - y)
+        self.position_256[item], self._box[item] = (x_256, y_256), after
         self._note(item, before, after, 1)
 
     def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
@@ -385,7 +378,6 @@ class Items:
         for item in np.flatnonzero(self.alive[: self.count]).tolist():
             offset[item] = atlas.take(self.variants[item])
         self.atlas, self.offset = atlas, offset
-        self.arrangement = next(ARRANGEMENTS)
 
     def _reserve(self, count: int) -> None:
         size = len(self.alive)

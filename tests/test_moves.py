@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_compose import MASKS, add_one, change, front_to_back, random_scene
 
 from planes import History, InputError, Scene
-from planes.items import Stack
+from planes.items import Role, Stack
 
 COLUMNS = ("ids", "occluder", "categories", "owner", "box_xyxy", "layered")
 
@@ -125,8 +125,10 @@ BAD: list[tuple[Any, Any]] = [
     (7, (1, 1)), (-1, (1, 1)), (3, (1, 1)), (True, (1, 1)), (1.5, (1, 1)), (None, (1, 1)), ("a", (1, 1)),
     ([0, 0], (1, 1)), ([0, 3], (1, 1)), ([0, 9], (1, 1)), ([0, -1], (1, 1)), ([[0]], (1, 1)), ([1, 0, 1], (1, 1)),
     (np.array([0, 1, 1]), (1, 1)), (np.array([0, 2, 3]), (1, 1)), (np.array([-1, 0]), (1, 1)), (np.array([2, 9]), 1),
-    (0, (NAN, 1)), (0, (1, INF)), (0, (1, 2 * FAR)), (0, (-2 * FAR, 1)), (0, (1, 2, 3)), (0, (True, 1)), (0, "ab"),
-    (0, ("1", 1)), (0, 5), (0, np.array([NAN, 1])), (0, np.array([1, -INF])), (0, np.array([1, 1 + FAR])),
+    (0, (NAN, 1)), (0, (1, INF)), (0, (1, 2 * FAR)), (0, (-2 * FAR, 1)), (0, (1, 2, 3)), (0, (True, 1)), (0, (1, True)),
+    (0, "ab"),
+    (0, ("1", 1)), (0, 5), (0, np.array([True, False])), (0, np.array([1, "a"], object)), (np.array([0, 99]), (1, 1)),
+    (0, np.array([NAN, 1])), (0, np.array([1, -INF])), (0, np.array([1, 1 + FAR])),
     (0, np.ma.masked_array([1.0, 2.0], [True, False])), ([0, 1], [[1, 1], [1, NAN]]), ([0, 1], [[1, 1], [INF, 1]]),
     ([0, 1], [[1, 1], [-INF, 1]]), ([0, 1], [[1, 1], [1, 1 + FAR]]), ([0, 1], [[1, 1], [-FAR - 1, 1]]),
     ([0, 1], [[1, 1]] * 3), ([0, 1], [1, 1, 1]), ([0, 1], [[1, 1j], [1, 1]]), (0, (10**400, 1)), (0, (1, 2**60)),
@@ -137,7 +139,7 @@ BAD: list[tuple[Any, Any]] = [
 def test_a_move_is_refused_as_a_change_of_position_is(number: int) -> None:
     ids, xy = BAD[number]
     scene = Scene((20, 20))
-    for place in range(5):
+    for place in range(16 if "-1" in str(ids) else 5):  # as many as the first columns hold
         scene.add(np.ones((2, 2), np.bool_), (place, place))
     scene.remove(3)
     before, version = said_of(scene), scene.version
@@ -196,6 +198,34 @@ def test_what_decides_nothing_is_moved_without_a_box() -> None:
     assert boxes is not None and boxes.tolist() == [[0, 0, 1, 1], [5, 5, 6, 6]]
     assert scene.items.position_256[ids[0]].tolist() == [7 * 256, 7 * 256]
     assert len(scene.items.stack()) == 1
+
+
+def test_ids_that_are_left_out_are_in_no_stack() -> None:
+    scene = Scene()
+    scene.add(MASKS[5])
+    assert scene.items.stack().rank_of.tolist() == [0]
+    scene.items.skip_to(3)
+    scene.items.version += 1
+    assert scene.items.stack().rank_of.tolist() == [0, -1, -1]
+
+
+def test_a_stack_of_other_roles_has_forms_of_its_own() -> None:
+    scene = random_scene(np.random.default_rng(3), 9)
+    forms = [scene.items.stack_of(*roles).forms for roles in ((Role.MOVER,), (Role.HUD,), (Role.HITTABLE,))]
+    assert len({*forms, scene.items.stack().forms}) == 4
+
+
+def test_the_journal_forgets_no_more_than_it_must(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.items.JOURNAL_ROWS", 5)
+    scene = random_scene(np.random.default_rng(3), 9)
+    ids = [*scene.ids("hittable"), *scene.ids("occluder")][:3]
+    for x in range(9):
+        scene.move(ids, (x, 0))
+        scene.move(int(ids[0]), (x, 1))
+    for lag, rows in ((0, 0), (1, 2), (2, 8), (3, 10)):
+        boxes = scene.items.changed_boxes(scene.version - lag)
+        assert boxes is not None and len(boxes) == rows
+    assert scene.items.changed_boxes(scene.version - 4) is None
 
 
 def test_the_stacks_of_the_past_are_those_of_their_time() -> None:
