@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 import reprlib
@@ -155,6 +154,8 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
     names = list(options)
     if isinstance(value, str) and value in names:
         return value
+    import difflib  # only an error needs it
+
     near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     listed = ", ".join(map(repr, names[:NAMES_SHOWN])) or "none"

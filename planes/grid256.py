@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from planes.constants import HALF, SUB, TRIG_BITS
 __all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "snap", "turned", "unit", "unit_toward"]
 
 ONE = 1 << TRIG_BITS
-_PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
+_PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _DOUBT = 2.0**-12  # numpy's sine is within a few ulp (2**-21 after the scaling); nearer to a tie than this, ask again
 
 
@@ -117,7 +116,9 @@ def _exact_cos(degrees: float) -> int:
 
 def _taylor(degrees: float, first: int) -> int:
     """Round 2**30 times the sine (first = 1) or cosine (first = 0) of [0, 45] degrees, from 30 terms in fractions."""
-    x = Fraction(float(degrees)) / 180 * _PI
+    from fractions import Fraction  # few angles are so near to a tie
+
+    x = Fraction(float(degrees)) / 180 * Fraction(*_PI)
     term = total = x if first else Fraction(1)
     for n in range(first + 1, first + 30, 2):
         term = -term * x * x / (n * (n + 1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import secrets
 import stat
 import struct
 import zlib
@@ -160,6 +159,8 @@ def _path(path: object, field: str) -> Path:
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file beside its place and rename it."""
     check_output(path)
+    import secrets  # dear to load
+
     aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")  # two that write at once do not share it
     try:
         aside.write_bytes(data)

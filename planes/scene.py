@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -333,6 +332,8 @@ class Scene:
 
     def content_hash(self) -> str:
         """Hash of all that decides hits: equal scenes answer every shot alike."""
+        import hashlib  # few calls need it, and it is dear to load
+
         stack = self.items.stack()
         digest = hashlib.sha256(repr(self.bounds).encode())
         for column in (stack.ids, stack.occluder, stack.categories, stack.owner, stack.box_xyxy):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Callable
@@ -415,4 +414,6 @@ def _digest_of(path: Path) -> str | None:
 
 
 def _digest(image: Image) -> str:
+    import hashlib  # few calls need it, and it is dear to load
+
     return hashlib.sha256(repr(image.shape).encode() + image.tobytes()).hexdigest()

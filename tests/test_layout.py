@@ -129,6 +129,17 @@ def test_importing_costs_little() -> None:
     assert len(extra) < 60
 
 
+def test_a_first_shot_loads_little_beside_numpy() -> None:
+    """What errors, hashes, files and angles near to a tie need waits for them; numba for a batch that pays."""
+    numpy = "import numpy, numpy.typing"
+    shot = (
+        "from planes import Scene; from weapons import Disc, fire; scene = Scene((9, 9)); fire(scene, Disc(3), (2, 2))"
+    )
+    extra = loaded_by(f"{numpy}\n{shot}") - loaded_by(numpy)
+    assert not extra & {"hashlib", "secrets", "random", "fractions", "decimal", "difflib", "numba", "cv2"}
+    assert len([name for name in extra if name.split(".")[0] not in ORDER]) < 20
+
+
 @pytest.mark.parametrize("package", ORDER)
 def test_whatever_a_package_lists_is_there(package: str) -> None:
     code = f"import {package}\nassert dir({package}) and all(getattr({package}, n) is not None for n in dir({package}))"
