@@ -111,7 +111,8 @@ class CodePlane:
                 self.codes = np.empty((y_max - y + 1, x_max - x + 1), kind)
                 self._pending = [np.array([self.box_xyxy])]
             if self._pending:
-                _paint(self.codes, self.box_xyxy, items.stack(), np.concatenate(self._pending))
+                dirty = self._pending[0] if len(self._pending) == 1 else np.concatenate(self._pending)
+                _paint(self.codes, self.box_xyxy, items.stack(), dirty)
             self._seen = items.version
             self._pending, self._cost = [], 0
             return self.codes

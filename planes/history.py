@@ -73,6 +73,9 @@ class PastItems(Items):
         self.variants = _shared(items.variants, before.variants)
         self.forms = before.forms if self.variants is before.variants else list(items.forms)
 
+    def _allot(self) -> None:
+        """Nothing: the columns are those that were recorded."""
+
     def between(self, after: PastItems, part: int, parts: int) -> PastItems:
         """These items on their way to a later moment; see `History`.
 

@@ -192,8 +192,9 @@ class Scene:
         if one is not None and 0 <= ids < self.items.count and self.items.alive[ids]:  # type: ignore[operator]
             self.items.move_one(int(ids), *one)  # type: ignore[arg-type]
             return
-        rows = self._existing(ids)
-        self.items.move(rows, snap(points("position_xy", xy, len(rows))))
+        risen = self._risen(ids)
+        rows = self._existing(ids) if risen is None else risen
+        self.items.move(rows, snap(points("position_xy", xy, len(rows))), in_order=risen is not None)
 
     def set(
         self,
@@ -395,14 +396,19 @@ class Scene:
         part_of = None if owner == item else owner
         return FileObject(role, items.sprites[item], (x, y), pose, items.names[item], categories, part_of, item)
 
+    def _risen(self, ids: object) -> Ints | None:
+        """A copy of an array of rising ids (n,) that are all in the scene; None of any other."""
+        if type(ids) is not np.ndarray or ids.ndim != 1 or ids.dtype != np.int64 or not rising(ids, self.items.count):
+            return None
+        rows = ids.copy()
+        return rows if self.items.alive.take(rows).all() else None
+
     def _existing(self, ids: object) -> Ints:
         """Ids that are in the scene, each once."""
-        given = array_of("ids", ids)
-        if given.ndim == 1 and given.dtype == np.int64 and rising(given, self.items.count):
-            rows = given.copy()
-            if self.items.alive.take(rows).all():
-                return rows
-        given = np.atleast_1d(given)
+        risen = self._risen(ids)
+        if risen is not None:
+            return risen
+        given = np.atleast_1d(array_of("ids", ids))
         rows = integers("ids", given, (None,), 0, self.items.count - 1)
         gone = rows[self.items.alive[rows] == 0]
         if len(gone):

@@ -43,8 +43,8 @@ class Stack:
     def placed(self, box_xyxy: Ints) -> Stack:
         """The same items in the same order at other places; this one keeps its own, and both share the rest."""
         stack = object.__new__(Stack)
-        kept = {name: value for name, value in vars(self).items() if name != "sizes"}
-        vars(stack).update(kept, box_xyxy=box_xyxy)
+        vars(stack).update(vars(self), box_xyxy=box_xyxy)
+        vars(stack).pop("sizes", None)
         return stack
 
     def __len__(self) -> int:
