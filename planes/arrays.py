@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
-    "Bools", "Floats", "Image", "InputError", "Ints", "array_of", "bools", "choice", "each", "flag", "integer",
-    "integers", "listed", "real", "reals", "rising", "shown", "within",
+    "Bools", "Floats", "Image", "InputError", "Ints", "all_within", "array_of", "bools", "choice", "each", "flag",
+    "integer", "integers", "listed", "real", "reals", "rising", "shown", "within",
 ]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
@@ -92,7 +92,7 @@ def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> 
         If it is not numeric, not finite, of another shape, or beyond the limit.
     """
     array = _float64(_numeric(field, values, shape, "iuf"))
-    if not _all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):
+    if not all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):
         _first_bad(field, array, np.isfinite(array), "a finite number")
         _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
     return array
@@ -105,7 +105,7 @@ def integers(field: str, values: object, shape: Shape, low: int, high: int) -> I
     if array.dtype.kind == "f":
         array = _float64(array)
         _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
-    if not _all_within(array, low, high):
+    if not all_within(array, low, high):
         _first_bad(field, array, (array >= low) & (array <= high), whole)
     return array.astype(np.int64)
 
@@ -224,7 +224,7 @@ def _float64(array: npt.NDArray[Any]) -> Floats:
         return array.astype(np.float64)
 
 
-def _all_within(array: npt.NDArray[Any], low: float, high: float) -> bool:
+def all_within(array: npt.NDArray[Any], low: float, high: float) -> bool:
     """Whether all numbers are from low to high, by their least and greatest alone; never where one is not a number."""
     return not array.size or bool(array.min() >= low and array.max() <= high)
 

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, InputError, Ints, choice
+from planes import placing
+from planes.arrays import Bools, Floats, InputError, Ints, choice
 from planes.constants import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURNAL_ROWS, SUB
 from planes.grid256 import pixel
+from planes.placing import boxes_at
 from planes.spans import Box
 from planes.sprite import Form, Sprite, Variant, variant_of
 from planes.stack import Stack, clipped
+from planes.twins import kernels_of
 
 if TYPE_CHECKING:
     from planes.bounding import Bounds, Kind
@@ -45,6 +48,9 @@ HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
 NOWHERE = (0, 0, -1, -1)
 Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
 """A version, the items that changed then, and their deciding boxes before and after it: of one item, plain numbers."""
+
+PLACED_NS = 30
+"""What it takes in numpy to place an item, of many."""
 
 NEVER = -1
 """A version before all others."""
@@ -221,23 +227,20 @@ class Items:
             self.arrangement = next(ARRANGEMENTS)
         self._note(ids, before, after, len(ids))
 
-    def move(self, ids: Ints, position_256: Ints, in_order: bool = False) -> None:
-        """Place items, each once (n,), at new positions (n, 2): their masks and their order stay.
+    def move(self, ids: Ints, position_256: Ints) -> None:
+        """Place items, each once (n,), at new positions (n, 2): their masks and their order stay."""
+        before, after = self._box.take(ids, axis=0), boxes_at(position_256, self._edge.take(ids, axis=0))
+        self.position_256[ids], self._box[ids] = position_256, after
+        self._note(ids, before, after, len(ids))
 
-        What is known to be `in_order`, rising, costs less where no id between is left out.
-        """
-        n, position_256 = len(ids), np.ascontiguousarray(position_256)
-        after = np.repeat(position_256.view(np.complex128), 2).view(np.int64).reshape(n, 4)  # x, y, x, y: whole pairs
-        some: Ints | slice = ids
-        if in_order and n and ids[-1] - ids[0] == n - 1:
-            some = slice(int(ids[0]), int(ids[-1]) + 1)
-            after += self._edge[some]
-        else:
-            after += self._edge.take(ids, axis=0)
-        after >>= 8
-        before = self._box.take(ids, axis=0)
-        self.position_256[some], self._box[some] = position_256, after
-        self._note(ids, before, after, n)
+    def move_risen(self, ids: Ints, xy: Floats) -> bool:
+        """Place items of rising ids (n,) at new positions (n, 2), px, and tell whether all is well; else do nothing."""
+        before, after = np.empty((2, len(ids), 4), np.int64)
+        place = kernels_of(placing, len(ids) * PLACED_NS).place
+        if not place(ids, xy, self.count, self.alive, self._edge, self.position_256, self._box, before, after):
+            return False
+        self._note(ids.copy(), before, after, len(ids))
+        return True
 
     def move_one(self, item: int, x_256: int, y_256: int) -> None:
         """Place one item at a new position: as `move`, without an array."""

@@ -9,7 +9,7 @@ from planes.constants import POSITION_MAX, SCALE_BITS, SUB
 from planes.items import Items
 from planes.sprite import Form, form_of
 
-__all__ = ["changed_forms", "one_place", "points", "scale_pair"]
+__all__ = ["are_rows", "changed_forms", "one_place", "points", "scale_pair"]
 
 ONE = 1 << SCALE_BITS
 NUMBERS = frozenset((int, float, np.float64))
@@ -20,6 +20,13 @@ def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> F
     if array_of(field, values).shape == (2,):
         return np.broadcast_to(reals(field, values, (2,), limit), (n, 2))
     return reals(field, values, (n, 2), limit)
+
+
+def are_rows(ids: object, xy: object) -> bool:
+    """Whether these are plain arrays of ids (n,) and of positions (n, 2), each in one piece."""
+    if type(ids) is not np.ndarray or type(xy) is not np.ndarray or ids.dtype != np.int64 or xy.dtype != np.float64:
+        return False
+    return ids.ndim == 1 and xy.shape == (len(ids), 2) and ids.flags.c_contiguous and xy.flags.c_contiguous
 
 
 def one_place(xy: object) -> tuple[int, int] | None:

@@ -16,7 +16,7 @@ from planes.grid256 import snap
 from planes.index import Index
 from planes.items import ROLES, UNARRANGED, Items, Role
 from planes.labels import Planes, plane_objects, plane_size
-from planes.poses import changed_forms, one_place, points, scale_pair
+from planes.poses import are_rows, changed_forms, one_place, points, scale_pair
 from planes.scenefile import FileObject, SceneFile, folder_of, write_scene
 from planes.schema import Text, typed
 from planes.spans import Box
@@ -192,9 +192,10 @@ class Scene:
         if one is not None and 0 <= ids < self.items.count and self.items.alive[ids]:  # type: ignore[operator]
             self.items.move_one(int(ids), *one)  # type: ignore[arg-type]
             return
-        risen = self._risen(ids)
-        rows = self._existing(ids) if risen is None else risen
-        self.items.move(rows, snap(points("position_xy", xy, len(rows))), in_order=risen is not None)
+        if are_rows(ids, xy) and self.items.move_risen(ids, xy):  # type: ignore[arg-type]
+            return
+        rows = self._existing(ids)
+        self.items.move(rows, snap(points("position_xy", xy, len(rows))))
 
     def set(
         self,

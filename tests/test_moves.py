@@ -1,14 +1,15 @@
 """Moves: stacks that follow them are those made anew, what was handed out stays, and every check is made."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_compose import MASKS, add_one, change, front_to_back, random_scene
 
-from planes import History, InputError, Scene
+from planes import History, InputError, Scene, use_jit
 from planes.items import Role, Stack
 
 COLUMNS = ("ids", "occluder", "categories", "owner", "box_xyxy", "layered")
@@ -49,9 +50,9 @@ def moved(scene: Scene, rng: np.random.Generator) -> None:
     scene.move(chosen, xy if n > 1 else xy.reshape(2))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(0, 12))
-def test_the_stack_after_any_change_is_the_one_made_anew(seed: int, count: int) -> None:
+def test_the_stack_after_any_change_is_the_one_made_anew(jit: bool, seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, count)
     if rng.random() < 0.5:
@@ -120,6 +121,15 @@ def test_the_sizes_of_a_stack_are_its_own() -> None:
     assert scene.items.stack().sizes[1].tolist() == [23, 13]
 
 
+@pytest.fixture(params=[False, True])
+def jit(request: pytest.FixtureRequest) -> Iterator[bool]:
+    if request.param:
+        pytest.importorskip("numba")
+    use_jit(request.param)
+    yield request.param
+    use_jit(None)
+
+
 NAN, INF, FAR = float("nan"), float("inf"), 2.0**40
 BAD: list[tuple[Any, Any]] = [
     (7, (1, 1)), (-1, (1, 1)), (3, (1, 1)), (True, (1, 1)), (1.5, (1, 1)), (None, (1, 1)), ("a", (1, 1)),
@@ -129,6 +139,12 @@ BAD: list[tuple[Any, Any]] = [
     (0, "ab"),
     (0, ("1", 1)), (0, 5), (0, np.array([True, False])), (0, np.array([1, "a"], object)), (np.array([0, 99]), (1, 1)),
     (0, np.array([NAN, 1])), (0, np.array([1, -INF])), (0, np.array([1, 1 + FAR])),
+    (np.array([0, 1]), np.array([[1, 1], [1, NAN]])), (np.array([0, 4]), np.array([[1, INF], [1, 1]])),
+    (np.array([0, 1]), np.array([[1, 1], [-FAR - 1, 1]])), (np.array([0, 4]), np.array([[1, FAR + 1], [1, 1]])),
+    (np.array([1, 0, 1]), np.ones((3, 2))), (np.array([0, 2, 3]), np.ones((3, 2))),
+    (np.array([-1, 0]), np.ones((2, 2))),
+    (np.array([0, 99]), np.ones((2, 2))), (np.array([0, 5]), np.ones((2, 2))), (np.array([0, 0]), np.ones((2, 2))),
+    (np.array([0, 1]), np.ones((3, 2))), (np.array([0, 1]), np.ones((2, 3))), (np.array([[0, 1]]), np.ones((2, 2))),
     (0, np.ma.masked_array([1.0, 2.0], [True, False])), ([0, 1], [[1, 1], [1, NAN]]), ([0, 1], [[1, 1], [INF, 1]]),
     ([0, 1], [[1, 1], [-INF, 1]]), ([0, 1], [[1, 1], [1, 1 + FAR]]), ([0, 1], [[1, 1], [-FAR - 1, 1]]),
     ([0, 1], [[1, 1]] * 3), ([0, 1], [1, 1, 1]), ([0, 1], [[1, 1j], [1, 1]]), (0, (10**400, 1)), (0, (1, 2**60)),
@@ -136,7 +152,7 @@ BAD: list[tuple[Any, Any]] = [
 
 
 @pytest.mark.parametrize("number", range(len(BAD)))
-def test_a_move_is_refused_as_a_change_of_position_is(number: int) -> None:
+def test_a_move_is_refused_as_a_change_of_position_is(jit: bool, number: int) -> None:
     ids, xy = BAD[number]
     scene = Scene((20, 20))
     for place in range(16 if "-1" in str(ids) else 5):  # as many as the first columns hold
@@ -176,7 +192,23 @@ def test_one_object_is_placed_as_many_are(x: float, y: float, kind: Any) -> None
     assert boxes[0] == boxes[1] and boxes[0][:2] == list(scene.mask(0)[1])
 
 
-def test_the_arrays_of_a_caller_are_not_kept() -> None:
+@given(st.lists(st.tuples(st.integers(0, 11), places, places), unique_by=lambda row: row[0]), st.booleans())
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_many_are_placed_as_each_is_alone(jit: bool, rows: list[tuple[int, float, float]], in_one_piece: bool) -> None:
+    """Rising ids in plain arrays take a path of their own; all but those of objects that decide nothing have boxes."""
+    scenes = [random_scene(np.random.default_rng(8), 12) for _ in range(2)]
+    rows.sort()
+    ids, xy = np.array([row[0] for row in rows], np.int64), np.array([row[1:] for row in rows], np.float64)
+    scenes[0].move(ids, xy.reshape(-1, 2) if in_one_piece else xy.reshape(-1, 2).copy(order="F"))
+    for item, x, y in rows:
+        scenes[1].move(item, (x, y))
+    assert scenes[0].items.position_256.tolist() == scenes[1].items.position_256.tolist()
+    assert told(scenes[0].items.stack()) == told(scenes[1].items.stack()) == said_of(scenes[0])
+    boxes = [sorted(scene.items.changed_boxes(12).tolist()) for scene in scenes]  # type: ignore[union-attr]
+    assert boxes[0] == boxes[1]
+
+
+def test_the_arrays_of_a_caller_are_not_kept(jit: bool) -> None:
     """Neither the ids nor the positions: what the caller does with them later changes nothing."""
     scene = random_scene(np.random.default_rng(4), 9)
     ids, xy, start = scene.ids(), np.full((9, 2), 3.0), scene.version

@@ -423,8 +423,8 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays compose constants grid256 image index items kept labels painting poses rasterise sampling scene scenefile"
-    " schema spans sprite stack twins"
+    "arrays compose constants grid256 image index items kept labels painting placing poses rasterise sampling scene"
+    " scenefile schema spans sprite stack twins"
 )
 OF_FIRE = "arsenal candidates columns draws explain firing guns hits pattern plan resolve volley weapon"
 OF_A_RAY = "ends flight meetings passes rayexplain rayfire rayhits rays trace tracing"
