@@ -120,7 +120,8 @@ class CodePlane:
 
 def area(boxes_xyxy: Ints) -> int:
     """Pixels of inclusive boxes, added up."""
-    return int((boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1).prod(axis=1).sum())
+    sides = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
+    return int((sides[:, 0] * sides[:, 1]).sum())
 
 
 def _areas(boxes_xyxy: Ints) -> Ints:

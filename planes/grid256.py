@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +20,9 @@ __all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "snap", "turned", "
 ONE = 1 << TRIG_BITS
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _DOUBT = 2.0**-12  # numpy's sine is within a few ulp (2**-21 after the scaling); nearer to a tie than this, ask again
+
+ANGLES_KEPT = 2**12
+"""Angles whose directions are kept: objects turn by the same steps again and again."""
 
 
 def snap(values: object) -> Ints:
@@ -79,6 +83,7 @@ def unit_toward(dx: Ints | int, dy: Ints | int) -> tuple[Ints, Ints]:
     return both[..., 0], both[..., 1]
 
 
+@lru_cache(maxsize=ANGLES_KEPT)
 def quarter_turns(degrees: float) -> tuple[int, int, int]:
     """Split an angle into k quarter turns and a rest in [-45, 45), as (k mod 4, cos, sin) of the rest."""
     folded = math.fmod(degrees, 360.0)

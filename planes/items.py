@@ -6,7 +6,7 @@ import itertools
 import re
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -122,6 +122,9 @@ COLUMNS: dict[str, tuple[int, ...]] = {
 UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))
 """Columns that change neither the order of the items nor what they are."""
 
+ORDERING = frozenset(("alive", "role", "layer"))
+"""Columns that change the order of the items, or which of them decide."""
+
 
 class Items:
     """Columns by id; ids count up from 0 and are never used again."""
@@ -150,6 +153,7 @@ class Items:
         self.names: list[str] = []
         self.arrangement = next(ARRANGEMENTS)
         self._journal: deque[Change] = deque()
+        self._in_order = False  # whether the order of the last stack still holds
         self._journal_rows = 0
         self._forgotten = 0
         self._stack: tuple[int, Stack] | None = None
@@ -201,6 +205,7 @@ class Items:
         self.names += [""] * missing
         self.count = item
         self.arrangement = next(ARRANGEMENTS)
+        self._in_order = False
 
     def remove(self, ids: Ints) -> None:
         """Take items away; their ids stay unused."""
@@ -217,14 +222,16 @@ class Items:
             self.forms[item], self.variants[item] = form, variant
             self._use(item, variant)
 
-    def record(self, ids: Ints, arranged: bool = False) -> None:
-        """Note that items changed; nothing but where they are, what they cost and how they fly if `arranged` still."""
+    def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
+        """Note that items changed in some columns."""
         before, after = self._box[ids], self.deciding_boxes(ids)
         low = HALF - self.pivot_256[ids]
         self._edge[ids] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
         self._box[ids] = after
-        if not arranged:
+        if not UNARRANGED.issuperset(columns):
             self.arrangement = next(ARRANGEMENTS)
+            there = (before[:, 0] <= before[:, 2]) == (after[:, 0] <= after[:, 2])
+            self._in_order &= ORDERING.isdisjoint(columns) and bool(there.all())
         self._note(ids, before, after, len(ids))
 
     def move(self, ids: Ints, position_256: Ints) -> None:
@@ -282,9 +289,10 @@ class Items:
 
     def boxes(self, ids: Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of items; x_max < x_min where nothing is there to be met."""
-        corner = pixel(self.position_256[ids] - self.pivot_256[ids])
-        boxes = np.concatenate([corner, corner + self.size_wh[ids] - 1], axis=1)
-        boxes[(self.alive[ids] == 0) | (self.size_wh[ids, 0] == 0)] = NOWHERE
+        corner = pixel(self.position_256.take(ids, axis=0) - self.pivot_256.take(ids, axis=0))
+        size = self.size_wh.take(ids, axis=0)
+        boxes = np.concatenate([corner, corner + size - 1], axis=1)
+        boxes[(self.alive[ids] == 0) | (size[:, 0] == 0)] = NOWHERE
         return boxes
 
     def corner(self, item: int) -> tuple[int, int]:
@@ -295,7 +303,8 @@ class Items:
     def deciding_boxes(self, ids: Ints) -> Ints:
         """Like `boxes`, and nowhere for items that decide no hit: what they do, planes need not follow."""
         boxes = self.boxes(ids)
-        boxes[~np.isin(self.role[ids], (HITTABLE, OCCLUDER))] = NOWHERE
+        role = self.role[ids]
+        boxes[(role != HITTABLE) & (role != OCCLUDER)] = NOWHERE
         return boxes
 
     @property
@@ -309,13 +318,21 @@ class Items:
             if self._stack is None or self._stack[0] != self.version:
                 if self.atlas.wasteful:
                     self._compact()
-                last = None if self._stack is None else self._stack[1]
-                if last is not None and last.forms == self.arrangement:
-                    stack = last.placed(self._boxes_in_order(last.ids))
-                else:
-                    stack = self.stack_of(*DECIDING)
-                self._stack = (self.version, stack)
+                self._stack = (self.version, self._stack_after(None if self._stack is None else self._stack[1]))
+                self._in_order = True
             return self._stack[1]
+
+    def _stack_after(self, last: Stack | None) -> Stack:
+        """The stack of the present version, which shares with the last one what did not change."""
+        if last is not None and last.forms == self.arrangement:
+            return last.placed(self._boxes_in_order(last.ids))
+        if last is None or not self._in_order:
+            return self.stack_of(*DECIDING)
+        ids = last.ids
+        columns = (column.take(ids) for column in (self.categories, self.owner))
+        return last.reformed(
+            self.arrangement, self._boxes_in_order(ids), self.offset.take(ids), self.atlas.flat, *columns
+        )
 
     def _boxes_in_order(self, ids: Ints) -> Ints:
         """Boxes of all that decides."""

@@ -14,7 +14,7 @@ from planes.compose import CodePlane, label_plane, plane_fits
 from planes.constants import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from planes.grid256 import snap
 from planes.index import Index
-from planes.items import ROLES, UNARRANGED, Items, Role
+from planes.items import ROLES, Items, Role
 from planes.labels import Planes, plane_objects, plane_size
 from planes.poses import are_rows, changed_forms, one_place, points, scale_pair
 from planes.scenefile import FileObject, SceneFile, folder_of, write_scene
@@ -241,7 +241,7 @@ class Scene:
                 self.items.angles[item] = value
         for name, values in columns.items():
             getattr(self.items, name)[rows] = values
-        self.items.record(rows, arranged=forms is None and columns.keys() <= UNARRANGED)
+        self.items.record(rows, columns if forms is None else {*columns, "mask"})
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role: what has the categories that its old role gave it gets those of the new one."""

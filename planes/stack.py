@@ -42,9 +42,22 @@ class Stack:
 
     def placed(self, box_xyxy: Ints) -> Stack:
         """The same items in the same order at other places; this one keeps its own, and both share the rest."""
+        return self._with(("sizes",), box_xyxy=box_xyxy)
+
+    def reformed(self, forms: int, box_xyxy: Ints, offset: Ints, masks: Bools, categories: Ints, owner: Ints) -> Stack:
+        """The same ids in the same order, of other masks, categories or owners."""
+        return self._with(
+            ("sizes", "width", "has_unmet"), forms=forms, box_xyxy=box_xyxy, offset=offset, masks=masks,
+            categories=categories, owner=owner,
+        )  # fmt: skip
+
+    def _with(self, stale: tuple[str, ...], **columns: object) -> Stack:
+        """A stack of some other columns, that shares the rest and what was worked out of it, but for what is stale."""
         stack = object.__new__(Stack)
-        vars(stack).update(vars(self), box_xyxy=box_xyxy)
-        vars(stack).pop("sizes", None)
+        vars(stack).update(vars(self))
+        for name in stale:
+            vars(stack).pop(name, None)
+        vars(stack).update(columns)
         return stack
 
     def __len__(self) -> int:
@@ -74,7 +87,7 @@ class Stack:
         """Whether any item is of no category, so that every shot refuses it."""
         return not self.categories.all()
 
-    @property
+    @cached_property
     def width(self) -> Ints:
         """Pixels in a row of each mask."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
