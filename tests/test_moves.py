@@ -25,6 +25,12 @@ def told(stack: Stack) -> list[Any]:
     return [*columns, [stack.mask(rank).tolist() for rank in range(len(stack))], ranks, stack.count]
 
 
+def worked_out(stack: Stack) -> list[Any]:
+    """What a stack works out of its columns, and keeps."""
+    sizes = [size.tolist() for size in stack.sizes] if len(stack) else []
+    return [stack.has_unmet, stack.has_occluders, stack.width.tolist(), sizes]
+
+
 def said_of(scene: Scene) -> list[Any]:
     """The same of a scene, one item at a time."""
     items = scene.items
@@ -74,6 +80,7 @@ def test_the_stack_after_any_change_is_the_one_made_anew(jit: bool, seed: int, c
             continue
         stack = scene.items.stack()
         assert told(stack) == said_of(scene)
+        assert worked_out(stack) == worked_out(scene.items.stack_of(Role.HITTABLE, Role.OCCLUDER))
         old.append((stack, told(stack)))
     for stack, before in old:
         assert told(stack) == before, "a stack that was handed out changed"
