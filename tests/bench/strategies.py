@@ -1,63 +1,70 @@
-"""Direct against composed, in one run: microseconds a shot, their ratio, and whether the planner chose well.
+"""The planner: "direct", "composed" and "auto" over the grid of `speed.py`, and how auto does beside the better one.
 
 python tests/bench/strategies.py
 """
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
 
-import numpy as np
+from speed_clock import Cell, Side, race, told
+from speed_moving import Own, frames_of, own_rows
+from speed_static import Settings, modes, ours
+from speed_world import PATTERNS, scene_of, volleys
 
-from planes import Scene
-from weapons import Disc, Hits, Point, Spread, Weapon, fire
-
-WEAPONS: dict[str, Weapon] = {
-    "point": Point(),
-    "shotgun 8 x r=2": Spread(Disc(2), count=8, radius=24),
-    "disc r=10": Disc(10),
-    "disc r=40": Disc(40),
-}
+STRATEGIES = ("direct", "composed", "auto")
 
 
-def scene_of(objects: int, rng: np.random.Generator) -> Scene:
-    """1920 x 1080 with irregular objects of 48 px and 60 occluders."""
-    scene = Scene((1920, 1080))
-    y, x = np.mgrid[:48, :48] - 23.5
-    for i in range(objects + 60):
-        wave = 17 + 6 * np.sin(rng.integers(2, 7) * np.arctan2(y, x) + rng.uniform(0, 6))
-        where = rng.uniform((0, 0), (1920, 1080))
-        scene.add(np.hypot(x, y) < wave, where, role="hittable" if i < objects else "occluder", layer=int(i >= objects))
-    return scene
+def planner(settings: Settings) -> Iterator[Cell]:
+    """Scenes that stand still, and scenes that move; each strategy has a scene of its own."""
+    for objects in settings.planner:
+        for name, weapon in PATTERNS.items():
+            if name != "ray 1000":
+                for shots in settings.batches:
+                    yield _still(settings, name, weapon, objects, shots)
+        for shots in (*settings.batches[:-1], 1000):
+            yield _in_motion(settings, objects, shots)
 
 
-def timed(scene: Scene, weapon: Weapon, strategy: str, shots: int, rng: np.random.Generator) -> tuple[float, Hits]:
-    """Least microseconds a shot of three rounds, each with fresh shots."""
-    best, hits = float("inf"), None
-    for _ in range(3):
-        at = rng.uniform((0, 0), (1920, 1080), (shots, 2))
-        begin = time.perf_counter()
-        hits = fire(scene, weapon, at, strategy=strategy)
-        best = min(best, (time.perf_counter() - begin) / shots * 1e6)
-    assert hits is not None
-    return best, hits
+def _still(settings: Settings, name: str, weapon: Any, objects: int, shots: int) -> Cell:
+    sides = []
+    for strategy in STRATEGIES:
+        for side in ours(settings, scene_of(objects), weapon, strategy=strategy):
+            side.name = f"{side.name}, {strategy}"
+            sides.append(side)
+    works = islice(volleys(name, shots, shots), max(settings.rounds, 5 if shots < 1000 else 0) + 1)
+    cell = race(Cell("planner", f"{name}, {shots} shots", objects), sides, works, shots, settings.seconds)
+    return _with_losses(settings, cell)
+
+
+def _in_motion(settings: Settings, objects: int, shots: int) -> Cell:
+    sides = []
+    for mode, ready in modes(settings).items():
+        for strategy in STRATEGIES:
+            own = Own(scene_of(objects), strategy=strategy)
+            sides.append(Side(f"{mode}, {strategy}", own.answer, own_rows, ready=ready, whole=True))
+    rounds = frames_of(scene_of(objects), settings.frames, shots, 0.0, shots)
+    works = (next(rounds) for _ in range(settings.rounds + 1))
+    cell = Cell("planner", f"all move, {shots} shots", objects, unit="ns a frame")
+    return _with_losses(settings, race(cell, sides, works, settings.frames, settings.seconds))
+
+
+def _with_losses(settings: Settings, cell: Cell) -> Cell:
+    for mode in modes(settings):
+        best = min(cell.sides[f"{mode}, {strategy}"].least for strategy in ("direct", "composed"))
+        cell.values[f"auto over best, {mode}"] = cell.sides[f"{mode}, auto"].least / best
+    return cell
 
 
 def main() -> None:
     """Print the table."""
-    rng = np.random.default_rng(1)
-    print(f"{'objects':>8} {'shots':>6} {'weapon':16} {'direct us':>10} {'composed us':>12} {'ratio':>6}  planner")
-    for objects in (10, 100, 1000):
-        scene = scene_of(objects, rng)
-        for shots in (1, 100, 5000):
-            for name, weapon in WEAPONS.items():
-                direct, _ = timed(scene, weapon, "direct", shots, rng)
-                composed, _ = timed(scene, weapon, "composed", shots, rng)
-                _, hits = timed(scene, weapon, "auto", shots, rng)
-                chosen = "composed" if any(stage.name == "code plane" for stage in hits.plan.ran) else "direct"
-                lost = {"direct": direct, "composed": composed}[chosen] / min(direct, composed)
-                times = f"{direct:10.2f} {composed:12.2f} {direct / composed:6.2f}"
-                print(f"{objects:8} {shots:6} {name:16} {times}  {chosen} {lost:.2f}")
+    from speed import Settings as Whole
+
+    for cell in planner(Whole()):
+        times = "  ".join(f"{name} {told(times.least)}" for name, times in cell.sides.items())
+        print(f"{cell.objects:6} {cell.what:28} {times}  {cell.values['auto over best, numpy']:.2f}", flush=True)
 
 
 if __name__ == "__main__":

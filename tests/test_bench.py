@@ -1,0 +1,85 @@
+"""The benchmark of speed runs, its JSON is whole, and a wrong row of any side ends it."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+for library in ("pygame", "pymunk", "shapely"):
+    pytest.importorskip(library)
+sys.path.append(str(Path(__file__).parent / "bench"))
+
+import speed
+from speed_clock import Cell, DisagreementError, Side, Times, race
+from speed_peers import Baked, Masks
+from speed_targets import TARGETS, judged
+from speed_world import PATTERNS
+
+TINY = replace(
+    speed.QUICK, objects=(6,), moving=(6,), single=(6,), planner=(6,), redrawn=6, huge=6, shots=60, rewound=20,
+    batches=(1, 20), frames=2, steps=4, calls=10, starts=1, rounds=1, seconds=0.002,
+)  # fmt: skip
+
+
+def test_a_quick_run_tells_tables_and_writes_json(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
+    monkeypatch.setattr(speed, "QUICK", TINY)
+    path = tmp_path / "speed.json"
+    speed.main(["--quick", "--objects", "10", "--only", "static,moving,redrawn", "--json", str(path)])
+    found = json.loads(path.read_text())
+    told = capsys.readouterr().out
+    assert [cell["what"] for cell in found["cells"] if cell["section"] == "static"] == list(PATTERNS)
+    assert {cell["objects"] for cell in found["cells"] if cell["section"] == "moving"} == {10}
+    assert len(found["targets"]) == len(TARGETS)
+    for cell in found["cells"]:
+        assert cell["what"] in told
+        for name, side in cell["sides"].items():
+            assert 0 < side["min_ns"] <= side["median_ns"]
+            if name in ("A pygame", "C pygame", "numpy plane"):
+                assert side["rows_compared"], (cell["what"], name)
+            if name in ("pymunk", "shapely"):
+                assert side["easier"] and not side["rows_compared"]
+
+
+def test_the_other_sections_run() -> None:
+    lines: list[str] = []
+    found = speed.measured(TINY, ["special", "single", "preparation", "rewind", "huge", "planner"], lines.append)
+    assert {cell["section"] for cell in found["cells"]} == {
+        "special", "single", "preparation", "rewind", "huge", "planner",
+    }  # fmt: skip
+    assert all(cell["sides"] for cell in found["cells"])
+
+
+@pytest.mark.parametrize("peer", [Masks, Baked])
+def test_a_wrong_row_ends_the_run(peer: Any, monkeypatch: Any) -> None:
+    name = "areas" if peer is Masks else "alike"
+    right = getattr(peer, name)
+    monkeypatch.setattr(peer, name, lambda *given: [(s, i, n + 1) for s, i, n in right(*given)])
+    crowded = replace(TINY, objects=(300,))
+    with pytest.raises(DisagreementError, match="differ"):
+        list(speed.static(crowded))
+
+
+def test_a_missing_row_ends_the_run() -> None:
+    sides = [
+        Side("numpy", lambda work, units: [(0, 1, 5), (1, 2, 7)], list, whole=True),
+        Side("A pygame", lambda work, units: [(0, 1, 5)], list, whole=True),
+    ]
+    with pytest.raises(DisagreementError, match=r"only numpy: \[\(1, 2, 7\)\]"):
+        race(Cell("static", "point", 6), sides, [None, None], 2, 0.001)
+    easier = [sides[0], Side("pymunk", lambda work, units: 3, easier="hulls", whole=True)]
+    assert not race(Cell("static", "point", 6), easier, [None, None], 2, 0.001).sides["pymunk"].compared
+
+
+def test_targets_are_judged_by_the_worst_cell() -> None:
+    cells = [
+        Cell("static", "point", m, {"numpy": Times([10.0, 90.0]), "A pygame": Times([a]), "C pygame": Times([30.0])})
+        for m, a in ((10, 1.0), (100, 900.0), (1000, 500.0))
+    ]
+    lines = {line["target"]: line for line in judged(cells, ["numpy"])}
+    a, c = lines["static point, M >= 100, x A"], lines["static point, M >= 100, x C"]
+    assert (a["measured"], a["reached"], a["where"]) == (50.0, True, "point, M = 1000")
+    assert (c["measured"], c["reached"]) == (3.0, False)
+    assert lines["static disc r=40, every M, x A"]["reached"] is None
