@@ -6,7 +6,8 @@ import gc
 import itertools
 import statistics
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +15,18 @@ import numpy as np
 
 from planes.arrays import Ints
 
-__all__ = ["PROBE", "Cell", "DisagreementError", "Side", "Times", "bandwidth", "race", "sorted_rows", "told"]
+__all__ = [
+    "PROBE",
+    "Cell",
+    "DisagreementError",
+    "Side",
+    "Times",
+    "bandwidth",
+    "no_collection",
+    "race",
+    "sorted_rows",
+    "told",
+]
 
 PROBE = 16
 """Units of work by which a side tells how many it can answer in its time."""
@@ -137,12 +149,19 @@ def _units(side: Side, work: Any, units: int, seconds: float) -> int:
 def _timed(side: Side, work: Any, units: int) -> tuple[float, Any]:
     if side.ready:
         side.ready()
-    gc.collect()
-    gc.disable()  # as timeit does
-    try:
+    with no_collection():
         begin = time.perf_counter_ns()
         answer = side.answer(work, units)
         return time.perf_counter_ns() - begin, answer
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Time without the collector, as timeit does; what is young is collected before."""
+    gc.collect(1)
+    gc.disable()
+    try:
+        yield
     finally:
         gc.enable()
 

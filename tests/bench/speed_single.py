@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from speed_clock import Cell, DisagreementError, Side, Times, race, sorted_rows
+from speed_clock import Cell, DisagreementError, Side, Times, no_collection, race, sorted_rows
 from speed_engines import EASIER, Space
 from speed_peers import MARGIN, Baked, Masks, Plane, pygame, rendered
 from speed_static import Settings, modes, ours
@@ -184,16 +184,12 @@ def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
 
 def _block(call: Call, work: list[Any]) -> tuple[list[int], list[Any]]:
     clock, taken, got = time.perf_counter_ns, [], []
-    gc.collect()
-    gc.disable()
-    try:
+    with no_collection():
         for at, aim in work:
             begin = clock()
             answer = call(at, aim)
             taken.append(clock() - begin)
             got.append(answer)
-    finally:
-        gc.enable()
     return taken, got
 
 
