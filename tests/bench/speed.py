@@ -109,26 +109,35 @@ def told_section(section: str, found: Iterator[Cell], tell: Callable[[str], obje
     """Tell the cells of a section as they are measured."""
     cells: list[Cell] = []
     easier: dict[str, str] = {}
+    head: list[str] = []
     for cell in found:
         if not cells:
-            tell(f"\n{section}, {cell.unit}: least (median); = rows compared; * an easier question")
+            tell(f"\n{section}, {cell.unit}: least (median), over ours; = rows compared; * an easier question")
         cells.append(cell)
         easier |= {name: times.easier for name, times in cell.sides.items() if times.easier}
-        tell(f"{cell.what:30} M = {cell.objects:<6} " + "  ".join(_sides(cell)))
+        if head != (head := _columns(cell, head)):
+            tell(f"{'M':>7}  {'':30}" + "".join(f"{name:>29}" for name in head))
+        tell(f"{cell.objects:7}  {cell.what:30}" + "".join(f"{_side(cell, name):>29}" for name in head))
         for name, value in cell.values.items():
-            tell(f"{'':30}   {name}: {_shown(value)}")
+            tell(f"{'':41}{name}: {_shown(value)}")
     for name, why in easier.items():
         tell(f"* {name}: {why}")
     return cells
 
 
-def _sides(cell: Cell) -> Iterator[str]:
-    first = next(iter(cell.sides), "")
-    for name, times in cell.sides.items():
-        mark = "=" * times.compared + "*" * bool(times.easier)
-        ratio = cell.ratio(name, first)
-        beside = f" {ratio:.3g}x" if ratio is not None and name != first else ""
-        yield f"{name}{mark} {told(times.least)} ({told(times.median)}){beside}"
+def _columns(cell: Cell, head: list[str]) -> list[str]:
+    """The sides of a cell: the columns before, if they have room for them."""
+    return head if set(cell.sides) <= set(head) else list(cell.sides)
+
+
+def _side(cell: Cell, name: str) -> str:
+    """Time of a side, and how many times as long as ours it takes."""
+    if name not in cell.sides:
+        return ""
+    times = cell.sides[name]
+    ratio = cell.ratio(name, next(iter(cell.sides)))
+    mark = "=" * times.compared + "*" * bool(times.easier)
+    return f"{told(times.least)} ({told(times.median)}) {ratio:.3g}x{mark:2}"
 
 
 def _shown(value: Any) -> str:

@@ -100,7 +100,7 @@ def huge(settings: Settings) -> Iterator[Cell]:
     for name in ("point", "disc r=40", "ray 1000"):
         weapon: Any = PATTERNS[name]
         works = list(islice(_half_near(name, settings.shots, middles), settings.rounds + 1))
-        sides = ours(settings, scene, weapon, name != "ray 1000")
+        sides = ours(settings, scene, weapon)
         if name == "ray 1000":
             sides.append(Side("pymunk", space.rays, easier=EASIER))
             sides.append(Side("shapely", lambda w, n: tree.lines(w, n, 1, 0), easier=EASIER + "; in no order"))

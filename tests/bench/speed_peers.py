@@ -31,7 +31,7 @@ Row = tuple[int, int, int]
 class Cells(NamedTuple):
     """For each cell of shots, who may be met: a mask's `overlap_area`, its first corner, its object."""
 
-    lists: list[list[tuple[Any, int, int, int]]]
+    lists: list[tuple[tuple[Any, int, int, int], ...]]
     shift: int
     stride: int
 
@@ -273,15 +273,15 @@ class Baked:
         """For each cell of shots, what the box of a pattern (its corner from the shot, its size) may meet."""
         shift = FINE if max(w, h) <= 1 << FINE else COARSE
         rows, stride = ((side >> shift) + 1 for side in self.size_hw)
-        cells = Cells([[] for _ in range(stride * rows)], shift, stride)
+        cells: list[list[tuple[Any, int, int, int]]] = [[] for _ in range(stride * rows)]
         for (mask, left, top, i), rect in zip(self.shown, self.rects, strict=True):
             one = (mask.overlap_area, left - dx, top - dy, i)
             first_x, last_x = (rect.left - dx - w + 1 + MARGIN) >> shift, (rect.right - 1 - dx + MARGIN) >> shift
             first_y, last_y = (rect.top - dy - h + 1 + MARGIN) >> shift, (rect.bottom - 1 - dy + MARGIN) >> shift
             for row in range(max(first_y, 0), min(last_y, rows - 1) + 1):
                 for column in range(max(first_x, 0), min(last_x, stride - 1) + 1):
-                    cells.lists[row * stride + column].append(one)
-        return cells
+                    cells[row * stride + column].append(one)
+        return Cells(list(map(tuple, cells)), shift, stride)  # all empty tuples are one: fewer cache misses
 
     def alike(self, xs: Sequence[int], ys: Sequence[int], pattern: Any, cells: Cells) -> list[Row]:
         """One pattern for all shots, with its cells."""

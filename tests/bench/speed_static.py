@@ -15,7 +15,7 @@ from speed_world import MARGIN, PATTERNS, SEED, WORLD, Volleys, items_of, patter
 
 from planes import Scene
 from planes.twins import use_jit
-from weapons import Disc, Hits, Weapon, fire
+from weapons import Disc, Hits, Laser, Weapon, fire
 
 __all__ = ["hit_rows", "modes", "ours", "static", "special"]
 
@@ -42,7 +42,7 @@ def hit_rows(hits: Hits) -> Any:
     return np.stack([hits.shot, hits.object, hits.samples], axis=1)
 
 
-def ours(settings: Settings, scene: Scene, weapon: Weapon, compared: bool = True, **options: Any) -> list[Side]:
+def ours(settings: Settings, scene: Scene, weapon: Weapon, **options: Any) -> list[Side]:
     """The public call, in each mode."""
 
     def answer(work: Volleys, units: int) -> Hits:
@@ -50,8 +50,14 @@ def ours(settings: Settings, scene: Scene, weapon: Weapon, compared: bool = True
         more = options if work.exclude is None else {**options, "exclude": work.exclude[:units]}
         return touched(fire(scene, weapon, work.at[:units], aim=aim, seed=SEED, **more))
 
-    rows = hit_rows if compared else None
-    return [Side(mode, answer, rows, ready=ready, whole=True) for mode, ready in modes(settings).items()]
+    return [Side(mode, answer, hit_rows, ready=ready, whole=True) for mode, ready in modes(settings).items()]
+
+
+def unfiltered(settings: Settings, scene: Scene, weapon: Weapon) -> Side:
+    """Ours again, that looks at every item: rays have no peer that gives the same rows."""
+    side = ours(settings, scene, weapon, prefilter="none")[0]
+    side.name, side.whole = "no pre-filter", False
+    return side
 
 
 @cache
@@ -155,7 +161,9 @@ def static(settings: Settings) -> Iterator[Cell]:
         scene = scene_of(objects)
         peers = Peers(scene)
         for name, weapon in PATTERNS.items():
-            sides = ours(settings, scene, weapon, name != "ray 1000") + peers.sides(name)
+            sides = ours(settings, scene, weapon) + peers.sides(name)
+            if name == "ray 1000" and objects <= 1000:
+                sides.append(unfiltered(settings, scene, weapon))
             works = islice(volleys(name, settings.shots, objects), settings.rounds + 1)
             yield race(Cell("static", name, objects), sides, works, settings.shots, settings.seconds)
         yield aimed_at_objects(settings, scene, objects, peers)
@@ -185,6 +193,7 @@ def special(settings: Settings) -> Iterator[Cell]:
     """Filters, piercing, objects of 200 px, objects and shots off the bounds."""
     for objects in [m for m in settings.objects if m <= 1000]:
         yield from choosy(settings, objects)
+        yield piercing_rays(settings, objects)
         yield from wide(settings, objects)
 
 
@@ -211,6 +220,16 @@ def choosy(settings: Settings, objects: int) -> Iterator[Cell]:
     works = islice(volleys("disc r=40", settings.shots, objects), settings.rounds + 1)
     sides = [*ours(settings, scene, Disc(40, pierce=True)), through]
     yield race(Cell("special", "r=40, pierce", objects), sides, works, settings.shots, settings.seconds)
+
+
+def piercing_rays(settings: Settings, objects: int) -> Cell:
+    """Rays that go through objects, up to an occluder; pymunk gives all shapes on a segment."""
+    scene = scene_of(objects)
+    space = Space(items_of(scene))
+    sides = [*ours(settings, scene, Laser(1000)), Side("pymunk", space.piercing_rays, easier=EASIER)]
+    sides.append(unfiltered(settings, scene, Laser(1000)))
+    works = islice(volleys("ray 1000", settings.shots, objects), settings.rounds + 1)
+    return race(Cell("special", "ray 1000, pierce", objects), sides, works, settings.shots, settings.seconds)
 
 
 def wide(settings: Settings, objects: int) -> Iterator[Cell]:
