@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+import weapons
+
 for library in ("pygame", "pymunk", "shapely"):
     pytest.importorskip(library)
 sys.path.append(str(Path(__file__).parent / "bench"))
@@ -20,7 +22,7 @@ from speed_world import PATTERNS  # noqa: E402
 
 TINY = replace(
     speed.QUICK, objects=(6,), moving=(6,), single=(6,), planner=(6,), redrawn=6, huge=6, shots=60, rewound=20,
-    batches=(1, 20), frames=2, steps=4, calls=10, starts=1, rounds=1, seconds=0.002,
+    batches=(4,), frames=2, steps=4, calls=10, starts=1, rounds=1, seconds=0.002,
 )  # fmt: skip
 
 
@@ -51,6 +53,26 @@ def test_the_other_sections_run(monkeypatch: Any) -> None:
         "special", "single", "preparation", "rewind", "huge", "planner",
     }  # fmt: skip
     assert all(cell["sides"] for cell in found["cells"])
+
+
+class Ready:
+    """What `prepare` is to give, by `fire`; `samples` more than there are."""
+
+    def __init__(self, scene: Any, weapon: Any, samples: int) -> None:
+        self.given, self.samples = (scene, weapon), samples
+
+    def fire(self, at: Any, **aim: Any) -> Any:
+        return [row._replace(samples=row.samples + self.samples) for row in weapons.fire(*self.given, at, **aim)]
+
+
+def test_the_prepared_call_is_compared_too(monkeypatch: Any) -> None:
+    crowded = replace(TINY, single=(300,), calls=20)
+    monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 0), raising=False)
+    for cell in speed.single(crowded):
+        assert cell.sides["ready, numpy"].compared == (cell.what != "ray 1000")
+    monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 1))
+    with pytest.raises(DisagreementError, match="ready, numpy differ"):
+        list(speed.single(crowded))
 
 
 @pytest.mark.parametrize("peer", [Masks, Baked])

@@ -213,11 +213,11 @@ def bandwidth() -> dict[str, float]:
     found: dict[str, float] = {}
     for name, size in (("64 MB", 1 << 26), ("256 kB", 1 << 18), ("32 kB", 1 << 15)):
         source = np.arange(size // 8, dtype=np.int64)
-        target = np.empty_like(source)
+        target, counts = np.empty_like(source), np.empty(len(source), np.uint8)
         again = max(1, (1 << 26) // size)
         found[f"copy {name}"] = 2 * size * again / _best(lambda a=source, b=target: np.copyto(b, a), again)
         found[f"sum {name}"] = size * again / _best(lambda a=source: a.sum(), again)
-        found[f"popcount {name}"] = size * again / _best(lambda a=source, b=target: np.bitwise_count(a), again)
+        found[f"popcount {name}"] = size * again / _best(lambda a=source, b=counts: np.bitwise_count(a, out=b), again)
     return found
 
 

@@ -153,8 +153,11 @@ def cold(settings: Settings) -> Iterator[Cell]:
     """Fresh processes, in turn: what importing adds to numpy, and the first shot."""
     root = Path(__file__).parents[2]
     cell = Cell("cold", "fresh process", 0, unit="ns a start", asked=settings.starts)
+    starts = COLD | (
+        {"first fire, jit": "from planes import use_jit; use_jit(); " + COLD["first fire"]} if settings.jit else {}
+    )
     for number in range(settings.starts + 1):
-        for name, code in COLD.items():
+        for name, code in starts.items():
             begin = time.perf_counter_ns()
             subprocess.run([sys.executable, "-c", code], cwd=root, check=True, timeout=60)
             if number:

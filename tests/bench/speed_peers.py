@@ -64,12 +64,12 @@ def blocking_plane(items: Sequence[Item], size_wh: tuple[int, int] | None) -> An
     """All occluders and the border, as one mask that starts MARGIN px before the bounds; None without bounds."""
     if size_wh is None:
         return None
-    plane = np.ones((size_wh[1] + 2 * MARGIN, size_wh[0] + 2 * MARGIN), np.bool_)
-    plane[MARGIN:-MARGIN, MARGIN:-MARGIN] = False
+    plane = pygame.mask.Mask((size_wh[0] + 2 * MARGIN, size_wh[1] + 2 * MARGIN), fill=True)
+    plane.erase(pygame.mask.Mask(size_wh, fill=True), (MARGIN, MARGIN))
     for item in items:
         if item.occluder:
-            _window(plane, item)[item.mask] = True
-    return pygame_mask(plane)
+            plane.draw(pygame_mask(item.mask), (item.left + MARGIN, item.top + MARGIN))
+    return plane
 
 
 def _window(plane: Any, item: Item) -> Any:

@@ -17,7 +17,7 @@ from speed_world import PATTERNS, Volleys, items_of, pattern_mask, scene_of, vol
 
 import weapons
 from planes import Scene
-from weapons import Weapon, fire
+from weapons import Pistol, Weapon, fire
 
 __all__ = ["preparation", "single"]
 
@@ -68,19 +68,21 @@ def own_calls(scene: Scene, weapon: Weapon, mode: str) -> dict[str, Call]:
         return hits.object.tolist(), hits.samples.tolist()
 
     calls: dict[str, Call] = {f"fire, {mode}": fired}
-    prepare = getattr(weapons, "prepare", None) if "prepare" in weapons.__all__ else None
+    prepare = getattr(weapons, "prepare", None)
     if prepare is None:
         return calls
     ready = prepare(scene, weapon)
-    directed = getattr(weapon, "directed", True)
-
-    def prepared(at: Any, aim: float) -> Any:
-        return list(ready.fire(at, aim=aim) if directed else ready.fire(at))
-
-    def length(at: Any, aim: float) -> Any:
-        return len(ready.fire(at, aim=aim) if directed else ready.fire(at))
-
-    return {**calls, f"ready, {mode}": prepared, f"ready, only len, {mode}": length}
+    if isinstance(weapon, Pistol):
+        return {
+            **calls,
+            f"ready, {mode}": lambda at, aim: list(ready.fire(at, aim=aim)),
+            f"ready, only len, {mode}": lambda at, aim: len(ready.fire(at, aim=aim)),
+        }
+    return {
+        **calls,
+        f"ready, {mode}": lambda at, aim: list(ready.fire(at)),
+        f"ready, only len, {mode}": lambda at, aim: len(ready.fire(at)),
+    }
 
 
 def masks_call(masks: Masks, weapon: Any) -> Call:

@@ -24,7 +24,7 @@ def planner(settings: Settings) -> Iterator[Cell]:
             if name != "ray 1000":
                 for shots in settings.batches:
                     yield _still(settings, name, weapon, objects, shots)
-        for shots in (*settings.batches[:-1], 1000):
+        for shots in (*settings.batches[:-1], min(1000, settings.shots)):
             yield _in_motion(settings, objects, shots)
 
 
