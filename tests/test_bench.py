@@ -66,13 +66,12 @@ class Ready:
 
 
 def test_the_prepared_call_is_compared_too(monkeypatch: Any) -> None:
-    crowded = replace(TINY, single=(300,), calls=20)
+    crowded = replace(TINY, single=(300,), calls=50)
     monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 0), raising=False)
-    for cell in speed.single(crowded):
-        assert cell.sides["ready, numpy"].compared == (cell.what != "ray 1000")
+    assert next(speed.single(crowded)).sides["ready, numpy"].compared
     monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 1))
     with pytest.raises(DisagreementError, match="ready, numpy differ"):
-        list(speed.single(crowded))
+        next(speed.single(crowded))
 
 
 @pytest.mark.parametrize("peer", [Masks, Baked])
@@ -106,3 +105,16 @@ def test_targets_are_judged_by_the_worst_cell() -> None:
     assert (a["measured"], a["reached"], a["where"]) == (50.0, True, "point, M = 1000")
     assert (c["measured"], c["reached"]) == (3.0, False)
     assert lines["static disc r=40, every M, x A"]["reached"] is None
+
+
+def test_a_row_of_many_objects_is_judged_beside_one_of_few() -> None:
+    costs = {10: 100.0, 100: 900.0, 10_000: 250.0}
+    cells = [Cell("at objects", "disc r=40", m, values={"ns a row, numpy": ns}) for m, ns in costs.items()]
+    moved = Cell("redrawn", "1 moved", 1000, values={"ns a moved object, numpy": 20_000.0})
+    lines = {line["target"]: line for line in judged([*cells, moved], ["numpy"])}
+    row = lines["r=40 at objects: a row, M = 10,000 over 10"]
+    assert (row["measured"], row["sense"], row["reached"]) == (2.5, "at most", False)
+    assert lines["moved object redrawn, M = 1000, us"]["measured"] == 20
+    assert lines["moved object redrawn, M = 1000, us"]["reached"]
+    few = judged(cells[:2], ["numpy"])
+    assert all(line["measured"] is None for line in few)
