@@ -112,7 +112,7 @@ def told_section(section: str, found: Iterator[Cell], tell: Callable[[str], obje
     head: list[str] = []
     for cell in found:
         if not cells:
-            tell(f"\n{section}, {cell.unit}: least (median), over ours; = rows compared; * an easier question")
+            tell(f"\n{section}, {cell.unit}: least (median), over the first; = rows compared; * an easier question")
         cells.append(cell)
         easier |= {name: times.easier for name, times in cell.sides.items() if times.easier}
         if head != (head := _columns(cell, head)):
@@ -131,7 +131,7 @@ def _columns(cell: Cell, head: list[str]) -> list[str]:
 
 
 def _side(cell: Cell, name: str) -> str:
-    """Time of a side, and how many times as long as ours it takes."""
+    """Time of a side, and how many times as long as the first it takes."""
     if name not in cell.sides:
         return ""
     times = cell.sides[name]
