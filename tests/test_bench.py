@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 import weapons
+from planes import use_jit
 
 for library in ("pygame", "pymunk", "shapely"):
     pytest.importorskip(library)
@@ -24,6 +26,12 @@ TINY = replace(
     speed.QUICK, objects=(6,), moving=(6,), single=(6,), planner=(6,), redrawn=6, huge=6, shots=60, rewound=20,
     batches=(4,), frames=2, steps=4, calls=10, starts=1, rounds=1, seconds=0.002,
 )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _kernels_as_before() -> Iterator[None]:
+    yield
+    use_jit(None)
 
 
 def test_a_quick_run_tells_tables_and_writes_json(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:

@@ -29,6 +29,7 @@ from speed_static import modes, special, static
 from speed_targets import judged
 from strategies import planner
 
+from planes import use_jit
 from planes.image import write_text
 
 SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
@@ -90,8 +91,11 @@ def measured(settings: Settings, only: Sequence[str], tell: Callable[[str], obje
     tell(f"{about['python']}, numpy {about['versions']['numpy']}, {about['cpus']} CPUs")
     tell("bytes a second: " + ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in rates.items()))
     cells: list[Cell] = []
-    for section in only:
-        cells += told_section(section, SECTIONS[section](settings), tell)
+    try:
+        for section in only:
+            cells += told_section(section, SECTIONS[section](settings), tell)
+    finally:
+        use_jit(None)
     targets = judged(cells, list(modes(settings)))
     tell("\ntargets")
     for line in targets:
