@@ -120,10 +120,13 @@ def told_section(section: str, found: Iterator[Cell], tell: Callable[[str], obje
         cells.append(cell)
         easier |= {name: times.easier for name, times in cell.sides.items() if times.easier}
         if head != (head := _columns(cell, head)):
-            tell(f"{'M':>7}  {'':30}" + "".join(f"{name:>29}" for name in head))
-        tell(f"{cell.objects:7}  {cell.what:30}" + "".join(f"{_side(cell, name):>29}" for name in head))
+            tell(f"{'M':>7}  {'':30}{'rows':>8}" + "".join(f"{name:>29}" for name in head))
+        tell(
+            f"{cell.objects:7}  {cell.what:30}{_shown_rows(cell):>8}"
+            + "".join(f"{_side(cell, name):>29}" for name in head)
+        )
         for name, value in cell.values.items():
-            tell(f"{'':41}{name}: {_shown(value)}")
+            tell(f"{'':47}{name}: {_shown(value)}")
     for name, why in easier.items():
         tell(f"* {name}: {why}")
     return cells
@@ -142,6 +145,11 @@ def _side(cell: Cell, name: str) -> str:
     ratio = cell.ratio(name, next(iter(cell.sides)))
     mark = "=" * times.compared + "*" * bool(times.easier)
     return f"{told(times.least)} ({told(times.median)}) {ratio:.3g}x{mark:2}"
+
+
+def _shown_rows(cell: Cell) -> str:
+    """Rows of a shot, or of a frame."""
+    return "" if cell.rows is None else f"{cell.rows:.3g}"
 
 
 def _shown(value: Any) -> str:

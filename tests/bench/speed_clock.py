@@ -87,7 +87,7 @@ class Times:
 
 @dataclass
 class Cell:
-    """One line of a table: the sides by name, and what else was measured."""
+    """One line of a table: the sides by name, and what else was measured; `rows` are those of a unit of work."""
 
     section: str
     what: str
@@ -96,6 +96,7 @@ class Cell:
     values: dict[str, Any] = field(default_factory=dict)
     unit: str = "ns a shot"
     asked: int = 0
+    rows: float | None = None
 
     def ratio(self, peer: str, ours: str) -> float | None:
         """How many times as long a peer takes, by the least of each."""
@@ -104,7 +105,13 @@ class Cell:
         return self.sides[peer].least / self.sides[ours].least
 
     def to_dict(self) -> dict[str, Any]:
-        head = {"section": self.section, "what": self.what, "objects": self.objects, "asked": self.asked}
+        head = {
+            "section": self.section,
+            "what": self.what,
+            "objects": self.objects,
+            "asked": self.asked,
+            "rows": self.rows,
+        }
         sides = {name: times.to_dict() for name, times in self.sides.items()}
         return {**head, "unit": self.unit, "sides": sides, "values": self.values}
 
@@ -172,6 +179,7 @@ def _compare(cell: Cell, sides: Sequence[Side], answers: dict[str, Any], share: 
     if first is None or first.rows is None:
         return
     expected = sorted_rows(first.rows(answers[first.name]))
+    cell.rows = len(expected) / share[first.name]
     for side in sides:
         if side is first or side.rows is None:
             continue
