@@ -73,8 +73,8 @@ class Settings:
     steps: int = 40
     calls: int = 500
     starts: int = 15
-    rounds: int = 5
-    seconds: float = 0.25
+    rounds: int = 7
+    seconds: float = 0.1
     jit: bool = False
 
 
@@ -88,7 +88,8 @@ def measured(settings: Settings, only: Sequence[str], tell: Callable[[str], obje
     """Measure sections, tell their tables as they come, and give all of it as JSON."""
     about = machine()
     rates = bandwidth()
-    tell(f"{about['python']}, numpy {about['versions']['numpy']}, {about['cpus']} CPUs")
+    load = ", ".join(f"{load:.1f}" for load in about["load"])
+    tell(f"{about['python']}, numpy {about['versions']['numpy']}, {about['cpus']} CPUs, load {load}")
     tell("bytes a second: " + ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in rates.items()))
     cells: list[Cell] = []
     try:
@@ -96,6 +97,7 @@ def measured(settings: Settings, only: Sequence[str], tell: Callable[[str], obje
             cells += told_section(section, SECTIONS[section](settings), tell)
     finally:
         use_jit(None)
+    about["load after"] = os.getloadavg()
     targets = judged(cells, list(modes(settings)))
     tell("\ntargets")
     for line in targets:
@@ -174,7 +176,13 @@ def machine() -> dict[str, Any]:
         except PackageNotFoundError:
             found[name] = None
     python = f"{platform.python_implementation()} {platform.python_version()}"
-    return {"python": python, "system": platform.system(), "cpus": os.cpu_count(), "versions": found}
+    return {
+        "python": python,
+        "system": platform.system(),
+        "cpus": os.cpu_count(),
+        "load": os.getloadavg(),
+        "versions": found,
+    }
 
 
 def main(arguments: Sequence[str]) -> dict[str, Any]:
