@@ -19,6 +19,7 @@ from speed_peers import MARGIN, Masks, first, pygame, rendered
 from speed_static import Settings, hit_rows, modes, ours, touched
 from speed_world import PATTERNS, WORLD, Volleys, items_of, pattern_mask, scene_of, volleys
 
+import planes
 from planes import History
 from weapons import Disc, fire
 
@@ -151,7 +152,7 @@ IMPORTS = (
 
 def cold(settings: Settings) -> Iterator[Cell]:
     """Fresh processes, in turn: what importing adds to numpy, and the first shot."""
-    root = Path(__file__).parents[2]
+    root = Path(planes.__file__).parents[1]
     cell = Cell("cold", "fresh process", 0, unit="ns a start", asked=settings.starts)
     starts = COLD | (
         {"first fire, jit": "from planes import use_jit; use_jit(); " + COLD["first fire"]} if settings.jit else {}
