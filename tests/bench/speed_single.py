@@ -157,7 +157,7 @@ def pymunk_ray(space: Space) -> Call:
 
 
 def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
-    """Time every call; blocks of the sides take turns. Rows of the first side and of the pygame ones are compared."""
+    """Time every call; blocks of the sides take turns; a round is told by its median. All rows are compared."""
     spent: dict[str, list[int]] = {name: [] for name in calls}
     nothing = _empty_ns()
     for number, work in enumerate(works):
@@ -168,11 +168,14 @@ def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
                     ready()
                 taken, got = _block(call, work[begin : begin + BLOCK])
                 answers[name] += got
-                if number:
-                    spent[name] += taken
-                    rounds = cell.sides.setdefault(name, Times(units=len(work)))
-                    rounds.rounds.append(float(np.median(taken)) - nothing)
+                spent[name] += taken
         _compare_calls(cell, answers)
+        for name in calls:
+            if number == 0:
+                spent[name].clear()  # that was for warming up
+            else:
+                times = cell.sides.setdefault(name, Times(units=len(work)))
+                times.rounds.append(float(np.median(spent[name][-len(work) :])) - nothing)
     for name, ns in spent.items():
         times = cell.sides[name]
         times.easier = EASIER if name == "pymunk" else ""
