@@ -5,20 +5,27 @@ Functions from arrays to arrays; `cells_jit` has the same ones, compiled.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from planes.arrays import Ints
-from planes.spans import ragged
+from planes.spans import meets, ragged
 
-__all__ = ["Cells", "cells_of", "coarse_enough", "listed_at"]
+__all__ = ["Cells", "cells_of", "coarse_enough", "listed_at", "met_boxes"]
 
 CELLS_MOST = 2**20
 """Cells of one list: 8 MB of where each begins."""
 
 ENTRIES_A_BOX = 64
 """Cells that a box is listed in at most, on average, before the cells are made larger."""
+
+BRUTE_PAIRS = 2**19
+"""Pairs of boxes that are compared one by one: to list some 1000 boxes and to read the lists takes as long."""
+
+PAIRS_AT_ONCE = 2**17
+"""Pairs of boxes compared at a time: 128 KB of booleans."""
 
 
 class Cells(NamedTuple):
@@ -100,3 +107,38 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
     offset = begin[busy] - np.cumsum(length) + length
     box = cells.listed[np.arange(len(place)) + np.repeat(offset, length)]
     return place if every else near[place], box
+
+
+def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+    """Pairs of inclusive boxes (n, 4) and (m, 4) that share a pixel, sorted; an empty one meets those that it lies in."""
+    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS and (asked_xyxy[:, :2] <= asked_xyxy[:, 2:]).all():
+        reach = np.concatenate([[0, 0], (asked_xyxy[:, 2:] - asked_xyxy[:, :2]).max(axis=0)])
+        listed = cells_of(boxes_xyxy, reach, int(reach.max()).bit_length())
+        row, box = listed_at(listed, asked_xyxy[:, 0], asked_xyxy[:, 1])
+        met = meets(asked_xyxy[row], boxes_xyxy[box]).nonzero()[0]
+        return row[met], box[met]
+    every = max(1, len(boxes_xyxy))
+    asked, boxes = _compact(asked_xyxy, boxes_xyxy)
+    found = [np.zeros(0, np.int64)]
+    step = max(1, PAIRS_AT_ONCE // every)
+    for first in range(0, len(asked), step):
+        left, top, right, bottom = (side[:, None] for side in asked[first : first + step].T)
+        met = left <= boxes[2]
+        met &= right >= boxes[0]
+        met &= top <= boxes[3]
+        met &= bottom >= boxes[1]
+        found.append(np.flatnonzero(met) + first * every)
+    pair = np.concatenate(found)
+    row = pair // every
+    return row, pair - row * every
+
+
+def _compact(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Boxes (n, 4), and the sides of others (4, m), in the least type of number that holds them about a corner."""
+    if not len(asked_xyxy) or not len(boxes_xyxy):
+        return asked_xyxy, boxes_xyxy.T
+    low = np.minimum(asked_xyxy.min(axis=0), boxes_xyxy.min(axis=0)).reshape(2, 2).min(axis=0)
+    size = int((np.maximum(asked_xyxy.max(axis=0), boxes_xyxy.max(axis=0)).reshape(2, 2).max(axis=0) - low).max())
+    kind = np.int16 if size < 2**15 else np.int32 if size < 2**31 else np.int64
+    corner = np.concatenate([low, low])
+    return (asked_xyxy - corner).astype(kind), np.ascontiguousarray((boxes_xyxy - corner).astype(kind).T)

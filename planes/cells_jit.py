@@ -8,11 +8,14 @@ from numba import njit, types
 from planes.arrays import Ints
 from planes.cells import Cells, coarse_enough
 
-__all__ = ["cells_of", "listed_at"]
+__all__ = ["cells_of", "listed_at", "met_boxes"]
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
 BOXES = types.Array(types.int64, 2, "C", readonly=True)
 OUT = types.int64[::1]
+
+BRUTE_PAIRS = 2**14
+"""Pairs of boxes that are compared one by one: to list some 1000 boxes and to read the lists takes as long."""
 
 
 @njit([OUT(BOXES, types.int64, types.int64, OUT)], cache=True, nogil=True)
@@ -77,4 +80,49 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         count = _at(*cells, x, y, place, box)
         if count <= room:
             return place[:count], box[:count]
+        room = count
+
+
+@njit([types.int64(BOXES, BOXES, OUT, OUT)], cache=True, nogil=True)
+def _met(asked, boxes, rows, others):
+    count, room = 0, len(rows)
+    for row in range(len(asked)):
+        left, top, right, bottom = asked[row]
+        for box in range(len(boxes)):
+            if (left <= boxes[box, 2]) & (right >= boxes[box, 0]) & (top <= boxes[box, 3]) & (bottom >= boxes[box, 1]):
+                if count < room:
+                    rows[count], others[count] = row, box
+                count += 1
+    return count
+
+
+@njit([types.int64(BOXES, BOXES, INTS, INTS, OUT, OUT)], cache=True, nogil=True)
+def _met_of(asked, boxes, row, box, rows, others):
+    count = 0
+    for pair in range(len(row)):
+        a, b = row[pair], box[pair]
+        across = (asked[a, 0] <= boxes[b, 2]) & (asked[a, 2] >= boxes[b, 0])
+        if across & (asked[a, 1] <= boxes[b, 3]) & (asked[a, 3] >= boxes[b, 1]):
+            rows[count], others[count] = a, b
+            count += 1
+    return count
+
+
+def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+    """See `cells.met_boxes`."""
+    asked_xyxy, boxes_xyxy = np.ascontiguousarray(asked_xyxy), np.ascontiguousarray(boxes_xyxy)
+    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS and (asked_xyxy[:, :2] <= asked_xyxy[:, 2:]).all():
+        reach = np.zeros(4, np.int64)
+        reach[2:] = (asked_xyxy[:, 2:] - asked_xyxy[:, :2]).max(axis=0)
+        listed = cells_of(boxes_xyxy, reach, int(reach.max()).bit_length())
+        row, box = listed_at(listed, asked_xyxy[:, 0], asked_xyxy[:, 1])
+        rows, others = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
+        count = _met_of(asked_xyxy, boxes_xyxy, row, box, rows, others)
+        return rows[:count], others[:count]
+    room = 4 * len(asked_xyxy) + 64
+    while True:
+        rows, others = np.empty(room, np.int64), np.empty(room, np.int64)
+        count = _met(asked_xyxy, boxes_xyxy, rows, others)
+        if count <= room:
+            return rows[:count], others[:count]
         room = count

@@ -159,6 +159,7 @@ class Items:
         self._stack: tuple[int, Stack] | None = None
         self._bounds: dict[Kind, Bounds] = {}
         self._tiles: list[TileAtlas] = []
+        self._imagery: tuple[int, list[Role]] | None = None
         self._lock = threading.Lock()
         self._allot()
 
@@ -357,16 +358,26 @@ class Items:
             layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
         )  # fmt: skip
 
+    def imagery(self) -> list[Role]:
+        """Roles of what is in the scene and decides no hit."""
+        forms, known = self.stack().forms, self._imagery
+        if known is None or known[0] != forms:
+            count = np.bincount(self.role[: self.count], self.alive[: self.count], len(ROLES)).tolist()
+            drawn = [
+                role for role in ROLES if count[ROLES.index(role)] and ROLES.index(role) not in (HITTABLE, OCCLUDER)
+            ]
+            known = self._imagery = forms, drawn
+        return known[1]
+
     def tiles(self) -> Tiles:
         """Bit rows of the masks of the stack."""
         from planes.tiles import TileAtlas  # what nothing is fired at needs none
 
+        if not self._tiles:
+            self._tiles.append(TileAtlas())
         stack = self.stack()
-        with self._lock:
-            if not self._tiles:
-                self._tiles.append(TileAtlas())
-            used = ((variant.uid, variant.mask) for variant in self.variants)
-            return self._tiles[0].tiles(used, self.mask[stack.ids])
+        used = ((variant.uid, variant.mask) for variant in self.variants)
+        return self._tiles[0].tiles(used, self.mask[stack.ids], stack.forms)
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""

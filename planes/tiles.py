@@ -32,6 +32,7 @@ class Tiles:
     size_wh : (T, 2) px, up to 64
     begin : (T,) its first row in `words`
     words : flat rows of all tiles
+    whole : whether each item is one tile
     """
 
     rank: Ints
@@ -40,18 +41,23 @@ class Tiles:
     size_wh: Ints
     begin: Ints
     words: Words
+    whole: bool
 
     def __len__(self) -> int:
         return len(self.rank)
 
     def of(self, rank: Ints) -> tuple[Ints, Ints]:
         """Tiles of items of ranks (n,), as (place in `rank`, tile)."""
+        if self.whole:
+            return np.arange(len(rank)), rank
         begin = np.searchsorted(self.rank, rank)
         place, tile = ragged(np.searchsorted(self.rank, rank, side="right") - begin)
         return place, begin[place] + tile
 
     def boxes(self, items_xyxy: Ints) -> Ints:
         """Inclusive boxes (T, 4) of tiles, of the boxes (M, 4) of the items of the stack."""
+        if self.whole:
+            return items_xyxy
         corner = np.stack([items_xyxy[self.rank, 0] + self.left, items_xyxy[self.rank, 1] + self.top], axis=1)
         return np.concatenate([corner, corner + self.size_wh - 1], axis=1)
 
@@ -65,20 +71,21 @@ class TileAtlas:
         self._first: dict[int, int] = {}
         self._count: dict[int, int] = {}
         self._columns = np.zeros((4, 4), np.int64)  # left, top, width, height
-        self._last: tuple[Ints, Tiles] | None = None
+        self._last: tuple[int, Tiles] | None = None
         self._lock = threading.Lock()
 
-    def tiles(self, masks: Iterable[tuple[int, Bools]], number: Ints) -> Tiles:
+    def tiles(self, masks: Iterable[tuple[int, Bools]], number: Ints, forms: int) -> Tiles:
         """Tiles of the items of a stack.
 
         Parameters
         ----------
         masks : number and mask (h, w) of all that are in use
         number : (M,) of the mask of each item
+        forms : of the stack: another of the same has the same tiles
         """
         with self._lock:
-            if self._last is None or not np.array_equal(self._last[0], number):
-                self._last = number, self._listed(masks, number)
+            if self._last is None or self._last[0] != forms:
+                self._last = forms, self._listed(masks, number)
             return self._last[1]
 
     def _listed(self, masks: Iterable[tuple[int, Bools]], number: Ints) -> Tiles:
@@ -95,7 +102,9 @@ class TileAtlas:
         rank, place = ragged(count)
         slot = first[rank] + place
         left, top, width, height = self._columns[slot].T
-        return Tiles(rank, left, top, np.stack([width, height], axis=1), slot * STRIDE + WORD, self.words)
+        size = np.stack([width, height], axis=1)
+        whole = len(rank) == len(number) and not left.any() and not top.any()
+        return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole)
 
     def _append(self, uid: int, mask: Bools) -> None:
         """Cut one mask into tiles, without those that have no pixel."""

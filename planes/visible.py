@@ -18,14 +18,11 @@ from planes.arrays import Bools, Ints
 from planes.bitrows import PAD, WORD, Beside, Seen, Words, beside_of
 from planes.cells import Cells
 from planes.items import Items, Stack
-from planes.spans import Box, meets
+from planes.spans import Box
 from planes.tiles import Tiles
 from planes.twins import kernels_of
 
 __all__ = ["Composition", "Compositions", "View", "cropped", "in_front", "seen_of"]
-
-FRONT_BITS = 6
-"""Of the side of the cells in which tiles in front are looked for: that of a tile."""
 
 VIEWS_MOST = 4
 """Compositions that a scene keeps: shots that accept other items see others."""
@@ -35,9 +32,6 @@ REACHES_MOST = 8
 
 SHOT_BITS = 4
 """Of the side of the cells of shot positions: 16 px; in larger ones more boxes are listed that no pattern meets."""
-
-TILES_AT_ONCE = 2**13
-"""Tiles for which those in front are looked for at a time."""
 
 
 class View(NamedTuple):
@@ -146,18 +140,10 @@ def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:
     tiles : (n,) those asked for
     blocks : (T,) which can cover another
     """
-    front = np.flatnonzero(blocks)
-    boxes, kernels = boxes_xyxy[front], kernels_of(cells)
-    listed = kernels.cells_of(boxes, np.array([0, 0, WORD - 1, WORD - 1]), FRONT_BITS)
-    parts = [(np.zeros(0, np.int64),) * 2]
-    for first in range(0, len(tiles), TILES_AT_ONCE):
-        some = tiles[first : first + TILES_AT_ONCE]
-        asked = boxes_xyxy[some]
-        place, other = kernels.listed_at(listed, asked[:, 0], asked[:, 1])
-        met = ((front[other] < some[place]) & meets(asked[place], boxes[other])).nonzero()[0]
-        parts.append((place[met] + first, front[other[met]]))
-    place, other = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return place, other
+    front = np.arange(len(boxes_xyxy)) if blocks.all() else np.flatnonzero(blocks)
+    place, other = kernels_of(cells).met_boxes(boxes_xyxy[tiles], boxes_xyxy[front])
+    before = (front[other] < tiles[place]).nonzero()[0]
+    return place[before], front[other[before]]
 
 
 def seen_of(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Seen:

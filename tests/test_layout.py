@@ -15,8 +15,9 @@ ORDER = {
         "constants", "arrays", "twins", "schema", "exact", "grid256", "spans", "bitrows", "bitrows_jit",
         "cells", "cells_jit", "tiles", "rasterise", "rings", "volumes", "parts", "axes", "overlap",
         "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles", "slabs", "image", "kept",
-        "sprite", "hull", "cover", "outline", "fit", "bounding", "items", "visible", "index", "compose",
-        "labels", "poses", "scenefile", "scene", "loading", "history", "render", "sampling",
+        "sprite", "hull", "cover", "outline", "fit", "bounding", "stack", "placing", "placing_jit",
+        "items", "visible", "index", "painting", "painting_jit", "compose", "labels", "poses",
+        "scenefile", "scene", "loading", "history", "render", "sampling",
     ),
     "weapons": (
         "draws", "weapon", "columns", "pattern", "windows", "guns", "arsenal", "volley", "rays",

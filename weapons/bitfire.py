@@ -15,19 +15,20 @@ from planes.arrays import Ints
 from planes.bitrows import Beside, Seen, Windows
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
+from planes.grid256 import ONE
 from planes.items import HITTABLE, Items, Stack
 from planes.scene import Scene
 from planes.tiles import Tiles
 from planes.twins import kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
-from weapons.arsenal import parts_of, pierces
+from weapons.arsenal import parts_of, pattern_of, pierces
 from weapons.candidates import may_refuse, refused
 from weapons.counting import counted, points
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, chosen_candidates, chosen_form, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
 from weapons.runfire import verdicts_of
-from weapons.volley import Shots, Volley, volley_of
+from weapons.volley import Shots, Volley, placements_of, volley_of
 from weapons.weapon import Weapon
 from weapons.windows import fits, windows_of
 
@@ -43,49 +44,35 @@ REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
 
 
-def counts(weapon: Weapon, first: Volley) -> bool:
+def counts(weapon: Weapon) -> bool:
     """Whether bit rows serve a weapon: one without weights, whose patterns are not too large."""
-    if first.table.prefix is not None:
-        return False
     plain = parts_of(weapon)[2]
-    return plain.reach_256 <= SUB * REACH_COUNTED or (not plain.directed and fits(first.table.patterns))
+    if plain.falloff is not None:
+        return False
+    return plain.reach_256 <= SUB * REACH_COUNTED or (not plain.directed and fits([pattern_of(plain, ONE, 0)]))
 
 
 def fired_by_bits(
-    scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, first: Volley, how: tuple[str, str, str], plan: Plan
+    scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, how: tuple[str, str, str], plan: Plan
 ) -> Hits:
-    """Decide what shots hit; `first` is the volley of the first, `how` the pre-filter, broad phase and strategy."""
+    """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
-    plan.run("patterns", "" if len(shots) else "no shots", first.nbytes)
-    view = view_of(pierces(weapon), shots)
-    placements = len(first.shot) * len(shots)
-    point = is_point(first, view, stack)
-    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
-    asked = 0 if name == "composed" else placements
+    view, each = view_of(pierces(weapon), shots), placements_of(weapon)
+    point = is_point(weapon, view, stack)
+    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, each * len(shots))
+    asked = 0 if name == "composed" else each * len(shots)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
     sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
     plan.run("plan", f"{name}: {why}")
-    if name == "composed" and point and (plane := scene.code_plane()):
-        read, most = _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE
-    elif name == "composed" and view is not None:
-        composition = scene.compositions().read(view, scene.items, scene.bounds)
-        plan.run("composition", "what can be seen of all objects", composition.nbytes)
-        read, most = _by_composition(composition, sight), PLACEMENTS_AT_ONCE
-    else:
-        read, most = _by_items(scene.items, view, sight), CHUNK_PAIRS // max(len(stack), 1)
-    rows = [Rows.none()]
-    begin = 0
-    for part, volley, windows in _parts(weapon, shots, first, max(1, min(most, PLACEMENTS_AT_ONCE))):
-        if volley is not first:
-            plan.run("patterns", "", volley.nbytes)
-        some = read(part, volley, windows)
-        rows.append(replace(some, shot=some.shot + begin) if begin else some)
-        begin += len(part)
-        plan.run("rows", "", rows[-1].nbytes)
-    hits = Hits(
-        Rows.joined(rows[1:] or rows), lambda: verdicts_of(weapon, shots, first, sight), scene, weapon, shots, plan
-    )
-    plan.run("rows", "")
+    read, most = _reader(scene, name, view, point, sight)
+    parts = [Rows.none()]
+    for begin, part, volley, windows in _parts(weapon, shots, max(1, min(most, PLACEMENTS_AT_ONCE) // each)):
+        plan.run("patterns", f"{len(volley.table.count)} distinct", volley.nbytes)
+        rows = read(part, volley, windows)
+        parts.append(replace(rows, shot=rows.shot + begin) if begin else rows)
+    rows = Rows.joined(parts[1:] or parts)
+    hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
+    plan.run("rows", "in their order", rows.nbytes)
     leave_out_uncounted(plan, scene, candidates, may_refuse(stack, shots), name, why)
     plan.run("plan", "")
     return hits
@@ -94,21 +81,29 @@ def fired_by_bits(
 Reader = Callable[[Shots, Volley, Windows], Rows]
 
 
-def _parts(weapon: Weapon, shots: Shots, first: Volley, most: int) -> Iterator[tuple[Shots, Volley, Windows]]:
-    """Parts of a batch of at most so many placements, and of as many patterns as fit memory at a time."""
-    step = max(1, most // max(len(first.shot), 1))
-    for begin in range(0, len(shots), step):
-        yield from _fitting(weapon, shots.take(begin, min(begin + step, len(shots))), first, len(shots) > OFTEN)
+def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sight) -> tuple[Reader, int]:
+    """How rows of placements are found, and of how many at a time."""
+    plane = scene.code_plane() if point and name == "composed" else None
+    if plane is not None:
+        return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE
+    if name == "composed" and view is not None:
+        composition = scene.compositions().read(view, scene.items, scene.bounds)
+        sight.plan.run("composition", "what can be seen of all objects", composition.nbytes)
+        return _by_composition(composition, sight), PLACEMENTS_AT_ONCE
+    return _by_items(scene.items, view, sight), CHUNK_PAIRS // max(len(sight.stack), 1)
 
 
-def _fitting(weapon: Weapon, shots: Shots, first: Volley, often: bool) -> Iterator[tuple[Shots, Volley, Windows]]:
-    volley = first if len(shots) == 1 == len(first.shot) and not shots.row[0] else volley_of(weapon, shots)
-    if fits(volley.table.patterns) or len(shots) == 1:
-        yield shots, volley, windows_of(volley.table.patterns, often)
-        return
-    half = len(shots) // 2
-    for begin, end in ((0, half), (half, len(shots))):
-        yield from _fitting(weapon, shots.take(begin, end), first, often)
+def _parts(weapon: Weapon, shots: Shots, step: int) -> Iterator[tuple[int, Shots, Volley, Windows]]:
+    """Parts of a batch: so many shots, or as many as have patterns that fit memory; and where each begins."""
+    begin = 0
+    while begin < len(shots):
+        part = shots.take(begin, min(begin + step, len(shots)))
+        volley = volley_of(weapon, part)
+        if len(part) > 1 and not fits(volley.table.patterns):
+            step = len(part) // 2
+            continue
+        yield begin, part, volley, windows_of(volley.table.patterns, len(shots) > OFTEN)
+        begin += len(part)
 
 
 def _by_plane(plane: CodePlane, items: Items, sight: Sight) -> Reader:
@@ -181,14 +176,24 @@ def _seen_by(
     stack = sight.stack
     blocks = stack.occluder if sight.pierce else np.ones(len(stack), np.bool_)
     if view is not None or seer is None:
-        which, near = np.unique(tile, return_inverse=True)
+        which, near = _distinct(tile, len(tiles))
         there = blocks if view is None else blocks & view.accepts(stack)
-        return which, near, *in_front(boxes, which, there[tiles.rank])
+        return which, near, *in_front(boxes, which, there if tiles.whole else there[tiles.rank])
     pairs, near = np.unique(seer * len(tiles) + tile, return_inverse=True)
     shot, which = np.divmod(pairs, len(tiles))
-    of, front = in_front(boxes, which, blocks[tiles.rank])
+    of, front = in_front(boxes, which, blocks if tiles.whole else blocks[tiles.rank])
     accepted = ~refused(stack, tiles.rank[front], shots, shot[of])
     return which, near, of[accepted], front[accepted]
+
+
+def _distinct(values: Ints, most: int) -> tuple[Ints, Ints]:
+    """Distinct numbers below `most`, rising, and the place of each value among them."""
+    there = np.zeros(most, np.bool_)
+    there[values] = True
+    distinct = there.nonzero()[0]
+    place = np.empty(most, np.int64)
+    place[distinct] = np.arange(len(distinct))
+    return distinct, place[values]
 
 
 NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
@@ -204,10 +209,12 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
     return View(pierce, int(accept[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
 
 
-def is_point(volley: Volley, view: View | None, stack: Stack) -> bool:
+def is_point(weapon: Weapon, view: View | None, stack: Stack) -> bool:
     """Whether placements are of one pixel each, for shots that end at the first item there is."""
-    one = len(volley.shot) == 1 and volley.table.count[0] == 1
-    return one and view == View(False, ALL, ()) and not stack.has_unmet
+    burst, spread, plain = parts_of(weapon)
+    if burst or spread or plain.directed or view != View(False, ALL, ()) or stack.has_unmet:
+        return False
+    return bool(pattern_of(plain, ONE, 0).table.count[0] == 1)
 
 
 def _is_disc(volley: Volley) -> bool:

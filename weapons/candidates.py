@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planes import cells
 from planes.arrays import Bools, Ints, choice
-from planes.constants import CHUNK_PAIRS
 from planes.index import Index
 from planes.items import Items, Stack, boxes_in
 from planes.sampling import BLOCK, HIT, SKIP, Kinds, Pairs
 from planes.spans import meets
+from planes.twins import kernels_of
 from weapons.volley import Shots, Volley
 
 __all__ = [
@@ -132,19 +133,13 @@ class Candidates:
         return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
 
     def _meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-        n, m = len(boxes_xyxy), len(self.stack)
         if self.index is None:
-            step = max(1, CHUNK_PAIRS // max(m, 1))
-            parts = [np.nonzero(meets(boxes_xyxy[i : i + step, None], self.stack.box_xyxy)) for i in range(0, n, step)]
-            if len(parts) == 1:
-                return parts[0][0], parts[0][1]
-            row = np.concatenate([np.zeros(0, np.int64), *(part[0] + i * step for i, part in enumerate(parts))])
-            return row, np.concatenate([np.zeros(0, np.int64), *(part[1] for part in parts)])
+            found: tuple[Ints, Ints] = kernels_of(cells).met_boxes(boxes_xyxy, self.stack.box_xyxy)
+            return found
+        m = len(self.stack)
         some = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
         row, item = self.index.query(self.items, boxes_xyxy[some])
-        rank_of = np.zeros(self.items.count, np.int64)
-        rank_of[self.stack.ids] = np.arange(m)
-        row, rank = np.divmod(np.sort(some[row] * m + rank_of[item]), m)
+        row, rank = np.divmod(np.sort(some[row] * m + self.stack.rank_of[item]), m)
         return row, rank
 
     def near(self, volley: Volley, placement: Ints, rank: Ints) -> Bools:

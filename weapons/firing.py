@@ -19,7 +19,7 @@ from weapons.bitfire import counts, fired_by_bits
 from weapons.hits import Hits
 from weapons.plan import Plan, read_stack
 from weapons.runfire import fired_by_runs
-from weapons.volley import Shots, checked_shots, volley_of
+from weapons.volley import Shots, checked_shots
 from weapons.weapon import Weapon
 
 if TYPE_CHECKING:  # most shots are of patterns, at the present: rays and the past are loaded when they are asked for
@@ -137,10 +137,8 @@ def fired(
         choice("strategy", strategy, ("auto", "direct"))
         return fired_rays(scene, weapon, parts, shots, prefilter, broadphase, plan)
     stack = read_stack(scene, plan)
-    first = volley_of(weapon, shots.take(0, 1))
-    how = (prefilter, broadphase, strategy)
-    fired_by = fired_by_bits if counts(weapon, first) else fired_by_runs
-    return fired_by(scene, weapon, shots, stack, first, how, plan)
+    fired_by = fired_by_bits if counts(weapon) else fired_by_runs
+    return fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
 
 
 def _bits(scene: Scene, accept: object) -> object:

@@ -43,6 +43,11 @@ class Pattern:
     swept: Swept | None = None
     _volumes: dict[str, Volumes] = field(default_factory=dict, repr=False)
 
+    @cached_property
+    def table(self) -> PatternTable:
+        """The table of this one pattern."""
+        return PatternTable([self])
+
     def volume(self, name: str, fitted: Callable[[Pattern], Volumes]) -> Volumes:
         """A volume of the pixels, made once for each name."""
         if name not in self._volumes:

@@ -13,7 +13,7 @@ from planes.arrays import InputError, choice
 from planes.compose import area
 from planes.constants import SUB
 from planes.index import STRUCTURES
-from planes.items import Role, Stack
+from planes.items import Stack
 from planes.scene import Scene
 from planes.visible import View
 from weapons.candidates import BOX, Candidates, prefilter_of
@@ -401,8 +401,5 @@ def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, cho
 
 def leave_out_imagery(plan: Plan, scene: Scene) -> None:
     """Record the roles that decide nothing."""
-    items = scene.items
-    count = np.bincount(items.role[: items.count], items.alive[: items.count], len(Role)).tolist()
-    for role, there in zip(Role, count, strict=True):
-        if there and role not in (Role.HITTABLE, Role.OCCLUDER):
-            plan.leave_out(role.value, "drawn only for a picture")
+    for role in scene.items.imagery():
+        plan.leave_out(role.value, "drawn only for a picture")

@@ -26,10 +26,11 @@ __all__ = ["fired_by_runs", "verdicts_of"]
 
 
 def fired_by_runs(
-    scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, first: Volley, how: tuple[str, str, str], plan: Plan
+    scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, how: tuple[str, str, str], plan: Plan
 ) -> Hits:
-    """Decide what shots hit; `first` is the volley of the first, `how` the pre-filter, broad phase and strategy."""
+    """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
+    first = volley_of(weapon, shots.take(0, 1))
     plan.run("patterns", "" if len(shots) else "no shots", first.nbytes)
     placements = len(first.shot) * len(shots)
     name, why = chosen_strategy(strategy, scene, stack, first.table, placements)
@@ -58,12 +59,12 @@ def fired_by_runs(
     return hits
 
 
-def verdicts_of(weapon: Weapon, shots: Shots, first: Volley, sight: Sight) -> Ints:
+def verdicts_of(weapon: Weapon, shots: Shots, sight: Sight) -> Ints:
     """Count samples (N, 5) by verdict, of the stack as it was when the shots were fired: it does not change."""
     boxes = Candidates(sight.candidates.items, sight.stack)
     then = Sight(sight.stack, sight.bounds, sight.pierce, boxes, Plan())
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for _, part in _parts(shots, first, boxes):
+    for _, part in _parts(shots, volley_of(weapon, shots.take(0, 1)), boxes):
         counts = direct(volley_of(weapon, part), part, then).counts
         verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     return np.concatenate(verdicts)

@@ -17,9 +17,10 @@ from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
 
-__all__ = ["Shots", "Volley", "check_aimed", "checked_shots", "recoiled", "volley_of"]
+__all__ = ["Shots", "Volley", "check_aimed", "checked_shots", "placements_of", "recoiled", "volley_of"]
 
 OWNER_MAX = 2**31
+EVERY = np.int64(ALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,7 @@ def _places(at: object) -> tuple[Ints, bool]:
 def _accepted(accept: object, n: int) -> Ints:
     """Category bits (n,)."""
     if accept is ALL:
-        return _spread(np.int64(ALL), n)
+        return _spread(EVERY, n)
     return integers("accept", each("accept", accept, n), (n,), 0, ALL)
 
 
@@ -170,6 +171,12 @@ def _spread(value: np.int64 | int | Ints, n: int) -> Ints:
     """One value, or one row of values, for all of n shots: read-only, and no larger than one."""
     one = np.asarray(value)
     return np.broadcast_to(one, (n, *one.shape))
+
+
+def placements_of(weapon: Weapon) -> int:
+    """Placements of one shot: pellets of all rounds."""
+    burst, spread, _ = parts_of(weapon)
+    return (burst.count if burst else 1) * (spread.count if spread else 1)
 
 
 def volley_of(weapon: Weapon, shots: Shots) -> Volley:
@@ -201,7 +208,7 @@ def _patterns(plain: Plain, direction: Ints) -> tuple[PatternTable, Ints]:
     """Distinct patterns of directions (P, 2), and which is whose."""
     if not plain.directed or not direction.strides[0] or not len(direction):
         c, s = direction[0].tolist() if plain.directed and len(direction) else (ONE, 0)
-        return PatternTable([pattern_of(plain, c, s)]), _spread(0, len(direction))
+        return pattern_of(plain, c, s).table, _spread(0, len(direction))
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
     c = (number + 2 * ONE) // (4 * ONE)
     pairs = zip(c.tolist(), (number - c * (4 * ONE)).tolist(), strict=True)
