@@ -21,6 +21,7 @@ WORDS = types.Array(types.uint64, 1, "C", readonly=True)
 FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 OUT = types.int64[::1]
 ALL = np.uint64(2**64 - 1)
+FAR = np.int64(2**62)
 
 
 @intrinsic
@@ -124,22 +125,29 @@ def _found(
         if samples:
             out_placement[count], out_seen[count], out_samples[count] = who, at, samples
             own, level = origin_x[who] - left, origin_y[who]
-            best, best_x, best_y, nearer = np.int64(2**62), np.int64(0), np.int64(0), ALL
-            down = max(low - level, level - high, 0)
-            while down * down <= best and nearer and (level + down <= high or level - down >= low):
-                for side in range(2 if down else 1):  # of two pixels as near the upper one is first
-                    row = level + down if side else level - down
-                    if row < low or row > high:
-                        continue
-                    met = tiles[tile + row] & _window(windows, word + row, step, shift)
-                    if met & nearer == 0:
-                        continue
-                    across = _across(met, own)
-                    distance2 = across * across + down * down
-                    if distance2 < best or (distance2 == best and not side):
-                        best, best_x, best_y = distance2, across, row - level
-                        nearer = _within(own, abs(across) - 1)
-                down += 1
+            middle = min(max(level, low), high)
+            best, best_x, best_y, nearer, first_row, last_row = FAR, np.int64(0), np.int64(0), ALL, low, high
+            row = middle
+            while row <= last_row:
+                met = tiles[tile + row] & _window(windows, word + row, step, shift)
+                if met & nearer:
+                    across, down = _across(met, own), row - level
+                    if across * across + down * down < best:
+                        best, best_x, best_y = across * across + down * down, across, down
+                        reach = np.int64(np.sqrt(best)) + 1  # no smaller than the root
+                        nearer, last_row = _within(own, reach), min(high, level + reach)
+                        first_row = max(low, level - reach)
+                row += 1
+            row = middle - 1
+            while row >= first_row:
+                met = tiles[tile + row] & _window(windows, word + row, step, shift)
+                if met & nearer:
+                    across, down = _across(met, own), row - level
+                    if across * across + down * down <= best:  # of two as near the upper one is first
+                        best, best_x, best_y = across * across + down * down, across, down
+                        reach = np.int64(np.sqrt(best)) + 1
+                        nearer, first_row = _within(own, reach), max(low, level - reach)
+                row -= 1
             out_distance2[count], out_x[count], out_y[count] = best, best_x, best_y
             count += 1
     return count

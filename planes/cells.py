@@ -110,7 +110,7 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
 
 
 def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-    """Pairs of inclusive boxes (n, 4) and (m, 4) that share a pixel, sorted; an empty one meets those that it lies in."""
+    """Pairs of inclusive boxes (n, 4) and (m, 4) that share a pixel, sorted; an empty one lies in others."""
     if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS and (asked_xyxy[:, :2] <= asked_xyxy[:, 2:]).all():
         reach = np.concatenate([[0, 0], (asked_xyxy[:, 2:] - asked_xyxy[:, :2]).max(axis=0)])
         listed = cells_of(boxes_xyxy, reach, int(reach.max()).bit_length())

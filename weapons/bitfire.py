@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,11 +35,11 @@ from weapons.windows import fits, windows_of
 
 __all__ = ["counts", "fired_by_bits", "view_of"]
 
-OFTEN = 64
-"""Shots that are worth all 64 shifts of a pattern."""
-
 PLACEMENTS_AT_ONCE = 2**14
 """Placements of a part of a batch at most: 128 KB for each of their columns."""
+
+PAIRS_AT_ONCE = 2**16
+"""Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
 
 REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
@@ -102,7 +103,7 @@ def _parts(weapon: Weapon, shots: Shots, step: int) -> Iterator[tuple[int, Shots
         if len(part) > 1 and not fits(volley.table.patterns):
             step = len(part) // 2
             continue
-        yield begin, part, volley, windows_of(volley.table.patterns, len(shots) > OFTEN)
+        yield begin, part, volley, windows_of(volley.table.patterns, len(volley.shot))
         begin += len(part)
 
 
@@ -225,7 +226,17 @@ def _is_disc(volley: Volley) -> bool:
 def _counted(
     volley: Volley, windows: Windows, placement: Ints, near: Ints, seen: Seen, beside: Beside, sight: Sight
 ) -> Rows:
-    rows = counted(volley, windows, placement, near, seen, beside, sight.stack.ids, kernels_of(bitrows))
+    """Count pairs, so many at a time as fit the cache, all of a shot together."""
+    edges = [0, len(placement)]
+    if len(placement) > PAIRS_AT_ONCE:
+        shot = volley.shot[placement]
+        wanted = shot[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
+        edges = [0, *np.unique(np.searchsorted(shot, wanted)).tolist(), len(placement)]
+    parts = [
+        counted(volley, windows, placement[a:b], near[a:b], seen, beside, sight.stack.ids, kernels_of(bitrows))
+        for a, b in pairwise(edges)
+    ]
+    rows = Rows.joined(parts)
     sight.plan.run("samples", "counted by bit rows", rows.nbytes)
     return rows
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planes.arrays import InputError, Ints
+from planes.bitrows import WORD
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
@@ -42,6 +43,12 @@ class Pattern:
     prefix: Ints | None
     swept: Swept | None = None
     _volumes: dict[str, Volumes] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def window_bytes(self) -> int:
+        """What its bit rows take in `weapons.windows`."""
+        x, y, x_max, y_max = self.spans.box_xyxy or (0, 0, -1, -1)
+        return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
 
     @cached_property
     def table(self) -> PatternTable:

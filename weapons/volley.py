@@ -22,6 +22,9 @@ __all__ = ["Shots", "Volley", "check_aimed", "checked_shots", "placements_of", "
 OWNER_MAX = 2**31
 EVERY = np.int64(ALL)
 
+FEW = 1024
+"""Rows that are sooner written than spread."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shots:
@@ -168,8 +171,10 @@ def _accepted(accept: object, n: int) -> Ints:
 
 
 def _spread(value: np.int64 | int | Ints, n: int) -> Ints:
-    """One value, or one row of values, for all of n shots: read-only, and no larger than one."""
+    """One value, or one row of values, for all of n shots; for many it is there once."""
     one = np.asarray(value)
+    if n <= FEW:
+        return np.full((n, *one.shape), one)
     return np.broadcast_to(one, (n, *one.shape))
 
 
@@ -206,7 +211,7 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
 
 def _patterns(plain: Plain, direction: Ints) -> tuple[PatternTable, Ints]:
     """Distinct patterns of directions (P, 2), and which is whose."""
-    if not plain.directed or not direction.strides[0] or not len(direction):
+    if not plain.directed or not len(direction) or not direction.strides[0] or (direction == direction[0]).all():
         c, s = direction[0].tolist() if plain.directed and len(direction) else (ONE, 0)
         return pattern_of(plain, c, s).table, _spread(0, len(direction))
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -19,9 +20,13 @@ TABLE_BYTES_MOST = 2**22
 PATTERN_BYTES_MOST, PATTERNS_BYTES_MOST = 2**22, 2**26
 """A pattern whose rows of words would be larger, or all of a call, are counted run by run."""
 
+OFTEN = 64
+"""Placements of a pattern, in all calls, that are worth all of its shifts."""
+
 WINDOW_CACHE_BYTES = 2**26
 """Windows kept for the next call, bytes."""
 
+_placed: WeakKeyDictionary[Pattern, int] = WeakKeyDictionary()
 _kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
     WINDOW_CACHE_BYTES, lambda windows: windows.words.nbytes + windows.box_xyxy.nbytes
 )
@@ -29,24 +34,22 @@ _kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
 
 def fits(patterns: Sequence[Pattern]) -> bool:
     """Whether windows of patterns, all at once, may be made."""
-    sizes = [_bytes_of(pattern.spans) for pattern in patterns]
+    sizes = [pattern.window_bytes for pattern in patterns]
     return max(sizes, default=0) <= PATTERN_BYTES_MOST and sum(sizes) <= PATTERNS_BYTES_MOST
 
 
-def windows_of(patterns: Sequence[Pattern], often: bool) -> Windows:
+def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
     """Windows of patterns; those of the last calls are kept.
 
     Parameters
     ----------
-    often : whether many more windows will be read than there are
+    placements : for which they are read
     """
-    often = often and len(patterns) == 1 and _bytes_of(patterns[0].spans) * WORD <= TABLE_BYTES_MOST
+    often = len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
+    if often:
+        _placed[patterns[0]] = _placed.get(patterns[0], 0) + placements
+        often = _placed[patterns[0]] > OFTEN
     return _kept.get((tuple(patterns), often), lambda: _made([pattern.spans for pattern in patterns], often))
-
-
-def _bytes_of(spans: Spans) -> int:
-    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
-    return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
 
 
 def _made(patterns: Sequence[Spans], often: bool) -> Windows:
