@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from weapons.picture import picture_of_report as picture_of_report
     from weapons.rayhits import RayHits as RayHits
     from weapons.rayhits import Reason as Reason
+    from weapons.ready import Ready as Ready
+    from weapons.ready import prepare as prepare
     from weapons.record import ShotRecord as ShotRecord
     from weapons.record import replay as replay
     from weapons.weapon import Weapon as Weapon
@@ -43,6 +45,8 @@ _HOME = {
     **dict.fromkeys(("Laser", "Pistol", "Projectile", "Rifle", "Sweep"), "weapons.guns"),
     "FixedStep": "weapons.clock",
     "RayHits": "weapons.rayhits",
+    "Ready": "weapons.ready",
+    "prepare": "weapons.ready",
     "Reason": "weapons.rayhits",
     "ShotRecord": "weapons.record",
     "replay": "weapons.record",
@@ -58,8 +62,8 @@ _HOME = {
 
 __all__ = [
     "Beam", "Box", "Cone", "Disc", "Point", "Polygon", "Ring", "Rounds", "Spread", "Stencil", "Weapon",
-    "Laser", "Pistol", "Projectile", "Rifle", "Sweep", "arsenal_of", "weapon_from_json", "fire", "Hits", "RayHits",
-    "Reason", "ShotRecord", "replay", "Verdict", "FixedStep", "report_of", "picture_of_report",
+    "Laser", "Pistol", "Projectile", "Rifle", "Sweep", "arsenal_of", "weapon_from_json", "fire", "prepare", "Ready",
+    "Hits", "RayHits", "Reason", "ShotRecord", "replay", "Verdict", "FixedStep", "report_of", "picture_of_report",
 ]  # fmt: skip
 
 

@@ -25,7 +25,7 @@ from weapons.weapon import Weapon
 if TYPE_CHECKING:  # most shots are of patterns, at the present: rays and the past are loaded when they are asked for
     from planes.history import History
 
-__all__ = ["fire"]
+__all__ = ["category_bits", "fire"]
 
 
 def fire(
@@ -74,7 +74,7 @@ def fire(
     """
     plan = Plan()
     present = scene if isinstance(scene, Scene) else _history(scene).scene
-    shots = checked_shots(weapon, at, aim, toward, _bits(present, accept), exclude, seed, shot)
+    shots = checked_shots(weapon, at, aim, toward, category_bits(present, accept), exclude, seed, shot)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if not isinstance(scene, Scene):
         return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
@@ -141,7 +141,7 @@ def fired(
     return fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
 
 
-def _bits(scene: Scene, accept: object) -> object:
+def category_bits(scene: Scene, accept: object) -> object:
     """Category bits of names; anything else as it is."""
     if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
         return scene.category_bits(*accept)

@@ -1,0 +1,429 @@
+"""A weapon made ready: each shot is what `fire` gives, of the scene as it is, also when it is asked later."""
+
+from __future__ import annotations
+
+import gc
+import math
+import random
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from test_fire import Volley, expected, some_battle, some_place, some_pose, told
+
+import weapons.cells
+import weapons.pieces
+import weapons.ready
+from planes import InputError, Scene, Sprite
+from planes.bigrows import packed, pixels_of, rows_of_spans, shared
+from planes.grid256 import pixel, snap
+from planes.spans import Spans
+from weapons import Beam, Box, Disc, Hits, Laser, Pistol, Point, Rounds, Spread, Stencil, Weapon, fire, prepare
+from weapons.oneshot import OneShot
+from weapons.ready import ODD, PIXEL
+
+WORLD = (220, 160)
+MASK = np.array([[1, 0, 1], [0, 1, 0]], bool)
+
+
+def crowd(seed: int, size_wh: tuple[int, int] | None = WORLD, objects: int = 40) -> Scene:
+    """Irregular objects, some hundred px wide, in three layers, and some occluders; a part of them off the bounds."""
+    rng = np.random.default_rng(seed)
+    scene = Scene(size_wh, categories=("glass",))
+    for k in range(objects):
+        side = rng.integers(1, (30, 30, 130)[k % 3], 2)
+        mask = rng.random(side) < (0.05, 0.6, 1.0)[rng.integers(3)]
+        pose = {
+            "layer": int(rng.integers(3)),
+            "categories": int(rng.integers(1, 4)),
+            "owner": None if k % 4 else k // 2,
+        }
+        role = "occluder" if k % 5 == 0 else "hittable"
+        scene.add(mask, rng.uniform((-30, -30), (250, 190)), role=role, angle=(0.0, 90.0, 33.0)[k % 3], **pose)
+    return scene
+
+
+def same(got: Hits, truth: Hits) -> None:
+    """All that can be asked of one answer is the same of the other."""
+    assert len(got) == len(truth)
+    assert bool(got) == bool(truth)
+    assert got == truth
+    assert truth == got
+    assert list(got) == list(truth) == got.of(0)
+    assert got.verdict_counts() == truth.verdict_counts()
+    assert got.fired.tolist() == truth.fired.tolist()
+    assert got.starts.tolist() == truth.starts.tolist()
+
+
+@settings(max_examples=300)
+@given(st.integers(0, 10**6))
+def test_random_scenes_against_the_oracle(seed: int) -> None:
+    """Small crowded worlds, any weapon but rays, filters, falloff, targets and aims, and changes between the shots."""
+    battle, rng = some_battle(seed), random.Random(seed)
+    scene, volley = battle.scene(), battle.volley
+    filtered = volley.shots[0]
+    ready = prepare(scene, volley.weapon, accept=filtered.accept, exclude=list(filtered.exclude), seed=volley.seed)
+    for one in [*volley.shots, *volley.shots]:
+        shot = replace(one, accept=filtered.accept, exclude=filtered.exclude)
+        aim, toward = (None, shot.toward) if shot.toward is not None else (shot.aim, None)
+        rows, verdicts = expected(scene, Volley(volley.weapon, [shot], volley.seed))
+        got = ready.fire(shot.at, aim=aim, toward=toward, shot=shot.number)
+        count = len(got)
+        assert told(got) == (rows, verdicts), f"{seed=}"
+        assert count == len(rows)
+        changed(scene, rng)
+
+
+def changed(scene: Scene, rng: random.Random) -> None:
+    """Move, turn, remove or add something."""
+    ids = scene.ids().tolist()
+    kind = rng.choice(["move", "set", "remove", "add", "layer", "role", "nothing"])
+    if kind == "add" or not ids:
+        scene.add(Sprite.box(rng.randint(1, 9), rng.randint(1, 9)), some_place(rng, (0, 0)))
+    elif kind == "move":
+        some = rng.sample(ids, rng.randint(1, len(ids)))
+        scene.move(some, [some_place(rng, (0, 0)) for _ in some])
+    elif kind == "set":
+        pose = some_pose(rng, 1)
+        scene.set(rng.choice(ids), angle=pose["angle"], flip=pose["flip"])
+    elif kind == "remove":
+        scene.remove(rng.choice(ids))
+    elif kind == "layer":
+        scene.set(rng.choice(ids), layer=rng.randint(-3, 3), categories=rng.choice([1, 2, 3]))
+    elif kind == "role":
+        scene.set(rng.choice(ids), role=rng.choice(["hittable", "occluder", "mover"]))
+
+
+WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
+    "point": (Point(), {}),
+    "piercing point": (Point(pierce=True), {"accept": ["default"]}),
+    "disc": (Disc(20), {}),
+    "largest whole": (Disc(47.9, falloff="smooth"), {"exclude": [1, 4]}),
+    "first in tiles": (Disc(48), {"accept": ["glass"]}),
+    "tiles": (Disc(90, pierce=True), {}),
+    "nothing": (Stencil([".."]), {}),
+    "beam": (Beam(200, 9), {}),
+    "box": (Box(31, 8, falloff="linear"), {"exclude": 2}),
+    "shotgun": (Spread(Disc(2), 6, 21.3), {"seed": 5}),
+    "wide spread": (Spread(Box(9, 2), 6, 80), {"seed": 2**64 - 1}),
+    "burst": (Rounds(Beam(60, 3), 3, (5, -70), 11), {}),
+    "sub-pixel recoil": (Rounds(Disc(5), 3, (0.3, 7)), {}),
+    "burst of spreads": (Rounds(Spread(Disc(3, pierce=True), 3, 8), 2, (0, 4)), {"accept": ["default"]}),
+    "giant": (Disc(600), {}),
+    "pistol": (Pistol(100), {"exclude": 3}),
+    "line of sight": (Laser(None), {}),
+}
+
+
+@pytest.mark.parametrize("name", WEAPONS)
+@pytest.mark.parametrize("bounded", [True, False])
+def test_every_weapon_in_a_crowd(name: str, bounded: bool) -> None:
+    """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
+    weapon, options = WEAPONS[name]
+    scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
+    ready, rows = prepare(scene, weapon, **options), 0
+    for k in range(24):
+        at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
+        how = [{}, {"aim": 22.5}, {"toward": (at[0] - 3, at[1] + 1)}, {"shot": 9}, {"aim": -90.0, "shot": 9}, {}][k % 6]
+        if name == "line of sight":
+            how = {"toward": (at[0] - 3 - k, at[1] + 1)}
+        for _ in range(2):
+            got = ready.fire(at, **how)
+            same(got, fire(scene, weapon, at, **options, **how))
+            rows += len(got)
+        some = rng.choice(scene.ids(), 2, replace=False)
+        if k % 3 == 0:
+            scene.move(some, rng.uniform((0, 0), WORLD, (2, 2)))
+        elif k % 7 == 0:
+            scene.set(some, angle=float(rng.integers(0, 360)), layer=int(rng.integers(4)))
+    assert rows > 1 or name == "nothing"
+
+
+def test_what_is_asked_of_a_shot() -> None:
+    """Whatever reads an answer of `fire` reads this one."""
+    scene = crowd(2)
+    ready = prepare(scene, Disc(30), exclude=3)
+    for at in ((40, 50), (100.5, 80.25), (215, 100), (400, 0)):
+        got, truth = ready.fire(at), fire(scene, Disc(30), at, exclude=3)
+        assert got.by_owner() == truth.by_owner()
+        assert got.why_not() == truth.why_not()
+        assert got.blockers() == truth.blockers()
+        assert got.margins() == truth.margins()
+        assert got.shares() == truth.shares()
+        assert got.pixels_at() == truth.pixels_at()
+        assert all(np.array_equal(a, b) for a, b in zip(got.samples_at(), truth.samples_at(), strict=True))
+        both = [{k: v for k, v in hits.to_dict().items() if k != "plan"} for hits in (got, truth)]
+        assert both[0] == both[1]
+        assert got.plan.ran[0].name == "prepared"
+        assert repr(got) == repr(truth)
+        with pytest.raises(ValueError, match="read-only"):
+            got.pixels[:] = 0
+        with pytest.raises(AttributeError, match="nothing"):
+            got.nothing  # noqa: B018
+
+
+def test_a_shot_of_the_past_is_still_what_it_was() -> None:
+    """Rows and verdicts are those of the scene when it was fired, though they are worked out later."""
+    scene, rng = crowd(4), np.random.default_rng(4)
+    ready = prepare(scene, Disc(25))
+    places = [tuple(at) for at in rng.uniform((0, 0), WORLD, (30, 2)).tolist()]
+    truths = [fire(scene, Disc(25), at) for at in places]
+    shots = [ready.fire(at) for at in places]
+    scene.move(scene.ids(), rng.uniform((0, 0), WORLD, (len(scene), 2)))
+    scene.remove(scene.ids()[::2])
+    for got, truth in zip(shots, truths, strict=True):
+        same(got, truth)
+        assert got.version == truth.version != scene.version
+        with pytest.raises(InputError, match="fire again"):
+            got.why_not()
+        with pytest.raises(InputError, match="fire again"):
+            got.by_owner()
+
+
+def test_only_what_lies_near_a_change_is_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene((2000, 2000))
+    for x in range(50, 2000, 100):
+        for y in range(50, 2000, 100):
+            scene.add(Sprite.circle(20), (x, y))
+    ready = prepare(scene, Disc(10))
+    every = [(x, y) for x in range(16, 2000, 32) for y in range(16, 2000, 32)]
+    for at in every:
+        ready.fire(at)
+    made: list[tuple[int, int]] = []
+    real = weapons.cells.Cells._found
+    monkeypatch.setattr(weapons.cells.Cells, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j))
+    for at in every:
+        ready.fire(at)
+    assert not made
+    scene.move(0, (60, 50))
+    for at in every:
+        ready.fire(at)
+    assert 4 <= len(made) <= 36
+    assert max(max(place) for place in made) <= 4
+    made.clear()
+    scene.add(Sprite.circle(20), (70, 50), role="mover")
+    for at in every[:500]:
+        ready.fire(at)
+    assert not made
+
+
+def test_a_scene_that_forgot_what_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.items.JOURNAL_ROWS", 4)
+    scene, rng = crowd(1), np.random.default_rng(0)
+    ready = prepare(scene, Disc(15))
+    for _ in range(10):
+        at = tuple(rng.uniform((0, 0), WORLD).tolist())
+        same(ready.fire(at), fire(scene, Disc(15), at))
+        scene.move(scene.ids()[:6], rng.uniform((0, 0), WORLD, (6, 2)))
+
+
+@pytest.mark.parametrize("limit", ["weapons.cells.KEPT_BYTES", "weapons.ready.AIMS_BYTES"])
+def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limit, 20_000)
+    scene = crowd(3)
+    ready: Any = prepare(scene, Beam(120, 20))
+    for k in range(300):
+        at, aim = (float(7 * k % 220), float(11 * k % 160)), float(k % 97)
+        assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
+        kept = ready._cells.nbytes if "cells" in limit else ready._aims_bytes
+        assert kept < 60_000
+        assert len(ready._told) <= 100
+
+
+NUMBERS: list[Callable[[float], Any]] = [
+    float, int, np.float64, np.float32, np.float16, np.int64, np.int16, np.uint8, np.longdouble,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", NUMBERS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("pair", [tuple, list, np.array])
+def test_positions_of_any_kind(kind: Callable[[float], Any], pair: Callable[[Any], Any]) -> None:
+    scene = crowd(5)
+    ready = prepare(scene, Point(pierce=True))
+    for x, y in ((40, 50), (101, 83), (7, 120)):
+        at = pair((kind(x), kind(y)))
+        same(ready.fire(at), fire(scene, Point(pierce=True), at))
+        same(
+            ready.fire(at, aim=kind(30), shot=kind(3)), fire(scene, Point(pierce=True), at, aim=kind(30), shot=kind(3))
+        )
+        assert ready.fire(at, toward=pair((kind(1), kind(2)))) == fire(scene, Point(pierce=True), at)
+
+
+def test_a_position_that_is_changed_later_was_read() -> None:
+    scene = crowd(5)
+    ready = prepare(scene, Disc(9))
+    for at in ([40.0, 50.0], np.array([40.0, 50.0])):
+        target: Any = [3.0, 4.0]
+        got = ready.fire(at, toward=target)
+        at[0], target[0] = 170.0, 100.0
+        same(got, fire(scene, Disc(9), (40, 50)))
+        assert got.shots.at_256.tolist() == [[40 * 256, 50 * 256]]
+
+
+@given(st.floats(-(2**40), 2**40))
+@example(ODD)
+@example(-ODD)
+@example(math.nextafter(ODD, 0))
+@example(math.nextafter(ODD, 1))
+@example(-1 / 2 - 1 / 512)
+@example(math.nextafter(-1 / 2 - 1 / 512, -1))
+@example(2.0**40)
+def test_the_pixel_of_a_position(v: float) -> None:
+    for x in {v, *(math.nextafter(math.floor(v) + 1 - PIXEL, end) for end in (-math.inf, math.inf))}:
+        if x != ODD and abs(x) <= 2**40:
+            assert math.floor(x + PIXEL) == pixel(snap(x))
+
+
+@pytest.mark.parametrize("x", [ODD, 0.498046875, math.nextafter(ODD, 0), -0.501953125, 2.498046875])
+def test_positions_on_the_edge_of_a_pixel(x: float) -> None:
+    scene = Scene()
+    for k in range(-3, 4):
+        scene.add([[True]], (k, 0))
+    ready = prepare(scene, Point())
+    ready.fire((1, 0))
+    for end in (-math.inf, math.inf):
+        for place in (x, math.nextafter(x, end)):
+            same(ready.fire((place, 0.0)), fire(scene, Point(), (place, 0.0)))
+            same(ready.fire((place, 0.0), aim=3.0), fire(scene, Point(), (place, 0.0)))
+
+
+BAD_SHOTS: list[dict[str, Any]] = [
+    {"at": at}
+    for at in (
+        (1, 2, 3), (1,), 5, "ab", None, {1.0: 2, 3.0: 4}, {1.0, 2.0}, iter((1.0, 2.0)), (True, 2.0), (1.0, False),
+        (math.nan, 0.0), (0.0, math.inf), (2.0**40 + 1, 0.0), (0, -(2**40) - 1), (10**400, 0), (1j, 0), ("1", "2"),
+        (Fraction(1), 2.0), (np.array([1.0]), 2.0), ([1.0], [2.0]), np.array(["a", "b"]), np.array([True, False]),
+        np.ma.masked_array([1.0, 2.0], [True, False]), (None, 1.0),
+    )
+] + [
+    {"at": (4.0, 4.0), **how}
+    for how in (
+        {"aim": math.nan}, {"aim": math.inf}, {"aim": True}, {"aim": "up"}, {"aim": [1, 2]}, {"aim": 10**400},
+        {"aim": Fraction(1)}, {"aim": 1.0, "toward": (1, 1)}, {"toward": (4, 4)}, {"toward": (math.nan, 1)},
+        {"toward": (1, 2, 3)}, {"toward": 1.0}, {"toward": (2.0**41, 1)}, {"shot": True}, {"shot": -1}, {"shot": 2**63},
+        {"shot": 0.5}, {"shot": "1"}, {"shot": [1, 2]}, {"aim": 1.0, "shot": True}, {"aim": None, "shot": Fraction(1)},
+    )
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", [Disc(3), Beam(9, 2), Spread(Disc(2), 3, 4), Pistol(9)], ids=lambda w: w.kind)
+@pytest.mark.parametrize("bad", BAD_SHOTS, ids=lambda bad: str(bad)[:40])
+def test_bad_shots_are_refused_in_the_same_words(bad: dict[str, Any], weapon: Weapon) -> None:
+    scene = crowd(6)
+    ready = prepare(scene, weapon)
+    for aim in (None, 1.0, 1):
+        for number in (None, 0, 1):
+            ready.fire((4.0, 4.0), aim=aim, shot=number)
+    ready.fire((2.0**40, 0.0))
+    how = dict(bad)
+    at = how.pop("at")
+    with pytest.raises(InputError) as truth:
+        fire(scene, weapon, at, **how)
+    with pytest.raises(InputError) as got:
+        ready.fire(at, **how)
+    assert str(got.value) == str(truth.value)
+
+
+@pytest.mark.parametrize(
+    "name, bad",
+    [
+        ("accept", -1), ("accept", True), ("accept", ["glas"]), ("exclude", 0.5), ("exclude", "me"), ("exclude", -2),
+        ("seed", -1), ("seed", 1.5), ("weapon", "disc"), ("weapon", None), ("weapon", {"kind": "disc"}),
+    ],
+)  # fmt: skip
+def test_bad_preparations_are_refused_in_the_same_words(name: str, bad: Any) -> None:
+    scene, how = crowd(6), {"weapon": Disc(3), name: bad}
+    weapon: Any = how.pop("weapon")
+    with pytest.raises(InputError) as truth:
+        fire(scene, weapon, (0, 0), **how)
+    with pytest.raises(InputError) as got:
+        prepare(scene, weapon, **how)
+    assert str(got.value) == str(truth.value)
+
+
+def test_only_a_scene_is_prepared_for() -> None:
+    with pytest.raises(InputError, match="scene: expected a Scene, got str"):
+        prepare("scene", Disc(3))  # type: ignore[arg-type]
+
+
+def test_a_batch_goes_the_way_of_fire() -> None:
+    scene, at = crowd(8), np.random.default_rng(1).uniform((0, 0), WORLD, (7, 2))
+    weapon = Spread(Disc(3), 3, 9)
+    assert prepare(scene, weapon, exclude=[1, 2], seed=4).fire(at) == fire(scene, weapon, at, exclude=[[1, 2]], seed=4)
+
+
+def test_far_away() -> None:
+    """At the ends of the range, and where the world begins at any place."""
+    for x, y in ((2**40, -(2**40)), (10**9, 10**9), (-(2**40) + 3, 7)):
+        scene = Scene()
+        scene.add(Sprite.circle(5), (x, y))
+        ready = prepare(scene, Disc(3))
+        for dx in (-12, -7, 0, 8):
+            for _ in range(2):
+                at = (max(min(x + dx, 2**40), -(2**40)), y)
+                same(ready.fire(at), fire(scene, Disc(3), at))
+        with pytest.raises(InputError, match="within"):
+            ready.fire((math.nextafter(2.0**40, math.inf), 0.0))
+
+
+def test_a_scene_that_is_filled_after_the_first_shot() -> None:
+    scene = Scene()
+    ready = prepare(scene, Disc(6))
+    assert not ready.fire((0, 0))
+    scene.add(np.ones((200, 150), bool), (0, 0))
+    scene.add(Sprite.circle(3), (2, 2), role="occluder", layer=1)
+    for at in ((0, 0), (-80, 0), (77, 90), (-75, -100)):
+        same(ready.fire(at), fire(scene, Disc(6), at))
+
+
+def test_threads_that_fire_one_at_once_agree() -> None:
+    scene, rng = crowd(9), np.random.default_rng(5)
+    ready = prepare(scene, Disc(9))
+
+    def shoot(places: list[tuple[float, float]]) -> list[tuple[int, ...]]:
+        return [tuple(row.object for row in ready.fire(at)) for at in places]
+
+    with ThreadPoolExecutor(4) as pool:
+        for _ in range(4):
+            scene.move(scene.ids(), rng.uniform((0, 0), WORLD, (len(scene), 2)))
+            places = list(map(tuple, rng.uniform((0, 0), WORLD, (60, 2)).tolist()))
+            asked = [pool.submit(shoot, places) for _ in range(4)]
+            truth = [tuple(row.object for row in fire(scene, Disc(9), at)) for at in places]
+            assert all(answer.result() == truth for answer in asked)
+
+
+def test_shots_that_are_not_kept_leave_nothing() -> None:
+    scene = crowd(9)
+    ready = prepare(scene, Disc(9))
+    ready.fire((50.0, 50.0))
+    gc.collect()
+    before = sum(isinstance(one, OneShot) for one in gc.get_objects())
+    for _ in range(50):
+        ready.fire((50.0, 50.0))
+    assert sum(isinstance(one, OneShot) for one in gc.get_objects()) == before
+
+
+# Integer rows
+
+
+@given(st.integers(0, 2**30), st.integers(1, 9), st.integers(1, 9), st.integers(-12, 12), st.integers(-12, 12))
+def test_rows_share_what_pixels_share(seed: int, w: int, h: int, dx: int, dy: int) -> None:
+    """One mask on another, at any place where their boxes are near, by shift and &; against sets of pixels."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.random((h, w)) < 0.5, rng.random((w, h)) < 0.5
+    stride = w + h + 24
+    near = {(x + dx, y + dy) for y, x in np.argwhere(a).tolist()} & {(x, y) for y, x in np.argwhere(b).tolist()}
+    found = shared(packed(a, stride), packed(b, stride), dy * stride + dx)
+    assert set(map(tuple, pixels_of(found, stride).tolist())) == near
+
+
+def test_rows_of_spans_begin_at_a_corner() -> None:
+    spans = Spans.from_mask(MASK, (5, 7))
+    assert pixels_of(rows_of_spans(spans, (3, 4), 10), 10).tolist() == [[2, 3], [4, 3], [3, 4]]
+    assert rows_of_spans(Spans.empty(), (0, 0), 10) == 0

@@ -1,0 +1,103 @@
+"""A shot's pixels as integer rows, in parts that fit the squares in which they are looked up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planes.bigrows import rows_of_spans
+from planes.constants import SUB
+from planes.grid256 import snap, unit_toward
+from planes.spans import Spans
+from weapons.arsenal import parts_of
+from weapons.volley import Shots, volley_of
+from weapons.weapon import Weapon
+
+__all__ = ["Frame", "Piece", "frame_of", "pieces_of"]
+
+WHOLE = 96
+"""A pattern within a box of this side is looked up as a whole, px: of a larger one most is empty where an object is."""
+
+TILE = 64
+"""Side of the parts of a larger one, px."""
+
+PARTS_MAX = 256
+"""Parts of a pattern that are looked up one by one; with more, numpy is as fast."""
+
+TURNED_PX = 2
+"""How far beyond its reach a pattern that turns may have pixels: those whose squares its axis meets, and rounding."""
+
+
+class Piece(NamedTuple):
+    """A part of a shot: the pixel where it is looked up, from the shot's; its pixels; and its round."""
+
+    dx: int
+    dy: int
+    rows: int
+    round: int
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The box that a part lies in, about the pixel where it is looked up; larger patterns are cut into tiles."""
+
+    corner: int
+    side: int
+    tiled: bool
+
+
+def frame_of(weapon: Weapon) -> Frame | None:
+    """The box of the pieces of a weapon of patterns; None if they are too many, or depend on the place in its pixel."""
+    burst, spread, plain = parts_of(weapon)
+    if burst and (snap(burst.recoil_xy) % SUB).any():
+        return None
+    reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
+    reach += int(snap(spread.radius)) // SUB if spread else 0
+    side = 2 * reach + 1
+    if side <= WHOLE:
+        return Frame(-reach, side, False)
+    return Frame(0, TILE, True) if (side // TILE + 1) ** 2 <= PARTS_MAX else None
+
+
+def pieces_of(
+    weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None, frame: Frame, stride: int
+) -> list[Piece]:
+    """Parts of a shot at the origin, which is aimed `toward` an offset, if any."""
+    if offset_256 is not None:
+        shots = replace(shots, direction=np.stack(unit_toward(*offset_256)).reshape(1, 2))
+    volley = volley_of(weapon, shots)
+    found: list[Piece] = []
+    for number in np.unique(volley.round).tolist():
+        pellets = np.flatnonzero(volley.round == number)
+        x, y = volley.origin_xy[pellets[0]].tolist()
+        placed = zip(volley.pattern[pellets].tolist(), volley.xy[pellets].tolist(), strict=True)
+        sets = [volley.table.patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed]
+        runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
+        found += _cut(Spans.from_runs(*runs), (x, y), number, frame, stride)
+    return found
+
+
+def _cut(spans: Spans, at_xy: tuple[int, int], number: int, frame: Frame, stride: int) -> list[Piece]:
+    """The pixels of one round, whole or cut into tiles."""
+    x, y = at_xy
+    box = spans.box_xyxy
+    if box is None:
+        return []
+    if not frame.tiled:
+        return [Piece(x, y, rows_of_spans(spans, (frame.corner, frame.corner), stride), number)]
+    found = []
+    for top in range(box[1], box[3] + 1, TILE):
+        for left in range(box[0], box[2] + 1, TILE):
+            part = _clipped(spans, left, top)
+            if len(part):
+                found.append(Piece(x + left, y + top, rows_of_spans(part, (left, top), stride), number))
+    return found
+
+
+def _clipped(spans: Spans, left: int, top: int) -> Spans:
+    """The pixels in one tile."""
+    first, last = np.maximum(spans.x_first, left), np.minimum(spans.x_last, left + TILE - 1)
+    some = (first <= last) & (spans.y >= top) & (spans.y < top + TILE)
+    return Spans(spans.y[some], first[some], last[some])

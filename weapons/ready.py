@@ -1,0 +1,257 @@
+"""A weapon made ready for a scene: the thin path for one shot a call.
+
+scene, weapon -> pieces and squares -> one look-up a shot -> hits
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from math import floor
+from typing import Any
+
+import numpy as np
+
+from planes.arrays import InputError
+from planes.constants import ALL, HALF, POSITION_MAX, SUB
+from planes.scene import Scene
+from weapons.arsenal import has_no_range, parts_of, ray_parts_of
+from weapons.cells import CELL_SHIFT, Cells, Squares
+from weapons.firing import category_bits, fire
+from weapons.hits import Hits
+from weapons.oneshot import Filter, OneShot, Present, Told
+from weapons.pieces import Frame, Piece, frame_of, pieces_of
+from weapons.volley import checked_shots
+from weapons.weapon import Weapon
+
+__all__ = ["Ready", "prepare"]
+
+PIXEL = 257 / 512
+"""The floor of a position moved by it is its whole pixel, (rint(256 v) + 128) // 256: a tie on the edge is even."""
+
+ODD = math.nextafter(1 - PIXEL, 0)
+"""The only position within the limits at which that sum is rounded up to a whole number."""
+
+AIMS_BYTES = 32 * 2**20
+"""Patterns of other aims and numbers that are kept as integer rows, bytes."""
+
+PIECE_BYTES = 200
+"""What a piece costs beside its pixels, bytes."""
+
+PLAIN = float, int
+NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
+
+
+def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: object = None, seed: object = 0) -> Ready:
+    """Make a weapon ready to be fired at a scene one shot a call.
+
+    Parameters
+    ----------
+    scene : what is fired at; it may change at any time: each shot is of the scene as it is then
+    weapon, accept, exclude, seed : those of `fire`, the same for all shots; `exclude` is a number or a list (K,)
+
+    Raises
+    ------
+    InputError
+        Naming the argument.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    toward = (1, 0) if has_no_range(weapon) else None
+    shots = checked_shots(weapon, (0, 0), None, toward, category_bits(scene, accept), exclude, seed, None)
+    kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
+    if ray_parts_of(weapon) is not None:
+        return Ready(scene, weapon, kept)
+    frame = frame_of(weapon)
+    return Ready(scene, weapon, kept) if frame is None else _ReadyPattern(scene, weapon, kept, frame)
+
+
+class Ready:
+    """A weapon that `prepare` made ready for a scene: `ready.fire(at)` is `fire(scene, weapon, at)`, at less cost.
+
+    What makes a shot cheap is found out when the first shot needs it, and once:
+
+    - the pattern of each aim, and of each number of a `Spread`, as integers of which a bit is a pixel;
+    - for squares of 16 px of shot positions, the objects near them, with the pixels that a shot could hit.
+
+    Every shot compares the version of the scene, which counts its changes, with that of what was found out. If the
+    scene has changed, the squares near the old and the new places of what changed are forgotten first (all of them, if
+    the scene no longer knows what changed): no answer is of an older scene.
+
+    Patterns of up to 96 px, and of up to 1000 px cut into tiles, at a position given as two numbers, are answered like
+    this. Rays, larger patterns, bursts whose recoil is not of whole pixels, batches and bad input go the way of `fire`.
+    Threads may fire one Ready at a scene that none of them changes.
+    """
+
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter) -> None:
+        self.scene, self.weapon = scene, weapon
+        self._filter = kept
+
+    def fire(self, at: object, aim: object = None, toward: object = None, shot: object = None) -> Hits:
+        """Decide what one shot hits; the arguments are those of `fire`."""
+        kept = self._filter
+        return fire(
+            self.scene, self.weapon, at, aim=aim, toward=toward, accept=kept.accept, exclude=kept.exclude,
+            seed=kept.seed, shot=shot,
+        )  # fmt: skip
+
+
+class _ReadyPattern(Ready):
+    """One of a pattern that is looked up."""
+
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, frame: Frame) -> None:
+        super().__init__(scene, weapon, kept)
+        _, spread, plain = parts_of(weapon)
+        self._frame, self._directed, self._drawn = frame, plain.directed, spread is not None
+        shots = kept.shots(weapon, (0, 0), (None, None, None))
+        self._cells = Cells(scene, shots, plain.pierce, frame.corner, frame.side)
+        self._items, self._version = scene.items, -1
+        self._lock = threading.Lock()
+        self._aims: dict[object, list[Piece]] = {}
+        self._told: dict[tuple[object, object], list[Piece]] = {}
+        self._aims_bytes = 0
+        self._quick: Squares = {}
+        self._rows = self._stride = 0
+        self._present: Present
+
+    def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
+        """Decide what one shot hits; the arguments are those of `fire`."""
+        if self._items.version != self._version:
+            self._follow()
+        try:
+            x, y = at
+            if (
+                at.__class__ is tuple
+                and (x.__class__ is float or x.__class__ is int)
+                and (y.__class__ is float or y.__class__ is int)
+                and x != ODD
+                and y != ODD
+            ):
+                x, y = floor(x + PIXEL), floor(y + PIXEL)
+                if aim is not None or toward is not None or shot is not None:
+                    return self._through(x, y, self._known(aim, toward, shot), self._cells.made, at, (aim, None, shot))
+                cell = self._quick[x >> CELL_SHIFT][y >> CELL_SHIFT]
+                hits: OneShot = OneShot()
+                hits._present, hits._at = self._present, at
+                if cell:
+                    found: dict[int, None] = {}
+                    place, rows = y * self._stride + x, self._rows
+                    for item, bits, base in cell:
+                        shift = place - base
+                        if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
+                            found[item] = None
+                    hits._found = found
+                else:
+                    hits._found = cell
+                return hits
+        except (KeyError, TypeError, ValueError, OverflowError):
+            pass
+        return self._looked_up(at, aim, toward, shot)
+
+    def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
+        """Fire at a square, or with an aim or number, that is not known yet, or at what is no tuple of floats."""
+        place = plain_pair(at)
+        pieces = None if place is None else self._pieces(place, aim, toward, shot)
+        if place is None or pieces is None:
+            return super().fire(at, aim, toward, shot)
+        x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
+        made: Squares = {}
+        for dx, dy, _, _ in pieces:
+            i, j = (x + dx) >> CELL_SHIFT, (y + dy) >> CELL_SHIFT
+            made.setdefault(i, {})[j] = self._cells.cell(i, j)
+        return self._through(x, y, pieces, made, place, (aim, None if toward is None else plain_pair(toward), shot))
+
+    def _through(
+        self, x: int, y: int, pieces: list[Piece], made: Squares, at: tuple[float, float], told: Told
+    ) -> OneShot:
+        """Look up piece by piece, in squares that are there."""
+        found: dict[tuple[int, int], None] = {}
+        stride = self._cells.stride
+        for dx, dy, rows, number in pieces:
+            left, top = x + dx, y + dy
+            if cell := made[left >> CELL_SHIFT][top >> CELL_SHIFT]:
+                place = top * stride + left
+                for item, bits, base in cell:
+                    shift = place - base
+                    if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
+                        found[number, item] = None
+        hits: OneShot = OneShot()
+        hits._present, hits._at, hits._found, hits._told = self._present, at, found, told
+        return hits
+
+    def _known(self, aim: object, toward: object, shot: object) -> list[Piece]:
+        """Pieces of an aim and a number that were asked for before."""
+        plain = toward is None and (aim.__class__ is float or aim is None or aim.__class__ is int)
+        if plain and (shot is None or shot.__class__ is int):  # True is no number, though it is found under that of 1
+            return self._told[aim, shot]
+        raise KeyError
+
+    def _pieces(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> list[Piece] | None:
+        """Pieces of a shot; None if an argument is not as plain as that."""
+        number, offset = 0, None
+        if shot is not None:
+            if type(shot) is not int or not 0 <= shot < 2**63:
+                return None
+            number = shot if self._drawn else 0
+        if toward is not None:
+            target = plain_pair(toward)
+            if target is None or aim is not None:
+                return None
+            offset = round(SUB * target[0]) - round(SUB * place[0]), round(SUB * target[1]) - round(SUB * place[1])
+            if offset == (0, 0):
+                return None
+        elif aim is not None and not (isinstance(aim, float | int) and type(aim) in PLAIN and abs(aim) <= POSITION_MAX):
+            return None
+        key = (number, aim, offset) if self._directed else number
+        pieces = self._aims.get(key)
+        if pieces is None:
+            pieces = self._made_pieces(key, aim, offset, number)
+        if pieces and toward is None:
+            self._told[aim, shot] = pieces
+            self._grow(PIECE_BYTES)
+        return pieces
+
+    def _made_pieces(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> list[Piece]:
+        shots = self._filter.shots(self.weapon, (0, 0), (aim, None, number))
+        pieces = pieces_of(self.weapon, shots, offset, self._frame, self._cells.stride)
+        self._grow(PIECE_BYTES + sum(PIECE_BYTES + piece.rows.bit_length() // 7 for piece in pieces))
+        self._aims[key] = pieces
+        straight = (0, None, None) if self._directed else 0
+        if key == straight and len(pieces) == 1 and (pieces[0].dx, pieces[0].dy) == (0, 0):
+            self._rows, self._stride, self._quick = pieces[0].rows, self._cells.stride, self._cells.made
+        return pieces
+
+    def _grow(self, size: int) -> None:
+        """Count what is kept of aims, and give it up if it is too much."""
+        with self._lock:
+            self._aims_bytes += size
+            if self._aims_bytes > AIMS_BYTES:
+                self._aims, self._told, self._aims_bytes = {}, {}, size
+
+    def _follow(self) -> None:
+        """Read the scene as it is now."""
+        with self._lock:
+            version = self._items.version
+            if version == self._version:
+                return
+            stack = self._items.stack()
+            self._cells.follow(stack)
+            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
+            self._version = version
+
+
+def plain_pair(value: object) -> tuple[float, float] | None:
+    """Two numbers within the limits as Python's own; None of anything that `fire` must look at more closely."""
+    if type(value) is tuple and len(value) == 2 and type(value[0]) is float is type(value[1]):
+        pair: Any = value
+    elif type(value) is np.ndarray and value.shape == (2,) and value.dtype.kind in "iuf" and value.itemsize <= 8:
+        pair = tuple(value.tolist())
+    elif type(value) in (tuple, list) and len(value) == 2:  # type: ignore[arg-type]
+        pair = tuple(v.item() if type(v) in NUMPY_NUMBERS else v for v in value)  # type: ignore[attr-defined]
+    else:
+        return None
+    for v in pair:
+        if type(v) not in PLAIN or not -POSITION_MAX <= v <= POSITION_MAX:
+            return None
+    x, y = pair
+    return x, y
