@@ -123,8 +123,9 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 
 @pytest.mark.parametrize("name", WEAPONS)
 @pytest.mark.parametrize("bounded", [True, False])
-def test_every_weapon_in_a_crowd(name: str, bounded: bool) -> None:
+def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
+    monkeypatch.setattr(weapons.pieces, "OFTEN", 1 if bounded else 3)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from planes.arrays import Ints
+from planes.arrays import Ints, integer
+from planes.bigrows import shared
+from planes.constants import HALF, SUB, WEIGHT_FULL
+from planes.grid256 import snap
 from planes.items import Stack
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from planes.spans import Box
-from weapons.arsenal import pierces
+from weapons.arsenal import parts_of, pierces
 from weapons.candidates import Candidates
+from weapons.cells import Cell
 from weapons.hits import HitRow, Hits, Rows, rows_of_met
+from weapons.pieces import Piece
 from weapons.plan import Plan
 from weapons.resolve import Met, Sight, direct
 from weapons.volley import Shots, Volley, checked_shots, volley_of
@@ -51,6 +57,18 @@ class Present:
     bounds: Box | None
     weapon: Weapon
     filter: Filter
+    stride: int
+
+    @cached_property
+    def even(self) -> bool:
+        """Whether each sample is a pixel of full weight: its rows can be told from the pixels that were shared."""
+        _, spread, plain = parts_of(self.weapon)
+        return spread is None and plain.falloff is None
+
+    @cached_property
+    def rank_of(self) -> dict[int, int]:
+        """Places in the stack by id."""
+        return {item: rank for rank, item in enumerate(self.stack.ids.tolist())}
 
 
 class OneShot(Hits):
@@ -63,7 +81,7 @@ class OneShot(Hits):
     _present: Present
     _at: tuple[float, float]
     _found: Any
-    _met: tuple[Volley, Met]
+    _near: list[tuple[Piece, Cell]]
     _told: Told = (None, None, None)
 
     __init__ = object.__init__  # one in Python would take a third of the time of a shot
@@ -75,7 +93,15 @@ class OneShot(Hits):
         return bool(self._found)
 
     def __iter__(self) -> Iterator[HitRow]:
-        return super().__iter__() if self._found else iter(())
+        return iter(self._listed) if self._found else iter(())
+
+    def of(self, shot: int) -> list[HitRow]:
+        """Rows of the shot, whose number in the batch is 0."""
+        self._checked(shot)
+        return list(self)
+
+    def _checked(self, shot: int) -> int:
+        return integer("shot", shot, 0, 0)
 
     def __getattr__(self, name: str) -> Any:
         """Make what is not there yet."""
@@ -90,8 +116,45 @@ class OneShot(Hits):
         return getattr(self, name)
 
     def _made_rows(self) -> Rows:
+        if not self._found:
+            return Rows.none()
+        if self._present.even:
+            return Rows(*(np.array(column, np.int64) for column in zip(*self._listed, strict=True)))
         volley, met = self._met
-        return rows_of_met(met, volley, self._present.stack.ids, 0) if self._found else Rows.none()
+        return rows_of_met(met, volley, self._present.stack.ids, 0)
+
+    def _list(self) -> list[HitRow]:
+        """Rows in their order."""
+        if not self._present.even:
+            return list(super().__iter__())
+        samples: dict[tuple[int, int], int] = {}
+        first: dict[tuple[int, int], tuple[int, int, int]] = {}
+        for number, item, count, nearest in self._pixels():
+            key = number, item
+            samples[key] = samples.get(key, 0) + count
+            first[key] = min(first.get(key, nearest), nearest)
+        order = sorted(samples, key=lambda key: (key[0], *first[key]))
+        if len({(key[0], first[key]) for key in order}) < len(order):  # pixels that are pierced: the front one first
+            order.sort(key=lambda key: (key[0], *first[key], self._present.rank_of[key[1]]))
+        x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
+        shift = _shifts(self._present.weapon)
+        return [
+            HitRow(
+                0, number, item, count := samples[number, item], count, count * WEIGHT_FULL, 1,
+                (x + number * shift[0] + (near := first[number, item])[2], y + number * shift[1] + near[1]), near[0],
+            )
+            for number, item in order
+        ]  # fmt: skip
+
+    def _pixels(self) -> Iterator[tuple[int, int, int, tuple[int, int, int]]]:
+        """What each piece shares with each tile of an object: round, object, number of pixels, and the nearest."""
+        x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
+        for piece, cell in self._near:
+            place = (y + piece.dy) * self._present.stride + x + piece.dx
+            for item, bits, base in cell:
+                hit = shared(bits, piece.rows, base - place)
+                if hit:
+                    yield piece.round, item, hit.bit_count(), piece.depths.nearest(hit)
 
     def _walk(self) -> tuple[Volley, Met]:
         """Walk the samples of the shot through the stack as it was."""
@@ -112,6 +175,13 @@ class OneShot(Hits):
         return plan
 
 
+def _shifts(weapon: Weapon) -> tuple[int, int]:
+    """Whole pixels from each round to the next."""
+    burst = parts_of(weapon)[0]
+    x, y = (snap(burst.recoil_xy) // SUB).tolist() if burst else (0, 0)
+    return x, y
+
+
 ROWS = frozenset((*HitRow._fields, "starts"))
 MADE: dict[str, Callable[[OneShot], Any]] = {
     "scene": lambda one: one._present.scene,
@@ -120,6 +190,7 @@ MADE: dict[str, Callable[[OneShot], Any]] = {
     "shots": lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told),
     "plan": OneShot._planned,
     "_met": OneShot._walk,
+    "_listed": OneShot._list,
     "_verdicts": OneShot._counted,
     "_scenes": lambda one: None,
     "_walked": lambda one: None,

@@ -16,7 +16,7 @@ from planes.arrays import InputError
 from planes.constants import ALL, HALF, POSITION_MAX, SUB
 from planes.scene import Scene
 from weapons.arsenal import has_no_range, parts_of, ray_parts_of
-from weapons.cells import CELL_SHIFT, Cells, Squares
+from weapons.cells import CELL_SHIFT, Cell, Cells, Squares
 from weapons.firing import category_bits, fire
 from weapons.hits import Hits
 from weapons.oneshot import Filter, OneShot, Present, Told
@@ -112,6 +112,7 @@ class _ReadyPattern(Ready):
         self._aims_bytes = 0
         self._quick: Squares = {}
         self._rows = self._stride = 0
+        self._piece: Piece
         self._present: Present
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
@@ -140,7 +141,7 @@ class _ReadyPattern(Ready):
                         shift = place - base
                         if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
                             found[item] = None
-                    hits._found = found
+                    hits._found, hits._near = found, [(self._piece, cell)]
                 else:
                     hits._found = cell
                 return hits
@@ -156,7 +157,7 @@ class _ReadyPattern(Ready):
             return super().fire(at, aim, toward, shot)
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
         made: Squares = {}
-        for dx, dy, _, _ in pieces:
+        for dx, dy, *_ in pieces:
             i, j = (x + dx) >> CELL_SHIFT, (y + dy) >> CELL_SHIFT
             made.setdefault(i, {})[j] = self._cells.cell(i, j)
         return self._through(x, y, pieces, made, place, (aim, None if toward is None else plain_pair(toward), shot))
@@ -167,16 +168,20 @@ class _ReadyPattern(Ready):
         """Look up piece by piece, in squares that are there."""
         found: dict[tuple[int, int], None] = {}
         stride = self._cells.stride
-        for dx, dy, rows, number in pieces:
+        near: list[tuple[Piece, Cell]] = []
+        for piece in pieces:
+            dx, dy, rows, number, _ = piece
             left, top = x + dx, y + dy
             if cell := made[left >> CELL_SHIFT][top >> CELL_SHIFT]:
                 place = top * stride + left
+                near.append((piece, cell))
                 for item, bits, base in cell:
                     shift = place - base
                     if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
                         found[number, item] = None
         hits: OneShot = OneShot()
-        hits._present, hits._at, hits._found, hits._told = self._present, at, found, told
+        hits._present, hits._at, hits._told = self._present, at, told
+        hits._found, hits._near = found, near
         return hits
 
     def _known(self, aim: object, toward: object, shot: object) -> list[Piece]:
@@ -218,7 +223,8 @@ class _ReadyPattern(Ready):
         self._aims[key] = pieces
         straight = (0, None, None) if self._directed else 0
         if key == straight and len(pieces) == 1 and (pieces[0].dx, pieces[0].dy) == (0, 0):
-            self._rows, self._stride, self._quick = pieces[0].rows, self._cells.stride, self._cells.made
+            self._piece, self._rows = pieces[0], pieces[0].rows
+            self._stride, self._quick = self._cells.stride, self._cells.made
         return pieces
 
     def _grow(self, size: int) -> None:
@@ -236,7 +242,9 @@ class _ReadyPattern(Ready):
                 return
             stack = self._items.stack()
             self._cells.follow(stack)
-            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
+            self._present = Present(
+                self.scene, version, stack, self.scene.bounds, self.weapon, self._filter, self._cells.stride
+            )  # fmt: skip
             self._version = version
 
 
