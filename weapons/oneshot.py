@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from planes.arrays import Ints, integer
-from planes.bigrows import shared
 from planes.constants import HALF, SUB, WEIGHT_FULL
 from planes.grid256 import snap
 from planes.items import Stack
@@ -31,6 +31,10 @@ __all__ = ["Filter", "OneShot", "Present", "Told"]
 
 Told = tuple[object, object, object]
 """Aim of a shot, what it was aimed toward, and its number."""
+
+
+Tile = tuple[int, int, int, int, int, int]
+"""Of what a piece shares with a tile of an object: round, squared distance, y and x of the nearest, id, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,13 @@ class Present:
         """Whether each sample is a pixel of full weight: its rows can be told from the pixels that were shared."""
         _, spread, plain = parts_of(self.weapon)
         return spread is None and plain.falloff is None
+
+    @cached_property
+    def recoil_xy(self) -> tuple[int, int]:
+        """Whole pixels from each round to the next."""
+        burst = parts_of(self.weapon)[0]
+        x, y = (snap(burst.recoil_xy) // SUB).tolist() if burst else (0, 0)
+        return x, y
 
     @cached_property
     def rank_of(self) -> dict[int, int]:
@@ -125,36 +136,29 @@ class OneShot(Hits):
 
     def _list(self) -> list[HitRow]:
         """Rows in their order."""
-        if not self._present.even:
+        present = self._present
+        if not present.even:
             return list(super().__iter__())
-        samples: dict[tuple[int, int], int] = {}
-        first: dict[tuple[int, int], tuple[int, int, int]] = {}
-        for number, item, count, nearest in self._pixels():
-            key = number, item
-            samples[key] = samples.get(key, 0) + count
-            first[key] = min(first.get(key, nearest), nearest)
-        order = sorted(samples, key=lambda key: (key[0], *first[key]))
-        if len({(key[0], first[key]) for key in order}) < len(order):  # pixels that are pierced: the front one first
-            order.sort(key=lambda key: (key[0], *first[key], self._present.rank_of[key[1]]))
         x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
-        shift = _shifts(self._present.weapon)
-        return [
-            HitRow(
-                0, number, item, count := samples[number, item], count, count * WEIGHT_FULL, 1,
-                (x + number * shift[0] + (near := first[number, item])[2], y + number * shift[1] + near[1]), near[0],
-            )
-            for number, item in order
-        ]  # fmt: skip
-
-    def _pixels(self) -> Iterator[tuple[int, int, int, tuple[int, int, int]]]:
-        """What each piece shares with each tile of an object: round, object, number of pixels, and the nearest."""
-        x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
+        met: list[Tile] = []
         for piece, cell in self._near:
-            place = (y + piece.dy) * self._present.stride + x + piece.dx
+            place, nearest = (y + piece.dy) * present.stride + x + piece.dx, piece.depths.nearest
             for item, bits, base in cell:
-                hit = shared(bits, piece.rows, base - place)
+                shift = place - base
+                hit = (bits >> shift if shift >= 0 else bits << -shift) & piece.rows
                 if hit:
-                    yield piece.round, item, hit.bit_count(), piece.depths.nearest(hit)
+                    met.append((piece.round, *nearest(hit), item, hit.bit_count()))
+        if len(met) > len(self._found):
+            met = _gathered(met)
+        met.sort()
+        if any(one[:4] == other[:4] for one, other in pairwise(met)):  # pixels that are pierced: the front one first
+            met.sort(key=lambda one: (*one[:4], present.rank_of[one[4]]))
+        shift_x, shift_y = present.recoil_xy
+        row = HitRow._make
+        return [
+            row((0, n, item, count, count, count * WEIGHT_FULL, 1, (x + dx + n * shift_x, y + dy + n * shift_y), near))
+            for n, near, dy, dx, item, count in met
+        ]
 
     def _walk(self) -> tuple[Volley, Met]:
         """Walk the samples of the shot through the stack as it was."""
@@ -175,11 +179,14 @@ class OneShot(Hits):
         return plan
 
 
-def _shifts(weapon: Weapon) -> tuple[int, int]:
-    """Whole pixels from each round to the next."""
-    burst = parts_of(weapon)[0]
-    x, y = (snap(burst.recoil_xy) // SUB).tolist() if burst else (0, 0)
-    return x, y
+def _gathered(met: list[Tile]) -> list[Tile]:
+    """Add up what lies in several tiles, or pieces, by round and object."""
+    every: dict[tuple[int, int], Tile] = {}
+    for one in met:
+        key = one[0], one[4]
+        other = every.get(key)
+        every[key] = one if other is None else (*min(one[:4], other[:4]), one[4], one[5] + other[5])
+    return list(every.values())
 
 
 ROWS = frozenset((*HitRow._fields, "starts"))

@@ -79,7 +79,7 @@ class Depths:
                 return int(distance2[first]), y, x
         assert self._sets is not None
         within = bits & self._sets[bisect_left(self._sets, True, key=lambda one: one & bits != 0)]
-        y, x = divmod((within & -within).bit_length() - 1, self._stride)
+        y, x = divmod((within ^ within - 1).bit_length() - 1, self._stride)
         x, y = x + self._x, y + self._y
         return x * x + y * y, y, x
 
