@@ -5,11 +5,16 @@ from __future__ import annotations
 import gc
 import math
 import random
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -21,13 +26,14 @@ import weapons.cells
 import weapons.pieces
 import weapons.ready
 from planes import InputError, Scene, Sprite
-from planes.bigrows import packed, pixels_of, rows_of_spans, shared
+from planes.bigrows import packed, pixels_of, rows_of_spans, shared, spans_of, struck_from, window
 from planes.grid256 import pixel, snap
 from planes.spans import Spans
 from weapons import Beam, Box, Disc, Hits, Laser, Pistol, Point, Rounds, Spread, Stencil, Weapon, fire, prepare
 from weapons.oneshot import OneShot
 from weapons.ready import ODD, PIXEL
 
+ROOT = Path(__file__).parents[1]
 WORLD = (220, 160)
 MASK = np.array([[1, 0, 1], [0, 1, 0]], bool)
 
@@ -61,10 +67,15 @@ def same(got: Hits, truth: Hits) -> None:
     assert got.starts.tolist() == truth.starts.tolist()
 
 
-@settings(max_examples=300)
+@settings(max_examples=200, deadline=None)
 @given(st.integers(0, 10**6))
 def test_random_scenes_against_the_oracle(seed: int) -> None:
     """Small crowded worlds, any weapon but rays, filters, falloff, targets and aims, and changes between the shots."""
+    with mock.patch.object(weapons.cells, "OFTEN", 1 + seed % 2), mock.patch.object(weapons.pieces, "OFTEN", 2):
+        check_random_scene(seed)
+
+
+def check_random_scene(seed: int) -> None:
     battle, rng = some_battle(seed), random.Random(seed)
     scene, volley = battle.scene(), battle.volley
     filtered = volley.shots[0]
@@ -73,10 +84,16 @@ def test_random_scenes_against_the_oracle(seed: int) -> None:
         shot = replace(one, accept=filtered.accept, exclude=filtered.exclude)
         aim, toward = (None, shot.toward) if shot.toward is not None else (shot.aim, None)
         rows, verdicts = expected(scene, Volley(volley.weapon, [shot], volley.seed))
-        got = ready.fire(shot.at, aim=aim, toward=toward, shot=shot.number)
-        count = len(got)
-        assert told(got) == (rows, verdicts), f"{seed=}"
-        assert count == len(rows)
+        for _ in range(rng.randint(1, 3)):
+            got = ready.fire(shot.at, aim=aim, toward=toward, shot=shot.number)
+            count = len(got)
+            assert told(got) == (rows, verdicts), f"{seed=}"
+            assert count == len(rows)
+        straight = [ready.fire(shot.at) for _ in range(4)]
+        alone = fire(
+            scene, volley.weapon, shot.at, accept=filtered.accept, exclude=list(filtered.exclude), seed=volley.seed
+        )
+        assert all(one == alone for one in straight), f"{seed=}"
         changed(scene, rng)
 
 
@@ -104,6 +121,7 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
     "point": (Point(), {}),
     "piercing point": (Point(pierce=True), {"accept": ["default"]}),
     "disc": (Disc(20), {}),
+    "piercing": (Disc(40, pierce=True), {}),
     "largest whole": (Disc(47.9, falloff="smooth"), {"exclude": [1, 4]}),
     "first in tiles": (Disc(48), {"accept": ["glass"]}),
     "tiles": (Disc(90, pierce=True), {}),
@@ -126,6 +144,7 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
     monkeypatch.setattr(weapons.pieces, "OFTEN", 1 if bounded else 3)
+    monkeypatch.setattr(weapons.cells, "OFTEN", 1)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0
@@ -134,7 +153,7 @@ def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.M
         how = [{}, {"aim": 22.5}, {"toward": (at[0] - 3, at[1] + 1)}, {"shot": 9}, {"aim": -90.0, "shot": 9}, {}][k % 6]
         if name == "line of sight":
             how = {"toward": (at[0] - 3 - k, at[1] + 1)}
-        for _ in range(2):
+        for _ in range(3):
             got = ready.fire(at, **how)
             same(got, fire(scene, weapon, at, **options, **how))
             rows += len(got)
@@ -144,6 +163,36 @@ def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.M
         elif k % 7 == 0:
             scene.set(some, angle=float(rng.integers(0, 360)), layer=int(rng.integers(4)))
     assert rows > 1 or name == "nothing"
+
+
+@pytest.mark.parametrize(
+    "name, objects",
+    [("point", 40), ("piercing point", 40), ("disc", 40), ("piercing", 90), ("piercing", 400), ("shotgun", 40)],
+)
+def test_every_pixel_of_squares_that_are_shot_at_often(
+    name: str, objects: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(weapons.cells, "OFTEN", 1)
+    monkeypatch.setattr(weapons.cells, "BYTE", 4 if objects == 90 else 256)
+    weapon, options = WEAPONS[name]
+    scene = crowd(12, WORLD, objects)
+    ready: Any = prepare(scene, weapon, **options)
+    places = [(float(x), float(y)) for x in range(-20, 76) for y in range(130, 194, 3)]
+    for x in range(-32, 96, 32):
+        for y in range(128, 224, 32):
+            for _ in range(3):
+                ready.fire((x, y))
+    how = options | ({"exclude": np.reshape(options["exclude"], (1, -1))} if "exclude" in options else {})
+    truth = fire(scene, weapon, places, shot=0, **how)
+    expected = [[] for _ in places]
+    for row in truth:
+        expected[row.shot].append(row.object)
+    for at, ids in zip(places, expected, strict=True):
+        got = ready.fire(at)
+        assert sorted(one if isinstance(one, int) else one[1] for one in got._found) == sorted(ids), at
+    tables = [square.table for column in ready._cells.made.values() for square in column.values()]
+    kinds = {type(table) for table in tables}
+    assert {40: bytes, 90: memoryview, 400: type(None)}[objects] in kinds
 
 
 def test_what_is_asked_of_a_shot() -> None:
@@ -410,7 +459,28 @@ def test_shots_that_are_not_kept_leave_nothing() -> None:
     assert sum(isinstance(one, OneShot) for one in gc.get_objects()) == before
 
 
+def test_the_example_of_the_readme() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8").split("\n## One shot a call\n")[1].split("\n## ")[0]
+    (code,), (shown, *_) = (re.findall(rf"```{kind}\n(.*?)```", text, re.S) for kind in ("python", "text"))
+    words = [sys.executable, "-W", "error", "-c", code]
+    assert subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True).stdout == shown
+
+
 # Integer rows
+
+
+@given(st.integers(0, 2**30), st.integers(1, 9), st.integers(1, 9), st.integers(-30, 30), st.integers(-30, 30))
+def test_places_from_where_a_pattern_would_meet_pixels(seed: int, side: int, w: int, x: int, y: int) -> None:
+    rng = np.random.default_rng(seed)
+    target, pattern = rng.random((w, 7)) < 0.3, rng.random((side, side)) < rng.random()
+    stride, spans = 7 + side + 3, Spans.from_mask(pattern)
+    found = struck_from(packed(target, stride), spans, side, stride)
+    on, of = (np.argwhere(mask)[:, ::-1].tolist() for mask in (target, pattern))
+    truth = {(tx - px + side - 1, ty - py + side - 1) for tx, ty in on for px, py in of}
+    assert set(map(tuple, pixels_of(found, stride).tolist())) == truth
+    seen = {(x + i, y + j) for j, i in np.argwhere(window(found, x, y, 8, stride)).tolist()}
+    assert seen == {(i, j) for i, j in truth if x <= i < x + 8 and y <= j < y + 8}
+    assert spans_of(packed(pattern, stride), stride) == spans
 
 
 @given(st.integers(0, 2**30), st.integers(1, 9), st.integers(1, 9), st.integers(-12, 12), st.integers(-12, 12))

@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from planes.arrays import Bools, Ints
-from planes.bigrows import packed
+from planes.bigrows import packed, struck_from, window
 from planes.constants import POSITION_MAX
 from planes.items import Stack
 from planes.scene import Scene
-from planes.spans import Box, meets
+from planes.spans import Box, Spans, meets
 from weapons.candidates import refused
 from weapons.volley import Shots
 
-__all__ = ["CELL_SHIFT", "Cell", "Cells", "Seen", "Squares"]
+__all__ = ["CELL_SHIFT", "Cell", "Cells", "Seen", "Square", "Squares"]
 
 CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
@@ -32,14 +32,26 @@ BLOCK_SHIFT = 2
 TILE_MIN, TILE = 32, 64
 """Objects are looked up whole, or in tiles of so many px a side: of a larger one most is empty where a shot falls."""
 
+OFTEN = 16
+"""Shots into a square after which their answers are tabled: that takes some 100 us, and saves up to 5 us a shot."""
+
+TABLED_MAX = 62
+"""Objects near a square whose answers are tabled: a bit for each in an int64."""
+
 KEPT_BYTES = 64 * 2**20
 """Squares and objects kept for one prepared weapon, bytes; beyond it all are made anew."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
 """Squares so near to the largest position are not kept: a shot that finds one needs no check of its range."""
 
-CELL_BYTES, SEEN_BYTES = 400, 300
-"""What a square costs, and what is seen of an object beside its pixels, bytes."""
+NOWHERE = bytes(SIDE * SIDE)
+"""Table of a square from where nothing is hit."""
+
+CELL_BYTES, SEEN_BYTES, ANSWER_BYTES = 400, 300, 60
+"""What a square costs, what is seen of an object beside its pixels, and an answer, bytes."""
+
+BYTE = 256
+"""Answers whose numbers fit one byte."""
 
 
 class Seen(NamedTuple):
@@ -51,7 +63,24 @@ class Seen(NamedTuple):
 
 
 Cell = tuple[Seen, ...]
-Squares = dict[int, dict[int, Cell]]
+
+
+class Square(NamedTuple):
+    """A square of shot positions.
+
+    Parameters
+    ----------
+    near : what is seen of the objects around it
+    table : for each pixel of a square that was shot at often, row by row, the number of its answer; else None
+    answers : sets of objects that are hit
+    """
+
+    near: Cell
+    table: bytes | memoryview | None
+    answers: tuple[tuple[int, ...], ...]
+
+
+Squares = dict[int, dict[int, Square]]
 """Squares (i, j): of the pixels from 32 i and 32 j on."""
 
 
@@ -87,6 +116,9 @@ class Cells:
         self._seen = -1
         self._blocks: dict[tuple[int, int], list[Near]] = {}
         self._tiles: dict[int, dict[tuple[int, int], Seen]] = {}
+        self._place_of: dict[Seen, tuple[int, int]] = {}
+        self._struck: dict[Seen, int] = {}
+        self._shot_at: dict[tuple[int, int], int] = {}
         self.nbytes = 0
         self._lock = threading.Lock()
 
@@ -106,7 +138,8 @@ class Cells:
 
     def _clear(self) -> None:
         self.made.clear()
-        self._tiles.clear()
+        for kept in (self._tiles, self._place_of, self._struck, self._shot_at):
+            kept.clear()
         self.nbytes = 0
 
     def _forget(self, boxes_xyxy: Ints, ids: Ints, stack: Stack) -> bool:
@@ -116,7 +149,9 @@ class Cells:
             return not len(boxes_xyxy)
         hidden = meets(boxes_xyxy[:, None], stack.box_xyxy).any(axis=0)
         for item in (*ids.tolist(), *stack.ids[hidden].tolist()):
-            self._tiles.pop(item, None)
+            for seen in self._tiles.pop(item, {}).values():
+                self._place_of.pop(seen, None)
+                self.nbytes -= _bytes(seen.bits) + _bytes(self._struck.pop(seen, 0))
         for x, y, x_max, y_max in np.concatenate([boxes_xyxy, stack.box_xyxy[hidden]]).tolist():
             for i in range(
                 (x - self._corner - self._side + 1) >> CELL_SHIFT, ((x_max - self._corner) >> CELL_SHIFT) + 1
@@ -124,10 +159,12 @@ class Cells:
                 column = self.made.get(i, {})
                 first, last = (y - self._corner - self._side + 1) >> CELL_SHIFT, (y_max - self._corner) >> CELL_SHIFT
                 for j in range(first, last + 1) if column else ():
-                    column.pop(j, None)
+                    self._shot_at.pop((i, j), None)
+                    if j in column:
+                        self.nbytes -= _size(column.pop(j))
         return True
 
-    def cell(self, i: int, j: int) -> Cell:
+    def square(self, i: int, j: int) -> Square:
         """The square (i, j), which is made if it is not there."""
         with self._lock:
             if self.nbytes > KEPT_BYTES:
@@ -135,11 +172,44 @@ class Cells:
             column = self.made.get(i, {})
             if j in column:
                 return column[j]
-            cell = self._found(i, j)
+            near = self._found(i, j)
+            square = Square(near, None if near else NOWHERE, ((),))
             if max(abs(i), abs(j)) < EDGE:
-                self.made.setdefault(i, column)[j] = cell
-                self.nbytes += CELL_BYTES + 8 * len(cell)
-            return cell
+                self.made.setdefault(i, column)[j] = square
+                self.nbytes += _size(square)
+            return square
+
+    def count(self, i: int, j: int, pattern: Spans) -> None:
+        """Note a shot into a square without a table; of one that is shot at often the answers are tabled."""
+        shots = self._shot_at[i, j] = self._shot_at.get((i, j), 0) + 1
+        if shots < OFTEN:
+            return
+        with self._lock:
+            square = self.made.get(i, {}).get(j)
+            if square is not None and square.table is None and len(square.near) <= TABLED_MAX:
+                tabled = self.made[i][j] = self._tabled(i * SIDE, j * SIDE, square.near, pattern)
+                self.nbytes += _size(tabled) - _size(square)
+
+    def _tabled(self, x: int, y: int, near: Cell, pattern: Spans) -> Square:
+        """A square with the answer of each pixel, for a pattern in the box."""
+        codes = np.zeros((SIDE, SIDE), np.int64)
+        for bit, seen in enumerate(near):
+            left, top = self._place_of[seen]
+            struck = self._struck.get(seen)
+            if struck is None:
+                struck = self._struck[seen] = struck_from(seen.bits, pattern, self._side, self.stride)
+                self.nbytes += _bytes(struck)
+            across, down = x - left + self._side - 1, y - top + self._side - 1
+            codes |= window(struck, across, down, SIDE, self.stride).astype(np.int64) << bit
+        distinct, which = np.unique(codes, return_inverse=True)
+        items = [seen.item for seen in near]
+        answers = tuple(
+            tuple(dict.fromkeys(item for bit, item in enumerate(items) if code >> bit & 1))
+            for code in distinct.tolist()
+        )
+        if len(distinct) <= BYTE:
+            return Square(near, which.astype(np.uint8).tobytes(), answers)
+        return Square(near, memoryview(which.astype(np.uint16).tobytes()).cast("H"), answers)
 
     def _found(self, i: int, j: int) -> Cell:
         """What is seen of the objects in the surroundings of a square."""
@@ -192,8 +262,10 @@ class Cells:
             left, top, right, low = self._scene.bounds
             mask[: max(top - y, 0)] = mask[max(low - y + 1, 0) :] = False
             mask[:, : max(left - x, 0)] = mask[:, max(right - x + 1, 0) :] = False
-        seen = Seen(one.item, packed(mask, self.stride), (y - self._corner) * self.stride + x - self._corner)
-        self.nbytes += SEEN_BYTES + seen.bits.bit_length() // 7
+        left, top = x - self._corner, y - self._corner
+        seen = Seen(one.item, packed(mask, self.stride), top * self.stride + left)
+        self._place_of[seen] = left, top
+        self.nbytes += _bytes(seen.bits)
         return seen
 
     def _part(self, one: Near, box: Box) -> Bools:
@@ -201,3 +273,16 @@ class Cells:
         assert self._stack is not None
         x, y, x_max, y_max = box
         return self._stack.mask(one.rank)[y - one.y : y_max - one.y + 1, x - one.x : x_max - one.x + 1]
+
+
+def _bytes(bits: int) -> int:
+    """Bytes of what is kept of a tile of an object; none of nothing."""
+    return SEEN_BYTES + bits.bit_length() // 7 if bits else 0
+
+
+def _size(square: Square) -> int:
+    """Bytes of a square."""
+    size = CELL_BYTES + 8 * len(square.near)
+    if square.table is not None and square.table is not NOWHERE:
+        size += 2 * SIDE * SIDE + sum(ANSWER_BYTES + 8 * len(answer) for answer in square.answers)
+    return size

@@ -19,7 +19,6 @@ from planes.scene import Scene
 from planes.spans import Box
 from weapons.arsenal import parts_of, pierces
 from weapons.candidates import Candidates
-from weapons.cells import Cell
 from weapons.hits import HitRow, Hits, Rows, rows_of_met
 from weapons.pieces import Piece
 from weapons.plan import Plan
@@ -62,6 +61,7 @@ class Present:
     weapon: Weapon
     filter: Filter
     stride: int
+    straight: list[Piece]
 
     @cached_property
     def even(self) -> bool:
@@ -92,7 +92,8 @@ class OneShot(Hits):
     _present: Present
     _at: tuple[float, float]
     _found: Any
-    _near: list[tuple[Piece, Cell]]
+    _pieces: list[Piece]
+    _cells: Any
     _told: Told = (None, None, None)
 
     __init__ = object.__init__  # one in Python would take a third of the time of a shot
@@ -141,7 +142,8 @@ class OneShot(Hits):
             return list(super().__iter__())
         x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
         met: list[Tile] = []
-        for piece, cell in self._near:
+        cells = self._cells if isinstance(self._cells, list) else [self._cells]
+        for piece, cell in zip(self._pieces, cells, strict=True):
             place, nearest = (y + piece.dy) * present.stride + x + piece.dx, piece.depths.nearest
             for item, bits, base in cell:
                 shift = place - base
@@ -198,6 +200,7 @@ MADE: dict[str, Callable[[OneShot], Any]] = {
     "plan": OneShot._planned,
     "_met": OneShot._walk,
     "_listed": OneShot._list,
+    "_pieces": lambda one: one._present.straight,
     "_verdicts": OneShot._counted,
     "_scenes": lambda one: None,
     "_walked": lambda one: None,

@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from planes.arrays import InputError
+from planes.bigrows import spans_of
 from planes.constants import ALL, HALF, POSITION_MAX, SUB
 from planes.scene import Scene
+from planes.spans import Spans
 from weapons.arsenal import has_no_range, parts_of, ray_parts_of
-from weapons.cells import CELL_SHIFT, Cell, Cells, Squares
+from weapons.cells import CELL_SHIFT, SIDE, Cell, Cells, Squares
 from weapons.firing import category_bits, fire
 from weapons.hits import Hits
 from weapons.oneshot import Filter, OneShot, Present, Told
@@ -38,6 +40,8 @@ AIMS_BYTES = 32 * 2**20
 PIECE_BYTES = 200
 """What a piece costs beside its pixels, bytes."""
 
+IN_SIDE = SIDE - 1
+NOT_TOLD: Told = (None, None, None)
 PLAIN = float, int
 NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
 
@@ -72,7 +76,7 @@ class Ready:
     What makes a shot cheap is found out when the first shot needs it, and once:
 
     - the pattern of each aim, and of each number of a `Spread`, as integers of which a bit is a pixel;
-    - for squares of 16 px of shot positions, the objects near them, with the pixels that a shot could hit.
+    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit.
 
     Every shot compares the version of the scene, which counts its changes, with that of what was found out. If the
     scene has changed, the squares near the old and the new places of what changed are forgotten first (all of them, if
@@ -111,8 +115,8 @@ class _ReadyPattern(Ready):
         self._told: dict[tuple[object, object], list[Piece]] = {}
         self._aims_bytes = 0
         self._quick: Squares = {}
-        self._rows = self._stride = 0
-        self._piece: Piece
+        self._one: list[Piece] = []
+        self._pattern: Spans
         self._present: Present
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
@@ -131,19 +135,14 @@ class _ReadyPattern(Ready):
                 x, y = floor(x + PIXEL), floor(y + PIXEL)
                 if aim is not None or toward is not None or shot is not None:
                     return self._through(x, y, self._known(aim, toward, shot), self._cells.made, at, (aim, None, shot))
-                cell = self._quick[x >> CELL_SHIFT][y >> CELL_SHIFT]
+                i, j = x >> CELL_SHIFT, y >> CELL_SHIFT
+                near, table, answers = self._quick[i][j]
+                if table is None:
+                    self._cells.count(i, j, self._pattern)
+                    return self._through(x, y, self._one, self._quick, at, NOT_TOLD)
                 hits: OneShot = OneShot()
-                hits._present, hits._at = self._present, at
-                if cell:
-                    found: dict[int, None] = {}
-                    place, rows = y * self._stride + x, self._rows
-                    for item, bits, base in cell:
-                        shift = place - base
-                        if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
-                            found[item] = None
-                    hits._found, hits._near = found, [(self._piece, cell)]
-                else:
-                    hits._found = cell
+                hits._present, hits._at, hits._cells = self._present, at, near
+                hits._found = answers[table[(y & IN_SIDE) << CELL_SHIFT | x & IN_SIDE]]
                 return hits
         except (KeyError, TypeError, ValueError, OverflowError):
             pass
@@ -159,7 +158,7 @@ class _ReadyPattern(Ready):
         made: Squares = {}
         for dx, dy, *_ in pieces:
             i, j = (x + dx) >> CELL_SHIFT, (y + dy) >> CELL_SHIFT
-            made.setdefault(i, {})[j] = self._cells.cell(i, j)
+            made.setdefault(i, {})[j] = self._cells.square(i, j)
         return self._through(x, y, pieces, made, place, (aim, None if toward is None else plain_pair(toward), shot))
 
     def _through(
@@ -168,20 +167,20 @@ class _ReadyPattern(Ready):
         """Look up piece by piece, in squares that are there."""
         found: dict[tuple[int, int], None] = {}
         stride = self._cells.stride
-        near: list[tuple[Piece, Cell]] = []
-        for piece in pieces:
-            dx, dy, rows, number, _ = piece
+        cells: list[Cell] = []
+        for dx, dy, rows, number, _ in pieces:
             left, top = x + dx, y + dy
-            if cell := made[left >> CELL_SHIFT][top >> CELL_SHIFT]:
+            cell = made[left >> CELL_SHIFT][top >> CELL_SHIFT][0]
+            cells.append(cell)
+            if cell:
                 place = top * stride + left
-                near.append((piece, cell))
                 for item, bits, base in cell:
                     shift = place - base
                     if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
                         found[number, item] = None
         hits: OneShot = OneShot()
         hits._present, hits._at, hits._told = self._present, at, told
-        hits._found, hits._near = found, near
+        hits._found, hits._pieces, hits._cells = found, pieces, cells
         return hits
 
     def _known(self, aim: object, toward: object, shot: object) -> list[Piece]:
@@ -223,8 +222,9 @@ class _ReadyPattern(Ready):
         self._aims[key] = pieces
         straight = (0, None, None) if self._directed else 0
         if key == straight and len(pieces) == 1 and (pieces[0].dx, pieces[0].dy) == (0, 0):
-            self._piece, self._rows = pieces[0], pieces[0].rows
-            self._stride, self._quick = self._cells.stride, self._cells.made
+            self._pattern = spans_of(pieces[0].rows, self._cells.stride)
+            self._one[:] = pieces
+            self._quick = self._cells.made
         return pieces
 
     def _grow(self, size: int) -> None:
@@ -243,7 +243,7 @@ class _ReadyPattern(Ready):
             stack = self._items.stack()
             self._cells.follow(stack)
             self._present = Present(
-                self.scene, version, stack, self.scene.bounds, self.weapon, self._filter, self._cells.stride
+                self.scene, version, stack, self.scene.bounds, self.weapon, self._filter, self._cells.stride, self._one
             )  # fmt: skip
             self._version = version
 
