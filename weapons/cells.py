@@ -54,31 +54,14 @@ BYTE = 256
 """Answers whose numbers fit one byte."""
 
 
-class Seen(NamedTuple):
-    """A tile of an object: what is seen of it, as integer rows, and its place as a number of bits in the world."""
-
-    item: int
-    bits: int
-    place: int
-
+Seen = tuple[int, int, int]
+"""Of a tile of an object: id, what is seen of it as integer rows, and its place as a number of bits in the world."""
 
 Cell = tuple[Seen, ...]
 
-
-class Square(NamedTuple):
-    """A square of shot positions.
-
-    Parameters
-    ----------
-    near : what is seen of the objects around it
-    table : for each pixel of a square that was shot at often, row by row, the number of its answer; else None
-    answers : sets of objects that are hit
-    """
-
-    near: Cell
-    table: bytes | memoryview | None
-    answers: tuple[tuple[int, ...], ...]
-
+Square = tuple[Cell, bytes | memoryview | None, tuple[tuple[int, ...], ...]]
+"""Of a square of shot positions: what is seen of the objects around it; for each of its pixels the number of its answer,
+if it was shot at often; and these answers, sets of objects that are hit. (Plain tuples are read fastest.)"""
 
 Squares = dict[int, dict[int, Square]]
 """Squares (i, j): of the pixels from 32 i and 32 j on."""
@@ -151,7 +134,7 @@ class Cells:
         for item in (*ids.tolist(), *stack.ids[hidden].tolist()):
             for seen in self._tiles.pop(item, {}).values():
                 self._place_of.pop(seen, None)
-                self.nbytes -= _bytes(seen.bits) + _bytes(self._struck.pop(seen, 0))
+                self.nbytes -= _bytes(seen[1]) + _bytes(self._struck.pop(seen, 0))
         for x, y, x_max, y_max in np.concatenate([boxes_xyxy, stack.box_xyxy[hidden]]).tolist():
             for i in range(
                 (x - self._corner - self._side + 1) >> CELL_SHIFT, ((x_max - self._corner) >> CELL_SHIFT) + 1
@@ -173,7 +156,7 @@ class Cells:
             if j in column:
                 return column[j]
             near = self._found(i, j)
-            square = Square(near, None if near else NOWHERE, ((),))
+            square: Square = (near, None if near else NOWHERE, ((),))
             if max(abs(i), abs(j)) < EDGE:
                 self.made.setdefault(i, column)[j] = square
                 self.nbytes += _size(square)
@@ -186,8 +169,8 @@ class Cells:
             return
         with self._lock:
             square = self.made.get(i, {}).get(j)
-            if square is not None and square.table is None and len(square.near) <= TABLED_MAX:
-                tabled = self.made[i][j] = self._tabled(i * SIDE, j * SIDE, square.near, pattern)
+            if square is not None and square[1] is None and len(square[0]) <= TABLED_MAX:
+                tabled = self.made[i][j] = self._tabled(i * SIDE, j * SIDE, square[0], pattern)
                 self.nbytes += _size(tabled) - _size(square)
 
     def _tabled(self, x: int, y: int, near: Cell, pattern: Spans) -> Square:
@@ -197,19 +180,19 @@ class Cells:
             left, top = self._place_of[seen]
             struck = self._struck.get(seen)
             if struck is None:
-                struck = self._struck[seen] = struck_from(seen.bits, pattern, self._side, self.stride)
+                struck = self._struck[seen] = struck_from(seen[1], pattern, self._side, self.stride)
                 self.nbytes += _bytes(struck)
             across, down = x - left + self._side - 1, y - top + self._side - 1
             codes |= window(struck, across, down, SIDE, self.stride).astype(np.int64) << bit
         distinct, which = np.unique(codes, return_inverse=True)
-        items = [seen.item for seen in near]
+        items = [item for item, _, _ in near]
         answers = tuple(
             tuple(dict.fromkeys(item for bit, item in enumerate(items) if code >> bit & 1))
             for code in distinct.tolist()
         )
         if len(distinct) <= BYTE:
-            return Square(near, which.astype(np.uint8).tobytes(), answers)
-        return Square(near, memoryview(which.astype(np.uint16).tobytes()).cast("H"), answers)
+            return near, which.astype(np.uint8).tobytes(), answers
+        return near, memoryview(which.astype(np.uint16).tobytes()).cast("H"), answers
 
     def _found(self, i: int, j: int) -> Cell:
         """What is seen of the objects in the surroundings of a square."""
@@ -226,7 +209,7 @@ class Cells:
                     seen = tiles.get((column, row))
                     if seen is None:
                         seen = tiles[column, row] = self._tile_of(one, column, row, near)
-                    if seen.bits:
+                    if seen[1]:
                         found.append(seen)
         return tuple(found)
 
@@ -263,9 +246,9 @@ class Cells:
             mask[: max(top - y, 0)] = mask[max(low - y + 1, 0) :] = False
             mask[:, : max(left - x, 0)] = mask[:, max(right - x + 1, 0) :] = False
         left, top = x - self._corner, y - self._corner
-        seen = Seen(one.item, packed(mask, self.stride), top * self.stride + left)
+        seen = one.item, packed(mask, self.stride), top * self.stride + left
         self._place_of[seen] = left, top
-        self.nbytes += _bytes(seen.bits)
+        self.nbytes += _bytes(seen[1])
         return seen
 
     def _part(self, one: Near, box: Box) -> Bools:
@@ -282,7 +265,8 @@ def _bytes(bits: int) -> int:
 
 def _size(square: Square) -> int:
     """Bytes of a square."""
-    size = CELL_BYTES + 8 * len(square.near)
-    if square.table is not None and square.table is not NOWHERE:
-        size += 2 * SIDE * SIDE + sum(ANSWER_BYTES + 8 * len(answer) for answer in square.answers)
+    near, table, answers = square
+    size = CELL_BYTES + 8 * len(near)
+    if table is not None and table is not NOWHERE:
+        size += 2 * SIDE * SIDE + sum(ANSWER_BYTES + 8 * len(answer) for answer in answers)
     return size

@@ -143,13 +143,13 @@ class OneShot(Hits):
         x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
         met: list[Tile] = []
         cells = self._cells if isinstance(self._cells, list) else [self._cells]
-        for piece, cell in zip(self._pieces, cells, strict=True):
-            place, nearest = (y + piece.dy) * present.stride + x + piece.dx, piece.depths.nearest
+        for (dx, dy, rows, number, depths), cell in zip(self._pieces, cells, strict=True):
+            place = (y + dy) * present.stride + x + dx
             for item, bits, base in cell:
                 shift = place - base
-                hit = (bits >> shift if shift >= 0 else bits << -shift) & piece.rows
+                hit = (bits >> shift if shift >= 0 else bits << -shift) & rows
                 if hit:
-                    met.append((piece.round, *nearest(hit), item, hit.bit_count()))
+                    met.append((number, *depths.nearest(hit), item, hit.bit_count()))
         if len(met) > len(self._found):
             met = _gathered(met)
         met.sort()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -39,16 +38,6 @@ DEPTHS_BYTES = 4 * 2**20
 
 DEPTH_BYTES = 40
 """What a set costs beside its pixels, bytes."""
-
-
-class Piece(NamedTuple):
-    """A part of a shot: the pixel where it is looked up, from the shot's; its pixels; its round."""
-
-    dx: int
-    dy: int
-    rows: int
-    round: int
-    depths: Depths
 
 
 class Depths:
@@ -103,6 +92,11 @@ class Depths:
         return True
 
 
+Piece = tuple[int, int, int, int, Depths]
+"""A part of a shot: the pixel (x, y) where it is looked up, from the shot's; its pixels as integer rows; its round; and
+the order of its pixels."""
+
+
 @dataclass(frozen=True)
 class Frame:
     """The box that a part lies in, about the pixel where it is looked up; larger patterns are cut into tiles."""
@@ -151,14 +145,14 @@ def _cut(spans: Spans, at_xy: tuple[int, int], number: int, frame: Frame, stride
         return []
     if not frame.tiled:
         rows = rows_of_spans(spans, (frame.corner, frame.corner), stride)
-        return [Piece(x, y, rows, number, Depths(rows, stride, frame.corner, frame.corner))]
-    found = []
+        return [(x, y, rows, number, Depths(rows, stride, frame.corner, frame.corner))]
+    found: list[Piece] = []
     for top in range(box[1], box[3] + 1, TILE):
         for left in range(box[0], box[2] + 1, TILE):
             part = _clipped(spans, left, top)
             if len(part):
                 rows = rows_of_spans(part, (left, top), stride)
-                found.append(Piece(x + left, y + top, rows, number, Depths(rows, stride, left, top)))
+                found.append((x + left, y + top, rows, number, Depths(rows, stride, left, top)))
     return found
 
 

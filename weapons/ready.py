@@ -76,7 +76,8 @@ class Ready:
     What makes a shot cheap is found out when the first shot needs it, and once:
 
     - the pattern of each aim, and of each number of a `Spread`, as integers of which a bit is a pixel;
-    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit.
+    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit; and of those
+      that are shot at often, without aim or number, what each pixel would hit.
 
     Every shot compares the version of the scene, which counts its changes, with that of what was found out. If the
     scene has changed, the squares near the old and the new places of what changed are forgotten first (all of them, if
@@ -218,11 +219,11 @@ class _ReadyPattern(Ready):
     def _made_pieces(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> list[Piece]:
         shots = self._filter.shots(self.weapon, (0, 0), (aim, None, number))
         pieces = pieces_of(self.weapon, shots, offset, self._frame, self._cells.stride)
-        self._grow(PIECE_BYTES + sum(PIECE_BYTES + piece.rows.bit_length() // 7 for piece in pieces))
+        self._grow(PIECE_BYTES + sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _, _ in pieces))
         self._aims[key] = pieces
         straight = (0, None, None) if self._directed else 0
-        if key == straight and len(pieces) == 1 and (pieces[0].dx, pieces[0].dy) == (0, 0):
-            self._pattern = spans_of(pieces[0].rows, self._cells.stride)
+        if key == straight and len(pieces) == 1 and pieces[0][:2] == (0, 0):
+            self._pattern = spans_of(pieces[0][2], self._cells.stride)
             self._one[:] = pieces
             self._quick = self._cells.made
         return pieces
