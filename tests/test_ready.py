@@ -283,6 +283,7 @@ def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
         assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
         kept = ready._cells.nbytes if "cells" in limit else ready._aims_bytes
         assert kept < 60_000
+        assert sum(map(len, ready._cells.made.values())) * weapons.cells.CELL_BYTES < 60_000 or "ready" in limit
         assert len(ready._told) <= 100
 
 
@@ -407,6 +408,15 @@ def test_a_batch_goes_the_way_of_fire() -> None:
     scene, at = crowd(8), np.random.default_rng(1).uniform((0, 0), WORLD, (7, 2))
     weapon = Spread(Disc(3), 3, 9)
     assert prepare(scene, weapon, exclude=[1, 2], seed=4).fire(at) == fire(scene, weapon, at, exclude=[[1, 2]], seed=4)
+
+
+def test_of_pixels_that_are_pierced_the_front_one_comes_first() -> None:
+    scene = Scene()
+    for layer in (1, 0, 2, 1):
+        scene.add(Sprite.circle(4), (9, 9), layer=layer)
+    ready = prepare(scene, Disc(6, pierce=True))
+    assert [row.object for row in ready.fire((4, 9))] == [2, 3, 0, 1]
+    same(ready.fire((4, 9)), fire(scene, Disc(6, pierce=True), (4, 9)))
 
 
 def test_far_away() -> None:

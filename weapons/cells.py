@@ -60,8 +60,8 @@ Seen = tuple[int, int, int]
 Cell = tuple[Seen, ...]
 
 Square = tuple[Cell, bytes | memoryview | None, tuple[tuple[int, ...], ...]]
-"""Of a square of shot positions: what is seen of the objects around it; for each of its pixels the number of its answer,
-if it was shot at often; and these answers, sets of objects that are hit. (Plain tuples are read fastest.)"""
+"""Of a square of shot positions: what is seen of the objects around it; for each of its pixels the number of its
+answer, if it was shot at often; and these answers, sets of objects that are hit. (Plain tuples are read fastest.)"""
 
 Squares = dict[int, dict[int, Square]]
 """Squares (i, j): of the pixels from 32 i and 32 j on."""
