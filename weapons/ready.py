@@ -18,11 +18,11 @@ from planes.constants import ALL, HALF, POSITION_MAX, SUB
 from planes.scene import Scene
 from planes.spans import Spans
 from weapons.arsenal import has_no_range, parts_of, ray_parts_of
-from weapons.cells import CELL_SHIFT, SIDE, Cell, Cells, Squares
 from weapons.firing import category_bits, fire
 from weapons.hits import Hits
 from weapons.oneshot import Filter, OneShot, Present, Told
 from weapons.pieces import Frame, Piece, frame_of, pieces_of
+from weapons.squares import CELL_SHIFT, SIDE, Cell, Cells, Squares
 from weapons.volley import checked_shots
 from weapons.weapon import Weapon
 

@@ -23,7 +23,7 @@ from planes.arrays import Bools
 from planes.grid256 import unit
 from weapons import Beam, Disc, Point, Stencil, Weapon, prepare
 from weapons.arsenal import Plain, pattern_of
-from weapons.cells import OFTEN
+from weapons.squares import OFTEN
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
