@@ -24,6 +24,7 @@ from planes.sprite import as_sprite, form_of
 
 if TYPE_CHECKING:
     from planes.visible import Compositions
+    from planes.clearance import ClearancePlane
     from planes.volumes import Volumes
 
 __all__ = ["Scene"]
@@ -74,6 +75,7 @@ class Scene:
         self.weapons: dict[str, Any] = {}
         self.shots: list[Any] = []
         self._code_plane: CodePlane | None = None
+        self._clearance: ClearancePlane | None = None
         self._indexes: dict[str, Index] = {}
         self._compositions: Compositions | None = None
 
@@ -325,6 +327,15 @@ class Scene:
 
             self._compositions = Compositions()
         return self._compositions
+
+    def clearance(self) -> ClearancePlane | None:
+        """The plane by which rays jump; None where there is no code plane."""
+        codes = self.code_plane()
+        if self._clearance is None and codes is not None:
+            from planes.clearance import ClearancePlane  # few calls need it
+
+            self._clearance = ClearancePlane(codes)
+        return self._clearance
 
     def index(self, structure: str) -> Index:
         """The broad phase of the items that decide, "none", "grid", "quadtree" or "bvh"; it follows the scene."""

@@ -427,7 +427,7 @@ OF_SCENES = (
     " scenefile schema spans sprite stack twins"
 )
 OF_FIRE = "arsenal candidates columns draws explain firing guns hits pattern plan resolve volley weapon"
-OF_A_RAY = "ends flight meetings passes rayexplain rayfire rayhits rays trace tracing"
+OF_A_RAY = "ends firsthits flight meetings passes rayexplain rayfire rayhits rays rayways trace tracing"
 
 
 def loaded(before: str, code: str) -> set[str]:

@@ -69,7 +69,8 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     scene = battle.scene()
     whole = fired(battle, scene=scene)
     assert sorted(set(whole.stop.shot.tolist())) == list(range(9))
-    for options in ({}, {"prefilter": "none"}, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
+    walks: tuple[dict[str, Any], ...] = ({"strategy": "direct"}, {"prefilter": "none"})
+    for options in (*walks, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("weapons.rayfire.trace", lambda *given, calls=calls: calls.append(1) or trace(*given))
@@ -100,10 +101,14 @@ def test_a_start_inside_is_named_by_its_row_in_any_part(
 
 def test_a_composed_ray_is_refused_by_name() -> None:
     scene = Scene((40, 40))
-    for weapon in (Pistol(9), Sweep(Laser(9), 30, 3), Rounds(Spread(Rifle(9), 3, 2), 2), Projectile(9, 1)):
+    for weapon in (Pistol(9, width=2), Sweep(Laser(9), 30, 3), Rounds(Spread(Rifle(9), 3, 2), 2), Projectile(9, 1)):
         with pytest.raises(InputError, match=r"^strategy: expected one of 'auto', 'direct', got 'composed'"):
             fire(scene, weapon, (1, 1), strategy="composed")
         assert fire(scene, weapon, (1, 1), strategy="direct") == fire(scene, weapon, (1, 1))
+    with pytest.raises(
+        InputError, match=r"^strategy: expected bounds that fit one plane for 'composed', got a scene with"
+    ):
+        fire(Scene(), Pistol(9), (1, 1), strategy="composed")
     with pytest.raises(InputError, match=r"^strategy: expected one of .*did you mean 'direct'"):
         fire(scene, Pistol(9), (1, 1), strategy="dirrect")
 

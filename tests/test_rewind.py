@@ -299,7 +299,7 @@ ERRORS: dict[str, tuple[Callable[[Scene, History], object], str]] = {
     "no scene": (lambda s, h: fire(h.ticks, Point(), (1, 1)), "scene: expected a Scene or a History, got list"),  # type: ignore[arg-type]
     "a bad shot": (lambda s, h: fire(h, Point(), [(1, 1), (1, np.inf)], tick=30), r"at\[1\]\[1\]: expected a finite"),
     "a composed ray": (
-        lambda s, h: fire(h, Pistol(9), (1, 1), tick=30, strategy="composed"), "strategy: .*got 'composed'"),
+        lambda s, h: fire(h, Pistol(9, width=2), (1, 1), tick=30, strategy="composed"), "strategy: .*got 'composed'"),
 }  # fmt: skip
 
 

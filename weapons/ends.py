@@ -7,6 +7,7 @@ items from the front.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any
@@ -20,7 +21,7 @@ from weapons.meetings import Meetings, stretches
 from weapons.plan import Plan
 from weapons.trace import ROOM, Lines
 
-__all__ = ["Ends", "Reason", "ends_of"]
+__all__ = ["Ends", "Reason", "endless", "ends_of"]
 
 NEVER = 2**62
 """A time after every end."""
@@ -62,10 +63,22 @@ class Ends:
         """Bytes of the columns."""
         return sum(int(column.nbytes) for column in vars(self).values())
 
+    @classmethod
+    def joined(cls, parts: Sequence[Ends]) -> Ends:
+        """All ends of one list or more."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
     def replaced(self, rays: Bools, other: Ends) -> Ends:
         """These ends, but for some rays those of another list."""
         columns = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
         return Ends(*(np.where(rays, new, old) for old, new in columns))
+
+    def put(self, rays: Ints, other: Ends) -> None:
+        """Set the ends of some rays (n,) to those of a list of their own."""
+        for f in fields(self):
+            getattr(self, f.name)[rays] = getattr(other, f.name)
 
     def walked(self, met: Meetings) -> Bools:
         """Which cells (K,) of meetings were walked before the end."""
@@ -89,7 +102,7 @@ def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced, 
     cost : (M,) of the items of the stack, by their place
     plan : to be told what was looked for
     """
-    ends = _endless(len(lines))
+    ends = endless(len(lines))
     objects = np.ones(len(met), np.bool_)
     plan.run("stops", "where each ray ends", ends.nbytes)
     if stack.has_occluders:
@@ -106,7 +119,7 @@ def ends_of(met: Meetings, lines: Lines, stack: Stack, cost: Ints, ray: Traced, 
     return ends
 
 
-def _endless(n: int) -> Ends:
+def endless(n: int) -> Ends:
     """Ends of n rays that nothing ends before their range."""
     return Ends(
         np.full(n, Reason.RANGE, np.int64),

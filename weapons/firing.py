@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planes.arrays import InputError, Ints, choice, each, reals, shown
+from planes.arrays import InputError, Ints, each, reals, shown
 from planes.constants import ALL
 from planes.scene import Scene
 from weapons.arsenal import ray_parts_of
@@ -63,7 +63,8 @@ def fire(
         before the pixels; it changes no row
     broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row; none
         without a pre-filter
-    strategy : "auto", "direct", "composed" (not of rays): how pixels are looked up; it changes no row
+    strategy : "auto", "direct", "composed" (of rays only thin ones that end at their first hit): how pixels are looked
+        up; it changes no row
 
     Each of aim, toward, accept, exclude, seed, shot and tick is one for all shots or one for each.
 
@@ -134,8 +135,7 @@ def fired(
     if parts is not None:
         from weapons.rayfire import fired_rays
 
-        choice("strategy", strategy, ("auto", "direct"))
-        return fired_rays(scene, weapon, parts, shots, prefilter, broadphase, plan)
+        return fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
     stack = read_stack(scene, plan)
     fired_by = fired_by_bits if counts(weapon) else fired_by_runs
     return fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)

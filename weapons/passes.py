@@ -17,7 +17,7 @@ from weapons.pattern import smoothed
 from weapons.rays import Rays
 from weapons.trace import Lines
 
-__all__ = ["Passes", "Stops", "passes_of", "stops_of"]
+__all__ = ["Passes", "Stops", "normals_at", "passes_of", "points_at", "stops_of", "weights_at"]
 
 SIDE = np.arange(-2, 3)
 GRADIENT_XY = np.stack(np.meshgrid(SIDE, SIDE), axis=-1).reshape(-1, 2)
@@ -122,9 +122,9 @@ def passes_of(
             np.arange(len(ray)) - np.searchsorted(ray, ray),
             entry_xy, at[out] + origin, first_part, last_part, first_part * length, last_part * length,
             _material(walked, ends, lines) * length,
-            _normals(stack, rank, entry_xy, sides),
-            _weights(entry, scale, falloff),
-            _points(rays, ray, first_part),
+            normals_at(stack, rank, entry_xy, sides),
+            weights_at(entry, scale, falloff),
+            points_at(rays, ray, first_part),
             walked.count,
             np.zeros_like(ray),
         ),
@@ -145,14 +145,15 @@ def stops_of(met: Meetings, ends: Ends, rays: Rays, lines: Lines, relative: Line
     key = met.ray * max(len(stack), 1) + met.rank
     order = np.argsort(key)
     pair = order[np.searchsorted(key[order], row * max(len(stack), 1) + ends.rank[row])] if len(row) else row
-    normal[row] = _normals(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
+    normal[row] = normals_at(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
     return Stops(
         rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction, ends.fraction * lines.length,
-        _points(rays, np.arange(len(rays)), ends.fraction), normal,
+        points_at(rays, np.arange(len(rays)), ends.fraction), normal,
     )  # fmt: skip
 
 
-def _points(rays: Rays, ray: Ints, part: Floats) -> Floats:
+def points_at(rays: Rays, ray: Ints, part: Floats) -> Floats:
+    """Points of rays at parts of them, px."""
     return np.asarray(rays.start_256[ray] / SUB + part[:, None] * (rays.step_256[ray] / SUB))
 
 
@@ -175,7 +176,7 @@ def _material(walked: Meetings, ends: Ends, lines: Lines) -> Floats:
     return total
 
 
-def _normals(stack: Stack, rank: Ints, xy: Ints, sides: Ints) -> Ints:
+def normals_at(stack: Stack, rank: Ints, xy: Ints, sides: Ints) -> Ints:
     """Outward normals of items at pixels of theirs (n, 2): gradients of their masks, or the sides that are given."""
     box = stack.box_xyxy[rank]
     near = xy[:, None] + GRADIENT_XY
@@ -187,7 +188,7 @@ def _normals(stack: Stack, rank: Ints, xy: Ints, sides: Ints) -> Ints:
     return np.where((normal == 0).all(axis=1, keepdims=True), sides, normal)
 
 
-def _weights(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
+def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
     """Whole weights from 65,535 at the muzzle to 0 at the end of the ray."""
     if falloff is None:
         return np.full(len(entry), WEIGHT_FULL)

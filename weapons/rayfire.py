@@ -1,25 +1,39 @@
 """Fire rays: the whole flow of a traced weapon on one screen.
 
 scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
+                                 -> jumps to the first pixel that is taken -> ends -> rows
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
 from planes.scene import Scene
-from weapons.candidates import may_refuse
+from weapons.candidates import Candidates, may_refuse
+from weapons.ends import Ends
+from weapons.firsthits import FirstHits
 from weapons.guns import Traced
 from weapons.hits import Rows
+from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops, passes_of, stops_of
 from weapons.plan import Plan, chosen_candidates, leave_out_absent, leave_out_imagery, read_stack
 from weapons.rayhits import RayHits, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
-from weapons.tracing import Range, expected_cells, trace
+from weapons.rayways import chosen_way, ends_at_first, jumps_at_all
+from weapons.trace import Lines
+from weapons.tracing import Range, expected_cells, lines_of, trace
 from weapons.volley import Shots
 from weapons.weapon import Weapon
+
+if TYPE_CHECKING:
+    from planes.clearance import ClearancePlane
 
 __all__ = ["fired_rays"]
 
@@ -29,48 +43,131 @@ RAYS_MOST = 1024
 GROWTH = 4
 """How much larger a part of the rays may be than the one before, if that touched few cells."""
 
+C = TypeVar("C", Passes, Stops)
+Choose = Callable[[int], Candidates]
+"""What chooses the pre-filter of so many rays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Rays of whole shots, to their ends."""
+
+    passes: Passes
+    stops: Stops
+
 
 def fired_rays(
-    scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, prefilter: object, broadphase: object, plan: Plan
+    scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, how: tuple[str, str, str], plan: Plan
 ) -> RayHits:
     """Decide what shots of a traced weapon hit; arguments are those of `fire`, and a plan that has begun."""
     stack, ray = read_stack(scene, plan), parts[2]
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
-    candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, each * len(shots))
+    prefilter, broadphase, strategy = how
+    plane, why = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
+    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack, False)
+    candidates = choose(0 if plane else each * len(shots))
     through = Range(scene.items, stack, scene.bounds, candidates, plan)
-    plan.run("plan", candidates.why)
+    plan.run("plan", why if plane else candidates.why)
     step = max(1, CHUNK_ROWS // each)
     rows: list[Rows] = []
-    passes: list[Passes] = []
-    stops: list[Stops] = []
+    found: list[tuple[int, Followed | FirstHits]] = []
     for begin in range(0, max(len(shots), 1), step):
         some = shots.take(begin, min(begin + step, len(shots)))
         rays = rays_of(parts, some)
         plan.run("rays", "both ends on the grid", rays.nbytes)
-        through_objects, ends, pixels = _followed(rays, ray, some, through)
-        rows.append(rows_of_passes(through_objects, pixels, rays))
-        passes.append(through_objects)
-        stops.append(ends)
-        for columns in (rows[-1], passes[-1], stops[-1]) if begin else ():
-            columns.shot[:] += begin
-        plan.run("rows", "passes, gathered by object", rows[-1].nbytes)
-    hits = RayHits(Rows.joined(rows), Passes.joined(passes), Stops.joined(stops), scene, weapon, shots, plan)
+        if ends_at_first(ray):
+            ends = _first_ends(rays, ray, some, through, plane, choose)
+            first = FirstHits(rays, lines_of(rays, ray), ends, stack, ray.fades)
+            rows.append(first.rows(len(some)))
+            found.append((begin, first))
+            plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
+        else:
+            through_objects, stops, pixels = _followed(rays, ray, some, through)
+            rows.append(rows_of_passes(through_objects, pixels, rays))
+            found.append((begin, Followed(through_objects, stops)))
+            plan.run("rows", "passes, gathered by object", rows[-1].nbytes)
+        if begin:
+            rows[-1].shot[:] += begin
+    told = (
+        lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
+        lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
+    )
+    hits = RayHits(Rows.joined(rows), told, each * len(shots), scene, weapon, shots, plan)
     plan.run("rows", "")
-    if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", candidates.why_unindexed)
-    plan.leave_out("cells between items", "only those inside their boxes are looked at")
-    plan.leave_out("verdicts", "counted when asked for")
-    if not plan.has_run("volumes"):
-        plan.leave_out("volumes", "boxes are the pre-filter")
-    leave_out_absent(plan, scene, stack, weighted=ray.fades is not None, choosy=may_refuse(stack, shots))
-    leave_out_imagery(plan, scene)
+    _leave_out_unused(plan, scene, through, shots, ray, plane is not None, why)
     plan.run("plan", "")
     return hits
 
 
-def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:
+def _later(columns: C, first_shot: int) -> C:
+    return replace(columns, shot=columns.shot + first_shot) if first_shot else columns
+
+
+def _leave_out_unused(
+    plan: Plan, scene: Scene, through: Range, shots: Shots, ray: Traced, jumps: bool, why: str
+) -> None:
+    """Complete a plan with what this scene and this weapon did not need."""
+    candidates, idle = through.candidates, "no ray was left to walk"
+    if not plan.has_run("walk"):
+        for name in ("pre-filter", "walk", "stops"):
+            plan.leave_out(name, idle)
+    if not plan.has_run("broad phase"):
+        plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("walk") else idle)
+    if ends_at_first(ray):
+        plan.leave_out("passes", "told when they are asked for, as the stops are")
+    if jumps_at_all(ray) and not jumps:
+        plan.leave_out("jumps", why)
+    plan.leave_out("cells between items", "only those inside their boxes are looked at")
+    plan.leave_out("verdicts", "counted when asked for")
+    if not plan.has_run("volumes"):
+        plan.leave_out("volumes", "boxes are the pre-filter")
+    choosy = may_refuse(through.stack, shots)
+    leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
+    leave_out_imagery(plan, scene)
+
+
+def _first_ends(
+    rays: Rays, ray: Traced, shots: Shots, through: Range, plane: ClearancePlane | None, choose: Choose
+) -> Ends:
+    """Where rays end, of a weapon that ends at its first hit: by jumps if there is a plane, and else by walking."""
+    if plane is None:
+        return Ends.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
+    from weapons.jumping import ends_by_jumps  # few calls need it
+
+    ends, left = ends_by_jumps(rays, ray, shots, through.items, through.stack, plane, through.plan)
+    if len(left):
+        candidates = choose(len(left))
+        through.plan.run("plan", "")
+        ends.put(left, _first_ends(rays.pick(left), ray, shots, replace(through, candidates=candidates), None, choose))
+    return ends
+
+
+def _walked(
+    rays: Rays, ray: Traced, shots: Shots, through: Range
+) -> Iterator[tuple[Rays, Meetings, Ends, Lines, Lines]]:
     """Follow rays to their ends, in parts whose cells stay within their chunk, as far as can be told before.
+
+    Yields
+    ------
+    rays, and what `trace` returns of them
+    """
+    begin = cells = 0
+    most = RAYS_MOST
+    if through.candidates.prefilter.name == "none":
+        most = min(most, CHUNK_PAIRS // max(len(through.stack), 1))
+    step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, through.stack))))
+    while begin < max(len(rays), 1):
+        some = rays.take(begin, begin + step)
+        met, ends, lines, relative = trace(some, ray, shots, through)
+        through.plan.run("walk", "")
+        yield some, met, ends, lines, relative
+        begin, cells = begin + step, cells + len(met.x)
+        step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
+
+
+def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:
+    """Follow rays to their ends.
 
     Returns
     -------
@@ -80,15 +177,7 @@ def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Pa
     passes: list[Passes] = []
     stops: list[Stops] = []
     pixels: list[Ints] = []
-    begin = cells = 0
-    most = RAYS_MOST
-    if through.candidates.prefilter.name == "none":
-        most = min(most, CHUNK_PAIRS // max(len(stack), 1))
-    step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, stack))))
-    while begin < len(rays) or not passes:
-        some = rays.take(begin, begin + step)
-        met, ends, lines, relative = trace(some, ray, shots, through)
-        plan.run("walk", "")
+    for some, met, ends, lines, relative in _walked(rays, ray, shots, through):
         through_objects, walked = passes_of(met, ends, some, lines, relative, stack, ray.fades)
         passes.append(through_objects)
         plan.run("passes", "each ray through each object", through_objects.nbytes)
@@ -96,6 +185,4 @@ def _followed(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Pa
         plan.run("stops", "", stops[-1].nbytes)
         pixels.append(pixels_of(through_objects, walked, some, rays))
         plan.run("rows", "", pixels[-1].nbytes)
-        begin, cells = begin + step, cells + len(met.x)
-        step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
     return Passes.joined(passes), Stops.joined(stops), np.concatenate(pixels)

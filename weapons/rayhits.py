@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -29,7 +29,12 @@ from weapons.weapon import Weapon
 if TYPE_CHECKING:
     from weapons.margins import Margin
 
-__all__ = ["RayHits", "Reason", "pixels_of", "rows_of_passes"]
+__all__ = ["RayHits", "Reason", "groups_of", "pixels_of", "rows_of_passes"]
+
+
+C = TypeVar("C", Passes, Stops)
+Told = tuple[Callable[[], Passes], Callable[[], Stops]]
+"""What makes the passes and the stops of rays, once they are asked for."""
 
 
 class RayHits(Hits):
@@ -40,18 +45,25 @@ class RayHits(Hits):
 
     Parameters
     ----------
-    passes : each ray through each object
-    stop : where each ray ended, and why
+    rays : how many were fired
     """
 
     def __init__(
-        self, rows: Rows, passes: Passes, stop: Stops, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+        self, rows: Rows, told: Told, rays: int, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self.passes, self.stop = replace(passes, row=_rows_of(rows, passes)), stop
-        for columns in (self.passes, stop):
-            for f in fields(columns):
-                getattr(columns, f.name).flags.writeable = False
+        self.rays, self._told, self._rows = rays, told, rows
+
+    @cached_property
+    def passes(self) -> Passes:
+        """Each ray through each object."""
+        passes = self._told[0]()
+        return _unwritable(replace(passes, row=_rows_of(self._rows, passes)))
+
+    @cached_property
+    def stop(self) -> Stops:
+        """Where each ray ended, and why."""
+        return _unwritable(self._told[1]())
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hits):
@@ -64,7 +76,7 @@ class RayHits(Hits):
     __hash__ = None
 
     def __repr__(self) -> str:
-        return f"<RayHits: {len(self)} rows, {len(self.passes)} passes of {len(self.stop)} rays>"
+        return f"<RayHits: {len(self)} rows, {len(self.passes)} passes of {self.rays} rays>"
 
     def passes_at(self, shot: int) -> Passes:
         """Passes of the rays of one shot."""
@@ -124,7 +136,7 @@ class RayHits(Hits):
         """Whether margins can be told: not of steps of a projectile, nor of very many rays."""
         from weapons.raymargins import has_ray_margins
 
-        return has_ray_margins(self._parts[2], len(self.stop) // max(len(self.shots), 1))
+        return has_ray_margins(self._parts[2], self.rays // max(len(self.shots), 1))
 
     def _rays(self, shot: int) -> RayDetail:
         scene, row = self.scene_of(shot), self._checked(shot)
@@ -153,8 +165,11 @@ class RayHits(Hits):
         rays = [part for part in parts if isinstance(part, RayHits)]
         found = cls(
             cls._gathered_rows(parts, rows),
-            Passes.gathered([part.passes for part in rays], rows),
-            Stops.gathered([part.stop for part in rays], rows),
+            (
+                lambda: Passes.gathered([part.passes for part in rays], rows),
+                lambda: Stops.gathered([part.stop for part in rays], rows),
+            ),
+            sum(part.rays for part in rays),
             parts[0].scene,
             parts[0].weapon,
             shots,
@@ -164,7 +179,13 @@ class RayHits(Hits):
         return found
 
 
-def _groups(of: Rows | Passes, rounds: int) -> Ints:
+def _unwritable(columns: C) -> C:
+    for f in fields(columns):
+        getattr(columns, f.name).flags.writeable = False
+    return columns
+
+
+def groups_of(of: Rows | Passes, rounds: int) -> Ints:
     """A number for each shot, round and object."""
     return (of.shot * rounds + of.round) * ITEMS_MAX + of.object
 
@@ -172,7 +193,7 @@ def _groups(of: Rows | Passes, rounds: int) -> Ints:
 def _rows_of(rows: Rows, passes: Passes) -> Ints:
     """Row of each pass: of the same shot, round and object."""
     rounds = int(rows.round.max(initial=0)) + 1
-    of_row, of_pass = _groups(rows, rounds), _groups(passes, rounds)
+    of_row, of_pass = groups_of(rows, rounds), groups_of(passes, rounds)
     order = np.argsort(of_row)
     return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
 
@@ -186,7 +207,7 @@ def pixels_of(passes: Passes, cells: Meetings, some: Rays, rays: Rays) -> Ints:
     """
     if not rays.pellet.any():
         return np.zeros((0, 3), np.int64)
-    group = _groups(passes, int(rays.round.max(initial=0)) + 1)[cells.pair]
+    group = groups_of(passes, int(rays.round.max(initial=0)) + 1)[cells.pair]
     x, y = (np.stack([cells.x, cells.y], axis=1) + some.origin_xy[cells.ray[cells.pair]]).T
     found = np.stack([group, x, y], axis=1)
     return found if len(some) == len(rays) else np.unique(found, axis=0)
@@ -195,7 +216,7 @@ def pixels_of(passes: Passes, cells: Meetings, some: Rays, rays: Rays) -> Ints:
 def rows_of_passes(passes: Passes, pixels: Ints, rays: Rays) -> Rows:
     """Gather the passes of all rays of whole shots into rows; `pixels` are those of `pixels_of`."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
-    group = _groups(passes, rounds)
+    group = groups_of(passes, rounds)
     order = np.lexsort((passes.order, passes.pellet, passes.entry_px, group))
     begins = np.flatnonzero(np.diff(group[order], prepend=-1))
     best = order[begins]

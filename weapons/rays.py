@@ -48,6 +48,10 @@ class Rays:
         part = slice(first, last)
         return replace(self, **{name: getattr(self, name)[part] for name in self.__dataclass_fields__})
 
+    def pick(self, rows: Ints) -> Rays:
+        """Some of the rays."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
+
 
 Parts = tuple[Rounds | None, Spread | Sweep | None, Traced]
 

@@ -68,7 +68,8 @@ class Lines:
     @cached_property
     def length2(self) -> Ints:
         """Squared lengths, (1/256 px)^2."""
-        return np.asarray((self.step**2).sum(axis=1))
+        dx, dy = self.step.T
+        return np.asarray(dx * dx + dy * dy)
 
     @cached_property
     def length(self) -> Floats:
@@ -82,7 +83,8 @@ class Lines:
             return np.full(len(self), self.common)
         if self.radius:
             return np.maximum(self.length2, 1)
-        return np.asarray(np.maximum(np.abs(self.step), 1).prod(axis=1))
+        dx, dy = np.maximum(np.abs(self.step), 1).T
+        return np.asarray(dx * dy)
 
     @cached_property
     def sides(self) -> Ints:

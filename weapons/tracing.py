@@ -26,7 +26,7 @@ from weapons.rays import Rays
 from weapons.trace import Lines
 from weapons.volley import Shots
 
-__all__ = ["Looked", "Range", "expected_cells", "touching", "trace"]
+__all__ = ["Looked", "Range", "expected_cells", "lines_of", "touching", "trace"]
 
 PAIRS_FIRST, GROWTH = 150, 2
 """Pairs of rays and boxes that are expected in the first stretch, of a ray at least one, and how much longer each next
@@ -73,7 +73,7 @@ def trace(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Meetin
     InputError
         Naming the shot and the item in which a ray starts, if that is an error for the weapon.
     """
-    lines = _lines_of(rays, ray)
+    lines = lines_of(rays, ray)
     cost = through.items.cost[through.stack.ids]
     common = common_scale(ray, through.items, through.stack)
     timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
@@ -104,14 +104,14 @@ def touching(rays: Rays, ray: Traced, through: Range) -> tuple[Meetings, Lines]:
     -------
     the cells; and for each pair the ray as the item sees it
     """
-    lines = _lines_of(rays, ray)
+    lines = lines_of(rays, ray)
     row, rank = _pairs(rays, ray, lines, np.arange(len(rays)), (-np.inf, np.inf), through)
     own = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
     met = meet(own, row, rank, through.stack, None, rays.origin_xy[row])
     return met, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
 
-def _lines_of(rays: Rays, ray: Traced) -> Lines:
+def lines_of(rays: Rays, ray: Traced) -> Lines:
     """Rays about the whole pixels that they begin on."""
     return Lines(rays.start_256 - SUB * rays.origin_xy, rays.step_256, ray.radius_256)
 

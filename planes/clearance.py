@@ -1,0 +1,63 @@
+"""The clearance plane of a scene: how far each pixel lies from anything that decides hits."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from planes import jumps
+from planes.arrays import Ints
+from planes.compose import CodePlane, Codes
+from planes.items import Items, clipped
+from planes.jumps import PAD, Clearance
+from planes.twins import kernels_of
+
+__all__ = ["ClearancePlane"]
+
+
+class ClearancePlane:
+    """City-block distances from what is on the code plane of a scene, made anew when that has changed.
+
+    Threads may read that of a scene that none of them changes.
+
+    Parameters
+    ----------
+    codes : the code plane
+    missed : nanoseconds that it would have saved since the scene changed last, had it been there
+    """
+
+    def __init__(self, codes: CodePlane) -> None:
+        self.codes = codes
+        self.missed = 0.0
+        self._clearance: Clearance | None = None
+        self._seen = -1
+        self._lock = threading.Lock()
+
+    @property
+    def corner_xy(self) -> Ints:
+        """Pixel of the world at [0, 0]."""
+        return np.array(self.codes.box_xyxy[:2]) - PAD
+
+    def is_made(self, items: Items) -> bool:
+        """Whether it is there as the scene is now."""
+        with self._lock:
+            return self._is_made(items)
+
+    def _is_made(self, items: Items) -> bool:
+        if self._seen != items.version:
+            changed = items.changed_boxes(self._seen)
+            if changed is not None:
+                changed = clipped(changed, self.codes.box_xyxy)
+            if changed is None or (changed[:, :2] <= changed[:, 2:]).all(axis=1).any():
+                self._clearance, self.missed = None, 0.0
+            self._seen = items.version
+        return self._clearance is not None
+
+    def read(self, items: Items) -> tuple[Codes, Clearance]:
+        """Codes (h, w) and distances (h + 2 PAD, w + 2 PAD) of the present version."""
+        with self._lock:
+            made, codes = self._is_made(items), self.codes.read(items)
+            if self._clearance is None or not made:
+                self._clearance = kernels_of(jumps).clearance_of(codes != 0)
+            return codes, self._clearance

@@ -1,0 +1,240 @@
+"""Kernels of rays that jump: how far each pixel of a plane is from anything, and the first cell of a ray that is taken.
+
+A thin ray that goes on crosses into one new cell after another: n times along x or y bring it to cell n, at a
+city-block distance n from the first. Where nothing lies nearer than a distance d to a cell, it may cross d times
+without a look: no cell in which it is before is taken, nor is one that it touches at a corner in between.
+
+    after n crossings, i(n) of them along x:    i(n) = floor((A n + C) / B)
+    A = 256 |dx|     B = 256 (|dx| + |dy|)      C = |dx| (128 - ay) + |dy| (128 + ax)
+
+for a ray that starts (ax, ay) ahead of the middle of its cell, in 1/256 px: of those it touches the one that it goes
+into. Where the quotient is whole it goes through a corner, first along x; the cell that it passes by on the other side
+is touched as well, and looked at from the first.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from planes.arrays import Bools, Floats, Ints
+from planes.constants import HALF, SUB
+
+__all__ = ["NOTHING", "PAD", "UNDECIDED", "clearance_of", "first_taken"]
+
+PAD = 2
+"""Free cells around a plane: a ray touches what is in it from a cell beside it at most, and looks one farther."""
+
+FAR = 254
+"""The greatest distance that is told; one more is the greatest byte."""
+
+NOTHING, UNDECIDED = -1, -2
+"""Instead of a number of crossings: it touches nothing; or it is none of those that this can follow."""
+
+EXACT = 2.0**52
+"""Whole numbers below it have an exact floor of their quotient in floats: a fraction is too far from a whole number."""
+
+LONGEST = 2**30
+"""The farthest step along an axis, 1/256 px: products with it fit int64."""
+
+WORTH_TAKING = 0.75
+"""Rays that are done are set aside when this part of them or less is left."""
+
+FEW = 50
+"""So few rays are followed faster one by one, in Python's own integers."""
+
+Clearance = npt.NDArray[np.uint8]
+
+
+def clearance_of(taken: Bools) -> Clearance:
+    """City-block distances of all cells from what is taken, up to FAR.
+
+    Parameters
+    ----------
+    taken : (h, w)
+
+    Returns
+    -------
+    (h + 2 PAD, w + 2 PAD) 0 for cells that are taken; what is beyond the plane is free
+    """
+    h, w = taken.shape
+    distance = np.full((h + 2 * PAD, w + 2 * PAD), FAR, np.uint8)
+    np.multiply(~taken, np.uint8(FAR), out=distance[PAD:-PAD, PAD:-PAD])
+    _spread(distance)
+    upright = np.ascontiguousarray(distance.T)
+    _spread(upright)
+    return np.ascontiguousarray(upright.T)
+
+
+def _spread(distance: Clearance) -> None:
+    """Let each row be at most 1 farther than those above and below it."""
+    farther = np.empty(distance.shape[1], np.uint8)
+    for rows in (distance, distance[::-1]):
+        for before, here in pairwise(rows):
+            np.add(before, 1, out=farther)
+            np.minimum(here, farther, out=here)
+
+
+def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
+    """The first cell of each ray that is taken.
+
+    Parameters
+    ----------
+    clearance : (H, W) of `clearance_of`
+    start_256, step_256 : (R, 2) rays, about the middle of pixel [0, 0] of `clearance`, up to 2**48
+
+    Returns
+    -------
+    entry : (R,) when a ray enters it, as a whole number over max(1, |dx|) max(1, |dy|); NOTHING; or UNDECIDED for a ray
+        that goes along the border of two rows or columns, has no length, or is too long
+    cell : (R,) its place in `clearance`
+    several : (R,) whether it is one of those that the ray comes to at once: then it may be that not this one is taken,
+        but another. At 0 those are the cells in which it starts; else it goes through a corner, and they are this one,
+        the one that it passes by along y, and the one behind both
+    """
+    count = len(start_256)
+    entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
+    start, step = np.ascontiguousarray(start_256.T), np.ascontiguousarray(step_256.T)
+    rays, first, columns = _ways(clearance.shape, start, step, entry)
+    n, flat = first.astype(np.float64), clearance.reshape(-1)
+    between = _between(flat, columns, n, start[:, rays])
+    several[rays[between]], cell[rays[between]] = True, columns[5, between]
+    found = [rays[between]]
+    if len(between):
+        others = np.delete(np.arange(len(n)), between)
+        rays, n, columns = rays[others], n[others], columns[:, others]
+    while len(n) > FEW:
+        k, at_corner, jump = _looked(flat, columns, n)
+        n += jump
+        np.minimum(n, columns[6], out=n)
+        live = n < columns[6]
+        hit = live & (jump == 0)
+        live ^= hit
+        if np.count_nonzero(live) > WORTH_TAKING * len(n):
+            continue
+        met, left = np.flatnonzero(hit), np.flatnonzero(live)
+        which = rays[met]
+        cell[which], several[which] = k[met], at_corner[met]
+        found.append(which)
+        rays, n, columns = rays[left], n[left], columns.take(left, axis=1)
+    for ray, column, crossings in zip(rays.tolist(), columns.T.tolist(), n.tolist(), strict=True):
+        place, corner = _alone(flat.data, [int(v) for v in column], int(crossings))
+        if place != NOTHING:
+            cell[ray], several[ray] = place, corner
+            found.append(np.array([ray]))
+    hit_rays = np.concatenate(found)
+    entry[hit_rays] = _entries(cell[hit_rays], clearance.shape[1], start[:, hit_rays], step[:, hit_rays])
+    return entry, cell, several
+
+
+def _alone(flat: memoryview, column: list[int], n: int) -> tuple[int, bool]:
+    """The first taken cell of one ray after n crossings, NOTHING if there is none, and whether it is at a corner."""
+    a, b, c, along, across, base, stop = column
+    while n < stop:
+        i, rest = divmod(a * n + c, b)
+        cell = base + i * along + n * across
+        jump: int = flat[cell]
+        if not rest:
+            jump = min(jump, flat[cell - along])
+        if not jump:
+            return cell, not rest
+        n += jump
+    return NOTHING, False
+
+
+def _entries(cell: Ints, width: int, start: Ints, step: Ints) -> Ints:
+    """When rays (2, n) enter cells."""
+    ahead = np.stack([cell % width, cell // width])
+    ahead *= SUB
+    ahead -= start
+    np.negative(ahead, out=ahead, where=step < 0)
+    ahead -= HALF
+    ahead *= np.maximum(np.abs(step[::-1]), 1)
+    entry: Ints = np.maximum(ahead[0], ahead[1])
+    return np.maximum(entry, 0, out=entry)
+
+
+def _between(flat: Clearance, columns: Floats, first: Floats, start: Ints) -> Ints:
+    """Rays that start on a border of cells, of which another than the one that they go into is taken."""
+    on_border = (start & (SUB - 1)) == HALF
+    at = np.flatnonzero((on_border[0] | on_border[1]) & (first == 0))
+    if not len(at):
+        return at
+    along, across, base = columns[3:6, at].astype(np.int64)
+    x, y = (along + across) * on_border[0, at], across * on_border[1, at]
+    taken = [(flat[base - step] == 0) & (step != 0) for step in (x, y, x + y)]
+    return at[np.any(taken, axis=0)]
+
+
+def _looked(flat: Clearance, columns: Floats, n: Floats) -> tuple[npt.NDArray[np.intp], Bools, Clearance]:
+    """Cells of rays after n crossings, whether they are at a corner, and how far they may jump from there."""
+    a, b, c, along, across, base, stop = columns
+    quotient = a * n
+    quotient += c
+    quotient /= b
+    place = np.floor(quotient)
+    corner = place == quotient
+    place *= along
+    place += base
+    np.multiply(across, n, out=quotient)
+    place += quotient
+    cell = place.astype(np.intp)
+    jump = flat.take(cell)
+    if corner.any():
+        corner &= n < stop
+        at = np.flatnonzero(corner)
+        jump[at] = np.minimum(jump[at], flat[cell[at] - along[at].astype(np.intp)])
+    return cell, corner, jump
+
+
+def _ways(shape: tuple[int, ...], start: Ints, step: Ints, entry: Ints) -> tuple[Ints, Ints, Floats]:
+    """Rays (2, R) that come to the plane: which, after how many crossings, and their columns; the others are told.
+
+    The columns (7, n) are A, B and C; what a crossing along x instead of y, and a crossing along y, add to the place
+    of a cell; the place of the first cell; and the number of crossings that brings a ray to its end, or off the plane.
+    """
+    height, width = shape
+    back, length = step < 0, np.abs(step)
+    cell = (start + (HALF - back)) >> 8
+    ahead = start - (cell << 8)
+    np.negative(ahead, out=ahead, where=back)
+    last = (length + ahead + HALF) >> 8
+    before, behind = cell - 1, np.array([[width - 2], [height - 2]]) - cell
+    room, owed = np.where(back, before, behind), -np.where(back, behind, before)
+    reached = (room >= 0) & (owed <= last)
+    odd = _odd(length, ahead)
+    rays = np.flatnonzero(reached[0] & reached[1] & ~odd)
+    entry[odd] = UNDECIDED
+    if len(rays) < len(odd):
+        length, ahead, last, room, owed = (v.take(rays, axis=1) for v in (length, ahead, last, room, owed))
+        back, cell = back[:, rays], cell[:, rays]
+    (dx, dy), (ax, ay) = length, ahead
+    a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
+    first, stop = np.zeros_like(dx), last[0] + last[1] + 1
+    for axis in (0, 1):
+        _reach(np.minimum, stop, np.flatnonzero(last[axis] > room[axis]), axis, room[axis] + 1, (a, b, c, dy))
+        _reach(np.maximum, first, np.flatnonzero(owed[axis] > 0), axis, owed[axis], (a, b, c, dy))
+    across = np.where(back[1], -width, width)
+    columns = np.array([a, b, c, 1 - 2 * back[0] - across, across, cell[1] * width + cell[0], stop], np.float64)
+    long = columns[0] * stop + c >= EXACT
+    entry[rays[long]] = UNDECIDED
+    some = np.flatnonzero((first < stop) & ~long)
+    return (rays, first, columns) if len(some) == len(rays) else (rays[some], first[some], columns[:, some])
+
+
+def _odd(length: Ints, ahead: Ints) -> Bools:
+    """Rays (2, R) that are none of those that this can follow."""
+    (dx, dy), still = length, (length == 0) & (ahead == -HALF)
+    return np.asarray(still[0] | still[1] | (dx + dy == 0) | (np.maximum(dx, dy) > LONGEST))
+
+
+def _reach(better: Any, crossings: Ints, rays: Ints, axis: int, place: Ints, of: tuple[Ints, ...]) -> None:
+    """Bound numbers of crossings by that after which rays come to a column (0) or a row (1) so far ahead."""
+    if not len(rays):
+        return
+    a, b, c, dy = (v[rays] for v in of)
+    at = (c + b * (place[rays] - 1)) // (SUB * dy) + 1 if axis else -((c - b * place[rays]) // a)
+    crossings[rays] = better(crossings[rays], at)

@@ -1,0 +1,360 @@
+"""Rays that jump: the clearance plane, the first cell of a ray that is taken, and the same answers as by walking."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import oracle_rays
+import pytest
+from hypothesis import HealthCheck, example, given, note, settings
+from hypothesis import strategies as st
+from ray_battles import Battle, Body, Gun, Shot, some_battle, some_place, some_target
+from test_rays import check_columns
+
+import weapons.jumping
+import weapons.rayfire
+from planes import ALL, History, InputError, Scene, jumps
+from planes.twins import kernels_of, use_jit
+from weapons import Hits, Laser, Pistol, RayHits, Rifle, Rounds, Spread, Sweep, Weapon, fire
+
+worlds = st.randoms(use_true_random=False)
+FAR = 2**20 - 400
+
+
+@pytest.fixture(params=["numpy", "compiled"])
+def kernels(request: pytest.FixtureRequest) -> Iterator[ModuleType]:
+    """The kernels, and their compiled twins."""
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    use_jit(request.param == "compiled")
+    yield kernels_of(jumps)
+    use_jit(None)
+
+
+def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    h, w, chance = rng.randint(1, 9), rng.randint(1, 9), rng.choice([0.0, 0.05, 0.1, 0.3, 0.7, 1.0])
+    plane = np.array([[rng.random() < chance for _ in range(w)] for _ in range(h)])
+    if rng.random() < 0.3:  # a wall that has nothing but corners
+        side = min(h, w)
+        plane[range(side), range(side - 1, -1, -1) if rng.random() < 0.5 else range(side)] = True
+    return plane
+
+
+# Kernels
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds)
+def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: random.Random) -> None:
+    plane = some_plane(rng)
+    found = kernels.clearance_of(plane)
+    assert found.dtype == np.uint8 and found.shape == tuple(n + 2 * jumps.PAD for n in plane.shape)
+    taken = [(y + jumps.PAD, x + jumps.PAD) for y, x in zip(*map(np.ndarray.tolist, np.nonzero(plane)), strict=True)]
+    for (y, x), distance in np.ndenumerate(found):
+        assert distance == min((abs(y - v) + abs(x - u) for v, u in taken), default=jumps.FAR)
+
+
+def test_the_clearance_ends_at_what_a_byte_holds(kernels: ModuleType) -> None:
+    plane = np.zeros((2, 700), np.bool_)
+    plane[1, 650] = True
+    row = kernels.clearance_of(plane)[jumps.PAD].tolist()
+    assert row == [min(abs(x - jumps.PAD - 650) + 1, jumps.FAR) for x in range(704)]
+
+
+def some_ray(rng: random.Random, h: int, w: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """A start and a step, 1/256 px: inside, around, on borders, level, diagonal, through corners, or any."""
+    grid = rng.choice([1, 32, 128, 256])
+    x, y = (rng.randint(-8 * 256 // grid, (n + 8) * 256 // grid) * grid for n in (w, h))
+    length = rng.choice([1, 3, 30]) * 256 // grid
+    dx, dy = (rng.randint(-length, length) * grid for _ in range(2))
+    kind = rng.choice(["any", "any", "any", "level", "upright", "diagonal", "still"])
+    step = {"level": (dx, 0), "upright": (0, dy), "diagonal": (dx, rng.choice([dx, -dx])), "still": (0, 0)}
+    return (x, y), step.get(kind, (dx, dy))
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds)
+def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: ModuleType, rng: random.Random) -> None:
+    plane = some_plane(rng)
+    rays = [some_ray(rng, *plane.shape) for _ in range(rng.choice([1, 7, 80]))]
+    start, step = (np.array(column) for column in zip(*rays, strict=True))
+    note(f"{plane.astype(int).tolist()} {rays}")
+    clearance = kernels.clearance_of(plane)
+    entry, cell, several = kernels.first_taken(clearance, start + 256 * jumps.PAD, step)
+    for k, (at, by) in enumerate(rays):
+        if entry[k] == jumps.UNDECIDED:
+            along_border = any(by[i] == 0 and at[i] % 256 == 128 for i in (0, 1))
+            assert by == (0, 0) or along_border
+            continue
+        cells, _ = oracle_rays.thin_times(at, (at[0] + by[0], at[1] + by[1]))
+        met = {
+            (x, y): time
+            for (x, y), (time, _) in cells.items()
+            if 0 <= x < plane.shape[1] and 0 <= y < plane.shape[0] and plane[y, x]
+        }
+        assert entry[k] == min(met.values(), default=jumps.NOTHING)
+        first = [(x, y) for (x, y), time in met.items() if time == entry[k]]
+        y, x = divmod(int(cell[k]), clearance.shape[1])
+        assert not first or several[k] or first == [(x - jumps.PAD, y - jumps.PAD)]
+
+
+def test_rays_from_anywhere_read_nothing_beyond_the_plane(kernels: ModuleType) -> None:
+    """Also those that begin or end as far off as a position may be, or are too long to be followed."""
+    plane = np.zeros((5, 7), np.bool_)
+    plane[2, 3] = True
+    clearance = kernels.clearance_of(plane)
+    rng = np.random.default_rng(1)
+    start = rng.integers(-(2**48), 2**48, (2000, 2))
+    step = rng.integers(-(2**29), 2**29, (2000, 2))
+    assert (kernels.first_taken(clearance, start, step)[0] == jumps.NOTHING).all()
+    ends = np.array([[2**23, 77], [-(2**23), 2**23 - 5], [2**29, 2**29], [2**35, 1]])
+    middle = np.array([(3 + jumps.PAD) * 256, (2 + jumps.PAD) * 256])
+    for sign in (1, -1):
+        entry, cell, _ = kernels.first_taken(clearance, middle - sign * ends, 2 * sign * ends)
+        decided = entry != jumps.UNDECIDED
+        assert decided.tolist() == [True, True, False, False] and (cell[decided] == 4 * 11 + 5).all()
+
+
+# The same answers
+
+
+def single(rng: random.Random, count: int) -> Battle:
+    """A battle with a weapon that ends at its first hit, of many shots."""
+    battle = some_battle(rng)
+    inside = rng.choice(["hit", "hit", battle.gun.inside])
+    kind = rng.choice(["pistol", "rifle"])
+    gun = replace(battle.gun, kind=kind, max_hits=1, budget=None, width=0, inside=inside)
+    shots = []
+    for number in range(count):
+        at = some_place(rng, battle.bodies)
+        shot = replace(rng.choice(battle.shots), at=at, number=number)
+        shots.append(replace(shot, toward=some_target(rng, at, battle.bodies)) if shot.toward is not None else shot)
+    bodies = battle.bodies
+    if rng.random() < 0.6:  # nothing is refused
+        shots = [replace(shot, accept=ALL, exclude=()) for shot in shots]
+        bodies = [replace(body, categories=body.categories or 1) for body in bodies]
+    bounds = rng.choice([(0, 0, 11, 9), (2, 1, 7, 8), (-20, -20, 40, 40)])
+    return replace(battle, gun=gun, shots=shots, bodies=bodies, bounds=bounds)
+
+
+def answer(battle: Battle, strategy: str) -> Hits | str:
+    try:
+        return battle.fired(strategy=strategy)
+    except InputError as error:
+        return str(error)
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds, count=st.integers(1, 12))
+def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
+    battle = single(rng, count)
+    note(repr(battle))
+    walked, jumped = (answer(battle, strategy) for strategy in ("direct", "composed"))
+    assert walked == jumped
+    if isinstance(walked, RayHits):
+        assert walked.verdicts.tolist() == jumped.verdicts.tolist()  # type: ignore[union-attr]
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds)
+def test_rays_that_jump_hit_what_the_oracle_hits(kernels: ModuleType, rng: random.Random) -> None:
+    battle = single(rng, 3)
+    note(repr(battle))
+    if battle.gun.inside == "error":
+        battle = replace(battle, gun=replace(battle.gun, inside="hit"))
+    check_columns(battle.fired(strategy="composed"), battle.walks(), battle.gun.falloff)
+
+
+def body(*pixels: tuple[int, int], **values: Any) -> Body:
+    return Body(frozenset(pixels), **values)
+
+
+CORNERS: dict[str, tuple[list[Body], int]] = {
+    "a side, and behind it the diagonal": ([body((1, 0)), body((1, 1), occluder=True)], 1),
+    "both sides, the upper one first": ([body((0, 1)), body((1, 0))], 1),
+    "an occluder at the lower side": ([body((1, 0)), body((0, 1), occluder=True)], 1),
+    "an occluder under the object at the lower side": (
+        [body((1, 0)), body((0, 1), layer=2), body((0, 1), occluder=True)], 1),
+    "an object under another is no occluder": ([body((1, 0)), body((0, 1), layer=2), body((0, 1))], 0),
+    "only the one that is passed by": ([body((0, 1))], 0),
+    "only the diagonal": ([body((1, 1))], 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("name", CORNERS)
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, 0.5), (-3.0, -3.0)])
+def test_what_comes_first_at_a_corner(
+    kernels: ModuleType, name: str, turn: int, start: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody walks: what is taken at once is told from the planes."""
+    monkeypatch.setattr(weapons.rayfire, "trace", lambda *_: pytest.fail("walked"))
+    bodies, _ = CORNERS[name]
+    sx, sy = 1 - 2 * (turn & 1), 1 - (turn & 2)
+    turned = [replace(b, pixels=frozenset((sx * x, sy * y) for x, y in b.pixels)) for b in bodies]
+    shot = Shot((sx * start[0], sy * start[1]), (sx * 6.0, sy * 6.0))
+    battle = Battle(Gun("pistol"), [shot, replace(shot, number=1)], turned, (-9, -9, 9, 9))
+    check_columns(battle.fired(strategy="composed"), battle.walks(), None)
+
+
+def test_rays_of_any_reach(kernels: ModuleType) -> None:
+    """From far off the bounds, and of the longest range, over batches that are cut into parts."""
+    rng = np.random.default_rng(3)
+    scene = Scene((300, 200), (-40, 7))
+    for _ in range(40):
+        scene.add(
+            rng.random((9, 12)) < 0.7, rng.uniform((-60, 0), (280, 220)), role=rng.choice(["hittable", "occluder"])
+        )
+    angle = rng.uniform(0, 2 * np.pi, 400)
+    for away in (100.0, 5000.0, 1e6):
+        target = rng.uniform((-40, 7), (260, 207), (400, 2))
+        at = target + away * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        for weapon in (Pistol(None), Pistol(min(2 * away, FAR), falloff="smooth"), Pistol(FAR)):
+            hits = fire(scene, weapon, at, toward=target, strategy="composed")
+            assert hits == fire(scene, weapon, at, toward=target, strategy="direct") and len(hits) > 30
+
+
+SEVERAL: list[Weapon] = [
+    Sweep(Pistol(90), 40, 5), Spread(Pistol(90, falloff="linear"), 6, 9), Rounds(Pistol(90), 3, (1.5, 2), 4),
+    Rounds(Spread(Rifle(70, max_hits=1), 3, 5), 2, (0, 3), 10),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", SEVERAL, ids=repr)
+def test_shots_of_several_rays_in_parts(weapon: Weapon, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    scene, at = some_scene(rng), rng.uniform(0, 100, (70, 2))
+    whole = fire(scene, weapon, at, aim=30, strategy="composed")
+    monkeypatch.setattr(weapons.rayfire, "CHUNK_ROWS", 64)
+    monkeypatch.setattr(weapons.jumping, "RAYS_AT_ONCE", 7)
+    for strategy in ("composed", "direct"):
+        hits = fire(scene, weapon, at, aim=30, strategy=strategy)
+        assert hits == whole and len(hits.stop) == hits.rays > len(hits) > 35  # type: ignore[attr-defined]
+
+
+def some_scene(rng: np.random.Generator) -> Scene:
+    scene = Scene((100, 100))
+    for k in range(30):
+        scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
+    return scene
+
+
+# What is kept
+
+
+def test_the_plane_follows_the_scene() -> None:
+    rng = np.random.default_rng(7)
+    scene, at, aim = some_scene(rng), rng.uniform(0, 100, (200, 2)), rng.uniform(0, 360, 200)
+    mover = scene.add(np.ones((5, 5), np.bool_), (50, 50), role="mover")
+
+    def jumped() -> dict[str, tuple[str, int]]:
+        hits = fire(scene, Pistol(80), at, aim=aim, strategy="composed")
+        assert hits == fire(scene, Pistol(80), at, aim=aim, strategy="direct")
+        return {stage.name: (stage.why, stage.bytes_made) for stage in hits.plan.ran}
+
+    for change in (
+        lambda: scene.move(3, (50, 50)), lambda: scene.remove(3), lambda: scene.set(5, role="occluder"),
+        lambda: scene.add(np.ones((3, 3), np.bool_), (20, 20)), lambda: scene.set(8, angle=45),
+    ):  # fmt: skip
+        change()
+        assert jumped()["clearance plane"] == ("measured anew", 104 * 104)
+        assert jumped()["clearance plane"] == ("as it was", 0)
+    scene.move(mover, (20, 20))
+    scene.move(9, (1000, 1000))
+    jumped()
+    scene.move(9, (2000, 1000))  # off the bounds before and after
+    assert jumped()["clearance plane"] == ("as it was", 0)
+
+
+def test_what_is_told_later_is_of_the_scene_as_it_was() -> None:
+    rng = np.random.default_rng(9)
+    scene, at, aim = some_scene(rng), rng.uniform(0, 100, (50, 2)), rng.uniform(0, 360, 50)
+    hits, same = (fire(scene, Pistol(80), at, aim=aim, strategy=s) for s in ("composed", "direct"))
+    assert isinstance(hits, RayHits) and isinstance(same, RayHits)
+    passes, stop = same.passes, same.stop
+    scene.move(scene.ids(), (5, 5))
+    for _ in range(20):
+        scene.add(rng.random((30, 30)) < 0.5, (50, 50))
+    scene.remove(range(20))
+    fire(scene, Pistol(80), at, aim=aim, strategy="composed")
+    assert hits.passes == passes and hits.stop == stop
+    with pytest.raises(ValueError, match="read-only"):
+        hits.stop.item[0] = 3
+
+
+def test_shots_at_the_past_jump_there() -> None:
+    rng = np.random.default_rng(11)
+    scene, at, aim = some_scene(rng), rng.uniform(0, 100, (60, 2)), rng.uniform(0, 360, 60)
+    history = History(scene)
+    for tick in range(3):
+        scene.move(scene.ids(), rng.uniform(0, 100, (len(scene), 2)))
+        history.record(tick)
+    ticks = rng.integers(0, 3, 60)
+    jumped, walked = (fire(history, Pistol(80), at, aim=aim, tick=ticks, strategy=s) for s in ("composed", "direct"))
+    assert jumped == walked and jumped.plan.has_run("jumps") and not walked.plan.has_run("jumps")
+
+
+# The choice
+
+
+def test_rays_jump_where_it_pays() -> None:
+    """A plane that has to be made is made for many rays, or for the last of many calls; a weapon that pierces walks."""
+    rng = np.random.default_rng(13)
+    scene = Scene((1920, 1080))
+    for _ in range(100):
+        scene.add(np.ones((48, 48), np.bool_), rng.uniform(0, (1920, 1080)))
+
+    def jumps_by(weapon: Weapon, rays: int, **how: Any) -> bool:
+        plan = fire(scene, weapon, rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
+        assert plan.has_run("jumps") != (
+            plan.has_left_out("jumps") or not isinstance(weapon, Pistol) or weapon.width > 0
+        )
+        return plan.has_run("jumps")
+
+    assert not jumps_by(Pistol(1000), 3)
+    assert jumps_by(Pistol(1000), 3000) and jumps_by(Pistol(1000), 3)
+    assert not jumps_by(Pistol(1000), 3000, prefilter="box") and not jumps_by(Pistol(1000), 3000, strategy="direct")
+    assert not jumps_by(Laser(1000), 300) and not jumps_by(Pistol(1000, width=2), 300)
+    scene.move(0, (500, 500))
+    assert not jumps_by(Pistol(1000), 3)
+    assert [jumps_by(Pistol(1000), 20) for _ in range(100)].index(True) > 1
+    assert jumps_by(Pistol(1000), 1)
+
+
+def test_few_are_left_to_walk() -> None:
+    """Only those that refuse what they meet first, or go along a border; the others walk not one cell."""
+    scene = Scene((60, 60))
+    scene.add(np.ones((5, 5), np.bool_), (20, 20))
+    scene.add(np.ones((5, 5), np.bool_), (40, 20))
+    at = [(10, 20), (10, 21.5), (20, 10.5), (0.5, 0.5), (10, 22.5)]
+    toward = [(55, 20), (55, 21.5), (20, 55), (55.5, 55.5), (5, 22.5)]
+    hits = fire(scene, Pistol(None), at, toward=toward, exclude=[-1, 0, -1, -1, -1], strategy="composed")
+    assert hits.object.tolist() == [0, 1, 0, 0] and hits.shot.tolist() == [0, 1, 2, 3]
+    assert {s.name: s.bytes_made for s in hits.plan.ran}["jumps"] == 8 * len(at)
+    walked = fire(scene, Pistol(None), at[1:], toward=toward[1:], exclude=[0, -1, -1, -1], strategy="direct")
+    assert walked.plan.has_run("walk")
+    quiet = fire(scene, Pistol(None), at[:1], toward=toward[:1], strategy="composed").plan
+    assert quiet.has_left_out("walk") and quiet.has_left_out("pre-filter") and not quiet.has_run("walk")
+
+
+@example(1)
+@example(50)
+@given(st.integers(1, 200))
+@settings(max_examples=15, deadline=None)
+def test_how_many_are_followed_together_changes_nothing(few: int) -> None:
+    rng = np.random.default_rng(few)
+    plane = rng.random((60, 90)) < 0.01
+    clearance = jumps.clearance_of(plane)
+    start, step = rng.integers(-20 * 256, 110 * 256, (300, 2)), rng.integers(-100 * 256, 100 * 256, (300, 2))
+    start[:100] &= -128
+    step[:100] &= -128
+    truth = jumps.first_taken(clearance, start, step)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jumps, "FEW", few)
+        found = jumps.first_taken(clearance, start, step)
+    assert all(np.array_equal(a, b) for a, b in zip(found, truth, strict=True))

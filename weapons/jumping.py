@@ -1,0 +1,146 @@
+"""Rays that jump to the first thing on their way, by the clearance plane of the scene, instead of walking past items.
+
+Only thin rays that end at their first hit: where such a ray first touches anything at all, the code plane tells what.
+The few for which that is not enough are left to the walk: those that refuse what they touch first, or go along the
+border of two rows or columns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes import jumps
+from planes.arrays import Bools, Ints
+from planes.clearance import ClearancePlane
+from planes.compose import Codes
+from planes.constants import HALF, SUB
+from planes.items import Items, Stack
+from planes.jumps import PAD, UNDECIDED, Clearance
+from planes.spans import meets
+from planes.twins import kernels_of
+from weapons.candidates import may_refuse, refused
+from weapons.ends import Ends, Reason, endless
+from weapons.guns import Traced
+from weapons.plan import Plan
+from weapons.rays import Rays
+from weapons.rayways import JUMP_RAY_NS
+from weapons.volley import Shots
+
+__all__ = ["ends_by_jumps"]
+
+RAYS_AT_ONCE = 2**14
+"""Rays whose columns fit the cache."""
+
+
+def ends_by_jumps(
+    rays: Rays, ray: Traced, shots: Shots, items: Items, stack: Stack, plane: ClearancePlane, plan: Plan
+) -> tuple[Ends, Ints]:
+    """Find where rays end, but for the parts of their lengths.
+
+    Returns
+    -------
+    the ends, and the rays for which they are yet to be found
+    """
+    codes, clearance = _read(plane, items, plan)
+    entry, cell, several = _first_taken(clearance, rays, plane.corner_xy)
+    unsure, met = entry == UNDECIDED, np.flatnonzero(entry >= 0)
+    place = cell[met]
+    choosy, at = may_refuse(stack, shots), np.flatnonzero(several[met])
+    if len(at):
+        one = met[at]
+        cells = _cells_at_once(place[at], entry[one] == 0, rays.pick(one), clearance.shape[1])
+        place[at], others = _first_of(cells, codes, clearance, plane.corner_xy, stack)
+        unsure[one] = others & choosy
+    y, x = np.divmod(place, clearance.shape[1])
+    rank = _ranks(stack).take(codes.reshape(-1).take((y - PAD) * codes.shape[1] + (x - PAD)) >> 1)
+    if choosy:
+        plan.run("jumps", "")
+        unsure[met] |= refused(stack, rank, shots, rays.shot[met])
+        plan.run("filter", "categories and owners", len(met))
+    if ray.inside != "hit":
+        unsure |= entry == 0
+    ends, aside = endless(len(rays)), plane.corner_xy - rays.origin_xy
+    ends.x[met], ends.y[met] = x + aside[met, 0], y + aside[met, 1]
+    ends.rank[met], ends.time[met], ends.reason[met] = rank, entry[met], Reason.HITS
+    if stack.has_occluders:
+        ends.reason[met[stack.occluder[rank]]] = Reason.OCCLUDER
+    plan.run("jumps", "each to the first cell that is taken", cell.nbytes)
+    return ends, np.flatnonzero(unsure)
+
+
+def _read(plane: ClearancePlane, items: Items, plan: Plan) -> tuple[Codes, Clearance]:
+    """Codes and distances of the scene as it is now."""
+    made = plane.is_made(items)
+    codes = plane.codes.read(items)
+    redrawn = plane.codes.redrawn
+    plan.run("code plane", f"{redrawn} px drawn anew", redrawn * codes.itemsize)
+    codes, clearance = plane.read(items)
+    plan.run("clearance plane", "as it was" if made else "measured anew", 0 if made else clearance.nbytes)
+    return codes, clearance
+
+
+def _first_taken(clearance: Clearance, rays: Rays, corner_xy: Ints) -> tuple[Ints, Ints, Bools]:
+    """First taken cells of all rays, so many at once that they fit the cache."""
+    kernels = kernels_of(jumps, len(rays) * JUMP_RAY_NS)
+    start, found = rays.start_256 - SUB * corner_xy, []
+    for begin in range(0, max(len(rays), 1), RAYS_AT_ONCE):
+        part = slice(begin, begin + RAYS_AT_ONCE)
+        found.append(kernels.first_taken(clearance, start[part], rays.step_256[part]))
+    if len(found) == 1:
+        first: tuple[Ints, Ints, Bools] = found[0]
+        return first
+    entry, cell, several = (np.concatenate(column) for column in zip(*found, strict=True))
+    return entry, cell, several
+
+
+def _ranks(stack: Stack) -> Ints:
+    """Place in the stack by id + 1."""
+    rank = np.zeros(int(stack.ids.max(initial=-1)) + 2, np.int64)
+    rank[stack.ids + 1] = np.arange(len(stack))
+    return rank
+
+
+def _cells_at_once(place: Ints, starts: Bools, rays: Rays, width: int) -> Ints:
+    """Cells (n, 4) of the clearance plane that rays come to at once; some are told twice.
+
+    Parameters
+    ----------
+    place : (n,) the cell that a ray goes into, or the one beside the corner, along x
+    starts : (n,) whether it starts there, or else goes through a corner
+    """
+    sign = np.where(rays.step_256 < 0, -1, 1)
+    border = sign * ((rays.start_256 & (SUB - 1)) == HALF)
+    at_start, at_corner = np.array([[0, 0], [-1, 0], [0, -1], [-1, -1]]), np.array([[0, 0], [-1, 1], [0, 1], [0, 1]])
+    steps = np.where(starts[:, None, None], at_start * border[:, None], at_corner * sign[:, None])
+    return np.asarray(place[:, None] + steps[:, :, 0] + width * steps[:, :, 1])
+
+
+def _first_of(cells: Ints, codes: Codes, clearance: Clearance, corner_xy: Ints, stack: Stack) -> tuple[Ints, Bools]:
+    """Of cells (n, k) that rays come to at once, the one that comes first: with an occluder, then by (y, x).
+
+    Returns
+    -------
+    its place; and whether more cells than that are taken
+    """
+    taken = clearance.reshape(-1)[cells] == 0
+    blocked = np.zeros_like(taken)
+    if stack.has_occluders:
+        y, x = np.divmod(cells[taken], clearance.shape[1])
+        code = codes[y - PAD, x - PAD].astype(np.int64)
+        in_front = stack.occluder[_ranks(stack)[code >> 1]]
+        behind = np.flatnonzero(~in_front & (code & 1 == 1))
+        in_front[behind] = _has_occluder(stack, np.stack([x, y], axis=1)[behind] + corner_xy)
+        blocked[taken] = in_front
+    last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
+    best = np.argmin((~taken * 2 + ~blocked) * clearance.size + cells, axis=1)
+    return cells[np.arange(len(cells)), best], (taken & (cells != last)).any(axis=1)
+
+
+def _has_occluder(stack: Stack, xy: Ints) -> Bools:
+    """Whether any occluder covers pixels (n, 2)."""
+    walls = np.flatnonzero(stack.occluder)
+    box = stack.box_xyxy[walls]
+    pixel, wall = np.nonzero(meets(np.concatenate([xy, xy], axis=1)[:, None], box))
+    x, y = (xy[pixel] - box[wall, :2]).T
+    on = stack.masks[stack.offset[walls[wall]] + y * stack.width[walls[wall]] + x]
+    return np.asarray(np.bincount(pixel, on, len(xy)) > 0)
