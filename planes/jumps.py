@@ -9,7 +9,8 @@ without a look: no cell in which it is before is taken, nor is one that it touch
 
 for a ray that starts (ax, ay) ahead of the middle of its cell, in 1/256 px: of those it touches the one that it goes
 into. Where the quotient is whole it goes through a corner, first along x; the cell that it passes by on the other side
-is touched as well, and looked at from the first.
+is touched as well, and looked at from the first. Of a ray along the border of two rows or columns it is always whole
+(C = 0), and the cell on the other side is looked at from each.
 """
 
 from __future__ import annotations
@@ -89,11 +90,12 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     Returns
     -------
     entry : (R,) when a ray enters it, as a whole number over max(1, |dx|) max(1, |dy|); NOTHING; or UNDECIDED for a ray
-        that goes along the border of two rows or columns, has no length, or is too long
+        that has no length, or is too long
     cell : (R,) its place in `clearance`
     several : (R,) whether it is one of those that the ray comes to at once: then it may be that not this one is taken,
-        but another. At 0 those are the cells in which it starts; else it goes through a corner, and they are this one,
-        the one that it passes by along y, and the one behind both
+        but another. At 0 those are the cells in which it starts. Else it goes along the border of two rows or columns,
+        and they are one of each; or through a corner, and they are this one, the one that it passes by along y, and
+        the one behind both
     """
     count = len(start_256)
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
@@ -132,13 +134,13 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
 
 def _alone(flat: memoryview, column: list[int], n: int) -> tuple[int, bool]:
     """The first taken cell of one ray after n crossings, NOTHING if there is none, and whether it is at a corner."""
-    a, b, c, along, across, base, stop = column
+    a, b, c, along, across, base, stop, aside = column
     while n < stop:
         i, rest = divmod(a * n + c, b)
         cell = base + i * along + n * across
         jump: int = flat[cell]
         if not rest:
-            jump = min(jump, flat[cell - along])
+            jump = min(jump, flat[cell - aside])
         if not jump:
             return cell, not rest
         n += jump
@@ -171,7 +173,7 @@ def _between(flat: Clearance, columns: Floats, first: Floats, start: Ints) -> In
 
 def _looked(flat: Clearance, columns: Floats, n: Floats) -> tuple[npt.NDArray[np.intp], Bools, Clearance]:
     """Cells of rays after n crossings, whether they are at a corner, and how far they may jump from there."""
-    a, b, c, along, across, base, stop = columns
+    a, b, c, along, across, base, stop, aside = columns
     quotient = a * n
     quotient += c
     quotient /= b
@@ -186,15 +188,16 @@ def _looked(flat: Clearance, columns: Floats, n: Floats) -> tuple[npt.NDArray[np
     if corner.any():
         corner &= n < stop
         at = np.flatnonzero(corner)
-        jump[at] = np.minimum(jump[at], flat[cell[at] - along[at].astype(np.intp)])
+        jump[at] = np.minimum(jump[at], flat[cell[at] - aside[at].astype(np.intp)])
     return cell, corner, jump
 
 
 def _ways(shape: tuple[int, ...], start: Ints, step: Ints, entry: Ints) -> tuple[Ints, Ints, Floats]:
     """Rays (2, R) that come to the plane: which, after how many crossings, and their columns; the others are told.
 
-    The columns (7, n) are A, B and C; what a crossing along x instead of y, and a crossing along y, add to the place
-    of a cell; the place of the first cell; and the number of crossings that brings a ray to its end, or off the plane.
+    The columns (8, n) are A, B and C; what a crossing along x instead of y, and a crossing along y, add to the place
+    of a cell; the place of the first cell; the number of crossings that brings a ray to its end, or off the plane; and
+    what adds to the place of the cell on the other side to make that of this one, where both are touched.
     """
     height, width = shape
     back, length = step < 0, np.abs(step)
@@ -205,7 +208,7 @@ def _ways(shape: tuple[int, ...], start: Ints, step: Ints, entry: Ints) -> tuple
     before, behind = cell - 1, np.array([[width - 2], [height - 2]]) - cell
     room, owed = np.where(back, before, behind), -np.where(back, behind, before)
     reached = (room >= 0) & (owed <= last)
-    odd = _odd(length, ahead)
+    odd = (length[0] + length[1] == 0) | (np.maximum(*length) > LONGEST)
     rays = np.flatnonzero(reached[0] & reached[1] & ~odd)
     entry[odd] = UNDECIDED
     if len(rays) < len(odd):
@@ -213,22 +216,19 @@ def _ways(shape: tuple[int, ...], start: Ints, step: Ints, entry: Ints) -> tuple
         back, cell = back[:, rays], cell[:, rays]
     (dx, dy), (ax, ay) = length, ahead
     a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
+    c[(dy == 0) & (ay == -HALF)] = 0
     first, stop = np.zeros_like(dx), last[0] + last[1] + 1
     for axis in (0, 1):
         _reach(np.minimum, stop, np.flatnonzero(last[axis] > room[axis]), axis, room[axis] + 1, (a, b, c, dy))
         _reach(np.maximum, first, np.flatnonzero(owed[axis] > 0), axis, owed[axis], (a, b, c, dy))
     across = np.where(back[1], -width, width)
-    columns = np.array([a, b, c, 1 - 2 * back[0] - across, across, cell[1] * width + cell[0], stop], np.float64)
+    along = 1 - 2 * back[0] - across
+    columns = np.array([a, b, c, along, across, cell[1] * width + cell[0], stop, along], np.float64)
+    columns[7, (dx == 0) & (ax == -HALF)], columns[7, (dy == 0) & (ay == -HALF)] = 1, width
     long = columns[0] * stop + c >= EXACT
     entry[rays[long]] = UNDECIDED
     some = np.flatnonzero((first < stop) & ~long)
     return (rays, first, columns) if len(some) == len(rays) else (rays[some], first[some], columns[:, some])
-
-
-def _odd(length: Ints, ahead: Ints) -> Bools:
-    """Rays (2, R) that are none of those that this can follow."""
-    (dx, dy), still = length, (length == 0) & (ahead == -HALF)
-    return np.asarray(still[0] | still[1] | (dx + dy == 0) | (np.maximum(dx, dy) > LONGEST))
 
 
 def _reach(better: Any, crossings: Ints, rays: Ints, axis: int, place: Ints, of: tuple[Ints, ...]) -> None:

@@ -11,7 +11,7 @@ from planes.jumps import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 
 __all__ = ["clearance_of", "first_taken"]
 
-COLUMNS = 11
+COLUMNS = 12
 BLOCK = 256
 """Rays that go on together, so that none waits for another's look: their columns fit the fastest cache."""
 
@@ -112,7 +112,7 @@ def _follow(flat, columns, at, rays, live, count, entry, cell, several):  # type
             look = np.int64(columns[one, 5] + i * along + n * columns[one, 4])
             jump = flat[look]
             if i == quotient:
-                jump = min(jump, flat[look - np.int64(along)])
+                jump = min(jump, flat[look - np.int64(columns[one, 11])])
             at[one] = n + jump
             live[left] = one
             left += jump > 0 and n + jump < columns[one, 6]
@@ -127,13 +127,13 @@ def _follow(flat, columns, at, rays, live, count, entry, cell, several):  # type
 def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ignore[no-untyped-def]
     """Crossings after which a ray comes to the plane, or why it has none.
 
-    Its column is as of `jumps._ways`, and |dx|, |dy|, ax and ay.
+    Its column is A, B and so on as of `jumps._ways`, and |dx|, |dy|, ax and ay before the last.
     """
     dx, dy = abs(step_x), abs(step_y)
     x, y = (x_256 + HALF - (step_x < 0)) >> 8, (y_256 + HALF - (step_y < 0)) >> 8
     ax, ay = x_256 - (x << 8), y_256 - (y << 8)
     ax, ay = ax if step_x >= 0 else -ax, ay if step_y >= 0 else -ay
-    if dx + dy == 0 or dx > LONGEST or dy > LONGEST or (dx == 0 and ax == -HALF) or (dy == 0 and ay == -HALF):
+    if dx + dy == 0 or dx > LONGEST or dy > LONGEST:
         return UNDECIDED
     last_x, last_y = (dx + ax + HALF) >> 8, (dy + ay + HALF) >> 8
     room_x, owed_x = (width - 2 - x, 1 - x) if step_x >= 0 else (x - 1, x - width + 2)
@@ -141,6 +141,13 @@ def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ig
     if room_x < 0 or room_y < 0 or owed_x > last_x or owed_y > last_y:
         return NOTHING
     a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
+    across = width if step_y >= 0 else -width
+    along = (1 if step_x >= 0 else -1) - across
+    columns[one, 11] = along
+    if dx == 0 and ax == -HALF:
+        columns[one, 11] = 1
+    if dy == 0 and ay == -HALF:
+        columns[one, 11], c = width, 0
     first, stop = 0, last_x + last_y + 1
     if last_x > room_x:
         stop = min(stop, -_over(c - b * (room_x + 1), a))
@@ -152,9 +159,8 @@ def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ig
         first = max(first, _over(c + b * (owed_y - 1), SUB * dy) + 1)
     if float(a) * stop + c >= EXACT:
         return UNDECIDED
-    across = width if step_y >= 0 else -width
     columns[one, 0], columns[one, 1], columns[one, 2] = a, b, c
-    columns[one, 3], columns[one, 4] = (1 if step_x >= 0 else -1) - across, across
+    columns[one, 3], columns[one, 4] = along, across
     columns[one, 5], columns[one, 6] = y * width + x, stop
     columns[one, 7], columns[one, 8], columns[one, 9], columns[one, 10] = dx, dy, ax, ay
     return first if first < stop else NOTHING

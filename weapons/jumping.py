@@ -1,8 +1,7 @@
 """Rays that jump to the first thing on their way, by the clearance plane of the scene, instead of walking past items.
 
 Only thin rays that end at their first hit: where such a ray first touches anything at all, the code plane tells what.
-The few for which that is not enough are left to the walk: those that refuse what they touch first, or go along the
-border of two rows or columns.
+Those for which that is not enough are left to the walk: they refuse what they touch first, or have no length.
 """
 
 from __future__ import annotations
@@ -106,10 +105,11 @@ def _cells_at_once(place: Ints, starts: Bools, rays: Rays, width: int) -> Ints:
     Parameters
     ----------
     place : (n,) the cell that a ray goes into, or the one beside the corner, along x
-    starts : (n,) whether it starts there, or else goes through a corner
+    starts : (n,) whether it starts there, or else goes through a corner, or along a border
     """
     sign = np.where(rays.step_256 < 0, -1, 1)
-    border = sign * ((rays.start_256 & (SUB - 1)) == HALF)
+    on_border = ((rays.start_256 & (SUB - 1)) == HALF) & (starts[:, None] | (rays.step_256 == 0))
+    border, starts = sign * on_border, starts | on_border.any(axis=1)
     at_start, at_corner = np.array([[0, 0], [-1, 0], [0, -1], [-1, -1]]), np.array([[0, 0], [-1, 1], [0, 1], [0, 1]])
     steps = np.where(starts[:, None, None], at_start * border[:, None], at_corner * sign[:, None])
     return np.asarray(place[:, None] + steps[:, :, 0] + width * steps[:, :, 1])
