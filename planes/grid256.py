@@ -15,7 +15,7 @@ import numpy as np
 from planes.arrays import Floats, InputError, Ints
 from planes.constants import HALF, SUB, TRIG_BITS
 
-__all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "snap", "turned", "unit", "unit_toward"]
+__all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "scaled", "snap", "turned", "unit", "unit_toward"]
 
 ONE = 1 << TRIG_BITS
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
@@ -96,13 +96,24 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
 def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
     """Turn points (N, 2) by a direction, or each by its own (N,), about the origin; rounded once, half to even."""
     x, y = points_256[..., 0], points_256[..., 1]
-    return np.stack([rounded_div(x * c - y * s, ONE), rounded_div(x * s + y * c, ONE)], axis=-1)
+    return np.stack([_over_one(x * c - y * s), _over_one(x * s + y * c)], axis=-1)
+
+
+def scaled(directions: Ints, length_256: int) -> Ints:
+    """Directions, (cos, sin) times 2**30, at a length; rounded once, half to even."""
+    return _over_one(directions * length_256)
+
+
+def _over_one(numerator: Ints) -> Ints:
+    """Divide by 2**30, rounding half to even: up from a half if what is below it is odd."""
+    return np.asarray((numerator + (ONE // 2 - 1) + ((numerator >> TRIG_BITS) & 1)) >> TRIG_BITS)
 
 
 def _rounded(scaled: Floats, folded: Floats, exactly: Callable[[float], int]) -> Ints:
     """Round to integers; where the float is nearer to a tie than its error, decide in integers."""
-    nearest = np.rint(scaled).astype(np.int64)
-    doubt = np.abs(np.abs(scaled - nearest) - 0.5) < _DOUBT
+    rounded = np.rint(scaled)
+    doubt = np.abs(scaled - rounded) > 0.5 - _DOUBT
+    nearest = rounded.astype(np.int64)
     if not doubt.any():
         return nearest
     flat = nearest.ravel()

@@ -130,7 +130,7 @@ class Hits:
     @cached_property
     def starts(self) -> Ints:
         """The rows of shot i are starts[i] .. starts[i + 1] - 1."""
-        starts = np.searchsorted(self.shot, np.arange(len(self.shots) + 1))
+        starts = np.concatenate([[0], np.cumsum(np.bincount(self.shot, minlength=len(self.shots)))])
         starts.flags.writeable = False
         return starts
 

@@ -47,7 +47,7 @@ def ends_by_jumps(
     choosy, at = may_refuse(stack, shots), np.flatnonzero(several[met])
     if len(at):
         one = met[at]
-        cells = _cells_at_once(place[at], entry[one] == 0, rays.pick(one), clearance.shape[1])
+        cells = _cells_at_once(place[at], entry[one] == 0, rays.start_256[one], rays.step_256[one], clearance.shape[1])
         place[at], others = _first_of(cells, codes, clearance, plane.corner_xy, stack)
         unsure[one] = others & choosy
     y, x = np.divmod(place, clearance.shape[1])
@@ -99,7 +99,7 @@ def _ranks(stack: Stack) -> Ints:
     return rank
 
 
-def _cells_at_once(place: Ints, starts: Bools, rays: Rays, width: int) -> Ints:
+def _cells_at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width: int) -> Ints:
     """Cells (n, 4) of the clearance plane that rays come to at once; some are told twice.
 
     Parameters
@@ -107,8 +107,8 @@ def _cells_at_once(place: Ints, starts: Bools, rays: Rays, width: int) -> Ints:
     place : (n,) the cell that a ray goes into, or the one beside the corner, along x
     starts : (n,) whether it starts there, or else goes through a corner, or along a border
     """
-    sign = np.where(rays.step_256 < 0, -1, 1)
-    on_border = ((rays.start_256 & (SUB - 1)) == HALF) & (starts[:, None] | (rays.step_256 == 0))
+    sign = np.where(step_256 < 0, -1, 1)
+    on_border = ((start_256 & (SUB - 1)) == HALF) & (starts[:, None] | (step_256 == 0))
     border, starts = sign * on_border, starts | on_border.any(axis=1)
     at_start, at_corner = np.array([[0, 0], [-1, 0], [0, -1], [-1, -1]]), np.array([[0, 0], [-1, 1], [0, 1], [0, 1]])
     steps = np.where(starts[:, None, None], at_start * border[:, None], at_corner * sign[:, None])

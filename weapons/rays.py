@@ -8,7 +8,7 @@ import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import SUB
-from planes.grid256 import pixel, snap, turned, unit
+from planes.grid256 import pixel, scaled, snap, turned, unit
 from weapons.arsenal import Rounds, Spread
 from weapons.draws import disc_offsets
 from weapons.guns import Sweep, Traced
@@ -63,7 +63,7 @@ def rays_of(parts: Parts, shots: Shots) -> Rays:
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
     round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
     pellet = np.tile(np.arange(pellets), len(shots) * rounds)
-    start = shots.at_256[shot]
+    start = shots.at_256 if rounds * pellets == 1 else shots.at_256[shot]
     if burst:
         start = start + round_[:, None] * snap(burst.recoil_xy)
     step = _steps(parts, shots, shot, round_, pellet)
@@ -76,21 +76,15 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -
     length = ray.length_256
     ahead = shots.toward_256 if length is None else shots.direction
     assert ahead is not None  # checked with the shots
-    ahead = ahead[shot]
+    ahead = ahead if len(shot) == len(shots) else ahead[shot]
     if burst:
         ahead = recoiled(ahead, round_, burst.recoil_deg)
     if isinstance(several, Sweep):
         # Both sides of the fan are mirrors of each other: an odd numerator over the same number.
         c, s = unit(several.angle * ((2 * np.arange(several.count) - several.count + 1) / (2 * (several.count - 1))))
         ahead = turned(ahead, c[pellet], s[pellet])
-    step = ahead if length is None else _along(ahead, length)
+    step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
         key = shots.seed[shot], shots.number[shot], round_, pellet
         step = step + SUB * disc_offsets(int(snap(several.radius)), *key)
     return step
-
-
-def _along(direction: Ints, length_256: int) -> Ints:
-    """Directions of length 2**30 at another length, rounded once, half to even."""
-    half = np.full(len(direction), length_256)
-    return turned(np.stack([half, np.zeros_like(half)], axis=1), direction[:, 0], direction[:, 1])
