@@ -44,8 +44,8 @@ LONGEST = 2**30
 WORTH_TAKING = 0.75
 """Rays that are done are set aside when this part of them or less is left."""
 
-FEW = 50
-"""So few rays are followed faster one by one, in Python's own integers."""
+FEW, ONE_BY_ONE = 50, 4
+"""So few rays are followed faster one by one, in Python's own integers; and so few are begun so."""
 
 Clearance = npt.NDArray[np.uint8]
 
@@ -90,7 +90,7 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     Returns
     -------
     entry : (R,) when a ray enters it, as a whole number over max(1, |dx|) max(1, |dy|); NOTHING; or UNDECIDED for a ray
-        that has no length, or is too long
+        that has no length, or may be too long
     cell : (R,) its place in `clearance`
     several : (R,) whether it is one of those that the ray comes to at once: then it may be that not this one is taken,
         but another. At 0 those are the cells in which it starts. Else it goes along the border of two rows or columns,
@@ -98,6 +98,8 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
         the one behind both
     """
     count = len(start_256)
+    if count <= ONE_BY_ONE:
+        return _each(clearance, start_256, step_256)
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
     start, step = np.ascontiguousarray(start_256.T), np.ascontiguousarray(step_256.T)
     rays, first, columns = _ways(clearance.shape, start, step, entry)
@@ -130,6 +132,55 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     hit_rays = np.concatenate(found)
     entry[hit_rays] = _entries(cell[hit_rays], clearance.shape[1], start[:, hit_rays], step[:, hit_rays])
     return entry, cell, several
+
+
+def _each(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
+    """As `first_taken`, of a few rays."""
+    flat, shape = clearance.reshape(-1).data, clearance.shape
+    found = [
+        (UNDECIDED, 0, False) if step == [0, 0] or max(map(abs, step)) > LONGEST else _one(flat, shape, start, step)
+        for start, step in zip(start_256.tolist(), step_256.tolist(), strict=True)
+    ]
+    entry, cell, several = zip(*found, strict=True) if found else ((), (), ())
+    return np.array(entry, np.int64), np.array(cell, np.int64), np.array(several, np.bool_)
+
+
+def _one(flat: memoryview, shape: tuple[int, ...], start: list[int], step: list[int]) -> tuple[int, int, bool]:
+    """Entry and place of the first taken cell of one ray, and whether it is one of several.
+
+    What lies off the plane is not looked up: there it jumps by its distance from the plane.
+    """
+    (height, width), (dx, dy), (back_x, back_y) = shape, map(abs, step), (v < 0 for v in step)
+    x, y = (start[0] + HALF - back_x) >> 8, (start[1] + HALF - back_y) >> 8
+    sx, sy = 1 - 2 * back_x, 1 - 2 * back_y
+    ax, ay = sx * (start[0] - SUB * x), sy * (start[1] - SUB * y)
+    last_x, last_y = (dx + ax + HALF) >> 8, (dy + ay + HALF) >> 8
+    if any(max(v, v + s * e) < 1 or min(v, v + s * e) > size - 2 for v, s, e, size in (
+        (x, sx, last_x, width), (y, sy, last_y, height)
+    )):  # fmt: skip
+        return NOTHING, 0, False
+    level, upright = dy == 0 and ay == -HALF, dx == 0 and ax == -HALF
+    a, b, c = SUB * dx, SUB * (dx + dy), 0 if level else dx * (HALF - ay) + dy * (HALF + ax)
+    aside = width if level else 1 if upright else sx - sy * width
+    n = 0
+    while n <= last_x + last_y:
+        i, rest = divmod(a * n + c, b)
+        u, v = x + sx * i, y + sy * (n - i)
+        off = max(1 - u, u - width + 2, 0) + max(1 - v, v - height + 2, 0)
+        cell = v * width + u
+        jump = off or (flat[cell] if rest else min(flat[cell], flat[cell - aside]))
+        if not n and not off and _starts_beside(flat, cell, (sx * (ax == -HALF), sy * width * (ay == -HALF))):
+            return 0, cell, True
+        if not jump:
+            times = (SUB * i - HALF - ax) * max(dy, 1), (SUB * (n - i) - HALF - ay) * max(dx, 1)
+            return max(*times, 0), cell, not rest
+        n += jump
+    return NOTHING, 0, False
+
+
+def _starts_beside(flat: memoryview, cell: int, back: tuple[int, int]) -> bool:
+    """Whether a ray that goes into a cell from its border, or along it, begins at another that is taken."""
+    return any(step and not flat[cell - step] for step in (*back, sum(back)))
 
 
 def _alone(flat: memoryview, column: list[int], n: int) -> tuple[int, bool]:

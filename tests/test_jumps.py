@@ -111,12 +111,14 @@ def test_rays_from_anywhere_read_nothing_beyond_the_plane(kernels: ModuleType) -
     start = rng.integers(-(2**48), 2**48, (2000, 2))
     step = rng.integers(-(2**29), 2**29, (2000, 2))
     assert (kernels.first_taken(clearance, start, step)[0] == jumps.NOTHING).all()
-    ends = np.array([[2**23, 77], [-(2**23), 2**23 - 5], [2**29, 2**29], [2**35, 1]])
+    ends = np.array([[2**23, 77], [-(2**23), 2**23 - 5], [2**29, 2**29], [2**35, 1]] * 2)
     middle = np.array([(3 + jumps.PAD) * 256, (2 + jumps.PAD) * 256])
     for sign in (1, -1):
         entry, cell, _ = kernels.first_taken(clearance, middle - sign * ends, 2 * sign * ends)
         decided = entry != jumps.UNDECIDED
-        assert decided.tolist() == [True, True, False, False] and (cell[decided] == 4 * 11 + 5).all()
+        alone = [kernels.first_taken(clearance, middle - sign * end[None], 2 * sign * end[None]) for end in ends[:4]]
+        assert [int(one[0][0]) for one in alone][:2] == entry[:2].tolist() and alone[3][0][0] == jumps.UNDECIDED
+        assert decided.tolist() == [True, True, False, False] * 2 and (cell[decided] == 4 * 11 + 5).all()
 
 
 # The same answers
