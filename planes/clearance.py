@@ -54,10 +54,9 @@ class ClearancePlane:
             self._seen = items.version
         return self._clearance is not None
 
-    def read(self, items: Items) -> tuple[Codes, Clearance]:
-        """Codes (h, w) and distances (h + 2 PAD, w + 2 PAD) of the present version."""
+    def read(self, items: Items, codes: Codes) -> Clearance:
+        """Distances (h + 2 PAD, w + 2 PAD) of the present version; `codes` are what the code plane reads then."""
         with self._lock:
-            made, codes = self._is_made(items), self.codes.read(items)
-            if self._clearance is None or not made:
+            if not self._is_made(items) or self._clearance is None:
                 self._clearance = kernels_of(jumps).clearance_of(codes != 0)
-            return codes, self._clearance
+            return self._clearance

@@ -336,7 +336,6 @@ def test_few_are_left_to_walk() -> None:
     toward = [(55, 20), (55, 21.5), (20, 55), (55.5, 55.5), (5, 22.5)]
     hits = fire(scene, Pistol(None), at, toward=toward, exclude=[-1, 0, -1, -1, -1], strategy="composed")
     assert hits.object.tolist() == [0, 1, 0, 0] and hits.shot.tolist() == [0, 1, 2, 3]
-    assert {s.name: s.bytes_made for s in hits.plan.ran}["jumps"] == 8 * len(at)
     assert hits.plan.has_run("walk") and not hits.plan.has_left_out("walk")
     quiet = fire(scene, Pistol(None), at, toward=toward, strategy="composed").plan
     assert quiet.has_left_out("walk") and quiet.has_left_out("pre-filter") and not quiet.has_run("walk")

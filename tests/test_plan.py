@@ -17,12 +17,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+import planes.clearance
 import planes.compose
 import planes.index
 import planes.items
 import planes.render
 import weapons.ends
 import weapons.firing
+import weapons.firsthits
+import weapons.jumping
 import weapons.narrow
 import weapons.pattern
 import weapons.plan
@@ -30,7 +33,7 @@ import weapons.rayfire
 import weapons.resolve
 import weapons.tracing
 from planes import History, Scene, Sprite
-from weapons import Box, Disc, Laser, Rifle, Weapon, fire, report_of
+from weapons import Box, Disc, Laser, Pistol, Rifle, Weapon, fire, report_of
 from weapons.candidates import Candidates
 from weapons.hits import Hits
 from weapons.pattern import PatternTable
@@ -128,6 +131,19 @@ OF_RAYS = [
     (RAYFIRE, "rows_of_passes", "rows", 10**11),
     (RAYFIRE, "pixels_of", "rows", 2 * 10**11),
 ]
+OF_JUMPS = [
+    *OF_ALL,
+    (RAYFIRE, "chosen_candidates", "plan", 100),
+    (RAYFIRE, "leave_out_absent", "plan", 200),
+    (RAYFIRE, "chosen_way", "plan", 400),
+    (RAYFIRE, "rays_of", "rays", 10**3),
+    (planes.compose.CodePlane, "read", "code plane", 10**4),
+    (planes.clearance.ClearancePlane, "read", "clearance plane", 10**5),
+    (weapons.jumping, "_first_taken", "jumps", 10**6),
+    (weapons.jumping, "_ranks", "jumps", 2 * 10**6),
+    (weapons.jumping, "refused", "filter", 10**7),
+    (weapons.firsthits.FirstHits, "rows", "rows", 10**8),
+]
 BOXES, INDEX = (Candidates, "meeting", "pre-filter", 10**12), (Candidates, "meeting", "broad phase", 10**12)
 CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]] = {
     "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
@@ -146,6 +162,7 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         ],
     ),
     "rays": (Rifle(60, max_hits=2), {"aim": 30, "prefilter": "circle"}, [*OF_RAYS, BOXES]),
+    "rays that jump": (Pistol(60), {"aim": 30, "strategy": "composed"}, OF_JUMPS),
     "rays by an index": (
         Rifle(60, max_hits=2),
         {"aim": 30, "prefilter": "circle", "broadphase": "bvh"},

@@ -63,7 +63,7 @@ def ends_by_jumps(
     ends.rank[met], ends.time[met], ends.reason[met] = rank, entry[met], Reason.HITS
     if stack.has_occluders:
         ends.reason[met[stack.occluder[rank]]] = Reason.OCCLUDER
-    plan.run("jumps", "each to the first cell that is taken", cell.nbytes)
+    plan.run("jumps", "each to the first cell that is taken", ends.nbytes)
     return ends, np.flatnonzero(unsure)
 
 
@@ -73,7 +73,7 @@ def _read(plane: ClearancePlane, items: Items, plan: Plan) -> tuple[Codes, Clear
     codes = plane.codes.read(items)
     redrawn = plane.codes.redrawn
     plan.run("code plane", f"{redrawn} px drawn anew", redrawn * codes.itemsize)
-    codes, clearance = plane.read(items)
+    clearance = plane.read(items, codes)
     plan.run("clearance plane", "as it was" if made else "measured anew", 0 if made else clearance.nbytes)
     return codes, clearance
 
