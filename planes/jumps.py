@@ -224,7 +224,7 @@ def _between(flat: Clearance, columns: Floats, first: Floats, start: Ints) -> In
 
 def _looked(flat: Clearance, columns: Floats, n: Floats) -> tuple[npt.NDArray[np.intp], Bools, Clearance]:
     """Cells of rays after n crossings, whether they are at a corner, and how far they may jump from there."""
-    a, b, c, along, across, base, stop, aside = columns
+    a, b, c, along, across, base, _, aside = columns
     quotient = a * n
     quotient += c
     quotient /= b
@@ -236,8 +236,7 @@ def _looked(flat: Clearance, columns: Floats, n: Floats) -> tuple[npt.NDArray[np
     place += quotient
     cell = place.astype(np.intp)
     jump = flat.take(cell)
-    if corner.any():
-        corner &= n < stop
+    if corner.any():  # it is entered along x, so it lies on a row of the plane, or on one beside, and so does the other
         at = np.flatnonzero(corner)
         jump[at] = np.minimum(jump[at], flat[cell[at] - aside[at].astype(np.intp)])
     return cell, corner, jump
