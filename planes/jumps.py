@@ -15,6 +15,7 @@ is touched as well, and looked at from the first. Of a ray along the border of t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -48,6 +49,7 @@ FEW, ONE_BY_ONE = 50, 4
 """So few rays are followed faster one by one, in Python's own integers; and so few are begun so."""
 
 Clearance = npt.NDArray[np.uint8]
+Passed = Callable[[Ints, Ints], Bools]
 
 
 def clearance_of(taken: Bools) -> Clearance:
@@ -79,13 +81,17 @@ def _spread(distance: Clearance) -> None:
             np.minimum(here, farther, out=here)
 
 
-def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
+def first_taken(
+    clearance: Clearance, start_256: Ints, step_256: Ints, passed: Passed | None = None
+) -> tuple[Ints, Ints, Bools]:
     """The first cell of each ray that is taken.
 
     Parameters
     ----------
     clearance : (H, W) of `clearance_of`
     start_256, step_256 : (R, 2) rays, about the middle of pixel [0, 0] of `clearance`, up to 2**48
+    passed : tells of rays and taken cells whether the ray goes on as if the cell were free; it may always say no. The
+        compiled twin has none
 
     Returns
     -------
@@ -98,7 +104,7 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
         the one behind both
     """
     count = len(start_256)
-    if count <= ONE_BY_ONE:
+    if count <= ONE_BY_ONE and passed is None:
         return _each(clearance, start_256, step_256)
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
     start, step = np.ascontiguousarray(start_256.T), np.ascontiguousarray(step_256.T)
@@ -110,8 +116,12 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     if len(between):
         others = np.delete(np.arange(len(n)), between)
         rays, n, columns = rays[others], n[others], columns[:, others]
-    while len(n) > FEW:
+    few = FEW if passed is None else 0
+    while len(n) > few:
         k, at_corner, jump = _looked(flat, columns, n)
+        if passed is not None:
+            at = np.flatnonzero((jump == 0) & ~at_corner)
+            jump[at] = passed(rays[at], k[at])
         n += jump
         np.minimum(n, columns[6], out=n)
         live = n < columns[6]

@@ -328,17 +328,18 @@ def test_rays_jump_where_it_pays() -> None:
 
 
 def test_few_are_left_to_walk() -> None:
-    """Only those that refuse what they meet first; the others walk not one cell."""
+    """Only those that refuse what lies in front of something; the others walk not one cell."""
     scene = Scene((60, 60))
-    scene.add(np.ones((5, 5), np.bool_), (20, 20))
-    scene.add(np.ones((5, 5), np.bool_), (40, 20))
-    at = [(10, 20), (10, 21.5), (20, 10.5), (0.5, 0.5), (10, 22.5)]
-    toward = [(55, 20), (55, 21.5), (20, 55), (55.5, 55.5), (5, 22.5)]
-    hits = fire(scene, Pistol(None), at, toward=toward, exclude=[-1, 0, -1, -1, -1], strategy="composed")
-    assert hits.object.tolist() == [0, 1, 0, 0] and hits.shot.tolist() == [0, 1, 2, 3]
-    assert hits.plan.has_run("walk") and not hits.plan.has_left_out("walk")
-    quiet = fire(scene, Pistol(None), at, toward=toward, strategy="composed").plan
-    assert quiet.has_left_out("walk") and quiet.has_left_out("pre-filter") and not quiet.has_run("walk")
+    for x in (20, 40, 41):
+        scene.add(np.ones((5, 5), np.bool_), (x, 20))
+    at = [(10, 20.25), (10, 21.5), (20, 10.5), (0.5, 0.5), (10, 22.5), (20.25, 20.25)]
+    toward = [(55, 20.5), (55, 21.5), (20, 55), (55.5, 55.5), (5, 22.5), (57, 20.5)]
+    plan = fire(scene, Pistol(None), at, toward=toward, strategy="composed").plan
+    assert plan.has_left_out("walk") and plan.has_left_out("pre-filter") and not plan.has_run("walk")
+    hits = fire(scene, Pistol(None), at[::5], toward=toward[::5], exclude=0, strategy="composed")
+    assert hits.object.tolist() == [1, 1] and hits.plan.has_left_out("walk")
+    hits = fire(scene, Pistol(None), toward[:1], toward=at[:1], exclude=2, strategy="composed")
+    assert hits.object.tolist() == [1] and hits.plan.has_run("walk")
 
 
 @example(1)

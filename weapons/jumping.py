@@ -1,10 +1,13 @@
 """Rays that jump to the first thing on their way, by the clearance plane of the scene, instead of walking past items.
 
 Only thin rays that end at their first hit: where such a ray first touches anything at all, the code plane tells what.
-Those for which that is not enough are left to the walk: they refuse what they touch first, or have no length.
+What rays refuse they go through, cell by cell. Those for which all this is not enough are left to the walk: they refuse
+what lies in front of something else, or what they touch together with it, or have no length.
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +17,7 @@ from planes.clearance import ClearancePlane
 from planes.compose import Codes
 from planes.constants import HALF, SUB
 from planes.items import Items, Stack
-from planes.jumps import PAD, UNDECIDED, Clearance
+from planes.jumps import PAD, UNDECIDED, Clearance, Passed
 from planes.spans import meets
 from planes.twins import kernels_of
 from weapons.candidates import may_refuse, refused
@@ -41,21 +44,38 @@ def ends_by_jumps(
     the ends, and the rays for which they are yet to be found
     """
     codes, clearance = _read(plane, items, plan)
-    entry, cell, several = _first_taken(clearance, rays, plane.corner_xy)
+    choosy, ranks = may_refuse(stack, shots), _ranks(stack)
+
+    def seen(cell: Ints) -> tuple[Ints, Codes]:
+        """Rank of the front of taken cells, and their codes."""
+        y, x = np.divmod(cell, clearance.shape[1])
+        code = codes.reshape(-1).take((y - PAD) * codes.shape[1] + (x - PAD))
+        return ranks.take(code >> 1), code
+
+    def refuses(ray: Ints, rank: Ints) -> Bools:
+        plan.run("jumps", "")
+        found = refused(stack, rank, shots, rays.shot[ray])
+        plan.run("filter", "categories and owners", found.nbytes)
+        return found
+
+    def passed(ray: Ints, cell: Ints) -> Bools:
+        """Whether rays refuse all that is in taken cells."""
+        rank, code = seen(cell)
+        return np.asarray(refuses(ray, rank) & (code & 1 == 0))
+
+    entry, cell, several = _first_taken(clearance, rays, plane.corner_xy, passed if choosy else None)
     unsure, met = entry == UNDECIDED, np.flatnonzero(entry >= 0)
     place = cell[met]
-    choosy, at = may_refuse(stack, shots), np.flatnonzero(several[met])
+    at = np.flatnonzero(several[met])
     if len(at):
         one = met[at]
         cells = _cells_at_once(place[at], entry[one] == 0, rays.start_256[one], rays.step_256[one], clearance.shape[1])
         place[at], others = _first_of(cells, codes, clearance, plane.corner_xy, stack)
         unsure[one] = others & choosy
     y, x = np.divmod(place, clearance.shape[1])
-    rank = _ranks(stack).take(codes.reshape(-1).take((y - PAD) * codes.shape[1] + (x - PAD)) >> 1)
+    rank, _ = seen(place)
     if choosy:
-        plan.run("jumps", "")
-        unsure[met] |= refused(stack, rank, shots, rays.shot[met])
-        plan.run("filter", "categories and owners", len(met))
+        unsure[met] |= refuses(met, rank)
     if ray.inside != "hit":
         unsure |= entry == 0
     ends, aside = endless(len(rays)), plane.corner_xy - rays.origin_xy
@@ -78,18 +98,26 @@ def _read(plane: ClearancePlane, items: Items, plan: Plan) -> tuple[Codes, Clear
     return codes, clearance
 
 
-def _first_taken(clearance: Clearance, rays: Rays, corner_xy: Ints) -> tuple[Ints, Ints, Bools]:
-    """First taken cells of all rays, so many at once that they fit the cache."""
-    kernels = kernels_of(jumps, len(rays) * JUMP_RAY_NS)
+def _first_taken(clearance: Clearance, rays: Rays, corner_xy: Ints, passed: Passed | None) -> tuple[Ints, Ints, Bools]:
+    """First taken cells of all rays, but for those that are passed, so many rays at once that they fit the cache."""
     start, found = rays.start_256 - SUB * corner_xy, []
     for begin in range(0, max(len(rays), 1), RAYS_AT_ONCE):
         part = slice(begin, begin + RAYS_AT_ONCE)
-        found.append(kernels.first_taken(clearance, start[part], rays.step_256[part]))
+        if passed is None:
+            kernels = kernels_of(jumps, len(rays) * JUMP_RAY_NS)
+            found.append(kernels.first_taken(clearance, start[part], rays.step_256[part]))
+        else:
+            later = partial(_later, passed, begin)
+            found.append(jumps.first_taken(clearance, start[part], rays.step_256[part], later))
     if len(found) == 1:
         first: tuple[Ints, Ints, Bools] = found[0]
         return first
     entry, cell, several = (np.concatenate(column) for column in zip(*found, strict=True))
     return entry, cell, several
+
+
+def _later(passed: Passed, begin: int, ray: Ints, cell: Ints) -> Bools:
+    return passed(ray + begin, cell)
 
 
 def _ranks(stack: Stack) -> Ints:
