@@ -116,6 +116,17 @@ def first_taken(
     if len(between):
         others = np.delete(np.arange(len(n)), between)
         rays, n, columns = rays[others], n[others], columns[:, others]
+    found.append(_follow(flat, rays, n, columns, cell, several, passed))
+    hit_rays = np.concatenate(found)
+    entry[hit_rays] = _entries(cell[hit_rays], clearance.shape[1], start[:, hit_rays], step[:, hit_rays])
+    return entry, cell, several
+
+
+def _follow(
+    flat: Clearance, rays: Ints, n: Floats, columns: Floats, cell: Ints, several: Bools, passed: Passed | None
+) -> Ints:
+    """Let rays go on, one jump each in turn, until all are done; those that came to something, and where is told."""
+    found: list[Ints] = []
     few = FEW if passed is None else 0
     while len(n) > few:
         k, at_corner, jump = _looked(flat, columns, n)
@@ -139,9 +150,7 @@ def first_taken(
         if place != NOTHING:
             cell[ray], several[ray] = place, corner
             found.append(np.array([ray]))
-    hit_rays = np.concatenate(found)
-    entry[hit_rays] = _entries(cell[hit_rays], clearance.shape[1], start[:, hit_rays], step[:, hit_rays])
-    return entry, cell, several
+    return np.concatenate([np.zeros(0, np.int64), *found])
 
 
 def _each(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:

@@ -7,6 +7,7 @@ what lies in front of something else, or what they touch together with it, or ha
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -34,6 +35,37 @@ RAYS_AT_ONCE = 2**14
 """Rays whose columns fit the cache."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What rays see of the scene where they come to something."""
+
+    rays: Rays
+    shots: Shots
+    stack: Stack
+    codes: Codes
+    clearance: Clearance
+    ranks: Ints
+    plan: Plan
+
+    def front(self, cell: Ints) -> tuple[Ints, Codes]:
+        """Rank of the front of taken cells, and their codes."""
+        y, x = np.divmod(cell, self.clearance.shape[1])
+        code = self.codes.reshape(-1).take((y - PAD) * self.codes.shape[1] + (x - PAD))
+        return self.ranks.take(code >> 1), code
+
+    def refuses(self, ray: Ints, rank: Ints) -> Bools:
+        """Whether rays refuse items."""
+        self.plan.run("jumps", "")
+        found = refused(self.stack, rank, self.shots, self.rays.shot[ray])
+        self.plan.run("filter", "categories and owners", found.nbytes)
+        return found
+
+    def passed(self, ray: Ints, cell: Ints) -> Bools:
+        """Whether rays refuse all that is in taken cells."""
+        rank, code = self.front(cell)
+        return np.asarray(self.refuses(ray, rank) & (code & 1 == 0))
+
+
 def ends_by_jumps(
     rays: Rays, ray: Traced, shots: Shots, items: Items, stack: Stack, plane: ClearancePlane, plan: Plan
 ) -> tuple[Ends, Ints]:
@@ -43,41 +75,21 @@ def ends_by_jumps(
     -------
     the ends, and the rays for which they are yet to be found
     """
-    codes, clearance = _read(plane, items, plan)
-    choosy, ranks = may_refuse(stack, shots), _ranks(stack)
-
-    def seen(cell: Ints) -> tuple[Ints, Codes]:
-        """Rank of the front of taken cells, and their codes."""
-        y, x = np.divmod(cell, clearance.shape[1])
-        code = codes.reshape(-1).take((y - PAD) * codes.shape[1] + (x - PAD))
-        return ranks.take(code >> 1), code
-
-    def refuses(ray: Ints, rank: Ints) -> Bools:
-        plan.run("jumps", "")
-        found = refused(stack, rank, shots, rays.shot[ray])
-        plan.run("filter", "categories and owners", found.nbytes)
-        return found
-
-    def passed(ray: Ints, cell: Ints) -> Bools:
-        """Whether rays refuse all that is in taken cells."""
-        rank, code = seen(cell)
-        return np.asarray(refuses(ray, rank) & (code & 1 == 0))
-
-    entry, cell, several = _first_taken(clearance, rays, plane.corner_xy, passed if choosy else None)
+    seen = _Seen(rays, shots, stack, *_read(plane, items, plan), _ranks(stack), plan)
+    choosy = may_refuse(stack, shots)
+    entry, cell, several = _first_taken(seen.clearance, rays, plane.corner_xy, seen.passed if choosy else None)
     unsure, met = entry == UNDECIDED, np.flatnonzero(entry >= 0)
-    place = cell[met]
-    at = np.flatnonzero(several[met])
+    at = np.flatnonzero(several)
     if len(at):
-        one = met[at]
-        cells = _cells_at_once(place[at], entry[one] == 0, rays.start_256[one], rays.step_256[one], clearance.shape[1])
-        place[at], others = _first_of(cells, codes, clearance, plane.corner_xy, stack)
-        unsure[one] = others & choosy
-    y, x = np.divmod(place, clearance.shape[1])
-    rank, _ = seen(place)
+        cells = _cells_at_once(cell[at], entry[at] == 0, rays.start_256[at], rays.step_256[at], seen.clearance.shape[1])
+        cell[at], others = _first_of(cells, seen, plane.corner_xy)
+        unsure[at] = others & choosy
+    rank, _ = seen.front(cell[met])
     if choosy:
-        unsure[met] |= refuses(met, rank)
+        unsure[met] |= seen.refuses(met, rank)
     if ray.inside != "hit":
         unsure |= entry == 0
+    y, x = np.divmod(cell[met], seen.clearance.shape[1])
     ends, aside = endless(len(rays)), plane.corner_xy - rays.origin_xy
     ends.x[met], ends.y[met] = x + aside[met, 0], y + aside[met, 1]
     ends.rank[met], ends.time[met], ends.reason[met] = rank, entry[met], Reason.HITS
@@ -143,24 +155,24 @@ def _cells_at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, 
     return np.asarray(place[:, None] + steps[:, :, 0] + width * steps[:, :, 1])
 
 
-def _first_of(cells: Ints, codes: Codes, clearance: Clearance, corner_xy: Ints, stack: Stack) -> tuple[Ints, Bools]:
+def _first_of(cells: Ints, seen: _Seen, corner_xy: Ints) -> tuple[Ints, Bools]:
     """Of cells (n, k) that rays come to at once, the one that comes first: with an occluder, then by (y, x).
 
     Returns
     -------
     its place; and whether more cells than that are taken
     """
-    taken = clearance.reshape(-1)[cells] == 0
+    taken = seen.clearance.reshape(-1)[cells] == 0
     blocked = np.zeros_like(taken)
-    if stack.has_occluders:
-        y, x = np.divmod(cells[taken], clearance.shape[1])
-        code = codes[y - PAD, x - PAD].astype(np.int64)
-        in_front = stack.occluder[_ranks(stack)[code >> 1]]
+    if seen.stack.has_occluders:
+        rank, code = seen.front(cells[taken])
+        in_front = seen.stack.occluder[rank]
         behind = np.flatnonzero(~in_front & (code & 1 == 1))
-        in_front[behind] = _has_occluder(stack, np.stack([x, y], axis=1)[behind] + corner_xy)
+        y, x = np.divmod(cells[taken][behind], seen.clearance.shape[1])
+        in_front[behind] = _has_occluder(seen.stack, np.stack([x, y], axis=1) + corner_xy)
         blocked[taken] = in_front
     last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
-    best = np.argmin((~taken * 2 + ~blocked) * clearance.size + cells, axis=1)
+    best = np.argmin((~taken * 2 + ~blocked) * seen.clearance.size + cells, axis=1)
     return cells[np.arange(len(cells)), best], (taken & (cells != last)).any(axis=1)
 
 

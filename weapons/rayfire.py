@@ -24,7 +24,7 @@ from weapons.hits import Rows
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops, passes_of, stops_of
 from weapons.plan import Plan, chosen_candidates, leave_out_absent, leave_out_imagery, read_stack
-from weapons.rayhits import RayHits, pixels_of, rows_of_passes
+from weapons.rayhits import RayHits, Told, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
 from weapons.rayways import chosen_way, ends_at_first, jumps_at_all
 from weapons.trace import Lines
@@ -89,15 +89,19 @@ def fired_rays(
             plan.run("rows", "passes, gathered by object", rows[-1].nbytes)
         if begin:
             rows[-1].shot[:] += begin
-    told = (
-        lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
-        lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
-    )
-    hits = RayHits(Rows.joined(rows), told, each * len(shots), scene, weapon, shots, plan)
+    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
     plan.run("rows", "")
     _leave_out_unused(plan, scene, through, shots, ray, plane is not None, why)
     plan.run("plan", "")
     return hits
+
+
+def _told(found: list[tuple[int, Followed | FirstHits]]) -> Told:
+    """What joins the passes and stops of parts of the shots, each with the number of its first shot."""
+    return (
+        lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
+        lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
+    )
 
 
 def _later(columns: C, first_shot: int) -> C:

@@ -29,7 +29,7 @@ from weapons.weapon import Weapon
 if TYPE_CHECKING:
     from weapons.margins import Margin
 
-__all__ = ["RayHits", "Reason", "groups_of", "pixels_of", "rows_of_passes"]
+__all__ = ["RayHits", "Reason", "Told", "groups_of", "pixels_of", "rows_of_passes"]
 
 
 C = TypeVar("C", Passes, Stops)
