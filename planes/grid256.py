@@ -19,6 +19,7 @@ __all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "scaled", "snap", "
 
 ONE = 1 << TRIG_BITS
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
+_FIXED_BITS = 160  # as exact as _PI
 _DOUBT = 2.0**-12  # numpy's sine is within a few ulp (2**-21 after the scaling); nearer to a tie than this, ask again
 
 ANGLES_KEPT = 2**12
@@ -131,15 +132,14 @@ def _exact_cos(degrees: float) -> int:
 
 
 def _taylor(degrees: float, first: int) -> int:
-    """Round 2**30 times the sine (first = 1) or cosine (first = 0) of [0, 45] degrees, from 30 terms in fractions."""
-    from fractions import Fraction  # few angles are so near to a tie
-
-    x = Fraction(float(degrees)) / 180 * Fraction(*_PI)
-    term = total = x if first else Fraction(1)
+    """Round 2**30 times the sine (first = 1) or cosine (first = 0) of [0, 45] degrees, from 30 terms in fixed point."""
+    part, whole = float(degrees).as_integer_ratio()
+    x = (part * _PI[0] << _FIXED_BITS) // (whole * 180 * _PI[1])
+    term = total = x if first else 1 << _FIXED_BITS
     for n in range(first + 1, first + 30, 2):
-        term = -term * x * x / (n * (n + 1))
+        term = -(term * x * x >> 2 * _FIXED_BITS) // (n * (n + 1))
         total += term
-    return round(total * ONE)
+    return (2 * total * ONE + (1 << _FIXED_BITS)) >> (_FIXED_BITS + 1)
 
 
 def _toward(dx: int, dy: int) -> tuple[int, int]:
