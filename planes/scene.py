@@ -23,8 +23,8 @@ from planes.spans import Box
 from planes.sprite import as_sprite, form_of
 
 if TYPE_CHECKING:
-    from planes.visible import Compositions
     from planes.clearance import ClearancePlane
+    from planes.visible import Compositions
     from planes.volumes import Volumes
 
 __all__ = ["Scene"]
