@@ -54,6 +54,10 @@ class Tiles:
         place, tile = ragged(np.searchsorted(self.rank, rank, side="right") - begin)
         return place, begin[place] + tile
 
+    def each(self, told: Bools) -> Bools:
+        """What is told of items (M,), of their tiles (T,)."""
+        return told if self.whole else told[self.rank]
+
     def boxes(self, items_xyxy: Ints) -> Ints:
         """Inclusive boxes (T, 4) of tiles, of the boxes (M, 4) of the items of the stack."""
         if self.whole:

@@ -18,6 +18,7 @@ LOADING_NS = 2e9
 """A call that is expected to take longer in numpy loads the compiled twins of itself, which takes about 1 s."""
 
 _asked: list[bool] = []
+_twins: dict[str, ModuleType] = {}
 
 
 def use_jit(on: bool | None = True) -> None:
@@ -43,4 +44,8 @@ def kernels_of(module: ModuleType, expected_ns: float = 0.0) -> ModuleType:
     expected_ns : what the call is expected to take in numpy
     """
     compiled = _asked[0] if _asked else expected_ns > LOADING_NS and find_spec("numba") is not None
-    return import_module(f"{module.__name__}_jit") if compiled else module
+    if not compiled:
+        return module
+    if module.__name__ not in _twins:
+        _twins[module.__name__] = import_module(f"{module.__name__}_jit")
+    return _twins[module.__name__]

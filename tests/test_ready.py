@@ -281,7 +281,7 @@ def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for k in range(300):
         at, aim = (float(7 * k % 220), float(11 * k % 160)), float(k % 97)
         assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
-        kept = ready._cells.nbytes if "cells" in limit else ready._aims_bytes
+        kept = ready._cells.nbytes if "squares" in limit else ready._aims_bytes
         assert kept < 60_000
         assert sum(map(len, ready._cells.made.values())) * weapons.squares.CELL_BYTES < 60_000 or "ready" in limit
         assert len(ready._told) <= 100

@@ -13,7 +13,7 @@ import numpy as np
 
 from planes import bitrows, cells
 from planes.arrays import Ints
-from planes.bitrows import Beside, Seen, Windows
+from planes.bitrows import WORD, Beside, Seen, Windows
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
@@ -38,8 +38,14 @@ __all__ = ["counts", "fired_by_bits", "view_of"]
 PLACEMENTS_AT_ONCE = 2**14
 """Placements of a part of a batch at most: 128 KB for each of their columns."""
 
+BESIDE_BYTES_MOST = 2**26
+"""Distances along the rows of tiles are not made if they take more."""
+
 PAIRS_AT_ONCE = 2**16
 """Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
+
+NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
+"""No distances along rows: the nearest pixel is looked for in what is hit."""
 
 REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
@@ -128,10 +134,11 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
         listed = composition.cells(_reach(windows.box_xyxy))
         placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
         sight.plan.run("pre-filter", f"cells of {1 << listed.bits} px", placement.nbytes + near.nbytes)
-        beside = NOT_BESIDE
-        if kernels_of(bitrows) is bitrows and len(near) > len(composition.seen.rank) and _is_disc(volley):
+        seen, beside = composition.seen, NOT_BESIDE
+        many = len(seen.rank) < len(near) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
+        if many and kernels_of(bitrows) is bitrows and _is_disc(volley):
             beside = composition.beside
-        return _counted(volley, windows, placement, near, composition.seen, beside, sight)
+        return _counted(volley, windows, placement, near, seen, beside, sight)
 
     return read
 
@@ -145,8 +152,10 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
     def read(shots: Shots, volley: Volley, windows: Windows) -> Rows:
         placement, rank = _near_objects(shots, volley, sight)
         pair, tile = tiles.of(rank)
-        seer = None if view is not None else volley.shot[placement[pair]]
-        which, near, of, front = _seen_by(tiles, boxes, tile, seer, view, shots, sight)
+        if view is None:
+            which, near, of, front = _seen_by_each(tiles, boxes, tile, volley.shot[placement[pair]], shots, sight)
+        else:
+            which, near, of, front = _seen_by_all(tiles, boxes, tile, view, sight)
         seen = seen_of(tiles, boxes, sight.bounds, which, of, front)
         sight.plan.run("visible", "what is in front of the tiles near placements", seen.words.nbytes)
         return _counted(volley, windows, placement[pair], near, seen, NOT_BESIDE, sight)
@@ -165,25 +174,24 @@ def _near_objects(shots: Shots, volley: Volley, sight: Sight) -> tuple[Ints, Int
     return placement[some], rank[some]
 
 
-def _seen_by(
-    tiles: Tiles, boxes: Ints, tile: Ints, seer: Ints | None, view: View | None, shots: Shots, sight: Sight
-) -> tuple[Ints, Ints, Ints, Ints]:
-    """Tiles to be seen, each once, or once for each shot that sees it; which of them each pair has; what covers them.
+def _seen_by_all(tiles: Tiles, boxes: Ints, tile: Ints, view: View, sight: Sight) -> tuple[Ints, Ints, Ints, Ints]:
+    """Tiles (V,) to be seen, each once; which of them each pair (n,) has; and what covers them, as `seen_of` takes it."""
+    there = view.accepts(sight.stack)
+    blocks = there & sight.stack.occluder if sight.pierce else there
+    which, near = _distinct(tile, len(tiles))
+    return which, near, *in_front(boxes, which, tiles.each(blocks))
 
-    Returns
-    -------
-    which tiles (V,); of each pair (n,) its place among them; and (of, front) as `seen_of` takes them
-    """
+
+def _seen_by_each(
+    tiles: Tiles, boxes: Ints, tile: Ints, shot: Ints, shots: Shots, sight: Sight
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """The same for shots that accept different items: a tile is seen once by each shot (n,) that has it in a pair."""
     stack = sight.stack
     blocks = stack.occluder if sight.pierce else np.ones(len(stack), np.bool_)
-    if view is not None or seer is None:
-        which, near = _distinct(tile, len(tiles))
-        there = blocks if view is None else blocks & view.accepts(stack)
-        return which, near, *in_front(boxes, which, there if tiles.whole else there[tiles.rank])
-    pairs, near = np.unique(seer * len(tiles) + tile, return_inverse=True)
-    shot, which = np.divmod(pairs, len(tiles))
-    of, front = in_front(boxes, which, blocks if tiles.whole else blocks[tiles.rank])
-    accepted = ~refused(stack, tiles.rank[front], shots, shot[of])
+    seen, near = np.unique(shot * len(tiles) + tile, return_inverse=True)
+    seer, which = np.divmod(seen, len(tiles))
+    of, front = in_front(boxes, which, tiles.each(blocks))
+    accepted = ~refused(stack, tiles.rank[front], shots, seer[of])
     return which, near, of[accepted], front[accepted]
 
 
@@ -195,9 +203,6 @@ def _distinct(values: Ints, most: int) -> tuple[Ints, Ints]:
     place = np.empty(most, np.int64)
     place[distinct] = np.arange(len(distinct))
     return distinct, place[values]
-
-
-NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
 
 
 def view_of(pierce: bool, shots: Shots) -> View | None:
