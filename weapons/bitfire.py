@@ -175,7 +175,7 @@ def _near_objects(shots: Shots, volley: Volley, sight: Sight) -> tuple[Ints, Int
 
 
 def _seen_by_all(tiles: Tiles, boxes: Ints, tile: Ints, view: View, sight: Sight) -> tuple[Ints, Ints, Ints, Ints]:
-    """Tiles (V,) to be seen, each once; which of them each pair (n,) has; and what covers them, as `seen_of` takes it."""
+    """Tiles (V,) to be seen, each once; which of them each pair (n,) has; what covers them, as `seen_of` takes it."""
     there = view.accepts(sight.stack)
     blocks = there & sight.stack.occluder if sight.pierce else there
     which, near = _distinct(tile, len(tiles))

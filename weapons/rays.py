@@ -9,8 +9,9 @@ import numpy as np
 from planes.arrays import Ints
 from planes.constants import SUB
 from planes.grid256 import pixel, scaled, snap, turned, unit
+from planes.twins import kernels_of
+from weapons import draws
 from weapons.arsenal import Rounds, Spread
-from weapons.draws import disc_offsets
 from weapons.guns import Sweep, Traced
 from weapons.volley import Shots, recoiled
 
@@ -86,5 +87,5 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
         key = shots.seed[shot], shots.number[shot], round_, pellet
-        step = step + SUB * disc_offsets(int(snap(several.radius)), *key)
+        step = step + SUB * kernels_of(draws).disc_offsets(int(snap(several.radius)), *key)
     return step

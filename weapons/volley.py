@@ -12,8 +12,9 @@ from planes.arrays import InputError, Ints, array_of, each, integer, integers, r
 from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
 from planes.poses import points
+from planes.twins import kernels_of
+from weapons import draws
 from weapons.arsenal import Plain, has_no_range, parts_of, pattern_of
-from weapons.draws import Words, disc_offsets
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
 
@@ -48,7 +49,7 @@ class Shots:
     accept: Ints
     exclude: Ints
     number: Ints
-    seed: Words
+    seed: draws.Words
     row: Ints
 
     def __len__(self) -> int:
@@ -203,7 +204,9 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     origin_xy = pixel(origin)
     xy = origin_xy
     if spread:
-        offsets = disc_offsets(int(snap(spread.radius)), shots.seed[shot], shots.number[shot], round_, pellet)
+        offsets = kernels_of(draws).disc_offsets(
+            int(snap(spread.radius)), shots.seed[shot], shots.number[shot], round_, pellet
+        )
         xy = origin_xy + offsets
     table, pattern = _patterns(plain, direction)
     return Volley(table, pattern, xy, origin_xy, shot, round_, pellet)
@@ -264,7 +267,7 @@ def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
     return turned(direction, c[round_], s[round_])
 
 
-def _seeds(seed: object, n: int) -> Words:
+def _seeds(seed: object, n: int) -> draws.Words:
     """Seeds (n,): one for all, or one for each."""
     # As objects: numpy would make float64 of a list with numbers on both sides of 2**63, and lose their last bits.
     if type(seed) is int and 0 <= seed <= SEED_MAX:
