@@ -56,6 +56,7 @@ _ONE = np.uint64(1)
 _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _SUM = np.uint64(0x0001000100010001)
+_NONE = 2**16 - 1
 _FAR, _FAR_SMALL = 2**22, 2**14
 """Farther from the origin than any pixel of a pattern, px; and of one whose squares fit int32, with a sum of two."""
 
@@ -200,13 +201,18 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
 
 def _meets(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints) -> Bools:
     """Whether the boxes of pairs share a pixel."""
-    pattern, boxes = placed.pattern[placement], windows.box_xyxy
-    x, y, tiles = placed.x[placement], placed.y[placement], seen.box_xyxy
-    met = x + boxes[pattern, 2] >= tiles[near, 0]
-    met &= x + boxes[pattern, 0] <= tiles[near, 2]
-    met &= y + boxes[pattern, 3] >= tiles[near, 1]
-    met &= y + boxes[pattern, 1] <= tiles[near, 3]
+    pattern, boxes = _which(placed, windows, placement), windows.box_xyxy
+    x, y, tiles = placed.x[placement], placed.y[placement], seen.box_xyxy[near]
+    met = tiles[:, 0] - x <= boxes[pattern, 2]
+    met &= tiles[:, 2] - x >= boxes[pattern, 0]
+    met &= tiles[:, 1] - y <= boxes[pattern, 3]
+    met &= tiles[:, 3] - y >= boxes[pattern, 1]
     return np.asarray(met)
+
+
+def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
+    """Patterns of placements; 0 where there is but one."""
+    return placed.pattern[placement] if len(windows.first) > 1 else 0
 
 
 def _rows_counted(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints) -> tuple[int, Ints]:
@@ -214,13 +220,13 @@ def _rows_counted(placed: Placed, windows: Windows, seen: Seen, placement: Ints,
     box = windows.box_xyxy
     high = -(-int((box[:, 3] - box[:, 1]).max(initial=0) + 1) // 8) * 8
     if high <= PAD and high < seen.height:
-        return high, placed.y[placement] + box[placed.pattern[placement], 1]
+        return high, placed.y[placement] + box[_which(placed, windows, placement), 1]
     return seen.height, seen.box_xyxy[near, 1]
 
 
 def _windows(placed: Placed, windows: Windows, height: int, placement: Ints, left: Ints, top: Ints) -> Words:
     """Windows (n, height) of placed patterns: of 64 columns from `left` on, of rows from `top` on, in the world."""
-    pattern = placed.pattern[placement]
+    pattern = _which(placed, windows, placement)
     column = left - placed.x[placement] - windows.box_xyxy[pattern, 0] + WORD - 1
     row = top - placed.y[placement] - windows.box_xyxy[pattern, 1]
     word, shift = column >> 6, column & (WORD - 1)
@@ -269,9 +275,9 @@ def front_at(codes: Codes, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) ->
     return place[some[hit]], item[hit]
 
 
-def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints, rank: Ints) -> Ints:
-    """Places of rows in the order of (group, distance2, y, x, rank); groups are sorted already."""
-    keys = (group, distance2, y, x, rank)
+def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
+    """Places of rows in the order of (group, distance2, y, x, place); groups are sorted already."""
+    keys = (group, distance2, y, x)
     count = len(group)
     least = [int(key.min(initial=0)) for key in keys]
     bits = [int(key.max(initial=0) - low).bit_length() for key, low in zip(keys, least, strict=True)]
@@ -322,19 +328,21 @@ def _nearest_seen(placed: Placed, seen: Seen, beside: Beside, placement: Ints, n
     """Like `_nearest`, of all visible pixels of tiles: a disc that hits any of them hits the nearest."""
     left, top = seen.box_xyxy[near, 0] - placed.origin_x[placement], seen.box_xyxy[near, 1] - placed.origin_y[placement]
     column = np.minimum(np.maximum(-left, 0), WORD - 1)
-    across = beside[near, column]
-    away = np.abs(left + column)
-    kind = np.int32 if _small(left, top, seen.height) else np.int64
-    distance = across.astype(kind)
-    distance += away.astype(kind)[:, None]
-    distance[across == NOWHERE] = _FAR if kind is np.int64 else _FAR_SMALL
-    row, distance2 = _least(distance, top, kind)
+    across, away = beside[near, column], np.abs(left + column)
+    far = max(int(away.max(initial=0)) + WORD, int(np.abs(top).max(initial=0)) + WORD)
+    kind = np.uint16 if 2 * far * far < _NONE else np.int64
+    distance2: npt.NDArray[Any] = across + away.astype(kind)[:, None]
+    np.square(distance2, out=distance2)
+    down = np.abs(top[:, None] + np.arange(seen.height)).astype(kind)
+    distance2 += np.square(down, out=down)
+    distance2[across == NOWHERE] = np.iinfo(kind).max
+    row = distance2.argmin(axis=1)
     every = np.arange(len(near))
     step = across[every, row].astype(np.int64)
     word = seen.words[seen.begin[near] + row]
     before = (word >> np.maximum(column - step, 0).astype(np.uint64)) & _ONE
     x = np.where((before == 1) & (step <= column), column - step, column + step) + left
-    return distance2, x, row + top
+    return distance2[every, row].astype(np.int64), x, row + top
 
 
 def _nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:

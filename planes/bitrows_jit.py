@@ -231,16 +231,16 @@ def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
 
 
 @njit(inline="always")
-def _sooner(a, b, distance2, y, x, rank):
+def _sooner(a, b, distance2, y, x):
     if distance2[a] != distance2[b]:
         return distance2[a] < distance2[b]
     if y[a] != y[b]:
         return y[a] < y[b]
-    return x[a] < x[b] if x[a] != x[b] else rank[a] < rank[b]
+    return x[a] < x[b] if x[a] != x[b] else a < b
 
 
-@njit([types.void(*[INTS] * 5, OUT)], cache=True, nogil=True)
-def _row_order(group, distance2, y, x, rank, order):
+@njit([types.void(*[INTS] * 4, OUT)], cache=True, nogil=True)
+def _row_order(group, distance2, y, x, order):
     begin = 0
     while begin < len(order):
         end = begin
@@ -253,7 +253,7 @@ def _row_order(group, distance2, y, x, rank, order):
         while step:  # Shell (1959): sorted runs of few rows are what there mostly is
             for i in range(begin + step, end):
                 row, j = order[i], i
-                while j - step >= begin and _sooner(row, order[j - step], distance2, y, x, rank):
+                while j - step >= begin and _sooner(row, order[j - step], distance2, y, x):
                     order[j] = order[j - step]
                     j -= step
                 order[j] = row
@@ -261,10 +261,10 @@ def _row_order(group, distance2, y, x, rank, order):
         begin = end
 
 
-def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints, rank: Ints) -> Ints:
+def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
     """See `bitrows.row_order`."""
     order = np.empty(len(group), np.int64)
-    _row_order(group, distance2, y, x, rank, order)
+    _row_order(group, distance2, y, x, order)
     return order
 
 

@@ -44,7 +44,7 @@ def counted(
     turn = volley.shot[found.placement] * volley.rounds + volley.round[found.placement]
     pixels, pellets = samples, np.ones_like(samples)
     if volley.scattered or not _rising(seen.rank):
-        order = kernels.row_order(turn, rank, found.seen, found.placement, np.zeros_like(rank))
+        order = kernels.row_order(turn, rank, found.seen, found.placement)
         found, rank, turn = Found(*(column[order] for column in found)), rank[order], turn[order]
         first = np.flatnonzero((np.diff(turn, prepend=-1) != 0) | (np.diff(rank, prepend=-1) != 0))
         samples = pixels = _sums(found.samples, first)
@@ -53,7 +53,7 @@ def counted(
         best = _nearest(found, first, kernels)
         found, rank, turn = Found(*(column[best] for column in found)), rank[best], turn[best]
         pellets = pellets[: len(best)]
-    order = kernels.row_order(turn, found.distance2, found.y, found.x, rank)
+    order = kernels.row_order(turn, found.distance2, found.y, found.x)
     placement, samples = found.placement[order], samples[order]
     xy = volley.origin_xy[placement]
     xy[:, 0] += found.x[order]
@@ -95,7 +95,7 @@ def _nearest(found: Found, first: Ints, kernels: ModuleType) -> Ints:
     begins = np.zeros(len(found.seen), np.int64)
     begins[first] = 1
     group = np.cumsum(begins)
-    return np.asarray(kernels.row_order(group, found.distance2, found.y, found.x, found.seen)[first])
+    return np.asarray(kernels.row_order(group, found.distance2, found.y, found.x)[first])
 
 
 def _distinct(
@@ -114,7 +114,7 @@ def _distinct(
         first_of = np.cumsum(length) - length
         together[several] = kernels.union(placed, windows, seen, found.placement[pair], found.seen[pair], first_of)
     group = np.searchsorted(first, np.arange(len(begins)), side="right") - 1
-    order = kernels.row_order(group, found.placement, group, group, group)
+    order = kernels.row_order(group, found.placement, group, group)
     new = np.diff(found.placement[order], prepend=-1) != 0
     new[first] = True
     return _sums(new.astype(np.int64), first), _sums(together, np.searchsorted(tile, first))
