@@ -79,7 +79,7 @@ def fired_by_bits(
         parts.append(replace(rows, shot=rows.shot + begin) if begin else rows)
     rows = Rows.joined(parts[1:] or parts)
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
-    plan.run("rows", "in their order", rows.nbytes)
+    plan.run("rows", "in their order", rows.nbytes if len(parts) > 2 else 0)
     leave_out_uncounted(plan, scene, candidates, may_refuse(stack, shots), name, why)
     plan.run("plan", "")
     return hits
@@ -94,8 +94,9 @@ def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sigh
     if plane is not None:
         return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE
     if name == "composed" and view is not None:
+        kept = scene.compositions().kept(view, scene.version) is not None
         composition = scene.compositions().read(view, scene.items, scene.bounds)
-        sight.plan.run("composition", "what can be seen of all objects", composition.nbytes)
+        sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
         return _by_composition(composition, sight), PLACEMENTS_AT_ONCE
     return _by_items(scene.items, view, sight), CHUNK_PAIRS // max(len(sight.stack), 1)
 
@@ -167,11 +168,14 @@ def _near_objects(shots: Shots, volley: Volley, sight: Sight) -> tuple[Ints, Int
     """Placements and ranks of the objects that they may touch and accept."""
     stack, plan = sight.stack, sight.plan
     placement, rank = near_pairs(volley, np.arange(len(volley.shot)), volley.boxes, sight)
-    some = ~stack.occluder[rank]
+    if stack.has_occluders:
+        objects = ~stack.occluder[rank]
+        placement, rank = placement[objects], rank[objects]
     if may_refuse(stack, shots):
-        some &= ~refused(stack, rank, shots, volley.shot[placement])
+        some = ~refused(stack, rank, shots, volley.shot[placement])
         plan.run("filter", "categories and owners", some.nbytes, (int(some.sum()), len(rank)))
-    return placement[some], rank[some]
+        placement, rank = placement[some], rank[some]
+    return placement, rank
 
 
 def _seen_by_all(tiles: Tiles, boxes: Ints, tile: Ints, view: View, sight: Sight) -> tuple[Ints, Ints, Ints, Ints]:
