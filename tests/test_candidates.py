@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import planes.items
-import weapons.firing
+import weapons.bitfire
+import weapons.runfire
 from planes import InputError, Scene, Sprite
 from planes.arrays import Bools
 from planes.broadphase import Grid
@@ -194,9 +195,13 @@ def test_the_plan_tells_what_was_tested() -> None:
 
 def test_a_broad_phase_that_no_sample_needed_is_left_out() -> None:
     scene = crowd(3, 30)
-    told = fire(scene, Disc(3), (60, 60), prefilter="circle", broadphase="grid", strategy="composed").plan
+    how = {"prefilter": "circle", "broadphase": "grid", "strategy": "composed"}
+    told = fire(scene, Disc(3, falloff="linear"), (60, 60), **how).plan
     for stage in ("broad phase", "volumes", "pre-filter"):
         assert why(told.left_out, stage) == "no sample needed the stack"
+    assert scene.index("grid").boxes is None
+    told = fire(scene, Disc(3), (60, 60), **how).plan  # of bit rows, cells are the pre-filter
+    assert why(told.left_out, "broad phase") == "composed: cells" and told.has_left_out("volumes")
     assert scene.index("grid").boxes is None
 
 
@@ -231,9 +236,14 @@ def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: py
 def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
     scene = crowd(6, 900, 900)
     at = np.random.default_rng(4).uniform(0, 900, (50, 2))
-    long = fire(scene, Beam(length=600, width=2), at, aim=40, strategy="direct")
+    long = fire(scene, Beam(length=600, width=2, falloff="linear"), at, aim=40, strategy="direct")
     assert why(long.plan.ran, "pre-filter").startswith("box, then swept")
-    for weapon, aim in ((Beam(length=600, width=2), 0), (Beam(length=4, width=2), 40), (Disc(200), 0)):
+    for weapon, aim in (
+        (Beam(length=600, width=2, falloff="linear"), 0),
+        (Beam(length=4, width=2, falloff="linear"), 40),
+        (Disc(200, falloff="linear"), 0),
+        (Beam(length=600, width=2), 40),  # bit rows of a pair cost less than its capsules
+    ):
         told = fire(scene, weapon, at, aim=aim if isinstance(weapon, Beam) else None, strategy="direct").plan
         assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
 
@@ -372,20 +382,23 @@ def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch
     scene = Scene()
     for i in range(300):
         scene.add(np.ones((9, 9), np.bool_), (i % 3, i // 3 % 3))
-    monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", 6000)
+    monkeypatch.setattr(weapons.runfire, "CHUNK_PAIRS", 6000)
+    monkeypatch.setattr(weapons.bitfire, "CHUNK_PAIRS", 6000)
     most = []
     monkeypatch.setattr(
         Candidates, "meeting", lambda self, *a, meeting=Candidates.meeting: most.append(p := meeting(self, *a)) or p
     )
     at = np.zeros((500, 2))
-    hits = fire(scene, Point(), at, strategy="direct", broadphase="bvh")
-    assert max(len(rank) for _, rank in most) <= 2 * 6000
-    assert hits == fire(scene, Point(), at, strategy="direct", broadphase="none")
+    for weapon, times in ((Disc(1, falloff="linear"), 2), (Point(), 1)):
+        most.clear()
+        hits = fire(scene, weapon, at, strategy="direct", broadphase="bvh")
+        assert 6000 / 2 < max(len(rank) for _, rank in most) <= times * 6000
+        assert hits == fire(scene, weapon, at, strategy="direct", broadphase="none")
     spread = Scene()
     for i in range(300):
         spread.add([[True]], (9 * i, 0))
     most.clear()
-    fire(spread, Point(), at, strategy="direct", broadphase="bvh")
+    fire(spread, Disc(1, falloff="linear"), at, strategy="direct", broadphase="bvh")
     assert len(most) < 10  # few are met: parts grow
 
 

@@ -441,13 +441,19 @@ def test_shots_with_seeds_of_their_own_are_the_shots_fired_one_by_one(
         assert np.array_equal(hits.samples_at(i).xy, alone.samples_at().xy)
 
 
-def test_seeds_stay_with_their_shots_in_the_parts_of_a_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("falloff", [None, "linear"])
+def test_seeds_stay_with_their_shots_in_the_parts_of_a_batch(
+    strategy: str, falloff: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = Scene((60, 60))
     scene.add(square(9), (25, 25))
-    weapon, seeds = Spread(Point(), count=5, radius=20), np.arange(40, dtype=np.uint64)
-    whole = fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3)
-    monkeypatch.setattr("weapons.firing.CHUNK_SAMPLES", 35)
-    assert whole and fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3) == whole
+    weapon, seeds = Spread(Disc(1, falloff=falloff), count=5, radius=20), np.arange(40, dtype=np.uint64)
+    whole = fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy)
+    assert whole and whole.fired.sum() == 1000  # verdicts are counted
+    monkeypatch.setattr("weapons.runfire.CHUNK_SAMPLES", 150)
+    monkeypatch.setattr("weapons.bitfire.PLACEMENTS_AT_ONCE", 35)
+    monkeypatch.setattr("weapons.bitfire.CHUNK_PAIRS", 35)
+    assert fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy) == whole
 
 
 @pytest.mark.parametrize(
@@ -651,7 +657,10 @@ def test_inputs_are_left_as_they_were() -> None:
 
 
 def test_composed_needs_bounds() -> None:
-    with pytest.raises(InputError, match=r"strategy: expected bounds"):
-        fire(Scene(), Point(), (0, 0), strategy="composed")
-    with pytest.raises(InputError, match=r"strategy: expected bounds"):
-        fire(Scene((70_000, 2)), Point(), (0, 0), strategy="composed")
+    """Of what fades, that is read from a plane; bit rows need none."""
+    for scene in (Scene(), Scene((70_000, 2))):
+        item = scene.add(square(3), (1, 1))
+        with pytest.raises(InputError, match=r"strategy: expected bounds"):
+            fire(scene, Disc(2, falloff="linear"), (0, 0), strategy="composed")
+        for weapon in (Point(), Disc(2)):
+            assert fire(scene, weapon, (1, 1), strategy="composed").object.tolist() == [item]

@@ -16,10 +16,15 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from test_fire import Volley, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
 
+import planes.bitrows
+import planes.cells
 import planes.items
-import weapons.firing
+import weapons.bitfire
 import weapons.resolve
+import weapons.runfire
+import weapons.windows
 from planes import ALL, InputError, Role, Scene, Sprite, load_scene
+from planes.bitrows import WORD
 from planes.compose import CodePlane
 from weapons import Disc, Hits, Point, fire
 
@@ -364,8 +369,14 @@ def in_whole_parts() -> list[tuple[Volley, Scene, str, Hits]]:
 def test_the_size_of_the_parts_changes_no_row(
     in_whole_parts: list[tuple[Volley, Scene, str, Hits]], samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(weapons.firing, "CHUNK_SAMPLES", samples)
-    monkeypatch.setattr(weapons.firing, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(weapons.runfire, "CHUNK_SAMPLES", samples)
+    monkeypatch.setattr(weapons.runfire, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(weapons.bitfire, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(weapons.bitfire, "PLACEMENTS_AT_ONCE", samples)
+    monkeypatch.setattr(planes.bitrows, "WORDS_AT_ONCE", max(samples, WORD))
+    monkeypatch.setattr(planes.cells, "PAIRS_AT_ONCE", pairs)
+    monkeypatch.setattr(weapons.windows, "PATTERNS_BYTES_MOST", 10 * samples)
+    monkeypatch.setattr(weapons.windows, "TABLE_BYTES_MOST", 10 * pairs)
     monkeypatch.setattr(weapons.resolve, "CHUNK_SAMPLES", samples)
     for number, (volley, scene, how, whole) in enumerate(in_whole_parts):
         assert volley.fired(scene, strategy=how) == whole, f"{number=} {how}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import random
 import threading
 import weakref
@@ -426,15 +427,19 @@ def test_caches_are_there_for_the_next_shot() -> None:
     history = History(scene)
     history.record()
     at = np.random.default_rng(1).uniform(0, 100, (50, 2))
-    for strategy in ("composed", "direct"):
-        fire(history.at(0), Disc(3), at, strategy=strategy, broadphase="grid")
+    weapons = Disc(3), Disc(3, falloff="linear")
+    for weapon, strategy in itertools.product(weapons, ("composed", "direct")):
+        fire(history.at(0), weapon, at, strategy=strategy, broadphase="grid")
     scene.move(0, (50, 50))
     history.record()
     past = history.at(0)
     plane = past.code_plane()
     assert plane is not None and plane.codes is not None and past.index("grid").boxes is not None
-    hits = fire(past, Disc(3), at, strategy="composed")
-    assert plane.redrawn == 0 and hits == fire(past, Disc(3), at, strategy="direct", prefilter="none")
+    for weapon in weapons:
+        hits = fire(past, weapon, at, strategy="composed")
+        assert plane.redrawn == 0 and hits == fire(past, weapon, at, strategy="direct", prefilter="none")
+        made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
+        assert made["code plane" if weapon.falloff else "composition"] == 0
 
 
 def test_a_few_shots_make_no_plane_and_no_index() -> None:
@@ -442,12 +447,13 @@ def test_a_few_shots_make_no_plane_and_no_index() -> None:
     history = History(scene)
     history.record()
     past = history.at(0)
-    for _ in range(3):
-        hits = fire(past, Disc(3), (30, 30))
-    plane = past.code_plane()
-    assert plane is not None and plane.codes is None
-    assert past.index("bvh").boxes is None
-    assert {"code plane", "broad phase", "volumes"} <= {stage.name for stage in hits.plan.left_out}
+    for falloff, whole in ((None, "composition"), ("linear", "code plane")):
+        for _ in range(3):
+            hits = fire(past, Disc(3, falloff=falloff), (30, 30))
+        plane = past.code_plane()
+        assert plane is not None and plane.codes is None
+        assert past.index("bvh").boxes is None
+        assert {whole, "broad phase", "volumes"} <= {stage.name for stage in hits.plan.left_out}
 
 
 def test_the_stack_is_kept_with_the_moment() -> None:

@@ -141,7 +141,7 @@ def test_equality_leaves_out_plan_and_version() -> None:
     assert again == direct and again.version != direct.version
     assert direct != fire(scene, Disc(2), (3, 4))
     assert direct != fire(scene, Disc(2), [(3, 3), (8, 8)])
-    for name in ("samples", "first_xy", "weight", "_verdicts", "object"):
+    for name in ("samples", "first_xy", "weight", "verdicts", "object"):
         other = copy.copy(direct)
         setattr(other, name, getattr(direct, name) + 1)
         assert other != direct, name
@@ -524,29 +524,52 @@ def test_direct_makes_no_plane() -> None:
     ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
     plane = scene.code_plane()
     assert plane is not None and plane.codes is None
-    assert list(ran) == [*BEGIN, "verdicts", "outside", "pre-filter", "samples", "walk", "rows"]
-    assert "code plane" in left_out
+    assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "pre-filter", "visible", "samples", "rows"]
+    assert left_out["composition"] == "direct: asked for"
+    ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="direct"))
+    assert plane.codes is None
+    assert list(ran) == [*BEGIN, "weights", "verdicts", "outside", "pre-filter", "samples", "walk", "rows"]
     assert left_out["code plane"] == "direct: asked for"
 
 
-def test_composed_tells_what_it_drew() -> None:
+@pytest.mark.parametrize("weapon", [Point(), Disc(3, falloff="linear")])
+def test_composed_tells_what_it_drew(weapon: Point | Disc) -> None:
     scene = Scene((50, 40))
     item = scene.add(square(5), (3, 3))
     made = []
     for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20)), lambda: scene.move(item, (0, 0))):
         change()
-        ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="composed"))
-        assert list(ran) == [*BEGIN, "code plane", "verdicts", "outside", "samples", "read", "rows"]
-        assert {"walk", "pre-filter"} <= set(left_out)
+        ran, left_out, bytes_made = stages(fire(scene, weapon, (4, 4), strategy="composed"))
+        if weapon.falloff:
+            assert list(ran) == [*BEGIN, "code plane", "weights", "verdicts", "outside", "samples", "read", "rows"]
+            assert {"walk", "pre-filter"} <= set(left_out)
+        else:
+            assert list(ran) == ["shots", "stack", "plan", "code plane", "patterns", "read", "rows"]
         made.append(bytes_made["code plane"])
     assert made == [2 * 50 * 40, 0, 2 * 2 * 25, 2 * 2 * 25]
+
+
+def test_composed_bit_rows_tell_what_they_made() -> None:
+    scene = Scene((50, 40))
+    item = scene.add(square(5), (3, 3))
+    made = []
+    for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20))):
+        change()
+        ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="composed"))
+        assert list(ran)[:5] == ["shots", "stack", "plan", "composition", "patterns"]
+        assert list(ran)[5:] == ["pre-filter", "samples", "rows"] and "verdicts" in left_out
+        made.append(bytes_made["composition"])
+    assert made[0] == made[2] > 0 == made[1]
 
 
 def test_what_a_scene_does_not_need_is_left_out() -> None:
     scene = Scene()
     hits = fire(scene, Disc(3), (4, 4))
     _, left_out, bytes_made = stages(hits)
-    unused = {"weights", "outside", "occluders", "layers", "filter", "broad phase", "volumes", "pre-filter", "walk"}
+    unused = {"weights", "outside", "occluders", "layers", "filter", "broad phase", "volumes"}
+    assert unused | {"composition", "verdicts"} == set(left_out) and bytes_made["patterns"] > 0
+    _, left_out, bytes_made = stages(fire(scene, Disc(3, falloff="linear"), (4, 4)))
+    unused = unused - {"weights"} | {"pre-filter", "walk"}
     assert unused | {"code plane"} == set(left_out) and bytes_made["patterns"] > 0
     for role in ("background", "mover", "hud"):
         scene.add(square(3), role=role)
@@ -563,13 +586,31 @@ def test_auto_says_why_and_changes_no_row() -> None:
     scene = Scene((64, 64))
     for number in range(200):
         scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
-    one = fire(scene, Point(), (5, 5))
+    one = fire(scene, Point(falloff="linear"), (5, 5))
     assert stages(one)[1]["code plane"].startswith("direct: about")
     at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
-    many = fire(scene, Disc(8), at)
+    many = fire(scene, Disc(8, falloff="linear"), at)
     assert "us composed" in stages(many)[0]["code plane"]
-    assert many == fire(scene, Disc(8), at, strategy="direct")
-    assert "no bounds" in stages(fire(Scene(), Point(), (0, 0)))[1]["code plane"]
+    assert many == fire(scene, Disc(8, falloff="linear"), at, strategy="direct")
+    assert "no bounds" in stages(fire(Scene(), Point(falloff="linear"), (0, 0)))[1]["code plane"]
+
+
+def test_auto_composes_for_bit_rows_when_it_pays() -> None:
+    """One shot is not worth a composition, 4000 are; what is there is read, and who asks for a pre-filter gets it."""
+    scene = Scene((64, 64))
+    for number in range(200):
+        scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
+    at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
+    direct = fire(scene, Disc(8), at, strategy="direct")
+    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"].startswith("direct: about")
+    many = fire(scene, Disc(8), at)
+    assert stages(many)[0]["plan"].startswith("composed: about") and many == direct
+    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "composed: it is there"
+    assert stages(fire(scene, Disc(8), at[0], prefilter="box"))[0]["plan"] == "direct: a pre-filter was asked for"
+    differ = fire(scene, Disc(8), at[:2], exclude=[1, 2], strategy="composed")
+    assert stages(differ)[0]["plan"] == "direct: shots accept different items"
+    scene.move(0, (9, 9))
+    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"].startswith("direct: about")
 
 
 # Bad arguments

@@ -22,6 +22,8 @@ import planes.compose
 import planes.index
 import planes.items
 import planes.render
+import planes.visible
+import weapons.bitfire
 import weapons.ends
 import weapons.firing
 import weapons.firsthits
@@ -31,9 +33,11 @@ import weapons.pattern
 import weapons.plan
 import weapons.rayfire
 import weapons.resolve
+import weapons.runfire
 import weapons.tracing
 from planes import History, Scene, Sprite
-from weapons import Box, Disc, Laser, Pistol, Rifle, Weapon, fire, report_of
+from planes.bitrows import WORDS_AT_ONCE
+from weapons import Box, Disc, Laser, Pistol, Point, Rifle, Weapon, fire, report_of
 from weapons.candidates import Candidates
 from weapons.hits import Hits
 from weapons.pattern import PatternTable
@@ -95,14 +99,32 @@ class Clock:
 
 
 FIRING, RESOLVE, TRACING, RAYFIRE = weapons.firing, weapons.resolve, weapons.tracing, weapons.rayfire
+BITFIRE, RUNFIRE = weapons.bitfire, weapons.runfire
 OF_ALL = [(FIRING, "checked_shots", "shots", 1), (planes.items.Items, "stack_of", "stack", 10)]
+OF_BITS = [
+    *OF_ALL,
+    (BITFIRE, "volley_of", "patterns", 200),
+    (BITFIRE, "windows_of", "patterns", 400),
+    (BITFIRE, "chosen_form", "plan", 10**3),
+    (BITFIRE, "chosen_candidates", "plan", 2 * 10**3),
+    (BITFIRE, "leave_out_uncounted", "plan", 4 * 10**3),
+    (BITFIRE, "counted", "samples", 10**4),
+]
+OF_TILES = [
+    *OF_BITS,
+    (planes.items.Items, "tiles", "tiles", 10**5),
+    (Candidates, "near", "volumes", 10**6),
+    (BITFIRE, "refused", "filter", 10**7),
+    (BITFIRE, "in_front", "visible", 10**8),
+    (BITFIRE, "seen_of", "visible", 10**9),
+]
 OF_PATTERNS = [
     *OF_ALL,
-    (FIRING, "volley_of", "patterns", 100),
-    (FIRING, "chosen_strategy", "plan", 10**3),
-    (FIRING, "chosen_candidates", "plan", 2 * 10**3),
-    (FIRING, "leave_out_unused", "plan", 4 * 10**3),
-    (FIRING, "rows_of_met", "rows", 10**4),
+    (RUNFIRE, "volley_of", "patterns", 200),
+    (RUNFIRE, "chosen_strategy", "plan", 10**3),
+    (RUNFIRE, "chosen_candidates", "plan", 2 * 10**3),
+    (RUNFIRE, "leave_out_unused", "plan", 4 * 10**3),
+    (RUNFIRE, "rows_of_met", "rows", 10**4),
     (RESOLVE, "_count", "verdicts", 10**5),
     (PatternTable, "weight", "weights", 10**6),
     (RESOLVE, "refused", "filter", 10**7),
@@ -146,6 +168,21 @@ OF_JUMPS = [
 ]
 BOXES, INDEX = (Candidates, "meeting", "pre-filter", 10**12), (Candidates, "meeting", "broad phase", 10**12)
 CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]] = {
+    "bit rows": (Disc(9), {"strategy": "direct", "prefilter": "circle"}, [*OF_TILES, BOXES]),
+    "bit rows by an index": (
+        Disc(9),
+        {"strategy": "direct", "prefilter": "circle", "broadphase": "grid"},
+        [*OF_TILES, INDEX],
+    ),
+    "bit rows composed": (
+        Disc(9),
+        {"strategy": "composed"},
+        [
+            *OF_BITS,
+            (planes.visible.Compositions, "read", "composition", 10**5),
+            (planes.visible.Composition, "cells", "pre-filter", 10**6),
+        ],
+    ),
     "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
     "by an index": (
         Disc(9, falloff="linear"),
@@ -274,6 +311,9 @@ def test_plans_are_added_up() -> None:
 MOST, SLACK = 16, 60_000
 """While a stage works it holds at most so many times the bytes that it hands on, and some beside."""
 
+AT_ONCE = 4 * 8 * WORDS_AT_ONCE
+"""Bytes that bit rows hold while some are counted: two sets of rows, windows and their counts."""
+
 SELECTING = {"pre-filter", "broad phase", "volumes", "filter", "occluders", "verdicts", "plan"}
 """Stages that hand on less than they look at."""
 
@@ -305,7 +345,7 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
     made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
     for stage in made.keys() - SELECTING:
         assert made[stage] - SLACK <= 1.5 * held[stage] and held[stage] <= MOST * made[stage] + SLACK, stage
-    assert sum(made.values()) / 3 < whole[0] < 3 * sum(made.values())
+    assert sum(made.values()) / 3 < whole[0] < 3 * sum(made.values()) + AT_ONCE * ("bit rows" in name)
 
 
 def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
@@ -337,10 +377,12 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
 def mixed() -> dict[str, Hits]:
     """A shot of each way, at nothing but objects on one layer, that nothing is asked of."""
     return {
-        "direct": fire(yard(), Disc(9), SHOTS, strategy="direct"),
-        "composed": fire(yard(), Disc(9, pierce=True), SHOTS, strategy="composed"),
+        "direct": fire(yard(), Disc(9, falloff="linear"), SHOTS, strategy="direct"),
+        "composed": fire(yard(), Disc(9, pierce=True, falloff="linear"), SHOTS, strategy="composed"),
+        "bit rows": fire(yard(), Disc(9), SHOTS, strategy="direct"),
+        "points": fire(yard(), Point(), SHOTS, strategy="composed"),
         "rays": fire(yard(), Laser(60), SHOTS, aim=30),
-        "unbounded": fire(yard(None), Disc(9), SHOTS),
+        "unbounded": fire(yard(None), Disc(9, falloff="linear"), SHOTS),
     }
 
 
@@ -368,8 +410,9 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
     filtered = False
     for hits in mixed().values():
         assert hits and names(hits)[1] >= {"occluders", "layers", "filter"}
-    full = fire(yard(full=True), Disc(9), SHOTS)
-    assert "occluders" in names(full)[0] and not {"occluders", "layers"} & names(full)[1]
+    for falloff in ("linear", None):
+        full = fire(yard(full=True), Disc(9, falloff=falloff), SHOTS)
+        assert ("occluders" in names(full)[0]) == bool(falloff) and not {"occluders", "layers"} & names(full)[1]
     filtered = True
     assert "filter" in names(fire(yard(), Disc(9), SHOTS, exclude=5))[0]
     unmet = yard()
@@ -390,14 +433,22 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(owner, name, counted)
 
     for owner, name in (
-        (RESOLVE, "refused"), (TRACING, "refused"), (weapons.ends, "_end_at_occluders"), (RESOLVE, "_look_behind"),
+        (RESOLVE, "refused"), (BITFIRE, "refused"), (TRACING, "refused"), (weapons.ends, "_end_at_occluders"),
+        (RESOLVE, "_look_behind"),
         (weapons.pattern, "falloff_weights"), (planes.compose.CodePlane, "read"), (planes.index.Index, "read"),
         (Candidates, "near"), (weapons.narrow, "near_rays"), (planes.render, "draw_view"), (PatternTable, "weight"),
         (RAYFIRE, "leave_out_absent"),
     ):  # fmt: skip
         count(owner, name)
     hits = {"direct": fire(yard(), Disc(9), SHOTS, strategy="direct"), "rays": fire(yard(), Laser(60), SHOTS, aim=30)}
-    assert all(hits.values()) and called == {"weight": 1, "leave_out_absent": 1}
+    assert all(hits.values()) and called == {"leave_out_absent": 1}
+    fire(yard(), Disc(9), SHOTS, strategy="composed")
+    assert called == {"leave_out_absent": 1}
+    assert fire(yard(), Disc(9.03125), SHOTS).verdict_counts()["hit"]
+    assert called == {"leave_out_absent": 1, "weight": 1}  # of the verdicts, that are asked for
+    called.clear()
+    fire(yard(), Disc(9), SHOTS, strategy="direct", exclude=[[5], *[[4]] * 8])
+    assert called == {"refused": 2}  # what shots come near, and what lies in front of that
     fire(yard(full=True), Disc(9.03125, falloff="linear"), SHOTS, strategy="composed", exclude=5)
     fire(yard(full=True), Disc(9), SHOTS, strategy="direct", prefilter="circle", broadphase="grid")
     fire(yard(full=True), Laser(60), SHOTS, aim=30, exclude=5, prefilter="circle")
@@ -413,7 +464,7 @@ def test_no_run_is_laid_out_for_bounds_that_nothing_reaches_over(monkeypatch: py
     monkeypatch.setattr(PatternTable, "laid", lambda *args: laid.append(1) or lay(*args))
     for size_wh, at, times in ((None, (20, 20), 1), ((99, 79), (20, 20), 1), ((99, 79), (8, 25), 2)):
         laid.clear()
-        hits = fire(yard(size_wh), Disc(9), at, strategy="direct")
+        hits = fire(yard(size_wh), Disc(9, falloff="linear"), at, strategy="direct")
         assert len(laid) == times and bool(hits.verdict_counts()["outside"]) == (times == 2)
 
 
@@ -440,10 +491,13 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays compose constants grid256 image index items kept labels painting placing poses rasterise sampling scene"
-    " scenefile schema spans sprite stack twins"
+    "arrays bitrows cells compose constants grid256 image index items kept labels painting placing poses rasterise"
+    " sampling scene scenefile schema spans sprite stack tiles twins visible"
 )
-OF_FIRE = "arsenal candidates columns draws explain firing guns hits pattern plan resolve volley weapon"
+OF_FIRE = (
+    "arsenal bitfire candidates columns counting draws explain firing guns hits pattern plan resolve runfire volley"
+    " weapon windows"
+)
 OF_A_RAY = "ends firsthits flight meetings passes rayexplain rayfire rayhits rays rayways trace tracing"
 
 
@@ -485,6 +539,8 @@ def test_each_thing_alone_adds_what_is_its_own() -> None:
         for name, column in columns.items()
     }
     assert changed["layers"] == {"layers"} and changed["bounds"] == {"outside"}
-    assert changed["imagery"] == set(IMAGERY) and changed["falloff"] == {"weights"}
-    assert changed["occluders"] == {"stack", "pre-filter", "occluders", "samples", "walk", "rows"}
-    assert changed["filter"] == {"filter", "walk", "rows"}
+    assert changed["imagery"] == set(IMAGERY)
+    assert changed["occluders"] == {"stack", "tiles", "pre-filter", "occluders", "samples"}
+    assert changed["filter"] == {"filter", "visible", "samples"}
+    by_runs = {"weights", "verdicts", "walk", "code plane"}
+    assert changed["falloff"] == {"patterns", "tiles", "visible", "composition", "samples", "rows"} | by_runs

@@ -232,7 +232,7 @@ def test_options_go_along() -> None:
         hits = fire(history, Disc(15), tick=ticks, **shots, **options)  # type: ignore[arg-type]
         assert hits == first
         ran = [stage.name for stage in hits.plan.ran]
-        assert ("code plane" in ran) == (options == {"strategy": "composed"})
+        assert ("composition" in ran) == (options == {"strategy": "composed"})
     with pytest.raises(InputError, match="prefilter: expected one of"):
         fire(history, Disc(15), tick=ticks, **shots, prefilter="sphere")
 

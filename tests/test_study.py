@@ -85,7 +85,7 @@ def test_a_quick_study_writes_all_its_files(quick: Path, effort: Effort) -> None
                 assert 0 < us["least"] <= us["median"] <= us["most"] and point["runs"] >= 1 and point["setup_ms"] >= 0
                 assert point["kept_bytes"] >= 0 and point["run_bytes"] > 0
                 assert point["wrong_per_shot"] == (point["missed"] + point["false"]) / question["shots"]
-    assert study["plan"]["shots"] == effort.shots and "walk" in [stage["stage"] for stage in study["plan"]["ran"]]
+    assert study["plan"]["shots"] == effort.shots and "samples" in [stage["stage"] for stage in study["plan"]["ran"]]
     assert {"stage": "occluders", "why": "the scene has none"} in study["plan"]["left_out"]
     rows = list(csv.DictReader(io.StringIO((quick / "study.csv").read_text())))
     assert len(rows) == sum(len(curve["points"]) for q in study["questions"] for curve in q["curves"])
