@@ -75,7 +75,7 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("weapons.rayfire.trace", lambda *given, calls=calls: calls.append(1) or trace(*given))
             patch.setattr("weapons.rayfire.RAYS_MOST", chunk)
-            patch.setattr("weapons.candidates.CHUNK_PAIRS", chunk * 8)
+            patch.setattr("planes.cells.PAIRS_AT_ONCE", chunk * 8)
             patch.setattr("weapons.meetings.CHUNK_SAMPLES", chunk)
             cut = fired(battle, scene=scene, **options)
             assert len(calls) >= -(-len(whole.stop) // chunk)
