@@ -94,9 +94,10 @@ class TileAtlas:
 
     def _listed(self, masks: Iterable[tuple[int, Bools]], number: Ints) -> Tiles:
         distinct, which = np.unique(number, return_inverse=True)
-        if self._used > 2 * len(distinct) + ATLAS_SLACK:
+        kept = sum(self._count[uid] for uid in distinct.tolist() if uid in self._first)
+        if self._used > 2 * kept + ATLAS_SLACK:
             self._first, self._used = {}, 0
-            self.words = np.zeros(4 * STRIDE, np.uint64)
+            self.words, self._columns = np.zeros(4 * STRIDE, np.uint64), np.zeros((4, 4), np.int64)
         missing = set(distinct.tolist()) - self._first.keys()
         for uid, mask in masks if missing else ():
             if uid in missing and uid not in self._first:
