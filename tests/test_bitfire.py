@@ -1,0 +1,274 @@
+"""Shots counted by bit rows: every strategy, size of the parts, and both kinds of kernels give the rows of the runs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from test_fire import Shot, Volley, expected, told
+
+import planes.bitrows
+import planes.cells
+import planes.items
+import planes.tiles
+import planes.visible
+import weapons.bitfire
+import weapons.firing
+import weapons.windows
+from planes import History, Scene, use_jit
+from planes.arrays import Bools
+from planes.bitrows import WORD
+from planes.constants import ALL
+from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire
+
+STRATEGIES = ("direct", "composed", "auto")
+PICTURE = np.random.default_rng(5).random((30, 90)) < 0.3
+WEAPONS: list[Weapon] = [
+    Point(), Point(pierce=True), Disc(0.4), Disc(3), Disc(9.3), Disc(12, pierce=True), Disc(40), Disc(100), Box(5, 4),
+    Box(30, 2), Box(1, 70), Ring(15, 20), Cone(50, 30), Beam(80, 6), Beam(80, 0, pierce=True), Stencil(PICTURE),
+    Stencil([".."]), Polygon([(-9, -9), (70, 0), (-9, 9)], [[(0, -2), (3, 0), (0, 2)]]),
+    Spread(Point(), count=9, radius=5), Spread(Disc(2), count=8, radius=20), Spread(Disc(3, pierce=True), 5, 9),
+    Spread(Box(3, 1), count=2, radius=0), Spread(Stencil([".."]), 3, 9), Rounds(Disc(5), 3, (3, 2), 10),
+    Rounds(Cone(40, 20), 3, (-3, 2), 45), Rounds(Spread(Disc(1), count=3, radius=6), 2, (3, 2)),
+]  # fmt: skip
+PARTS: dict[str, dict[str, int]] = {
+    "whole": {},
+    "parts": {"PLACEMENTS_AT_ONCE": 7, "WORDS_AT_ONCE": 640, "PAIRS_AT_ONCE": 50, "BRUTE_PAIRS": 0, "OFTEN": 0},
+    "single": {"CHUNK_PAIRS": 1, "WORDS_AT_ONCE": WORD, "PAIRS_AT_ONCE": 1, "PATTERNS_BYTES_MOST": 1, "OFTEN": 10**9},
+    "few cells": {"CELLS_MOST": 4, "BRUTE_PAIRS": 9, "TABLE_BYTES_MOST": 0, "ENTRIES_A_BOX": 2},
+}
+"""Limits that cut a batch, and choose between two ways to do the same."""
+
+OWNERS = (
+    weapons.bitfire, weapons.windows, planes.bitrows, planes.cells, planes.visible, planes.tiles
+)  # fmt: skip
+
+
+@pytest.fixture(params=["numpy", "jit"])
+def kernels(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Kernels that are used for all calls of a test."""
+    if request.param == "jit":
+        pytest.importorskip("numba")
+    use_jit(request.param == "jit")
+    yield request.param
+    use_jit(None)
+
+
+def cut(patch: pytest.MonkeyPatch, limits: dict[str, int]) -> None:
+    """Set limits wherever they are read."""
+    for name, value in limits.items():
+        owners = [owner for owner in OWNERS if hasattr(owner, name)]
+        assert owners, name
+        for owner in owners:
+            patch.setattr(owner, name, value)
+
+
+def by_runs(scene: Scene | History, weapon: Weapon, at: object, **how: Any) -> Hits:
+    """The same shots, counted run by run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(weapons.firing, "counts", lambda *_: False)
+        hits = fire(scene, weapon, at, strategy="direct", prefilter="none", **how)
+        assert hits.plan.has_run("verdicts")
+        return hits
+
+
+def some_mask(rng: np.random.Generator, most: int) -> Bools:
+    """Holes, lines, single pixels far apart, nothing; sometimes over many tiles, some of which are empty."""
+    h, w = rng.integers(1, most, 2)
+    if rng.random() < 0.15:
+        h, w = rng.integers(60, 150, 2)
+    mask = rng.random((h, w)) < rng.choice([0, 0.1, 0.5, 0.9, 1, 1])
+    if rng.random() < 0.2:
+        mask[h // 4 :, : 3 * w // 4] = False
+    if rng.random() < 0.1:
+        mask[:] = False
+        mask[rng.integers(h), rng.integers(w)] = mask[rng.integers(h), rng.integers(w)] = True
+    return np.asarray(mask)
+
+
+def some_scene(rng: np.random.Generator, most: int = 40, count: int = 25) -> Scene:
+    """Objects and occluders on some layers, of some categories and owners, in bounds or none, over the edges."""
+    scene = Scene((200, 160), tuple(rng.integers(-5, 5, 2).tolist())) if rng.random() < 0.7 else Scene()
+    plain, flat = rng.random(2) < 0.3
+    for i in range(int(rng.integers(0, count))):
+        scene.add(
+            some_mask(rng, most),
+            rng.uniform((-20, -20), (220, 180)) if i % 2 else rng.uniform(50, 110, 2),
+            role="hittable" if plain or rng.random() < 0.7 else "occluder",
+            layer=0 if flat else int(rng.integers(-1, 2)),
+            categories=1 if plain else int(rng.choice([0, 1, 2, 3, 7])),
+            owner=None if i == 0 or rng.random() < 0.5 else int(rng.integers(0, i)),
+        )
+    return scene
+
+
+def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[np.ndarray, dict[str, Any]]:
+    """Places and filters, one for all or one for each."""
+    count, items = int(rng.integers(1, most)), len(scene)
+    how: dict[str, Any] = {"aim": rng.integers(0, 8, count) * 45.0 if rng.random() < 0.5 else 30.0}
+    if rng.random() < 0.5:
+        how["accept"] = int(rng.choice([1, 2, 7, ALL])) if rng.random() < 0.5 else rng.integers(0, 8, count)
+    if rng.random() < 0.4:
+        how["exclude"] = rng.integers(-1, items + 1, (count, 2) if rng.random() < 0.7 else (1, 2))
+    low, high = ((-50, -50), (250, 210)) if rng.random() < 0.4 else (40, 130)
+    return rng.uniform(low, high, (count, 2)), how
+
+
+@pytest.mark.parametrize("limits", PARTS)
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 30))])
+def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng([seed, len(limits)])
+    cut(monkeypatch, PARTS[limits])
+    rows = ways = 0
+    for _ in range(4):
+        scene = some_scene(rng)
+        for weapon in WEAPONS:
+            at, how = some_shots(rng, scene)
+            truth = by_runs(scene, weapon, at, **how)
+            for strategy in STRATEGIES:
+                hits = fire(scene, weapon, at, strategy=strategy, **how)
+                assert hits == truth, f"{weapon} {strategy} {how}"
+                assert hits.plan.has_left_out("verdicts")
+                ways |= (
+                    hits.plan.has_run("composition") + 2 * hits.plan.has_run("tiles") + 4 * hits.plan.has_run("read")
+                )
+            rows += len(truth)
+    assert rows > 300 and ways & 3 == 3
+
+
+def test_the_oracle_says_the_same(kernels: str) -> None:
+    """Sample by sample, of masks and patterns that are wider than a word, too."""
+    rng = np.random.default_rng(7)
+    rows = 0
+    for _ in range(25):
+        scene = some_scene(rng, 40, 20)
+        weapon = WEAPONS[rng.integers(len(WEAPONS))]
+        at = rng.uniform(40, 130, (3, 2))
+        shots = [Shot((x, y), 90.0 * rng.integers(4), accept=int(rng.choice([1, 2, 3, ALL, ALL]))) for x, y in at]
+        for number, shot in enumerate(shots):
+            shot.exclude, shot.number = (() if rng.random() < 0.6 else (int(rng.integers(9)),)), number
+        if rng.random() < 0.5:
+            for shot in shots:
+                shot.accept, shot.exclude = ALL, ()
+        volley = Volley(weapon, shots, seed=3)
+        truth = expected(scene, volley)
+        for strategy in STRATEGIES:
+            assert told(volley.fired(scene, strategy=strategy)) == truth, f"{weapon} {strategy}"
+        rows += len(truth[0])
+    assert rows > 40
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_changes_between_shots_are_seen(kernels: str, seed: int) -> None:
+    """No composition, cell list, tile or plane is older than the scene."""
+    rng = np.random.default_rng([seed, 11])
+    scene = some_scene(rng)
+    for _ in range(4):
+        scene.add(some_mask(rng, 50), rng.uniform(0, 150, 2))
+    at = rng.uniform((-10, -10), (210, 170), (70, 2))
+    for step in range(30):
+        ids = scene.ids()
+        some = rng.choice(ids, min(len(ids), 3), replace=False)
+        change = step % 6
+        if change == 0:
+            scene.move(some, rng.uniform(0, 150, (len(some), 2)))
+        elif change == 1:
+            scene.set(some, layer=int(rng.integers(3)), categories=int(rng.integers(4)))
+        elif change == 2:
+            scene.set(some, angle=float(rng.uniform(0, 360)), scale=float(rng.choice([0.5, 1, 2])))
+        elif change == 3 and len(ids) > 5:
+            scene.remove(int(some[0]))
+        elif change == 4:
+            scene.add(some_mask(rng, 70), rng.uniform(0, 150, 2), role="occluder" if step % 4 else "hittable")
+        for weapon, strategy in itertools.product((Point(), Disc(9), Disc(5, pierce=True)), STRATEGIES):
+            assert fire(scene, weapon, at, strategy=strategy) == by_runs(scene, weapon, at), f"{step=} {weapon}"
+
+
+def test_masks_come_and_go(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles of dropped masks are never those of new ones."""
+    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(planes.tiles, "ATLAS_SLACK", 0)
+    rng = np.random.default_rng(3)
+    scene, at = Scene((90, 90)), rng.uniform(0, 90, (40, 2))
+    for _ in range(40):
+        ids = [scene.add(some_mask(rng, 30), rng.uniform(0, 90, 2)) for _ in range(3)]
+        for strategy in ("direct", "composed"):
+            assert fire(scene, Disc(6), at, strategy=strategy) == by_runs(scene, Disc(6), at)
+        scene.remove(ids[:2])
+        if len(scene) > 6:
+            scene.remove(scene.ids()[:3])
+
+
+def test_the_past_is_counted_as_it_was(kernels: str) -> None:
+    rng = np.random.default_rng(4)
+    scene = some_scene(rng)
+    ids = [scene.add(some_mask(rng, 40), rng.uniform(0, 150, 2)) for _ in range(8)]
+    history = History(scene)
+    for tick in range(5):
+        history.record(tick)
+        scene.move(ids, rng.uniform(0, 150, (8, 2)))
+    scene.remove(ids[:4])
+    at, ticks = rng.uniform(0, 160, (60, 2)), rng.integers(0, 5, 60)
+    for weapon in (Point(), Disc(9), Disc(9, pierce=True), Spread(Disc(2), 4, 9)):
+        truth = by_runs(history, weapon, at, tick=ticks)
+        for strategy in STRATEGIES:
+            hits = fire(history, weapon, at, tick=ticks, strategy=strategy)
+            assert hits == truth and truth and not hits.plan.has_run("verdicts"), f"{weapon} {strategy}"
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+@pytest.mark.parametrize("weapon", [Point(), Disc(9), Spread(Disc(2, pierce=True), 4, 9)])
+def test_verdicts_are_those_of_the_moment_of_the_shot(
+    kernels: str, weapon: Weapon, strategy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are counted when they are asked for, of the scene and the shots as they were."""
+    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(planes.tiles, "ATLAS_SLACK", 0)
+    rng = np.random.default_rng(6)
+    scene = Scene((150, 150))
+    ids = [scene.add(rng.random((20, 20)) < 0.7, rng.uniform(0, 150, 2), layer=i % 3) for i in range(30)]
+    scene.set(ids[:5], role="occluder")
+    at, accept, exclude = rng.uniform(-5, 155, (50, 2)), np.full(50, ALL), rng.integers(0, 30, 50)
+    truth = [by_runs(scene, weapon, at), by_runs(scene, weapon, at, accept=accept, exclude=exclude)]
+    kept = [hits.verdicts.copy() for hits in truth]
+    late = [
+        fire(scene, weapon, at, strategy=strategy),
+        fire(scene, weapon, at, strategy=strategy, accept=accept, exclude=exclude),
+    ]
+    at[:], accept[:], exclude[:] = 0, 0, -1
+    scene.move(ids, rng.uniform(0, 150, (30, 2)))
+    scene.set(ids, layer=0, categories=0, angle=45)
+    scene.remove(ids[3:])
+    for _ in range(20):
+        scene.add(rng.random((20, 20)) < 0.7, rng.uniform(0, 150, 2))
+    fire(scene, weapon, at, strategy=strategy)
+    for hits, verdicts in zip(late, kept, strict=True):
+        assert np.array_equal(hits.verdicts, verdicts) and len(np.unique(verdicts[:, 1])) > 1
+        assert not hits.verdicts.flags.writeable
+
+
+def test_no_shots_no_objects(kernels: str) -> None:
+    scene = Scene((50, 50))
+    for weapon, strategy in itertools.product(WEAPONS, STRATEGIES):
+        assert not fire(scene, weapon, np.zeros((0, 2)), strategy=strategy)
+        empty = fire(scene, weapon, [(9, 9), (70, 70)], strategy=strategy)
+        assert not empty and empty.starts.tolist() == [0, 0, 0] and empty == by_runs(scene, weapon, [(9, 9), (70, 70)])
+    item = scene.add(np.zeros((5, 100), np.bool_), (9, 9))
+    for weapon, strategy in itertools.product(WEAPONS, STRATEGIES):
+        assert not fire(scene, weapon, [(9, 9), (30, 9)], strategy=strategy)
+    scene.set(item, role="occluder")
+    assert not fire(scene, Disc(9), (9, 9))
+
+
+def test_far_from_the_origin_of_the_world(kernels: str) -> None:
+    """Positions near the limit, and objects as far apart as can be."""
+    scene = Scene()
+    far = 2.0**40
+    ids = [scene.add(np.ones((70, 70), np.bool_), place) for place in ((-far + 99, 3), (far - 99, far - 99), (0, 0))]
+    at = [(-far + 99, 3), (far - 99, far - 99), (5, 5), (far, far), (-far, -far)]
+    for weapon, strategy in itertools.product((Point(), Disc(40), Spread(Disc(3), 4, 9)), STRATEGIES):
+        hits = fire(scene, weapon, at, strategy=strategy)
+        assert hits == by_runs(scene, weapon, at) and hits.object.tolist() == ids

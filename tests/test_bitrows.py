@@ -1,0 +1,399 @@
+"""Kernels on bit rows, in numpy and compiled: each gives what sets of pixels, counted one by one, give."""
+
+from __future__ import annotations
+
+import importlib
+import random
+from typing import Any
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from planes import bitrows, cells, use_jit, visible
+from planes.arrays import InputError
+from planes.bitrows import PAD, WORD, Placed, Seen
+from planes.spans import Spans
+from planes.tiles import STRIDE, TileAtlas, Tiles
+from planes.twins import LOADING_NS, kernels_of
+from weapons import windows
+from weapons.pattern import Pattern
+
+Pixel = tuple[int, int]
+SEEDS = st.integers(0, 2**32)
+
+
+@pytest.fixture(params=["planes.bitrows", "planes.bitrows_jit"])
+def rows(request: pytest.FixtureRequest) -> Any:
+    if request.param.endswith("jit"):
+        pytest.importorskip("numba")
+    return importlib.import_module(request.param)
+
+
+@pytest.fixture(params=["planes.cells", "planes.cells_jit"])
+def listing(request: pytest.FixtureRequest) -> Any:
+    if request.param.endswith("jit"):
+        pytest.importorskip("numba")
+    return importlib.import_module(request.param)
+
+
+def mask_of(rng: random.Random, width: int, height: int) -> np.ndarray:
+    """Dense, sparse or a single pixel; not empty, with a pixel on each side."""
+    chance = rng.choice([0.05, 0.5, 0.9, 1])
+    mask = np.array([[rng.random() < chance for _ in range(width)] for _ in range(height)])
+    mask[rng.randrange(height), 0] = mask[rng.randrange(height), -1] = True
+    mask[0, rng.randrange(width)] = mask[-1, rng.randrange(width)] = True
+    return mask
+
+
+def pixels_of(mask: np.ndarray, left: int, top: int) -> set[Pixel]:
+    return {(left + x, top + y) for y, x in np.argwhere(mask).tolist()}
+
+
+def as_read(column: np.ndarray, rng: random.Random) -> np.ndarray:
+    """The same numbers, read-only, strided or, if they are all one, broadcast."""
+    if len(column) and (column == column[0]).all() and rng.random() < 0.5:
+        return np.broadcast_to(column[0], column.shape)
+    if rng.random() < 0.5:
+        column = np.repeat(column, 3)[::3]
+    column.flags.writeable = False
+    return column
+
+
+class Case:
+    """Random tiles, patterns and placements of them, as columns and as sets of pixels."""
+
+    def __init__(self, seed: int) -> None:
+        rng = self.rng = random.Random(seed)
+        sides = rng.choice([(1, 8), (1, WORD), (50, WORD)])
+        heights = rng.choice([(1, 8), (1, WORD)])
+        masks = [mask_of(rng, rng.randint(*sides), rng.randint(*heights)) for _ in range(rng.randint(1, 5))]
+        corners = [(rng.randint(-40, 40), rng.randint(-40, 40)) for _ in masks]
+        self.tiles = [pixels_of(mask, *corner) for mask, corner in zip(masks, corners, strict=True)]
+        boxes = np.array(
+            [(x, y, x + m.shape[1] - 1, y + m.shape[0] - 1) for m, (x, y) in zip(masks, corners, strict=True)]
+        )
+        height = -(-max(m.shape[0] for m in masks) // 8) * 8
+        packed = np.zeros((len(masks), height), np.uint64)
+        for row, mask in zip(packed, masks, strict=True):
+            row[: len(mask)] = bitrows.packed(mask)
+        self.seen: Seen = visible._laid_out(np.arange(len(masks)), boxes, packed)
+        most = rng.choice([3, 12, 40, 150])
+        self.patterns = []
+        for _ in range(rng.choice([1, 1, 3])):
+            mask = mask_of(rng, rng.randint(1, most), rng.randint(1, rng.choice([6, most])))
+            self.patterns.append((Spans.from_mask(mask, (0, 0)), rng.randint(-20, 5), rng.randint(-20, 5), mask))
+        spans = [Spans.from_mask(mask, (left, top)) for _, left, top, mask in self.patterns]
+        self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        count = rng.randint(1, 6)
+        pattern = np.array([rng.randrange(len(spans)) for _ in range(count)])
+        x, y = np.array([[rng.randint(-60, 60) for _ in range(count)] for _ in range(2)])
+        far = rng.choice([0, 9, 5000, 2**21])
+        shift = np.array([[rng.randint(-far, far) for _ in range(count)] for _ in range(2)])
+        self.placed = Placed(*(as_read(c, rng) for c in (pattern, x, y, x + shift[0], y + shift[1])))
+        pairs = [(p, t) for p in range(count) for t in range(len(masks)) if rng.random() < 0.8]
+        self.placement, self.near = (as_read(np.array(c, np.int64), rng) for c in np.array(pairs).reshape(-1, 2).T)
+
+    def shared(self, placement: int, tile: int) -> set[Pixel]:
+        _, left, top, mask = self.patterns[int(self.placed.pattern[placement])]
+        x, y = int(self.placed.x[placement]) + left, int(self.placed.y[placement]) + top
+        return pixels_of(mask, x, y) & self.tiles[tile]
+
+    def found(self) -> list[tuple[int, ...]]:
+        """What `found` must give."""
+        told = []
+        for who, at in zip(self.placement.tolist(), self.near.tolist(), strict=True):
+            shared = self.shared(who, at)
+            if shared:
+                ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
+                best = min(((x - ox) ** 2 + (y - oy) ** 2, y - oy, x - ox) for x, y in shared)
+                told.append((who, at, len(shared), best[0], best[2], best[1]))
+        return told
+
+
+NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
+
+
+@settings(max_examples=250, deadline=None)
+@given(SEEDS, st.sampled_from([64, 200, 2**15]))
+@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, case = importlib.import_module(f"planes.{name}"), Case(seed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bitrows, "WORDS_AT_ONCE", at_once)
+        found = kernels.found(case.placed, case.windows, case.seen, case.placement, case.near, NOT_BESIDE)
+    assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
+    order = sorted(range(len(case.near)), key=lambda i: (case.near[i], case.placement[i]))
+    order = [i for i in order if case.shared(int(case.placement[i]), int(case.near[i]))]
+    if order:
+        near, placement = case.near[order], case.placement[order]
+        first = np.flatnonzero(np.diff(near, prepend=-1))
+        together = [
+            len(
+                set().union(
+                    *(case.shared(int(p), int(tile)) for p, t in zip(placement, near, strict=True) if t == tile)
+                )
+            )
+            for tile in near[first]
+        ]
+        assert kernels.union(case.placed, case.windows, case.seen, placement, near, first).tolist() == together
+
+
+@settings(max_examples=80, deadline=None)
+@given(SEEDS, st.integers(0, 40))
+def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
+    """About its own pixel, of which it holds all that is as near as any of its own."""
+    case = Case(seed)
+    rng = random.Random(seed)
+    side = range(-radius, radius + 1)
+    mask = np.array([[x * x + y * y <= radius * radius for x in side] for y in side])
+    spans = Spans.from_mask(mask, (-radius, -radius))
+    case.patterns, case.windows = [(spans, -radius, -radius, mask)], windows._made([spans], rng.random() < 0.5)
+    x, y = case.placed.x, case.placed.y
+    case.placed = Placed(np.zeros_like(x), x, y, x, y)
+    beside = bitrows.beside_of(case.seen)
+    found = bitrows.found(case.placed, case.windows, case.seen, case.placement, case.near, beside)
+    assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
+    for tile, pixels in enumerate(case.tiles):
+        left, top = case.seen.box_xyxy[tile, :2].tolist()
+        for row in range(case.seen.height):
+            columns = [px - left for px, py in pixels if py == top + row]
+            told = [min((abs(column - c) for c in columns), default=255) for column in range(WORD)]
+            assert beside[tile, :, row].tolist() == told
+
+
+@settings(max_examples=100, deadline=None)
+@given(SEEDS, st.sampled_from([64, 2**15]))
+@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(f"planes.{name}"), random.Random(seed)
+    masks = [mask_of(rng, rng.randint(1, WORD), rng.randint(1, WORD)) for _ in range(rng.randint(1, 6))]
+    words = np.zeros(STRIDE * len(masks) + WORD, np.uint64)
+    begin = np.arange(len(masks)) * STRIDE + WORD
+    for mask, first in zip(masks, begin.tolist(), strict=True):
+        words[first : first + len(mask)] = bitrows.packed(mask)
+    pairs = sorted((rng.randrange(len(masks)), rng.randrange(len(masks))) for _ in range(rng.randint(0, 9)))
+    shift = [(rng.randint(-63, 63), rng.randint(-63, 63)) for _ in pairs]
+    of, other = np.array(pairs, np.int64).reshape(-1, 2).T
+    right, down = np.array(shift, np.int64).reshape(-1, 2).T
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bitrows, "WORDS_AT_ONCE", at_once)
+        seen = kernels.visible(words, WORD, begin, as_read(of.copy(), rng), begin[other] - down, right)
+    for number, mask in enumerate(masks):
+        left = pixels_of(mask, 0, 0)
+        for (own, front), corner in zip(pairs, shift, strict=True):
+            left -= pixels_of(masks[front], *corner) if own == number else set()
+        told = {(x, y) for y, word in enumerate(seen[number].tolist()) for x in range(WORD) if word >> x & 1}
+        assert told == left
+
+
+@settings(deadline=None)
+@given(SEEDS, st.sampled_from([1, 3, 2**20, 2**40, 2**60]))
+@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+def test_the_order_of_rows(name: str, seed: int, far: int) -> None:
+    """Also where the keys together do not fit one number."""
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(f"planes.{name}"), random.Random(seed)
+    count = rng.choice([0, 1, 2, 9, 60])
+    keys = [sorted(rng.randint(0, 3) for _ in range(count))]
+    keys += [[rng.randint(-min(far, 9), far) for _ in range(count)] for _ in range(3)]
+    order = kernels.row_order(*(as_read(np.array(key, np.int64), rng) for key in keys))
+    assert order.tolist() == sorted(range(count), key=lambda i: [key[i] for key in keys])
+
+
+@settings(deadline=None)
+@given(SEEDS, st.sampled_from([np.uint16, np.uint32]))
+@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+def test_what_lies_in_front_at_a_pixel(name: str, seed: int, kind: type) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
+    codes, objects = rng.choice([0, 2, 3, 4, 5, 6, 7], (5, 7)).astype(kind), rng.random(3) < 0.6
+    x, y = rng.integers(-3, 10, (2, 40))
+    place, item = kernels.front_at(codes, (1, -1, 7, 3), x, y, objects)
+    told = []
+    for i, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        code = int(codes[py + 1, px - 1]) if 1 <= px <= 7 and -1 <= py <= 3 else 0
+        if code >= 2 and objects[code // 2 - 1]:
+            told.append((i, code // 2 - 1))
+    assert list(zip(place.tolist(), item.tolist(), strict=True)) == told
+
+
+def boxes(rng: np.random.Generator, count: int, far: int, side: int) -> np.ndarray:
+    low = rng.integers(-far, far + 1, (count, 2))
+    return np.concatenate([low, low + rng.integers(0, side, (count, 2))], axis=1)
+
+
+@settings(max_examples=100, deadline=None)
+@given(SEEDS, st.sampled_from([5, 90, 2**40]), st.integers(0, 7), st.sampled_from([1, 9, 2**20]))
+@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+def test_no_box_that_meets_is_missing_in_a_cell(name: str, seed: int, far: int, bits: int, most: int) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
+    some, reach = boxes(rng, int(rng.integers(0, 9)), far, 40), boxes(rng, 1, 30, 60)[0]
+    x, y = np.concatenate([rng.integers(-far - 50, far + 50, (2, 30)), some[:, :2].T, some[:, 2:].T], axis=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells, "CELLS_MOST", most)
+        made = kernels.cells_of(some, reach, bits)
+    place, box = kernels.listed_at(made, x, y)
+    told = list(zip(place.tolist(), box.tolist(), strict=True))
+    assert told == sorted(set(told)) and made.wide * made.high <= most
+    for i, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        for k, (left, top, right, bottom) in enumerate(some.tolist()):
+            a, b, c, d = np.add(reach, (px, py, px, py)).tolist()
+            if a <= right and c >= left and b <= bottom and d >= top:
+                assert (i, k) in told
+    plain = cells.cells_of(some, reach, bits) if most == 2**20 else made
+    for one, other in zip(made, plain, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    SEEDS, st.sampled_from([5, 90, 2**14, 2**30, 2**40]), st.sampled_from([0, 10, 2**20]), st.sampled_from([1, 2**17])
+)
+@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, at_once: int) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
+    a, b = (boxes(rng, int(rng.integers(0, 12)), far, 60) for _ in range(2))
+    if rng.random() < 0.2 and len(a):
+        a[0, 2] = a[0, 0] - 1  # empty
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "BRUTE_PAIRS", brute)
+        patch.setattr(cells, "PAIRS_AT_ONCE", at_once)
+        row, box = kernels.met_boxes(a, b)
+    truth = [
+        (i, k)
+        for i, p in enumerate(a.tolist())
+        for k, q in enumerate(b.tolist())
+        if p[0] <= q[2] and p[2] >= q[0] and p[1] <= q[3] and p[3] >= q[1]
+    ]
+    assert list(zip(row.tolist(), box.tolist(), strict=True)) == truth
+
+
+# Tiles, and what of them is seen
+
+
+def tiled(masks: list[np.ndarray], atlas: TileAtlas, forms: int) -> Tiles:
+    return atlas.tiles(enumerate(masks), np.arange(len(masks)), forms)
+
+
+def pixels_in(words: np.ndarray, begin: int, left: int, top: int, height: int) -> set[Pixel]:
+    rows_ = words[begin : begin + height].tolist()
+    return {(left + x, top + y) for y, word in enumerate(rows_) for x in range(WORD) if word >> x & 1}
+
+
+@settings(max_examples=60, deadline=None)
+@given(SEEDS)
+def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
+    """Of any size, some of them empty; beyond the bounds, and under what is in front, nothing is seen."""
+    rng = random.Random(seed)
+    masks = [mask_of(rng, rng.randint(1, 150), rng.randint(1, 150)) for _ in range(rng.randint(1, 5))]
+    masks[0][: rng.choice([0, 70, 200]), : rng.choice([0, 70, 200])] = False
+    atlas, corners = TileAtlas(), [(rng.randint(-60, 60), rng.randint(-60, 60)) for _ in masks]
+    tiles = tiled(masks, atlas, 1)
+    items = np.array([(x, y, x + m.shape[1] - 1, y + m.shape[0] - 1) for m, (x, y) in zip(masks, corners, strict=True)])
+    box = tiles.boxes(items)
+    each = [
+        pixels_in(tiles.words, *place)
+        for place in zip(tiles.begin.tolist(), *box[:, :2].T.tolist(), [64] * len(box), strict=True)
+    ]
+    for rank, (mask, corner) in enumerate(zip(masks, corners, strict=True)):
+        own = [k for k in range(len(tiles)) if tiles.rank[k] == rank]
+        assert sum(len(each[k]) for k in own) == mask.sum() and all(each[k] for k in own)
+        assert set().union(*(each[k] for k in own)) == pixels_of(mask, *corner)
+        place, tile = tiles.of(np.array([rank]))
+        assert tile.tolist() == own and not place.any()
+    blocks = np.array([rng.random() < 0.6 for _ in each], np.bool_)
+    which = np.array(sorted(rng.sample(range(len(each)), rng.randint(0, len(each)))), np.int64)
+    of, front = visible.in_front(box, which, blocks)
+    assert sorted(zip(of.tolist(), front.tolist(), strict=True)) == [
+        (i, k) for i, tile in enumerate(which.tolist()) for k in range(tile) if blocks[k]
+        and (box[k, :2] <= box[tile, 2:]).all() and (box[k, 2:] >= box[tile, :2]).all()
+    ]  # fmt: skip
+    bounds = rng.choice([None, (-30, -20, 100, 90), (0, 0, 0, 0), (500, 500, 501, 501)])
+    seen = visible.seen_of(tiles, box, bounds, which, of, front)
+    truth = []
+    for tile in which.tolist():
+        left = each[tile].difference(*(each[k] for k in range(tile) if blocks[k]))
+        if bounds:
+            left = {(x, y) for x, y in left if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
+        truth.append((int(tiles.rank[tile]), left))
+    for one, kept in ((seen, truth), (visible.cropped(seen), [(rank, left) for rank, left in truth if left])):
+        told = zip(one.rank.tolist(), one.begin.tolist(), *one.box_xyxy[:, :2].T.tolist(), strict=True)
+        assert [(rank, pixels_in(one.words, b, x, y, one.height)) for rank, b, x, y in told] == kept
+        assert len(one.words) == PAD + len(one.rank) * (one.height + PAD) and one.height % 8 == 0
+    for own, (_, left) in zip(visible.cropped(seen).box_xyxy.tolist(), [t for t in truth if t[1]], strict=True):
+        xs, ys = zip(*left, strict=True)
+        assert own == [min(xs), min(ys), max(xs), max(ys)]
+
+
+def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles that were handed out stay; memory follows what is in use."""
+    monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 4)
+    rng, atlas = random.Random(1), TileAtlas()
+    old, kept = atlas.tiles([], np.zeros(0, np.int64), -1), atlas.words
+    for forms in range(60):
+        masks = {10 * forms + k: mask_of(rng, rng.randint(1, 140), rng.randint(1, 70)) for k in range(3)}
+        tiles = atlas.tiles(masks.items(), np.array(list(masks)), forms)
+        words = tiles.words.copy()
+        assert atlas.tiles([], np.array(list(masks)), forms) is tiles
+        for rank, mask in enumerate(masks.values()):
+            own = [k for k in range(len(tiles)) if tiles.rank[k] == rank]
+            told = [pixels_in(words, int(tiles.begin[k]), int(tiles.left[k]), int(tiles.top[k]), 64) for k in own]
+            assert set().union(*told) == pixels_of(mask, 0, 0)
+        assert all(np.array_equal(old.words[b : b + 64], kept[b : b + 64]) for b in old.begin.tolist())
+        old, kept = tiles, words
+    assert len(atlas.words) <= 64 * STRIDE and len(atlas._columns) * STRIDE == len(atlas.words)
+
+
+def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:
+    """All 64 shifts of a pattern that was placed often, one call or many."""
+    mask = np.ones((5, 9), np.bool_)
+    pattern, other = (Pattern(Spans.from_mask(mask, (x, 0)), None) for x in (0, 3))
+    few = windows.windows_of([pattern], windows.OFTEN - 3)
+    assert few.shifted == 0 and windows.windows_of([pattern], 2) is few
+    often = windows.windows_of([pattern], 2)
+    assert often.shifted > 0 and windows.windows_of([pattern], 1) is often
+    assert windows.windows_of([pattern, other], 10**6).shifted == 0
+    assert windows.windows_of([other], windows.OFTEN).shifted == 0
+    assert windows.fits([pattern, other]) and windows.fits([])
+
+
+# Which kernels
+
+
+def test_kernels_are_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    twin = importlib.import_module("planes.bitrows_jit")
+    try:
+        use_jit(None)
+        assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS) is bitrows
+        assert kernels_of(bitrows, LOADING_NS * 2) is twin
+        for on, expected in ((True, twin), (False, bitrows)):
+            use_jit(on)
+            assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS * 2) is expected
+    finally:
+        use_jit(None)
+
+
+def test_without_numba_there_is_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.twins.find_spec", lambda name: None)
+    try:
+        use_jit(None)
+        assert kernels_of(bitrows, 10 * LOADING_NS) is bitrows
+        use_jit(False)
+        with pytest.raises(InputError, match=r"^jit: expected numba, .* got no such module"):
+            use_jit(True)
+        assert kernels_of(bitrows, 10 * LOADING_NS) is bitrows
+    finally:
+        use_jit(None)
