@@ -257,7 +257,10 @@ def test_no_box_that_meets_is_missing_in_a_cell(name: str, seed: int, far: int, 
 
 @settings(max_examples=100, deadline=None)
 @given(
-    SEEDS, st.sampled_from([5, 90, 2**14, 2**30, 2**40]), st.sampled_from([0, 10, 2**20]), st.sampled_from([1, 2**17])
+    SEEDS,
+    st.sampled_from([5, 90, 2**14, 40_000, 2**30, 2**31, 2**40]),
+    st.sampled_from([0, 10, 2**20]),
+    st.sampled_from([1, 2**17]),
 )
 @pytest.mark.parametrize("name", ["cells", "cells_jit"])
 def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, at_once: int) -> None:
