@@ -400,3 +400,14 @@ def test_without_numba_there_is_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
         assert kernels_of(bitrows, 10 * LOADING_NS) is bitrows
     finally:
         use_jit(None)
+
+
+@pytest.mark.parametrize("apart", [2**15, 2**16, 2**31, 2**32, 2**40])
+@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+def test_boxes_far_apart_do_not_meet(name: str, apart: int) -> None:
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    row, box = importlib.import_module(f"planes.{name}").met_boxes(
+        np.array([[0, 0, 9, 9], [apart, 0, apart + 9, 9]]), np.array([[5, 5, 6, 6], [5, apart, 6, apart]])
+    )
+    assert (row.tolist(), box.tolist()) == ([0], [0])
