@@ -38,6 +38,9 @@ __all__ = ["counts", "fired_by_bits", "view_of"]
 PLACEMENTS_AT_ONCE = 2**14
 """Placements of a part of a batch at most: 128 KB for each of their columns."""
 
+NEAR_AT_ONCE = 2**12
+"""Placements at most whose objects are looked up at a time: in a crowd each meets a hundred."""
+
 BESIDE_BYTES_MOST = 2**26
 """Distances along the rows of tiles are not made if they take more."""
 
@@ -98,7 +101,8 @@ def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sigh
         composition = scene.compositions().read(view, scene.items, scene.bounds)
         sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
         return _by_composition(composition, sight), PLACEMENTS_AT_ONCE
-    return _by_items(scene.items, view, sight), CHUNK_PAIRS // max(len(sight.stack), 1)
+    most = CHUNK_PAIRS // max(len(sight.stack), 1) if sight.candidates.prefilter.name == "none" else NEAR_AT_ONCE
+    return _by_items(scene.items, view, sight), most
 
 
 def _parts(weapon: Weapon, shots: Shots, step: int) -> Iterator[tuple[int, Shots, Volley, Windows]]:

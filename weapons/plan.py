@@ -44,9 +44,11 @@ DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
 COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
 REDRAW_PIXEL_NS = 0.5
 SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
-DIRECT_CALL_NS, DIRECT_ITEM_NS, DIRECT_SHOT_NS, DIRECT_BOX_NS = 200_000.0, 2000.0, 500.0, 1.5
+DIRECT_CALL_NS, DIRECT_STACK_NS, DIRECT_ITEM_NS = 150_000.0, 200.0, 2000.0
+DIRECT_SHOT_NS, DIRECT_BOX_NS = 500.0, 1.0
 ITEMS_A_SHOT = 5
-COMPOSE_NS, COMPOSE_ITEM_NS = 500_000.0, 4000.0
+DRAWN_NS, DRAWN_ITEM_NS = 100_000.0, 5000.0
+COMPOSE_NS, COMPOSE_ITEM_NS = 500_000.0, 6500.0
 BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 """Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
 ratios only."""
@@ -253,9 +255,13 @@ def chosen_form(
     known = scene.compositions()
     if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
         return "composed", "it is there"
-    lost = DIRECT_CALL_NS + min(len(stack), ITEMS_A_SHOT * placements) * DIRECT_ITEM_NS
+    lost = DIRECT_CALL_NS + len(stack) * DIRECT_STACK_NS
+    lost += min(len(stack), ITEMS_A_SHOT * placements) * DIRECT_ITEM_NS
     lost += placements * (DIRECT_SHOT_NS + len(stack) * DIRECT_BOX_NS)
-    cost = plane.cost(scene.items) * REDRAW_PIXEL_NS if plane else COMPOSE_NS + len(stack) * COMPOSE_ITEM_NS
+    cost = COMPOSE_NS + len(stack) * COMPOSE_ITEM_NS
+    if plane is not None:
+        drawn = DRAWN_NS + len(stack) * DRAWN_ITEM_NS if plane.codes is None else 0
+        cost = plane.cost(scene.items) * REDRAW_PIXEL_NS + drawn
     told = f"about {cost / 1e3:.0f} us to compose, {lost / 1e3:.0f} us more without it"
     return "composed" if known.pays(view, scene.version, lost, cost) else "direct", told
 
