@@ -23,7 +23,7 @@ from planes.tiles import Tiles
 from planes.twins import kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
 from weapons.arsenal import parts_of, pattern_of, pierces
-from weapons.candidates import may_refuse, refused
+from weapons.candidates import Candidates, may_refuse, refused
 from weapons.counting import counted, points
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, chosen_candidates, chosen_form, leave_out_uncounted
@@ -74,9 +74,9 @@ def fired_by_bits(
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
     sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
     plan.run("plan", f"{name}: {why}")
-    read, most = _reader(scene, name, view, point, sight)
+    read, first, most = _reader(scene, name, view, point, sight)
     parts = [Rows.none()]
-    for begin, part, volley, windows in _parts(weapon, shots, max(1, min(most, PLACEMENTS_AT_ONCE) // each)):
+    for begin, part, volley, windows in _parts(weapon, shots, first // each, most // each, candidates):
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.nbytes)
         rows = read(part, volley, windows)
         parts.append(replace(rows, shot=rows.shot + begin) if begin else rows)
@@ -91,31 +91,37 @@ def fired_by_bits(
 Reader = Callable[[Shots, Volley, Windows], Rows]
 
 
-def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sight) -> tuple[Reader, int]:
-    """How rows of placements are found, and of how many at a time."""
+def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sight) -> tuple[Reader, int, int]:
+    """How rows of placements are found, and of how many at first and at most at a time."""
     plane = scene.code_plane() if point and name == "composed" else None
     if plane is not None:
-        return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE
+        return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if name == "composed" and view is not None:
         kept = scene.compositions().kept(view, scene.version) is not None
         composition = scene.compositions().read(view, scene.items, scene.bounds)
         sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
-        return _by_composition(composition, sight), PLACEMENTS_AT_ONCE
-    most = CHUNK_PAIRS // max(len(sight.stack), 1) if sight.candidates.prefilter.name == "none" else NEAR_AT_ONCE
-    return _by_items(scene.items, view, sight), most
+        return _by_composition(composition, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
+    first = min(CHUNK_PAIRS // max(len(sight.stack), 1), NEAR_AT_ONCE)
+    return _by_items(scene.items, view, sight), first, NEAR_AT_ONCE
 
 
-def _parts(weapon: Weapon, shots: Shots, step: int) -> Iterator[tuple[int, Shots, Volley, Windows]]:
-    """Parts of a batch: so many shots, or as many as have patterns that fit memory; and where each begins."""
-    begin = 0
+def _parts(
+    weapon: Weapon, shots: Shots, first: int, most: int, candidates: Candidates
+) -> Iterator[tuple[int, Shots, Volley, Windows]]:
+    """Parts of a batch, and where each begins: as many shots as have pairs and patterns that fit their chunks.
+
+    Parts grow as long as their placements meet few items.
+    """
+    begin, step = 0, first
     while begin < len(shots):
-        part = shots.take(begin, min(begin + step, len(shots)))
+        part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         volley = volley_of(weapon, part)
         if len(part) > 1 and not fits(volley.table.patterns):
             step = len(part) // 2
             continue
         yield begin, part, volley, windows_of(volley.table.patterns, len(volley.shot))
         begin += len(part)
+        step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
 
 
 def _by_plane(plane: CodePlane, items: Items, sight: Sight) -> Reader:
