@@ -115,7 +115,7 @@ class Case:
 NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(SEEDS, st.sampled_from([64, 200, 2**15]))
 @pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
 def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> None:
