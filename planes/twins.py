@@ -12,7 +12,7 @@ from types import ModuleType
 
 from planes.arrays import InputError
 
-__all__ = ["kernels_of", "use_jit"]
+__all__ = ["expect", "kernels_of", "use_jit"]
 
 LOADING_NS = 2e9
 """A call that is expected to take longer in numpy loads the compiled twins of itself, which takes about 1 s."""
@@ -22,7 +22,7 @@ _twins: dict[str, ModuleType] = {}
 
 
 def use_jit(on: bool | None = True) -> None:
-    """Use compiled kernels from now on; False: only numpy; None: as each call pays, as it is at first.
+    """Use compiled kernels from now on; False: only numpy; None: from the first call on that pays, as it is at first.
 
     They change no result. The first calls of all compile them, and keep them on disk.
 
@@ -36,15 +36,16 @@ def use_jit(on: bool | None = True) -> None:
     _asked[:] = [] if on is None else [bool(on)]
 
 
-def kernels_of(module: ModuleType, expected_ns: float = 0.0) -> ModuleType:
-    """The module of kernels itself, or its compiled twin.
+def expect(ns: float) -> None:
+    """Tell how long a call is expected to take in numpy: from one on that is long enough, compiled kernels are used."""
+    if not _asked and ns > LOADING_NS and find_spec("numba") is not None:
+        use_jit(True)
 
-    Parameters
-    ----------
-    expected_ns : what the call is expected to take in numpy
-    """
-    compiled = _asked[0] if _asked else expected_ns > LOADING_NS and find_spec("numba") is not None
-    if not compiled:
+
+def kernels_of(module: ModuleType, expected_ns: float = 0.0) -> ModuleType:
+    """The module of kernels itself, or its compiled twin, for work that is expected to take so long in numpy."""
+    expect(expected_ns)
+    if not _asked or not _asked[0]:
         return module
     if module.__name__ not in _twins:
         _twins[module.__name__] = import_module(f"{module.__name__}_jit")

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from planes import bitrows, cells, use_jit, visible
+from planes import Scene, bitrows, cells, use_jit, visible
 from planes.arrays import InputError
 from planes.bitrows import PAD, WORD, Placed, Seen
 from planes.spans import Spans
 from planes.tiles import STRIDE, TileAtlas, Tiles
 from planes.twins import LOADING_NS, kernels_of
-from weapons import windows
+from weapons import Disc, fire, windows
 from weapons.pattern import Pattern
 
 Pixel = tuple[int, int]
@@ -381,7 +381,11 @@ def test_kernels_are_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         use_jit(None)
         assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS) is bitrows
-        assert kernels_of(bitrows, LOADING_NS * 2) is twin
+        assert kernels_of(bitrows, LOADING_NS * 2) is kernels_of(bitrows) is twin
+        use_jit(None)
+        monkeypatch.setattr("weapons.bitfire.SHOT_NS", 2 * LOADING_NS)
+        fire(Scene((50, 40)), Disc(3), (9, 9))
+        assert kernels_of(bitrows) is twin
         for on, expected in ((True, twin), (False, bitrows)):
             use_jit(on)
             assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS * 2) is expected

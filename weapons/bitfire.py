@@ -20,7 +20,7 @@ from planes.grid256 import ONE
 from planes.items import HITTABLE, Items, Stack
 from planes.scene import Scene
 from planes.tiles import Tiles
-from planes.twins import kernels_of
+from planes.twins import expect, kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
 from weapons.arsenal import parts_of, pattern_of, pierces
 from weapons.candidates import Candidates, may_refuse, refused
@@ -34,6 +34,9 @@ from weapons.weapon import Weapon
 from weapons.windows import fits, windows_of
 
 __all__ = ["counts", "fired_by_bits", "view_of"]
+
+SHOT_NS, ITEM_NS = 300.0, 3.0
+"""What a placement of a disc of 40 px takes in numpy, and more for each item: by `tests/bench/speed.py`."""
 
 PLACEMENTS_AT_ONCE = 2**14
 """Placements of a part of a batch at most: 128 KB for each of their columns."""
@@ -69,6 +72,7 @@ def fired_by_bits(
     prefilter, broadphase, strategy = how
     view, each = view_of(pierces(weapon), shots), placements_of(weapon)
     point = is_point(weapon, view, stack)
+    expect(each * len(shots) * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, each * len(shots))
     asked = 0 if name == "composed" else each * len(shots)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
