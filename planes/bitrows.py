@@ -174,7 +174,8 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     Parameters
     ----------
     placement, near : (n,) pairs of them that may meet, sorted
-    X
+    beside : of the seen tiles, if each pattern holds all pixels that are nearer to its origin than one of its own; or
+        empty
     """
     met = _meets(placed, windows, seen, placement, near).nonzero()[0]
     placement, near = placement[met], near[met]
