@@ -70,13 +70,14 @@ def fired_by_bits(
 ) -> Hits:
     """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
-    view, each = view_of(pierces(weapon), shots), placements_of(weapon)
+    pierce, each = pierces(weapon), placements_of(weapon)
+    view = view_of(pierce, shots)
     point = is_point(weapon, view, stack)
     expect(each * len(shots) * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, each * len(shots))
     asked = 0 if name == "composed" else each * len(shots)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
-    sight = Sight(stack, scene.bounds, pierces(weapon), candidates, plan)
+    sight = Sight(stack, scene.bounds, pierce, candidates, plan)
     plan.run("plan", f"{name}: {why}")
     read, first, most = _reader(scene, name, view, point, sight)
     parts = [Rows.none()]
@@ -134,8 +135,8 @@ def _by_plane(plane: CodePlane, items: Items, sight: Sight) -> Reader:
     sight.plan.run("code plane", f"{plane.redrawn} px drawn anew", plane.redrawn * codes.itemsize)
     objects = items.role[: items.count] == HITTABLE
 
-    def read(_: Shots, volley: Volley, windows: Windows) -> Rows:
-        rows = points(volley, windows, codes, plane.box_xyxy, objects, kernels_of(bitrows))
+    def read(_: Shots, volley: Volley, __: Windows) -> Rows:
+        rows = points(volley, codes, plane.box_xyxy, objects, kernels_of(bitrows))
         sight.plan.run("read", "one code for each sample", rows.nbytes)
         return rows
 
@@ -234,11 +235,11 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
 
 
 def is_point(weapon: Weapon, view: View | None, stack: Stack) -> bool:
-    """Whether placements are of one pixel each, for shots that end at the first item there is."""
+    """Whether a shot is the pixel that it is placed on, and ends at the first item there."""
     burst, spread, plain = parts_of(weapon)
     if burst or spread or plain.directed or view != View(False, ALL, ()) or stack.has_unmet:
         return False
-    return bool(pattern_of(plain, ONE, 0).table.count[0] == 1)
+    return pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
 
 
 def _is_disc(volley: Volley) -> bool:

@@ -65,24 +65,17 @@ def counted(
     )  # fmt: skip
 
 
-def points(
-    volley: Volley, windows: Windows, codes: Codes, plane_xyxy: Box, objects: Bools, kernels: ModuleType
-) -> Rows:
-    """Rows of placements of one pixel: what the code plane tells of it.
+def points(volley: Volley, codes: Codes, plane_xyxy: Box, objects: Bools, kernels: ModuleType) -> Rows:
+    """Rows of placements of the pixel that they lie on: what the code plane tells of it.
 
     Parameters
     ----------
     objects : by id, whether it can be hit
     """
-    x, y = windows.box_xyxy[0, :2].tolist()
-    at = np.add(volley.xy, (x, y)) if x or y else volley.xy
-    place, item = kernels.front_at(codes, plane_xyxy, at[:, 0], at[:, 1], objects)
-    ones = np.broadcast_to(np.int64(1), len(place))
-    xy = at[place]
-    offset = xy - volley.origin_xy[place] if at is not volley.origin_xy else None
-    distance2 = (offset**2).sum(axis=1) if offset is not None else np.broadcast_to(np.int64(0), len(place))
+    place, item = kernels.front_at(codes, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
+    ones, none = (np.broadcast_to(np.int64(value), len(place)) for value in (1, 0))
     shot, round_ = volley.shot[place], volley.round[place]
-    return Rows(shot, round_, item, ones, ones, ones * WEIGHT_FULL, ones, xy, distance2)
+    return Rows(shot, round_, item, ones, ones, ones * WEIGHT_FULL, ones, volley.xy[place], none)
 
 
 def _sums(values: Ints, first: Ints) -> Ints:
