@@ -78,6 +78,14 @@ class Stack:
         return ranks
 
     @cached_property
+    def rank_by_code(self) -> Ints:
+        """Place in the stack of the front item of a code plane, by its id + 1; 0 where there is none."""
+        ranks = np.zeros(int(self.ids.max(initial=-1)) + 2, np.int64)
+        ranks[self.ids + 1] = np.arange(len(self.ids))
+        ranks.flags.writeable = False
+        return ranks
+
+    @cached_property
     def has_occluders(self) -> bool:
         """Whether any item is an occluder."""
         return bool(self.occluder.any())

@@ -162,7 +162,6 @@ OF_JUMPS = [
     (planes.compose.CodePlane, "read", "code plane", 10**4),
     (planes.clearance.ClearancePlane, "read", "clearance plane", 10**5),
     (weapons.jumping, "_first_taken", "jumps", 10**6),
-    (weapons.jumping, "_ranks", "jumps", 2 * 10**6),
     (weapons.jumping, "refused", "filter", 10**7),
     (weapons.firsthits.FirstHits, "rows", "rows", 10**8),
 ]

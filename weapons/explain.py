@@ -180,12 +180,11 @@ def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
 def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; what an object shows is worked out once for each filter."""
     stack = scene.items.stack()
-    rank_of = {item: rank for rank, item in enumerate(stack.ids.tolist())}
     visible: dict[tuple[object, ...], int] = {}
     shares = []
     in_round: dict[int, Ints] = {}
     for row in rows:
-        rank = rank_of[row.object]
+        rank = int(stack.rank_of[row.object])
         key = (rank, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
             visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))

@@ -44,14 +44,13 @@ class _Seen:
     stack: Stack
     codes: Codes
     clearance: Clearance
-    ranks: Ints
     plan: Plan
 
     def front(self, cell: Ints) -> tuple[Ints, Codes]:
         """Rank of the front of taken cells, and their codes."""
         y, x = np.divmod(cell, self.clearance.shape[1])
         code = self.codes.reshape(-1).take((y - PAD) * self.codes.shape[1] + (x - PAD))
-        return self.ranks.take(code >> 1), code
+        return self.stack.rank_by_code.take(code >> 1), code
 
     def refuses(self, ray: Ints, rank: Ints) -> Bools:
         """Whether rays refuse items."""
@@ -75,7 +74,7 @@ def ends_by_jumps(
     -------
     the ends, and the rays for which they are yet to be found
     """
-    seen = _Seen(rays, shots, stack, *_read(plane, items, plan), _ranks(stack), plan)
+    seen = _Seen(rays, shots, stack, *_read(plane, items, plan), plan)
     choosy = may_refuse(stack, shots)
     entry, cell, several = _first_taken(seen.clearance, rays, plane.corner_xy, seen.passed if choosy else None)
     unsure, met = entry == UNDECIDED, np.flatnonzero(entry >= 0)
@@ -130,13 +129,6 @@ def _first_taken(clearance: Clearance, rays: Rays, corner_xy: Ints, passed: Pass
 
 def _later(passed: Passed, begin: int, ray: Ints, cell: Ints) -> Bools:
     return passed(ray + begin, cell)
-
-
-def _ranks(stack: Stack) -> Ints:
-    """Place in the stack by id + 1."""
-    rank = np.zeros(int(stack.ids.max(initial=-1)) + 2, np.int64)
-    rank[stack.ids + 1] = np.arange(len(stack))
-    return rank
 
 
 def _cells_at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width: int) -> Ints:

@@ -76,11 +76,6 @@ class Present:
         x, y = (snap(burst.recoil_xy) // SUB).tolist() if burst else (0, 0)
         return x, y
 
-    @cached_property
-    def rank_of(self) -> dict[int, int]:
-        """Places in the stack by id."""
-        return {item: rank for rank, item in enumerate(self.stack.ids.tolist())}
-
 
 class OneShot(Hits):
     """What one shot of a prepared weapon hit: equal to what `fire` gives, and made when it is asked for.
@@ -154,7 +149,7 @@ class OneShot(Hits):
             met = _gathered(met)
         met.sort()
         if any(one[:4] == other[:4] for one, other in pairwise(met)):  # pixels that are pierced: the front one first
-            met.sort(key=lambda one: (*one[:4], present.rank_of[one[4]]))
+            met.sort(key=lambda one: (*one[:4], present.stack.rank_of[one[4]]))
         shift_x, shift_y = present.recoil_xy
         row = HitRow._make
         return [
@@ -171,9 +166,7 @@ class OneShot(Hits):
         return volley, direct(volley, self.shots, sight)
 
     def _counted(self) -> Ints:
-        counts = self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1)
-        counts.flags.writeable = False
-        return np.asarray(counts)
+        return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))
 
     def _planned(self) -> Plan:
         plan = Plan()
@@ -191,7 +184,7 @@ def _gathered(met: list[Tile]) -> list[Tile]:
     return list(every.values())
 
 
-ROWS = frozenset((*HitRow._fields, "starts"))
+ROWS = frozenset(HitRow._fields)
 MADE: dict[str, Callable[[OneShot], Any]] = {
     "scene": lambda one: one._present.scene,
     "version": lambda one: one._present.version,
@@ -201,7 +194,6 @@ MADE: dict[str, Callable[[OneShot], Any]] = {
     "_met": OneShot._walk,
     "_listed": OneShot._list,
     "_pieces": lambda one: one._present.straight,
-    "_verdicts": OneShot._counted,
     "_scenes": lambda one: None,
     "_walked": lambda one: None,
 }

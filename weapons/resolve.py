@@ -84,14 +84,12 @@ def composed(volley: Volley, shots: Shots, sight: Sight, codes: Codes, plane_xyx
     every = np.arange(len(volley.shot))
     runs = _laid(volley, every, np.broadcast_to(np.array(plane_xyxy), (len(every), 4)))
     plan.run("samples", "runs inside the bounds", runs.nbytes)
-    rank_of = np.zeros(int(stack.ids.max(initial=-1)) + 2, np.int64)
-    rank_of[stack.ids + 1] = np.arange(len(stack))
-    plan.run("read", "one code for each sample", rank_of.nbytes)
+    plan.run("read", "one code for each sample", stack.rank_by_code.nbytes)
     events, behind = [], []
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         run, x_first, x_last, code = read_codes(part, codes, plane_xyxy)
-        rank = rank_of[code >> 1]
+        rank = stack.rank_by_code[code >> 1]
         plan.run("read", "", int(part.lengths.sum()) * codes.itemsize + 5 * rank.nbytes)
         kind = _kinds(rank, volley.shot[part.placement[run]], shots, sight)
         more = (code & 1 == 1) & ((kind == SKIP) | (sight.pierce & (kind == HIT)))
