@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
-    "Bools", "Floats", "Image", "InputError", "Ints", "all_within", "array_of", "bools", "choice", "each", "flag",
+    "Bools", "Codes", "Floats", "Image", "InputError", "Ints", "all_within", "array_of", "bools", "choice", "each", "flag",
     "integer", "integers", "listed", "real", "reals", "rising", "shown", "within",
 ]  # fmt: skip
 
@@ -22,6 +22,7 @@ Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Image = npt.NDArray[np.uint8]
+Codes = npt.NDArray[np.unsignedinteger[Any]]  # of a code plane, see `planes.compose`
 Shape = tuple[int | None, ...]
 
 SHOWN = 60

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
+from planes.arrays import Bools, Codes, Ints
 from planes.spans import Box
 
 __all__ = [
@@ -37,7 +37,6 @@ __all__ = [
 
 Words = npt.NDArray[np.uint64]
 Beside = npt.NDArray[np.uint8]
-Codes = npt.NDArray[np.unsignedinteger[Any]]
 
 WORD = 64
 """Columns of a tile, and rows at most."""

@@ -9,8 +9,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-from planes.arrays import Bools, Ints
-from planes.bitrows import Beside, Codes, Found, Placed, Seen, Windows, Words
+from planes.arrays import Bools, Codes, Ints
+from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
 from planes.spans import Box
 
 __all__ = ["front_at", "found", "row_order", "union", "visible"]

@@ -7,8 +7,8 @@ import threading
 import numpy as np
 
 from planes import jumps
-from planes.arrays import Ints
-from planes.compose import CodePlane, Codes
+from planes.arrays import Codes, Ints
+from planes.compose import CodePlane
 from planes.items import Items, clipped
 from planes.jumps import PAD, Clearance
 from planes.twins import kernels_of

@@ -13,10 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from planes import painting
-from planes.arrays import InputError, Ints
+from planes.arrays import Codes, InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
 from planes.items import Items, Stack, clipped
-from planes.painting import Codes
 from planes.spans import Box
 from planes.twins import kernels_of
 

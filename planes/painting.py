@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
+from planes.arrays import Bools, Codes, Ints
 from planes.spans import Box, meets
 
 __all__ = ["paint"]
 
-Codes = npt.NDArray[np.unsignedinteger[Any]]
 
 PAIRS = 2**18
 """Boxes against boxes that are compared at a time."""

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from planes.arrays import Bools, Ints
+from planes.arrays import Bools, Codes, Ints
 
 __all__ = ["paint"]
-
-Codes = npt.NDArray[np.unsignedinteger[Any]]
 
 
 @njit(cache=True)

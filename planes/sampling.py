@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
-from planes.compose import Codes
+from planes.arrays import Bools, Codes, Ints
 from planes.items import Stack
 from planes.spans import Box, each_pixel, ragged
 

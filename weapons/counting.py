@@ -9,8 +9,8 @@ from types import ModuleType
 
 import numpy as np
 
-from planes.arrays import Bools, Ints
-from planes.bitrows import Beside, Codes, Found, Placed, Seen, Windows
+from planes.arrays import Bools, Codes, Ints
+from planes.bitrows import Beside, Found, Placed, Seen, Windows
 from planes.constants import WEIGHT_FULL
 from planes.spans import Box, ragged
 from weapons.hits import Rows

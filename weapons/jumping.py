@@ -13,9 +13,8 @@ from functools import partial
 import numpy as np
 
 from planes import jumps
-from planes.arrays import Bools, Ints
+from planes.arrays import Bools, Codes, Ints
 from planes.clearance import ClearancePlane
-from planes.compose import Codes
 from planes.constants import HALF, SUB
 from planes.items import Items, Stack
 from planes.jumps import PAD, UNDECIDED, Clearance, Passed

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planes.arrays import Ints
-from planes.compose import Codes, area
+from planes.arrays import Codes, Ints
+from planes.compose import area
 from planes.constants import CHUNK_SAMPLES
 from planes.items import Stack, clipped
 from planes.sampling import (
