@@ -1,9 +1,11 @@
-"""What the tests of bad input share."""
+"""What several tests share."""
 
 import signal
 from collections.abc import Iterator
 
 import pytest
+
+from planes import use_jit
 
 
 class HangError(BaseException):
@@ -22,3 +24,13 @@ def bounded() -> Iterator[None]:
     yield
     signal.setitimer(signal.ITIMER_REAL, 0)
     signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture(params=[False, True])
+def jit(request: pytest.FixtureRequest) -> Iterator[bool]:
+    """Whether compiled kernels are used for all calls of a test: once without, once with."""
+    if request.param:
+        pytest.importorskip("numba")
+    use_jit(request.param)
+    yield request.param
+    use_jit(None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ import planes.visible
 import weapons.bitfire
 import weapons.firing
 import weapons.windows
-from planes import History, Scene, use_jit
+from planes import History, Scene
 from planes.arrays import Bools
 from planes.bitrows import WORD
 from planes.constants import ALL
@@ -47,14 +46,10 @@ OWNERS = (
 )  # fmt: skip
 
 
-@pytest.fixture(params=["numpy", "jit"])
-def kernels(request: pytest.FixtureRequest) -> Iterator[str]:
+@pytest.fixture
+def kernels(jit: bool) -> str:
     """Kernels that are used for all calls of a test."""
-    if request.param == "jit":
-        pytest.importorskip("numba")
-    use_jit(request.param == "jit")
-    yield request.param
-    use_jit(None)
+    return "jit" if jit else "numpy"
 
 
 def cut(patch: pytest.MonkeyPatch, limits: dict[str, int]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 from dataclasses import replace
 from types import ModuleType
 from typing import Any
@@ -19,21 +18,17 @@ from test_rays import check_columns
 import weapons.jumping
 import weapons.rayfire
 from planes import ALL, History, InputError, Scene, jumps
-from planes.twins import kernels_of, use_jit
+from planes.twins import kernels_of
 from weapons import Hits, Laser, Pistol, RayHits, Rifle, Rounds, Spread, Sweep, Weapon, fire
 
 worlds = st.randoms(use_true_random=False)
 FAR = 2**20 - 400
 
 
-@pytest.fixture(params=["numpy", "compiled"])
-def kernels(request: pytest.FixtureRequest) -> Iterator[ModuleType]:
+@pytest.fixture
+def kernels(jit: bool) -> ModuleType:
     """The kernels, and their compiled twins."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    use_jit(request.param == "compiled")
-    yield kernels_of(jumps)
-    use_jit(None)
+    return kernels_of(jumps)
 
 
 def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -1,6 +1,5 @@
 """Moves: stacks that follow them are those made anew, what was handed out stays, and every check is made."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_compose import MASKS, add_one, change, front_to_back, random_scene
 
-from planes import History, InputError, Scene, Sprite, use_jit
+from planes import History, InputError, Scene, Sprite
 from planes.items import Role, Stack
 
 BLINKING = Sprite.from_image(np.array([[[0] * 4] * 3 + [[255] * 4] * 3] * 4, np.uint8), grid_wh=(3, 4))
@@ -136,15 +135,6 @@ def test_the_sizes_of_a_stack_are_its_own() -> None:
     assert scene.items.stack().sizes[1].tolist() == [8, 3]
     scene.move(ids[1], (24, 15))
     assert scene.items.stack().sizes[1].tolist() == [23, 13]
-
-
-@pytest.fixture(params=[False, True])
-def jit(request: pytest.FixtureRequest) -> Iterator[bool]:
-    if request.param:
-        pytest.importorskip("numba")
-    use_jit(request.param)
-    yield request.param
-    use_jit(None)
 
 
 NAN, INF, FAR = float("nan"), float("inf"), 2.0**40

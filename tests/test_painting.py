@@ -1,7 +1,6 @@
 """Boxes of a code plane drawn anew, in numpy and compiled: every pixel as one that is asked by itself."""
 
 import importlib
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_compose import brute_codes, random_scene
 
-from planes import Scene, painting, use_jit
+from planes import Scene, painting
 from planes.compose import CodePlane, label_plane
 
 BOX = (-9, 4, 40, 33)
@@ -59,15 +58,6 @@ def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, each: bool,
     for x, y, x_max, y_max in dirty.tolist():
         drawn[y - BOX[1] : y_max - BOX[1] + 1, x - BOX[0] : x_max - BOX[0] + 1] = True
     assert np.array_equal(codes, np.where(drawn, truth, 999))
-
-
-@pytest.fixture(params=[False, True])
-def jit(request: pytest.FixtureRequest) -> Iterator[bool]:
-    if request.param:
-        pytest.importorskip("numba")
-    use_jit(request.param)
-    yield request.param
-    use_jit(None)
 
 
 def test_planes_follow_many_moves(jit: bool) -> None:
