@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = [
-    "Bools", "Codes", "Floats", "Image", "InputError", "Ints", "all_within", "array_of", "bools", "choice", "each", "flag",
-    "integer", "integers", "listed", "real", "reals", "rising", "shown", "within",
+    "Bools", "Codes", "Floats", "Image", "InputError", "Ints", "all_within", "array_of", "bools", "choice", "each",
+    "flag", "integer", "integers", "listed", "real", "reals", "rising", "shown", "within",
 ]  # fmt: skip
 
 Ints = npt.NDArray[np.int64]
