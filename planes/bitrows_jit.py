@@ -88,6 +88,50 @@ def _within(column: Any, reach: Any) -> Any:
     return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
 
 
+@njit
+def _shared(tiles, tile, windows, word, step, shift, low, high):
+    """Pixels that a tile shares with a window, in rows from `low` to `high` of the world."""
+    samples = 0
+    if shift == 0:
+        for row in range(low, high + 1):
+            samples += _bits(tiles[tile + row] & windows[word + row])
+        return samples
+    right, rest = np.uint64(shift), np.uint64(64 - shift)
+    for row in range(low, high + 1):
+        window = (windows[word + row] >> right) | (windows[word + step + row] << rest)
+        samples += _bits(tiles[tile + row] & window)
+    return samples
+
+
+@njit
+def _closest(tiles, tile, windows, word, step, shift, low, high, own, level):
+    """Squared distance and place, about the origin at (own, level), of the nearest of these pixels, by (y, x)."""
+    middle = min(max(level, low), high)
+    best, best_x, best_y, nearer, first_row, last_row = FAR, np.int64(0), np.int64(0), ALL, low, high
+    row = middle
+    while row <= last_row:
+        met = tiles[tile + row] & _window(windows, word + row, step, shift)
+        if met & nearer:
+            across, down = _across(met, own), row - level
+            if across * across + down * down < best:
+                best, best_x, best_y = across * across + down * down, across, down
+                reach = np.int64(np.sqrt(best)) + 1  # no smaller than the root
+                nearer, last_row = _within(own, reach), min(high, level + reach)
+                first_row = max(low, level - reach)
+        row += 1
+    row = middle - 1
+    while row >= first_row:
+        met = tiles[tile + row] & _window(windows, word + row, step, shift)
+        if met & nearer:
+            across, down = _across(met, own), row - level
+            if across * across + down * down <= best:  # of two as near the upper one is first
+                best, best_x, best_y = across * across + down * down, across, down
+                reach = np.int64(np.sqrt(best)) + 1
+                nearer, first_row = _within(own, reach), max(low, level - reach)
+        row -= 1
+    return best, best_x, best_y
+
+
 @njit(
     [types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, types.int64, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6)],
     cache=True,
@@ -113,41 +157,11 @@ def _found(
             word += shift * shifted
             shift = 0
         tile = begin[at] - top
-        samples = 0
-        if shift == 0:
-            for row in range(low, high + 1):
-                samples += _bits(tiles[tile + row] & windows[word + row])
-        else:
-            right, rest = np.uint64(shift), np.uint64(64 - shift)
-            for row in range(low, high + 1):
-                window = (windows[word + row] >> right) | (windows[word + step + row] << rest)
-                samples += _bits(tiles[tile + row] & window)
+        samples = _shared(tiles, tile, windows, word, step, shift, low, high)
         if samples:
             out_placement[count], out_seen[count], out_samples[count] = who, at, samples
             own, level = origin_x[who] - left, origin_y[who]
-            middle = min(max(level, low), high)
-            best, best_x, best_y, nearer, first_row, last_row = FAR, np.int64(0), np.int64(0), ALL, low, high
-            row = middle
-            while row <= last_row:
-                met = tiles[tile + row] & _window(windows, word + row, step, shift)
-                if met & nearer:
-                    across, down = _across(met, own), row - level
-                    if across * across + down * down < best:
-                        best, best_x, best_y = across * across + down * down, across, down
-                        reach = np.int64(np.sqrt(best)) + 1  # no smaller than the root
-                        nearer, last_row = _within(own, reach), min(high, level + reach)
-                        first_row = max(low, level - reach)
-                row += 1
-            row = middle - 1
-            while row >= first_row:
-                met = tiles[tile + row] & _window(windows, word + row, step, shift)
-                if met & nearer:
-                    across, down = _across(met, own), row - level
-                    if across * across + down * down <= best:  # of two as near the upper one is first
-                        best, best_x, best_y = across * across + down * down, across, down
-                        reach = np.int64(np.sqrt(best)) + 1
-                        nearer, first_row = _within(own, reach), max(low, level - reach)
-                row -= 1
+            best, best_x, best_y = _closest(tiles, tile, windows, word, step, shift, low, high, own, level)
             out_distance2[count], out_x[count], out_y[count] = best, best_x, best_y
             count += 1
     return count
