@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "twins", "schema", "exact", "grid256", "spans", "bitrows", "bitrows_jit",
-        "cells", "cells_jit", "tiles", "bigrows", "rasterise", "rings", "volumes", "parts", "axes",
+        "cells", "cells_jit", "tiles", "fronttoback", "bigrows", "rasterise", "rings", "volumes", "parts", "axes",
         "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles", "slabs", "image",
         "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "stack", "placing",
         "placing_jit", "items", "visible", "index", "painting", "painting_jit", "compose", "jumps",

@@ -1,0 +1,139 @@
+"""What patterns hit of tiles front to back, in numpy and compiled: what sets of pixels, walked one by one, give."""
+
+from __future__ import annotations
+
+import random
+from importlib.util import find_spec
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from planes import fronttoback
+from planes.bitrows import Placed
+from planes.fronttoback import Pile
+from planes.spans import Spans
+from planes.tiles import TileAtlas
+from planes.twins import kernels_of
+from weapons import windows
+
+Pixel = tuple[int, int]
+
+
+def mask_of(rng: random.Random, most: int) -> np.ndarray:
+    """Dense, sparse, with an empty stripe, or without any pixel; cropped."""
+    width, height = rng.randint(1, most), rng.randint(1, rng.choice([5, most]))
+    chance = rng.choice([0, 0.02, 0.5, 0.9, 1, 1])
+    mask = np.array([[rng.random() < chance for _ in range(width)] for _ in range(height)])
+    mask[rng.randrange(height)] &= rng.random() < 0.5
+    rows, columns = mask.any(axis=1).nonzero()[0], mask.any(axis=0).nonzero()[0]
+    return mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else mask
+
+
+def pixels_of(mask: np.ndarray, left: int, top: int) -> list[Pixel]:
+    return [(left + x, top + y) for y, x in np.argwhere(mask).tolist()]
+
+
+class Case:
+    """A random pile of items of one or more tiles, and placed patterns with filters."""
+
+    def __init__(self, seed: int) -> None:
+        rng = random.Random(seed)
+        far = rng.choice([0, 0, 2**15, 2**33, -(2**40)])
+        spread, most = rng.choice([(10, 20), (40, 60), (60, 150)])
+        masks = [mask_of(rng, most) for _ in range(rng.randint(0, 9))]
+        corners = [(far + rng.randint(-spread, spread), rng.randint(-spread, spread)) for _ in masks]
+        tiles = TileAtlas().tiles(enumerate(masks), np.arange(len(masks)), 1)
+        boxes = np.array(
+            [(x, y, x + m.shape[1] - 1, y + m.shape[0] - 1) for m, (x, y) in zip(masks, corners, strict=True)], np.int64
+        )
+        self.occluder = [rng.random() < 0.3 for _ in masks]
+        self.categories = [rng.choice([1, 1, 1, 2, 6, 0]) for _ in masks]
+        self.owner = [rng.randint(0, 3) for _ in masks]
+        told = (np.array(self.occluder, np.bool_), np.array(self.categories, np.int64), np.array(self.owner, np.int64))
+        self.pile = Pile(
+            tiles.rank, tiles.boxes(boxes.reshape(-1, 4)), tiles.begin, tiles.words,
+            *(column[tiles.rank] for column in told),
+        )  # fmt: skip
+        self.items = [pixels_of(mask, *corner) for mask, corner in zip(masks, corners, strict=True)]
+        self._place(rng, far)
+
+    def _place(self, rng: random.Random, far: int) -> None:
+        most = rng.choice([3, 12, 40, 150])
+        self.patterns = [
+            (mask_of(rng, most), rng.randint(-20, 5), rng.randint(-20, 5)) for _ in range(rng.randint(1, 3))
+        ]
+        spans = [Spans.from_mask(mask, (left, top)) for mask, left, top in self.patterns]
+        self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        count = rng.choice([0, 1, 1, 2, 5])
+        pattern = np.array([rng.randrange(len(spans)) for _ in range(count)], np.int64)
+        x, y = np.array([[rng.randint(-60, 60) for _ in range(count)] for _ in range(2)], np.int64)
+        apart = rng.choice([0, 9, 5000, 2**21])
+        off = np.array([[rng.randint(-apart, apart) for _ in range(count)] for _ in range(2)], np.int64)
+        x += far
+        self.placed = Placed(pattern, x, y, x + off[0], y + off[1])
+        self.accept: np.ndarray | int = rng.choice([2**32 - 1, 1, 3])
+        if rng.random() < 0.3:
+            self.accept = np.array([rng.choice([1, 2, 4, 7]) for _ in range(count)], np.int64)
+        owners = np.array([[rng.randint(-1, 3) for _ in range(2)] for _ in range(max(count, 1))], np.int64)
+        self.exclude = rng.choice([None, owners[:1, : rng.randint(0, 2)], owners[:count, : rng.randint(0, 2)]])
+        self.pierce = rng.random() < 0.3
+        self.bounds = rng.choice([None, None, (far - 30, -20, far + 100, 90), (far, 0, far, 0), (5 * 10**12,) * 4])
+
+    def refuses(self, who: int, item: int) -> bool:
+        bits = self.accept if isinstance(self.accept, int) else int(self.accept[who])
+        owners = [] if self.exclude is None else self.exclude[who if len(self.exclude) > 1 else 0].tolist()
+        return not self.categories[item] & bits or self.owner[item] in owners
+
+    def inside(self, x: int, y: int) -> bool:
+        return self.bounds is None or (self.bounds[0] <= x <= self.bounds[2] and self.bounds[1] <= y <= self.bounds[3])
+
+    def hits(self, who: int) -> list[tuple[int, list[Pixel]]]:
+        """Items that a placement hits, and where: each of its pixels walks the stack."""
+        mask, left, top = self.patterns[int(self.placed.pattern[who])]
+        x, y = int(self.placed.x[who]) + left, int(self.placed.y[who]) + top
+        live = {p for p in pixels_of(mask, x, y) if self.inside(*p)}
+        met = []
+        for item, pixels in enumerate(self.items):
+            if self.refuses(who, item):
+                continue
+            here = [p for p in pixels if p in live]
+            if here and not self.occluder[item]:
+                met.append((item, here))
+            if self.occluder[item] or not self.pierce:
+                live -= set(here)
+        return met
+
+    def found(self) -> list[tuple[int, ...]]:
+        rows = []
+        for who in range(len(self.placed.x)):
+            ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
+            for item, pixels in self.hits(who):
+                nearest = min(((x - ox) ** 2 + (y - oy) ** 2, y - oy, x - ox) for x, y in pixels)
+                tiles = [
+                    k for k, (x0, y0, x1, y1) in enumerate(self.pile.box_xyxy.tolist())
+                    if self.pile.rank[k] == item and any(x0 <= x <= x1 and y0 <= y <= y1 for x, y in pixels)
+                ]  # fmt: skip
+                rows.append((who, *nearest, item, min(tiles), len(pixels)))
+        return [(who, tile, count, d2, x, y) for who, d2, y, x, _, tile, count in sorted(rows)]
+
+
+@settings(max_examples=250, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from([64, 2**15]))
+def judged(seed: int, at_once: int) -> None:
+    case = Case(seed)
+    kernels = kernels_of(fronttoback)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fronttoback, "WORDS_AT_ONCE", at_once)
+        found = kernels.front_to_back(
+            case.placed, case.windows, case.pile, case.accept, case.exclude, case.pierce, case.bounds
+        )
+    assert all(column.dtype == np.int64 for column in found)
+    assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
+
+
+def test_each_pixel_ends_at_the_first_item_that_the_shot_accepts(jit: bool) -> None:
+    if jit and find_spec("planes.fronttoback_jit") is None:
+        pytest.skip("no compiled twin")
+    judged()
