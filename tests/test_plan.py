@@ -80,12 +80,6 @@ class Clock:
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.ns, self.patch = 0, patch
         patch.setattr(weapons.plan, "perf_counter_ns", lambda: self.ns)
-        start = Plan.__init__
-
-        def begun(plan: Plan, *args: Any, **values: Any) -> None:
-            start(plan, *args, **{"_mark": self.ns, **values})
-
-        patch.setattr(Plan, "__init__", begun)
 
     def takes(self, owner: Any, name: str, ns: int) -> None:
         """Let every call of a function take so long."""
@@ -263,6 +257,24 @@ def test_times_are_in_no_report_and_make_no_difference() -> None:
         s.ns for s in first.plan.ran
     ] and timed == first.plan.to_dict()
     assert Plan.joined([first.plan, second.plan]).ns == first.plan.ns + second.plan.ns
+
+
+def test_what_ran_or_is_known_is_not_left_out_again() -> None:
+    plan = Plan()
+    plan.leave_out("hud", "none")
+    plan.run("walk", "")
+    assert [stage.name for stage in plan.ran] == ["walk"]  # also of a plan that was read before it was complete
+    plan.run("walk", "by depth", 5)
+    plan.run("rows", "", 7)
+    for name in ("rows", "hud", "walk", "filter"):
+        plan.leave_out(name, "idle")
+    assert plan.to_dict() == {
+        "ran": [{"stage": "walk", "why": "by depth", "bytes": 5}, {"stage": "rows", "why": "", "bytes": 7}],
+        "left_out": [{"stage": "hud", "why": "none"}, {"stage": "filter", "why": "idle"}],
+    }
+    twice = Plan.joined([plan, plan])
+    assert [stage.bytes_made for stage in twice.ran] == [10, 14] and [s.bytes_made for s in plan.ran] == [5, 7]
+    assert plan != twice and plan == Plan.joined([plan]) and "by depth" in repr(plan) and plan != "plan"
 
 
 # As a table

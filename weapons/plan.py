@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter_ns
 from typing import Any
 
@@ -54,6 +55,10 @@ BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80
 ratios only."""
 
 
+READING = threading.RLock()
+"""Held while stages are made of the notes of a plan."""
+
+
 @dataclass(slots=True)
 class Stage:
     """A stage that ran, or one that was left out, and why.
@@ -77,47 +82,89 @@ class Stage:
         return told if self.pairs is None else {**told, "pairs": list(self.pairs)}
 
 
-@dataclass
 class Plan:
     """Stages of a call in the order in which they ran, and those left out.
 
     It is a lap timer, started when it is made: the time since the last stage ended is that of the stage which is told
     to have ended now, so the times add up to that of the call. They are in no report: see `timed`.
+
+    While the call runs it only notes what it is told; the stages are made of its notes when they are asked for.
     """
 
-    ran: list[Stage] = field(default_factory=list)
-    left_out: list[Stage] = field(default_factory=list)
-    _mark: int = field(default_factory=perf_counter_ns, repr=False, compare=False)
-    _stage_of: dict[str, Stage] = field(default_factory=dict, repr=False, compare=False)
+    __slots__ = ("_left_out", "_mark", "_notes", "_ran", "_stage_of")
+
+    def __init__(self) -> None:
+        self._notes: list[tuple[Any, ...]] = []
+        self._ran: list[Stage] = []
+        self._left_out: list[Stage] = []
+        self._stage_of: dict[str, Stage] = {}
+        self._mark = perf_counter_ns()
 
     def run(self, name: str, why: str, bytes_made: int = 0, pairs: tuple[int, int] | None = None) -> None:
         """Record that a stage ended; the numbers of its runs, for the parts of a batch or of the work, add up.
 
         Why it ran is told once.
         """
-        now = perf_counter_ns()
-        self._add(name, why, bytes_made, pairs, now - self._mark)
-        self._mark = now
+        self._notes.append((name, why, bytes_made, pairs, perf_counter_ns()))
 
-    def _add(self, name: str, why: str, bytes_made: int, pairs: tuple[int, int] | None, ns: int) -> None:
-        stage = self._stage_of.get(name)
-        if stage is None:
-            stage = self._stage_of[name] = Stage(name, why, bytes_made, pairs, ns)
-            self.ran.append(stage)
+    def leave_out(self, name: str, why: str) -> None:
+        """Record that a stage was not needed; nothing of one that ran, or of which that is known."""
+        self._notes.append((name, why))
+
+    @property
+    def ran(self) -> list[Stage]:
+        """Stages that ran."""
+        self._read()
+        return self._ran
+
+    @property
+    def left_out(self) -> list[Stage]:
+        """Stages that were not needed."""
+        self._read()
+        return self._left_out
+
+    def _read(self) -> None:
+        """Make stages of the notes, each once, also if threads ask for them at the same time."""
+        with READING:
+            for name, why, *numbers in self._notes:
+                if numbers:
+                    bytes_made, pairs, now = numbers
+                    self._add(Stage(name, why, bytes_made, pairs, now - self._mark))
+                    self._mark = now
+                elif name not in self._stage_of and name not in (stage.name for stage in self._left_out):
+                    self._left_out.append(Stage(name, why))
+            self._notes.clear()
+
+    def _add(self, stage: Stage) -> None:
+        """Count a stage, or what it did once more."""
+        known = self._stage_of.setdefault(stage.name, stage)
+        if known is stage:
+            self._ran.append(stage)
             return
-        stage.why = stage.why or why
-        stage.bytes_made += bytes_made
-        stage.ns += ns
-        if pairs:
-            stage.pairs = added(stage.pairs, pairs)
+        known.why = known.why or stage.why
+        known.bytes_made += stage.bytes_made
+        known.ns += stage.ns
+        if stage.pairs:
+            known.pairs = added(known.pairs, stage.pairs)
 
     @classmethod
     def joined(cls, plans: Sequence[Plan]) -> Plan:
         """What ran in one or more that followed each other, added up; what the first left out."""
-        plan = cls(left_out=list(plans[0].left_out), _mark=plans[-1]._mark)
+        plan = cls()
         for stage in (stage for one in plans for stage in one.ran):
-            plan._add(stage.name, stage.why, stage.bytes_made, stage.pairs, stage.ns)
+            plan._add(replace(stage))
+        plan._left_out, plan._mark = list(plans[0].left_out), plans[-1]._mark
         return plan
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Plan):
+            return NotImplemented
+        return self.ran == other.ran and self.left_out == other.left_out
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Plan(ran={self.ran}, left_out={self.left_out})"
 
     @property
     def ns(self) -> int:
@@ -126,15 +173,12 @@ class Plan:
 
     def has_run(self, name: str) -> bool:
         """Whether a stage ran."""
+        self._read()
         return name in self._stage_of
 
     def has_left_out(self, name: str) -> bool:
         """Whether a stage was left out."""
         return any(stage.name == name for stage in self.left_out)
-
-    def leave_out(self, name: str, why: str) -> None:
-        """Record that a stage was not needed."""
-        self.left_out.append(Stage(name, why))
 
     def to_dict(self) -> dict[str, list[dict[str, object]]]:
         """The plan as JSON."""
@@ -360,32 +404,25 @@ def leave_out_unused(
 ) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
     idle = "no sample needed the stack"
-    if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", candidates.why_unindexed if candidates.index is None else idle)
+    plan.leave_out("broad phase", candidates.why_unindexed if candidates.index is None else idle)
     if not candidates.prefilter.volume:
         plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     elif not plan.has_run("pre-filter"):
         plan.leave_out("volumes", idle)
     leave_out_absent(plan, scene, candidates.stack, weighted=table.prefix is not None, choosy=choosy)
     for name in ("filter", "occluders"):
-        if not plan.has_run(name) and not plan.has_left_out(name):
-            plan.leave_out(name, idle)
-    if not plan.has_run("code plane"):
-        plan.leave_out("code plane", f"direct: {why_strategy}")
-    if not plan.has_run("pre-filter"):
-        plan.leave_out("pre-filter", idle)
-    if not plan.has_run("walk"):
-        plan.leave_out("walk", "no sample lay where it needed one")
+        plan.leave_out(name, idle)
+    plan.leave_out("code plane", f"direct: {why_strategy}")
+    plan.leave_out("pre-filter", idle)
+    plan.leave_out("walk", "no sample lay where it needed one")
     leave_out_imagery(plan, scene)
 
 
 def leave_out_uncounted(plan: Plan, scene: Scene, candidates: Candidates, choosy: bool, name: str, why: str) -> None:
     """Complete a plan of a call that was counted by bit rows with what it did not need."""
     composed = name == "composed"
-    if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", "composed: cells" if composed else candidates.why_unindexed)
-    if not plan.has_run("volumes"):
-        plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
+    plan.leave_out("broad phase", "composed: cells" if composed else candidates.why_unindexed)
+    plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
     leave_out_absent(plan, scene, candidates.stack, weighted=False, choosy=choosy)
     plan.leave_out("verdicts", "counted when asked for")
     if not composed:

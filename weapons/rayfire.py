@@ -116,16 +116,14 @@ def _leave_out_unused(
     if not plan.has_run("walk"):
         for name in ("pre-filter", "walk", "stops"):
             plan.leave_out(name, idle)
-    if not plan.has_run("broad phase"):
-        plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("walk") else idle)
+    plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("walk") else idle)
     if ends_at_first(ray):
         plan.leave_out("passes", "told when they are asked for, as the stops are")
     if jumps_at_all(ray) and not jumps:
         plan.leave_out("jumps", why)
     plan.leave_out("cells between items", "only those inside their boxes are looked at")
     plan.leave_out("verdicts", "counted when asked for")
-    if not plan.has_run("volumes"):
-        plan.leave_out("volumes", "boxes are the pre-filter")
+    plan.leave_out("volumes", "boxes are the pre-filter")
     choosy = may_refuse(through.stack, shots)
     leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
     leave_out_imagery(plan, scene)
