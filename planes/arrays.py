@@ -152,7 +152,7 @@ def flag(field: str, value: object) -> bool:
 
 def choice(field: str, value: object, options: Iterable[str]) -> str:
     """Check one word out of a few; the error suggests the nearest."""
-    names = list(options)
+    names = options if isinstance(options, tuple) else list(options)
     if isinstance(value, str) and value in names:
         return value
     import difflib  # only an error needs it

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 from fractions import Fraction
 from math import floor, isqrt
 from typing import Any
@@ -12,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planes import InputError, Scene
+from planes import InputError, Scene, Sprite
 from planes.grid256 import ONE, unit
 from planes.kept import Kept
 from planes.spans import Spans
@@ -21,12 +23,14 @@ from weapons import (
     Box,
     Cone,
     Disc,
+    Laser,
     Point,
     Polygon,
     Ring,
     Rounds,
     Spread,
     Stencil,
+    Sweep,
     Weapon,
     arsenal,
     fire,
@@ -249,3 +253,15 @@ def test_patterns_that_are_kept_are_bounded(monkeypatch: pytest.MonkeyPatch) -> 
         pattern_of(Beam(40, 2), *(int(v) for v in unit(degrees)))
         assert kept.bytes == sum(p.nbytes for p in kept.values.values()) <= 20_000
     assert len(kept.values) > 3
+
+
+@pytest.mark.parametrize(
+    "weapon", [Disc(3), Rounds(Spread(Disc(2), 3, 4), 2), Sweep(Laser(9), 3, 20), Stencil(["##", "#."])]
+)
+def test_a_weapon_that_was_fired_can_be_copied(weapon: Weapon) -> None:
+    """What is worked out of its fields and kept with it is no part of it."""
+    scene = Scene((30, 30))
+    scene.add(Sprite.circle(5), (15, 15))
+    hits, told = fire(scene, weapon, (12, 12)), repr(weapon)
+    for copied in (copy.deepcopy(weapon), pickle.loads(pickle.dumps(weapon))):
+        assert copied == weapon and repr(copied) == told and fire(scene, copied, (12, 12)) == hits

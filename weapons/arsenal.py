@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
 from typing import Any, ClassVar
+from weakref import ref
 
 import numpy as np
 
 from planes.arrays import InputError, Ints, choice, integer, shown, within
 from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
-from planes.grid256 import pixel, snap, turned, unit
+from planes.grid256 import ONE, pixel, snap, turned, unit
 from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
 from planes.scene import Scene
@@ -307,6 +308,11 @@ class Rounds(Weapon):
             integer("count", self.count, 1, PELLETS_MAX // self.weapon.count)
 
 
+Parts = tuple[
+    tuple[Rounds | None, Spread | None, Plain] | None, tuple[Rounds | None, Spread | Sweep | None, Traced] | None
+]
+"""Of a weapon of patterns its burst, its spread and its one pattern; and those of a weapon of rays."""
+
 KINDS: dict[str, type[Weapon]] = {
     kind.kind: kind
     for kind in (
@@ -317,24 +323,37 @@ KINDS: dict[str, type[Weapon]] = {
 
 def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, Plain]:
     """Take a weapon of patterns apart: its burst, its spread and its one pattern."""
-    burst, spread, one = _apart(weapon)
-    if type(one) not in KINDS.values() or not isinstance(one, Plain) or isinstance(spread, Sweep):
+    parts = _parts_of(weapon)[0]
+    if parts is None:
         raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
-    return burst, spread, one
+    return parts
 
 
 def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, Traced] | None:
     """Take a weapon of rays apart: its burst, its spread or sweep and its one ray; None for any other."""
-    burst, spread, one = _apart(weapon)
-    return (burst, spread, one) if isinstance(one, Traced) and type(one) in KINDS.values() else None
+    return _parts_of(weapon)[1]
 
 
-def _apart(weapon: object) -> tuple[Rounds | None, Spread | Sweep | None, object]:
+def _parts_of(weapon: object) -> Parts:
+    """Parts of a weapon, of patterns and of rays; they are kept with it, as it does not change."""
+    if not isinstance(weapon, Weapon):
+        return None, None
+    kept = vars(weapon)
+    if "_parts" not in kept:
+        kept["_parts"] = _apart(weapon)
+    return kept["_parts"]  # type: ignore[no-any-return]
+
+
+def _apart(weapon: Weapon) -> Parts:
     burst = weapon if isinstance(weapon, Rounds) else None
-    inner = burst.weapon if burst else weapon
-    if isinstance(inner, Spread):
-        return burst, inner, inner.pellet
-    return (burst, inner, inner.ray) if isinstance(inner, Sweep) else (burst, None, inner)
+    inner: Weapon = burst.weapon if burst else weapon
+    several = inner if isinstance(inner, Spread | Sweep) else None
+    one: Weapon = inner.pellet if isinstance(inner, Spread) else inner.ray if isinstance(inner, Sweep) else inner
+    if type(one) not in KINDS.values():
+        return None, None
+    if isinstance(one, Plain):
+        return (burst, several if isinstance(several, Spread) else None, one), None
+    return None, (burst, several, one) if isinstance(one, Traced) else None
 
 
 def has_no_range(weapon: Weapon) -> bool:
@@ -352,12 +371,22 @@ _kept: Kept[tuple[Plain, int, int], Pattern] = Kept(PATTERN_CACHE_BYTES, lambda 
 
 
 def pattern_of(weapon: Plain, c: int, s: int) -> Pattern:
-    """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept."""
+    """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept.
+
+    The straight one, which is that of every aim where a weapon has none, is found by the weapon itself.
+    """
+    straight = s == 0 and c == ONE
+    found: Pattern | None = vars(weapon)["_straight"]() if straight and "_straight" in vars(weapon) else None
+    if found is not None:
+        return found
 
     def make() -> Pattern:
         return make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256, weapon.swept(c, s))
 
-    return _kept.get((weapon, c, s), make)
+    pattern = _kept.get((weapon, c, s), make)
+    if straight:
+        weapon._keep("_straight", ref(pattern))  # no longer than others are kept
+    return pattern
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:
@@ -400,7 +429,8 @@ def arsenal_of(scene: Scene) -> dict[str, Weapon]:
 
 
 def _snapped(length: float) -> int:
-    return int(snap(length))
+    """As `snap`, of one number of Python's own."""
+    return round(SUB * length)
 
 
 def _farthest(points_256: Ints) -> int:

@@ -9,11 +9,14 @@ It may keep too much; it never drops a hit: a pixel that is shared lies, with it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from planes import cells
 from planes.arrays import Bools, Ints, choice
+from planes.constants import BOXES_MAX
 from planes.index import Index
 from planes.items import Items, Stack, boxes_in
 from planes.sampling import BLOCK, HIT, SKIP, Kinds, Pairs
@@ -29,8 +32,7 @@ PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "4 boxes", "polyg
 """Names of pre-filters; any number of boxes up to BOXES_MAX is one."""
 
 
-@dataclass(frozen=True)
-class Prefilter:
+class Prefilter(NamedTuple):
     """What goes before the pixels.
 
     Parameters
@@ -53,6 +55,15 @@ BOX = Prefilter("box")
 
 def prefilter_of(name: object) -> Prefilter:
     """Read the name of a pre-filter: one of PREFILTERS, with any number of boxes."""
+    return _known(name) if isinstance(name, str) else _named(name)
+
+
+@lru_cache(maxsize=len(PREFILTERS) + BOXES_MAX)
+def _known(name: str) -> Prefilter:
+    return _named(name)
+
+
+def _named(name: object) -> Prefilter:
     k = boxes_in("prefilter", name)
     if k is not None:
         return Prefilter("boxes", "boxes", k)

@@ -337,7 +337,7 @@ def chosen_candidates(
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, told)
     if structure == "auto":
-        if not _bvh_pays(scene, len(stack), asked):
+        if not asked or not _bvh_pays(scene, len(stack), asked):
             return Candidates(scene.items, stack, wanted, None, told, "few pairs: every box is compared")
         structure = "bvh"
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")

@@ -56,6 +56,10 @@ class Weapon:
     def _keep(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone, for copies: what is worked out of them is worked out again."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
     def to_json(self) -> dict[str, Any]:
         """The weapon as a scene file has it; fields at their defaults are left out."""
         shown: dict[str, Any] = {"kind": self.kind}
