@@ -13,7 +13,19 @@ from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
 from planes.spans import Box
 
-__all__ = ["front_at", "found", "row_order", "union", "visible"]
+__all__ = [
+    "bits_of",
+    "found",
+    "front_at",
+    "grown",
+    "is_far",
+    "key_of",
+    "put_rows",
+    "row_order",
+    "shared",
+    "union",
+    "visible",
+]
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
 BOXES = types.Array(types.int64, 2, "C", readonly=True)
@@ -22,10 +34,13 @@ FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 OUT = types.int64[::1]
 ALL = np.uint64(2**64 - 1)
 FAR = np.int64(2**62)
+ONE = np.uint64(1)
+ROW_BITS, ROWS = 6, 63
+SIDE, SIDE_BITS = np.int64(2**17), 19  # no pixel of a pattern is so far from its origin
 
 
 @intrinsic
-def _bits(_: Any, word: Any) -> Any:
+def bits_of(_: Any, word: Any) -> Any:
     """How many bits of a word are set."""
 
     def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
@@ -36,20 +51,20 @@ def _bits(_: Any, word: Any) -> Any:
 
 @intrinsic
 def _lowest(_: Any, word: Any) -> Any:
-    """Place of the lowest bit of a word that is not 0."""
+    """Place of the lowest bit of a word; 64 if it has none."""
 
     def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-        return builder.cttz(values[0], ir.Constant(ir.IntType(1), 1))
+        return builder.cttz(values[0], ir.Constant(ir.IntType(1), 0))
 
     return types.int64(types.uint64), made
 
 
 @intrinsic
 def _above(_: Any, word: Any) -> Any:
-    """How many bits lie above the highest bit of a word that is not 0."""
+    """How many bits lie above the highest bit of a word; 64 if it has none."""
 
     def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-        return builder.ctlz(values[0], ir.Constant(ir.IntType(1), 1))
+        return builder.ctlz(values[0], ir.Constant(ir.IntType(1), 0))
 
     return types.int64(types.uint64), made
 
@@ -63,73 +78,74 @@ def _window(words: Any, begin: Any, following: Any, shift: Any) -> Any:
 
 
 @njit(inline="always")
-def _across(word: Any, column: Any) -> Any:
-    """From a column to the nearest pixel of a word that is not 0; of two as near that before it."""
-    if column <= 0:
-        return _lowest(word) - column
-    if column >= 63:
-        return 63 - _above(word) - column
-    right = word >> np.uint64(column)
-    left = word << np.uint64(63 - column)
-    if right == 0:
-        return -_above(left)
-    after = _lowest(right)
-    if left != 0 and _above(left) <= after:
-        return -_above(left)
-    return after
+def key_of(distance2, x, y):
+    """A number that sorts as (distance2, y, x): of two pixels of a row that are as far one lies before the origin."""
+    return (distance2 << SIDE_BITS) | ((y + SIDE) << 1) | (x > 0)
 
 
 @njit(inline="always")
-def _within(column: Any, reach: Any) -> Any:
-    """Columns of a word that lie within a reach of a column."""
-    low, high = max(column - reach, 0), min(column + reach, 63)
-    if low > 63 or high < 0 or reach < 0:
-        return np.uint64(0)
-    return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
+def is_far(origin_x, origin_y, left, top, right, bottom):
+    """Whether a box about an origin is too far from it for `key_of`."""
+    across = max(abs(left - origin_x), abs(right - origin_x))
+    return max(across, abs(top - origin_y), abs(bottom - origin_y)) >= SIDE
 
 
 @njit
-def _shared(tiles, tile, windows, word, step, shift, low, high):
-    """Pixels that a tile shares with a window, in rows from `low` to `high` of the world."""
-    samples = 0
-    if shift == 0:
-        for row in range(low, high + 1):
-            samples += _bits(tiles[tile + row] & windows[word + row])
-        return samples
-    right, rest = np.uint64(shift), np.uint64(64 - shift)
-    for row in range(low, high + 1):
-        window = (windows[word + row] >> right) | (windows[word + step + row] << rest)
-        samples += _bits(tiles[tile + row] & window)
-    return samples
+def put_rows(who, count, n, key, across, seen, samples, placement_out, seen_out, samples_out, distance2, x, y):
+    """Write n rows of a placement, sorted by their keys, and tell how many there are now."""
+    for i in range(n):
+        j = count + i
+        while j > count and distance2[j - 1] > key[i]:
+            distance2[j], y[j] = distance2[j - 1], y[j - 1]
+            j -= 1
+        distance2[j], y[j] = key[i], i
+    for j in range(count, count + n):
+        i = y[j]
+        placement_out[j], seen_out[j], samples_out[j], x[j] = who, seen[i], samples[i], across[i]
+        y[j] = ((distance2[j] >> 1) & (2 * SIDE - 1)) - SIDE
+        distance2[j] >>= SIDE_BITS
+    return count + n
+
+
+def grown(out: Ints, count: int) -> Ints:
+    """Columns (6, n) for twice as many rows, the first of which are there."""
+    more = np.empty((6, 2 * out.shape[1]), np.int64)
+    more[:, :count] = out[:, :count]
+    return more
 
 
 @njit
-def _closest(tiles, tile, windows, word, step, shift, low, high, own, level):
-    """Squared distance and place, about the origin at (own, level), of the nearest of these pixels, by (y, x)."""
-    middle = min(max(level, low), high)
-    best, best_x, best_y, nearer, first_row, last_row = FAR, np.int64(0), np.int64(0), ALL, low, high
-    row = middle
-    while row <= last_row:
-        met = tiles[tile + row] & _window(windows, word + row, step, shift)
-        if met & nearer:
-            across, down = _across(met, own), row - level
-            if across * across + down * down < best:
-                best, best_x, best_y = across * across + down * down, across, down
-                reach = np.int64(np.sqrt(best)) + 1  # no smaller than the root
-                nearer, last_row = _within(own, reach), min(high, level + reach)
-                first_row = max(low, level - reach)
-        row += 1
-    row = middle - 1
-    while row >= first_row:
-        met = tiles[tile + row] & _window(windows, word + row, step, shift)
-        if met & nearer:
-            across, down = _across(met, own), row - level
-            if across * across + down * down <= best:  # of two as near the upper one is first
-                best, best_x, best_y = across * across + down * down, across, down
-                reach = np.int64(np.sqrt(best)) + 1
-                nearer, first_row = _within(own, reach), max(low, level - reach)
-        row -= 1
-    return best, best_x, best_y
+def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
+    """What a tile shares with a window, in rows from `low` to `high` of the world.
+
+    Returns
+    -------
+    samples, and of the nearest to the origin at (own, level) by (y, x): squared distance, x and y about it. All rows
+    are worked on alike, without a branch, so that eight of them are one instruction each.
+    """
+    count = (high - low + 8) & -8
+    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
+    right, left = np.uint64(shift), np.uint64(63 - shift)
+    column = min(max(own, 0), 63)
+    beyond = abs(own - column)
+    ahead, behind = np.uint64(column), np.uint64(63 - column)
+    samples, nearest = np.int64(0), FAR
+    for i in range(count):
+        row = np.uint64(i)
+        met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
+        samples += bits_of(met)
+        across = beyond + min(_lowest(met >> ahead), _above(met << behind))
+        down = low - level + i
+        key = ((across * across + down * down) << ROW_BITS) | i
+        nearest = min(nearest, key if met else FAR)
+    if samples == 0:
+        return samples, FAR, np.int64(0), np.int64(0)
+    i = nearest & ROWS
+    row = np.uint64(i)
+    met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
+    after, before = _lowest(met >> ahead), _above(met << behind)
+    across = column - before if before <= after else column + after
+    return samples, nearest >> ROW_BITS, across - own, low - level + i
 
 
 @njit(
@@ -157,12 +173,11 @@ def _found(
             word += shift * shifted
             shift = 0
         tile = begin[at] - top
-        samples = _shared(tiles, tile, windows, word, step, shift, low, high)
+        own, level = origin_x[who] - left, origin_y[who]
+        samples, distance2, across, down = shared(tiles, tile, windows, word, step, shift, low, high, own, level)
         if samples:
             out_placement[count], out_seen[count], out_samples[count] = who, at, samples
-            own, level = origin_x[who] - left, origin_y[who]
-            best, best_x, best_y = _closest(tiles, tile, windows, word, step, shift, low, high, own, level)
-            out_distance2[count], out_x[count], out_y[count] = best, best_x, best_y
+            out_distance2[count], out_x[count], out_y[count] = distance2, across, down
             count += 1
     return count
 
@@ -231,7 +246,7 @@ def _union(
                 together[row - top] |= tiles[begin[at] + row - top] & _window(windows, word + row, step, shift)
         samples = 0
         for row in range(height):
-            samples += _bits(together[row])
+            samples += bits_of(together[row])
         out[number] = samples
 
 
@@ -292,19 +307,18 @@ def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
 )
 def _front_at(codes, left, top, x, y, objects, place, item):
     count = 0
-    high, wide = codes.shape
-    for i in range(len(x)):
-        column, row = x[i] - left, y[i] - top
-        if 0 <= column < wide and 0 <= row < high:
-            front = np.int64(codes[row, column] >> 1)
-            if front and objects[front - 1]:
-                place[count], item[count] = i, front - 1
-                count += 1
+    high, wide = np.uint64(codes.shape[0]), np.uint64(codes.shape[1])
+    for i in range(len(x)):  # every answer is written, and the next over it if it was none: no branch to be guessed
+        column, row = np.uint64(x[i] - left), np.uint64(y[i] - top)  # what lies before the plane wraps far beyond it
+        inside = (column < wide) & (row < high)
+        front = np.int64(codes[row, column] >> 1) if inside else 0
+        place[count], item[count] = i, front - 1
+        count += (front > 0) and objects[front - 1]
     return count
 
 
 def front_at(codes: Codes, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) -> tuple[Ints, Ints]:
     """See `bitrows.front_at`."""
-    place, item = np.empty(len(x), np.int64), np.empty(len(x), np.int64)
+    place, item = np.empty((2, len(x)), np.int64)
     count = _front_at(codes, plane_xyxy[0], plane_xyxy[1], x, y, objects, place, item)
     return place[:count], item[:count]

@@ -28,7 +28,7 @@ class Pile(NamedTuple):
     box_xyxy : (T, 4) inclusive, px
     begin : (T,) its first row in `words`
     words : flat rows, with WORD empty ones before and after each tile
-    occluder : (T,) whether it is of an occluder, which no shot hits
+    occluder : (T,) whether it is of an occluder, which no shot hits; (0,) where there is none
     categories, owner : (T,) of its item: category bits, and whose it is
     """
 
@@ -45,7 +45,7 @@ def front_to_back(
     placed: Placed,
     windows: Windows,
     pile: Pile,
-    accept: Ints | int,
+    accept: Ints | int | None,
     exclude: Ints | None,
     pierce: bool,
     bounds: Box | None,
@@ -54,7 +54,7 @@ def front_to_back(
 
     Parameters
     ----------
-    accept : category bits, of all placements or (P,) of each
+    accept : category bits, of all placements or (P,) of each; None: nothing is refused, nor looked up for it
     exclude : owners that are passed over, of all (1, K) or (P, K) of each, -1 for none; or None
     pierce : whether objects let through; occluders do not
     bounds : beyond them nothing is hit
@@ -66,8 +66,9 @@ def front_to_back(
     """
     boxes = windows.box_xyxy[placed.pattern] + np.stack([placed.x, placed.y] * 2, axis=1)
     placement, tile = met_boxes(boxes, pile.box_xyxy)
-    some = _accepted(pile, accept, exclude, placement, tile)
-    placement, tile = placement[some], tile[some]
+    if accept is not None:
+        some = _accepted(pile, accept, exclude, placement, tile)
+        placement, tile = placement[some], tile[some]
     left, top = pile.box_xyxy[tile, 0], pile.box_xyxy[tile, 1]
     height = -(-int((pile.box_xyxy[:, 3] - pile.box_xyxy[:, 1]).max(initial=0) + 1) // 8) * 8
     rows = bitrows.rows_of(pile.words, height, pile.begin[tile])
@@ -75,7 +76,8 @@ def front_to_back(
     if bounds is not None:
         rows &= _inside(left, top, height, bounds)
     _take_away_front(rows, pile, accept, exclude, pierce, placement, tile)
-    rows[pile.occluder[tile]] = 0
+    if len(pile.occluder):
+        rows[pile.occluder[tile]] = 0
     samples = np.bitwise_count(rows).sum(axis=1, dtype=np.int64)
     hit = samples.nonzero()[0]
     who = placement[hit]
@@ -104,7 +106,7 @@ def _inside(left: Ints, top: Ints, height: int, bounds: Box) -> Words:
 
 
 def _take_away_front(
-    rows: Words, pile: Pile, accept: Ints | int, exclude: Ints | None, pierce: bool, placement: Ints, tile: Ints
+    rows: Words, pile: Pile, accept: Ints | int | None, exclude: Ints | None, pierce: bool, placement: Ints, tile: Ints
 ) -> None:
     """Take away of the pixels of tiles (n, height) those on which one lies that ends the placement's pixels before."""
     distinct, which = np.unique(tile, return_inverse=True)
@@ -115,10 +117,12 @@ def _take_away_front(
     begin = np.searchsorted(own, np.arange(len(distinct) + 1))
     pair, place = ragged((begin[1:] - begin[:-1])[which])
     front = distinct[other[begin[which][pair] + place]]
-    ends = _accepted(pile, accept, exclude, placement[pair], front)
+    if accept is not None:
+        ends = _accepted(pile, accept, exclude, placement[pair], front)
+        pair, front = pair[ends], front[ends]
     if pierce:
-        ends &= pile.occluder[front]
-    pair, front = pair[ends], front[ends]
+        ends = pile.occluder[front] if len(pile.occluder) else np.zeros(len(front), np.bool_)
+        pair, front = pair[ends], front[ends]
     height = rows.shape[1]
     step = max(WORDS_AT_ONCE // height, 1)
     for first in range(0, len(pair), step):

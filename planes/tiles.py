@@ -5,12 +5,16 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
 from planes.bitrows import WORD, Words, packed
+from planes.fronttoback import Pile
 from planes.spans import ragged
+from planes.stack import Stack
 
 __all__ = ["TileAtlas", "Tiles"]
 
@@ -19,6 +23,8 @@ STRIDE = 3 * WORD
 
 ATLAS_SLACK = 1024
 """Tiles no longer in use that an atlas keeps, beside as many as are."""
+
+NO_FLAGS = np.zeros(0, np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +60,7 @@ class Tiles:
         place, tile = ragged(np.searchsorted(self.rank, rank, side="right") - begin)
         return place, begin[place] + tile
 
-    def each(self, told: Bools) -> Bools:
+    def each(self, told: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What is told of items (M,), of their tiles (T,)."""
         return told if self.whole else told[self.rank]
 
@@ -64,6 +70,12 @@ class Tiles:
             return items_xyxy
         corner = np.stack([items_xyxy[self.rank, 0] + self.left, items_xyxy[self.rank, 1] + self.top], axis=1)
         return np.concatenate([corner, corner + self.size_wh - 1], axis=1)
+
+    def pile(self, stack: Stack) -> Pile:
+        """The tiles where they lie, with what decides who hits them; `stack` is the one whose they are."""
+        occluder = self.each(stack.occluder) if stack.has_occluders else NO_FLAGS
+        whose = self.each(stack.categories), self.each(stack.owner)
+        return Pile(self.rank, self.boxes(stack.box_xyxy), self.begin, self.words, occluder, *whose)
 
 
 class TileAtlas:

@@ -51,10 +51,14 @@ class Case:
         self.occluder = [rng.random() < 0.3 for _ in masks]
         self.categories = [rng.choice([1, 1, 1, 2, 6, 0]) for _ in masks]
         self.owner = [rng.randint(0, 3) for _ in masks]
-        told = (np.array(self.occluder, np.bool_), np.array(self.categories, np.int64), np.array(self.owner, np.int64))
+        told = (
+            np.array(self.occluder * any(self.occluder), np.bool_),
+            np.array(self.categories, np.int64),
+            np.array(self.owner, np.int64),
+        )
         self.pile = Pile(
             tiles.rank, tiles.boxes(boxes.reshape(-1, 4)), tiles.begin, tiles.words,
-            *(column[tiles.rank] for column in told),
+            *(column[tiles.rank] if len(column) else column for column in told),
         )  # fmt: skip
         self.items = [pixels_of(mask, *corner) for mask, corner in zip(masks, corners, strict=True)]
         self._place(rng, far)
@@ -73,7 +77,7 @@ class Case:
         off = np.array([[rng.randint(-apart, apart) for _ in range(count)] for _ in range(2)], np.int64)
         x += far
         self.placed = Placed(pattern, x, y, x + off[0], y + off[1])
-        self.accept: np.ndarray | int = rng.choice([2**32 - 1, 1, 3])
+        self.accept: np.ndarray | int | None = rng.choice([None, 2**32 - 1, 1, 3])
         if rng.random() < 0.3:
             self.accept = np.array([rng.choice([1, 2, 4, 7]) for _ in range(count)], np.int64)
         owners = np.array([[rng.randint(-1, 3) for _ in range(2)] for _ in range(max(count, 1))], np.int64)
@@ -82,6 +86,8 @@ class Case:
         self.bounds = rng.choice([None, None, (far - 30, -20, far + 100, 90), (far, 0, far, 0), (5 * 10**12,) * 4])
 
     def refuses(self, who: int, item: int) -> bool:
+        if self.accept is None:
+            return False
         bits = self.accept if isinstance(self.accept, int) else int(self.accept[who])
         owners = [] if self.exclude is None else self.exclude[who if len(self.exclude) > 1 else 0].tolist()
         return not self.categories[item] & bits or self.owner[item] in owners

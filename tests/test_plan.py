@@ -102,10 +102,10 @@ OF_BITS = [
     (BITFIRE, "chosen_form", "plan", 10**3),
     (BITFIRE, "chosen_candidates", "plan", 2 * 10**3),
     (BITFIRE, "leave_out_uncounted", "plan", 4 * 10**3),
-    (BITFIRE, "counted", "samples", 10**4),
 ]
 OF_TILES = [
     *OF_BITS,
+    (BITFIRE, "counted", "samples", 10**4),
     (planes.items.Items, "tiles", "tiles", 10**5),
     (Candidates, "near", "volumes", 10**6),
     (BITFIRE, "refused", "filter", 10**7),
@@ -167,11 +167,22 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         {"strategy": "direct", "prefilter": "circle", "broadphase": "grid"},
         [*OF_TILES, INDEX],
     ),
+    "bit rows front to back": (
+        Disc(9),
+        {"strategy": "direct"},
+        [
+            *OF_BITS,
+            (planes.items.Items, "tiles", "tiles", 10**5),
+            (planes.fronttoback, "front_to_back", "samples", 10**6),
+            (BITFIRE, "rows_of", "samples", 10**7),
+        ],
+    ),
     "bit rows composed": (
         Disc(9),
         {"strategy": "composed"},
         [
             *OF_BITS,
+            (BITFIRE, "rows_of", "samples", 10**4),
             (planes.visible.Compositions, "read", "composition", 10**5),
             (planes.visible.Composition, "cells", "pre-filter", 10**6),
         ],
@@ -425,10 +436,10 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
         full = fire(yard(full=True), Disc(9, falloff=falloff), SHOTS)
         assert ("occluders" in names(full)[0]) == bool(falloff) and not {"occluders", "layers"} & names(full)[1]
     filtered = True
-    assert "filter" in names(fire(yard(), Disc(9), SHOTS, exclude=5))[0]
+    assert "filter" not in names(fire(yard(), Disc(9), SHOTS, exclude=5))[1]
     unmet = yard()
     unmet.set(3, categories=0)
-    assert "filter" in names(fire(unmet, Disc(9), SHOTS))[0]
+    assert "filter" not in names(fire(unmet, Disc(9), SHOTS))[1]
 
 
 def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -458,7 +469,7 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
     assert fire(yard(), Disc(9.03125), SHOTS).verdict_counts()["hit"]
     assert called == {"leave_out_absent": 1, "weight": 1}  # of the verdicts, that are asked for
     called.clear()
-    fire(yard(), Disc(9), SHOTS, strategy="direct", exclude=[[5], *[[4]] * 8])
+    fire(yard(), Disc(9), SHOTS, strategy="direct", exclude=[[5], *[[4]] * 8], prefilter="box")
     assert called == {"refused": 2}  # what shots come near, and what lies in front of that
     fire(yard(full=True), Disc(9.03125, falloff="linear"), SHOTS, strategy="composed", exclude=5)
     fire(yard(full=True), Disc(9), SHOTS, strategy="direct", prefilter="circle", broadphase="grid")
@@ -502,7 +513,7 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bitrows cells compose constants grid256 image index items kept labels painting placing poses rasterise"
+    "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing poses rasterise"
     " sampling scene scenefile schema spans sprite stack tiles twins visible"
 )
 OF_FIRE = (
@@ -551,7 +562,7 @@ def test_each_thing_alone_adds_what_is_its_own() -> None:
     }
     assert changed["layers"] == {"layers"} and changed["bounds"] == {"outside"}
     assert changed["imagery"] == set(IMAGERY)
-    assert changed["occluders"] == {"stack", "tiles", "pre-filter", "occluders", "samples"}
-    assert changed["filter"] == {"filter", "visible", "samples"}
+    assert changed["occluders"] == {"stack", "tiles", "occluders", "samples"}
+    assert changed["filter"] == {"filter", "samples"}
     by_runs = {"weights", "verdicts", "walk", "code plane"}
     assert changed["falloff"] == {"patterns", "tiles", "visible", "composition", "samples", "rows"} | by_runs

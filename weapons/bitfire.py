@@ -1,6 +1,9 @@
 """Fire patterns by bit rows: the whole flow of a counted weapon on one screen.
 
-scene -> stack -> weapon -> patterns -> windows -> near -> visible -> shared -> rows
+scene -> stack -> weapon -> patterns -> windows -> what they share with tiles of items -> rows
+
+Composed: with what can be seen of all, by cells of shot positions. Direct: with tiles where they lie, front to back; of
+pellets that scatter, and where a pre-filter is asked for, with what can be seen of the items that they come near.
 """
 
 from __future__ import annotations
@@ -11,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from planes import bitrows, cells
+from planes import bitrows, cells, fronttoback, lookup
 from planes.arrays import Ints
-from planes.bitrows import WORD, Beside, Seen, Windows
+from planes.bitrows import WORD, Seen, Windows
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
@@ -24,7 +27,7 @@ from planes.twins import expect, kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
 from weapons.arsenal import parts_of, pattern_of, pierces
 from weapons.candidates import Candidates, may_refuse, refused
-from weapons.counting import counted, points
+from weapons.counting import NOT_BESIDE, counted, placed_of, points, rows_of
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, chosen_candidates, chosen_form, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
@@ -50,9 +53,6 @@ BESIDE_BYTES_MOST = 2**26
 PAIRS_AT_ONCE = 2**16
 """Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
 
-NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
-"""No distances along rows: the nearest pixel is looked for in what is hit."""
-
 REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
 
@@ -73,13 +73,14 @@ def fired_by_bits(
     pierce, each = pierces(weapon), placements_of(weapon)
     view = view_of(pierce, shots)
     point = is_point(weapon, view, stack)
+    alone = parts_of(weapon)[1] is None and (prefilter, broadphase) == ("auto", "auto")
     expect(each * len(shots) * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, each * len(shots))
-    asked = 0 if name == "composed" else each * len(shots)
+    asked = 0 if alone or name == "composed" else each * len(shots)
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
     sight = Sight(stack, scene.bounds, pierce, candidates, plan)
     plan.run("plan", f"{name}: {why}")
-    read, first, most = _reader(scene, name, view, point, sight)
+    read, first, most = _reader(scene, name, view, point, alone, sight)
     parts = [Rows.none()]
     for begin, part, volley, windows in _parts(weapon, shots, first // each, most // each, candidates):
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.nbytes)
@@ -96,8 +97,15 @@ def fired_by_bits(
 Reader = Callable[[Shots, Volley, Windows], Rows]
 
 
-def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sight) -> tuple[Reader, int, int]:
-    """How rows of placements are found, and of how many at first and at most at a time."""
+def _reader(
+    scene: Scene, name: str, view: View | None, point: bool, alone: bool, sight: Sight
+) -> tuple[Reader, int, int]:
+    """How rows of placements are found, and of how many at first and at most at a time.
+
+    Parameters
+    ----------
+    alone : whether each placement has rows of its own, and no pre-filter but boxes was asked for
+    """
     plane = scene.code_plane() if point and name == "composed" else None
     if plane is not None:
         return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
@@ -106,6 +114,8 @@ def _reader(scene: Scene, name: str, view: View | None, point: bool, sight: Sigh
         composition = scene.compositions().read(view, scene.items, scene.bounds)
         sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
         return _by_composition(composition, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
+    if alone:
+        return _by_pile(scene.items, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     first = min(CHUNK_PAIRS // max(len(sight.stack), 1), NEAR_AT_ONCE)
     return _by_items(scene.items, view, sight), first, NEAR_AT_ONCE
 
@@ -117,14 +127,14 @@ def _parts(
 
     Parts grow as long as their placements meet few items.
     """
-    begin, step = 0, first
+    begin, step, compiled = 0, first, kernels_of(bitrows) is not bitrows
     while begin < len(shots):
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         volley = volley_of(weapon, part)
         if len(part) > 1 and not fits(volley.table.patterns):
             step = len(part) // 2
             continue
-        yield begin, part, volley, windows_of(volley.table.patterns, len(volley.shot))
+        yield begin, part, volley, windows_of(volley.table.patterns, 0 if compiled else len(volley.shot))
         begin += len(part)
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
 
@@ -147,14 +157,40 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
     """Count what placements cover of what can be seen of all objects."""
 
     def read(_: Shots, volley: Volley, windows: Windows) -> Rows:
-        listed = composition.cells(_reach(windows.box_xyxy))
-        placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
-        sight.plan.run("pre-filter", f"cells of {1 << listed.bits} px", placement.nbytes + near.nbytes)
-        seen, beside = composition.seen, NOT_BESIDE
-        many = len(seen.rank) < len(near) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
-        if many and kernels_of(bitrows) is bitrows and _is_disc(volley):
+        listed, seen, plan = composition.cells(_reach(windows.box_xyxy)), composition.seen, sight.plan
+        plan.run("pre-filter", f"cells of {1 << listed.bits} px")
+        if volley.scattered:
+            placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
+            plan.run("pre-filter", "", placement.nbytes + near.nbytes)
+            return _counted(volley, windows, placement, near, seen, sight)
+        kernels, beside = kernels_of(lookup), NOT_BESIDE
+        many = len(seen.rank) < len(volley.shot) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
+        if many and kernels is lookup and _is_disc(volley):
             beside = composition.beside
-        return _counted(volley, windows, placement, near, seen, beside, sight)
+        found = kernels.looked_up(placed_of(volley), windows, seen, listed, beside)
+        rows = rows_of(volley, found, sight.stack.ids[seen.rank])
+        plan.run("samples", "counted by bit rows", rows.nbytes)
+        return rows
+
+    return read
+
+
+def _by_pile(items: Items, sight: Sight) -> Reader:
+    """Count what placements cover of tiles where they lie, front to back."""
+    tiles, stack = items.tiles(), sight.stack
+    pile = tiles.pile(stack)
+    sight.plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else pile.box_xyxy.nbytes)
+
+    def read(shots: Shots, volley: Volley, windows: Windows) -> Rows:
+        accept, exclude = None, None
+        if may_refuse(stack, shots):
+            accept, exclude = shots.accept[volley.shot], shots.exclude[volley.shot]
+        found = kernels_of(fronttoback).front_to_back(
+            placed_of(volley), windows, pile, accept, exclude, sight.pierce, sight.bounds
+        )
+        rows = rows_of(volley, found, tiles.each(stack.ids))
+        sight.plan.run("samples", "counted by bit rows, front to back: boxes, filters and occluders, too", rows.nbytes)
+        return rows
 
     return read
 
@@ -174,7 +210,7 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
             which, near, of, front = _seen_by_all(tiles, boxes, tile, view, sight)
         seen = seen_of(tiles, boxes, sight.bounds, which, of, front)
         sight.plan.run("visible", "what is in front of the tiles near placements", seen.words.nbytes)
-        return _counted(volley, windows, placement[pair], near, seen, NOT_BESIDE, sight)
+        return _counted(volley, windows, placement[pair], near, seen, sight)
 
     return read
 
@@ -247,9 +283,7 @@ def _is_disc(volley: Volley) -> bool:
     return not volley.scattered and len(volley.table.patterns) == 1 and volley.table.patterns[0].is_disc
 
 
-def _counted(
-    volley: Volley, windows: Windows, placement: Ints, near: Ints, seen: Seen, beside: Beside, sight: Sight
-) -> Rows:
+def _counted(volley: Volley, windows: Windows, placement: Ints, near: Ints, seen: Seen, sight: Sight) -> Rows:
     """Count pairs, so many at a time as fit the cache, all of a shot together."""
     edges = [0, len(placement)]
     if len(placement) > PAIRS_AT_ONCE:
@@ -257,7 +291,7 @@ def _counted(
         wanted = shot[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
         edges = [0, *np.unique(np.searchsorted(shot, wanted)).tolist(), len(placement)]
     parts = [
-        counted(volley, windows, placement[a:b], near[a:b], seen, beside, sight.stack.ids, kernels_of(bitrows))
+        counted(volley, windows, placement[a:b], near[a:b], seen, sight.stack.ids, kernels_of(bitrows))
         for a, b in pairwise(edges)
     ]
     rows = Rows.joined(parts)

@@ -10,13 +10,39 @@ from types import ModuleType
 import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
-from planes.bitrows import Beside, Found, Placed, Seen, Windows
+from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
 from planes.constants import WEIGHT_FULL
 from planes.spans import Box, ragged
 from weapons.hits import Rows
 from weapons.volley import Volley
 
-__all__ = ["counted", "points"]
+__all__ = ["NOT_BESIDE", "counted", "placed_of", "points", "rows_of"]
+
+NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
+"""No distances along rows: the nearest pixel is looked for in what is hit."""
+
+
+def placed_of(volley: Volley) -> Placed:
+    """Placements as the kernels take them."""
+    return Placed(volley.pattern, *volley.xy.T, *volley.origin_xy.T)
+
+
+def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
+    """Rows of what each placement hit by itself.
+
+    Parameters
+    ----------
+    found : a pair for each row, in the order of rows
+    ids : of the item of each tile
+    """
+    who, samples = found.placement, found.samples
+    xy = volley.origin_xy[who]
+    xy[:, 0] += found.x
+    xy[:, 1] += found.y
+    return Rows(
+        volley.shot[who], volley.round[who], ids[found.seen], samples, samples, samples * WEIGHT_FULL,
+        np.ones_like(samples), xy, found.distance2,
+    )  # fmt: skip
 
 
 def counted(
@@ -25,7 +51,6 @@ def counted(
     placement: Ints,
     near: Ints,
     seen: Seen,
-    beside: Beside,
     ids: Ints,
     kernels: ModuleType,
 ) -> Rows:
@@ -34,12 +59,11 @@ def counted(
     Parameters
     ----------
     placement, near : (n,) pairs of placements and seen tiles that may meet, sorted
-    beside : of the seen tiles, or empty, as `bitrows.found` takes it
     ids : (M,) of the items of the stack
     kernels : `planes.bitrows` or its twin
     """
-    placed = Placed(volley.pattern, *volley.xy.T, *volley.origin_xy.T)
-    found: Found = kernels.found(placed, windows, seen, placement, near, beside)
+    placed = placed_of(volley)
+    found: Found = kernels.found(placed, windows, seen, placement, near, NOT_BESIDE)
     rank, samples = seen.rank[found.seen], found.samples
     turn = volley.shot[found.placement] * volley.rounds + volley.round[found.placement]
     pixels, pellets = samples, np.ones_like(samples)

@@ -43,7 +43,7 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
 
     Parameters
     ----------
-    placements : for which they are read
+    placements : for which all shifts would serve
     """
     often = len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
     if often:

@@ -1,0 +1,294 @@
+"""The kernel of `fronttoback`, compiled: each placement takes its pixels from what is left of its pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from planes import fronttoback
+from planes.arrays import Ints
+from planes.bitrows import Found, Placed, Windows
+from planes.bitrows_jit import (
+    ALL,
+    BOXES,
+    FLAGS,
+    INTS,
+    ONE,
+    OUT,
+    WORDS,
+    bits_of,
+    grown,
+    is_far,
+    key_of,
+    put_rows,
+    shared,
+)
+from planes.fronttoback import Pile
+from planes.spans import Box
+
+__all__ = ["front_to_back"]
+
+ROOM = 16
+"""Rows a placement for which there is room at first; memory that is not written to costs nothing."""
+
+FEW = 4
+"""So few placements look at every tile; for more, tiles are put into cells of the world first."""
+
+CELL_BITS = 6
+"""Of the side of those cells, at least: no tile is wider."""
+
+PAD = 64
+"""Empty rows before and after those of a pattern."""
+
+EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
+
+OWNERS = types.Array(types.int64, 2, "A", readonly=True)
+OUT_WORDS = types.uint64[::1]
+
+
+@njit(types.Tuple((OUT, OUT, OUT))(BOXES), cache=True, nogil=True)
+def _binned(box):
+    """Tiles by the cell of their first corner: where each list begins, the lists, and the cells' place and size."""
+    count = len(box)
+    x, y, x_max, y_max = box[0, 0], box[0, 1], box[0, 0], box[0, 1]
+    for tile in range(count):
+        x, x_max = min(x, box[tile, 0]), max(x_max, box[tile, 0])
+        y, y_max = min(y, box[tile, 1]), max(y_max, box[tile, 1])
+    bits = CELL_BITS
+    while (((x_max - x) >> bits) + 1.0) * (((y_max - y) >> bits) + 1.0) > 2.0 * count + 64:
+        bits += 1
+    wide, high = ((x_max - x) >> bits) + 1, ((y_max - y) >> bits) + 1
+    begin, listed = np.zeros(wide * high + 1, np.int64), np.empty(count, np.int64)
+    for tile in range(count):
+        begin[((box[tile, 1] - y) >> bits) * wide + ((box[tile, 0] - x) >> bits)] += 1
+    total = 0
+    for cell in range(wide * high + 1):
+        total, begin[cell] = total + begin[cell], total
+    for tile in range(count):
+        cell = ((box[tile, 1] - y) >> bits) * wide + ((box[tile, 0] - x) >> bits)
+        listed[begin[cell]] = tile
+        begin[cell] += 1
+    for cell in range(wide * high, 0, -1):
+        begin[cell] = begin[cell - 1]
+    begin[0] = 0
+    return begin, listed, np.array([x, y, bits, wide, high])
+
+
+@njit
+def _near(box, begin, listed, cells, left, top, right, bottom, near):
+    """Tiles whose boxes meet one, front to back; how many."""
+    count = 0
+    if not len(cells):
+        for tile in range(len(box)):
+            across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
+            if across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top):
+                near[count] = tile
+                count += 1
+        return count
+    x, y, bits, wide, high = cells[0], cells[1], cells[2], cells[3], cells[4]
+    first, last = max((left - PAD + 1 - x) >> bits, 0), min((right - x) >> bits, wide - 1)
+    if first > last:
+        return 0
+    for row in range(max((top - PAD + 1 - y) >> bits, 0), min((bottom - y) >> bits, high - 1) + 1):
+        for entry in range(begin[row * wide + first], begin[row * wide + last + 1]):
+            tile = listed[entry]
+            across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
+            if across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top):
+                near[count] = tile
+                count += 1
+    _sort(near, count)
+    return count
+
+
+@njit
+def _sort(numbers, count):
+    """Shell (1959)."""
+    step = 1
+    while step < count // 3:
+        step = 3 * step + 1
+    while step:
+        for i in range(step, count):
+            number, j = numbers[i], i
+            while j >= step and numbers[j - step] > number:
+                numbers[j] = numbers[j - step]
+                j -= step
+            numbers[j] = number
+        step //= 3
+
+
+@njit
+def _laid(windows, first, columns, step, rows, rest):
+    """Copy the rows of a pattern between the empty ones, and tell how many pixels it has."""
+    pixels = 0
+    for column in range(columns):
+        source, target = np.uint64(first + column * step), np.uint64(PAD + column * step)
+        for i in range(rows):
+            row = np.uint64(i)
+            rest[target + row] = windows[source + row]
+            pixels += bits_of(windows[source + row])
+    return pixels
+
+
+@njit
+def _cut_off(rest, columns, step, left, top, rows, x, y, x_max, y_max):
+    """Take away what of a pattern lies beyond the bounds, and tell how many pixels it has left."""
+    pixels = 0
+    for column in range(columns):
+        first = left - 63 + 64 * column  # of the world
+        low, high = max(x - first, 0), min(x_max - first, 63)
+        kept = np.uint64(0)
+        if low <= 63 and high >= low:
+            kept = (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
+        for row in range(rows):
+            word = column * step + PAD + row
+            rest[word] = rest[word] & kept if y <= top + row <= y_max else np.uint64(0)
+            pixels += bits_of(rest[word])
+    return pixels
+
+
+@njit
+def _take(tiles, tile, rest, word, step, shift, low, high):
+    """Take the pixels of a tile away from what is left, in rows from `low` to `high`; how many there were."""
+    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
+    left, right = np.uint64(shift), np.uint64(63 - shift)
+    taken = 0
+    for i in range(high - low + 1):
+        row = np.uint64(i)
+        near, far = tiles[tile + row] << left, tiles[tile + row] >> right >> ONE
+        taken += bits_of(rest[word + row] & near) + bits_of(rest[following + row] & far)
+        rest[word + row] &= ~near
+        rest[following + row] &= ~far
+    return taken
+
+
+@njit(inline="always")
+def _refused(tile, categories, owner, accept, exclude, who):
+    """Whether a shot refuses the item of a tile; what there is one of is for all shots."""
+    if categories[tile] & accept[who if len(accept) > 1 else 0] == 0:
+        return True
+    for k in range(exclude.shape[1]):  # noqa: SIM110 - a generator costs a call of its own
+        if owner[tile] == exclude[who if len(exclude) > 1 else 0, k]:
+            return True
+    return False
+
+
+@njit
+def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
+    """Keep tiles that a shot accepts, up to the last object's; how many."""
+    kept = objects = 0
+    for i in range(count):
+        tile = near[i]
+        if len(accept) and _refused(tile, categories, owner, accept, exclude, who):
+            continue
+        near[kept] = tile
+        kept += 1
+        if len(occluder) == 0 or not occluder[tile]:
+            objects = kept
+    return objects
+
+
+@njit(
+    [
+        types.UniTuple(types.int64, 2)(
+            types.int64, types.int64, *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
+            INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4), *[OUT] * 6
+        )
+    ],
+    cache=True,
+    nogil=True,
+)  # fmt: skip
+def _front_to_back(
+    who, count, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    rank, box, tile_begin, tiles, occluder, categories, owner, accept, exclude, pierce, bounds,
+    out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+):  # fmt: skip
+    room, most = len(out_placement), 0
+    for kind in range(len(first)):
+        most = max(most, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
+    begin = listed = cells = np.zeros(0, np.int64)
+    if len(x) > FEW and len(box):
+        begin, listed, cells = _binned(box)
+    near, rest, last_kind = np.empty(len(box), np.int64), np.empty(most, np.uint64), -1
+    key, nearest_x = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
+    hit, hit_samples = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
+    while who < len(x):
+        kind = pattern[who]
+        left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
+        right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
+        if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
+            return -1, 0
+        close = _near(box, begin, listed, cells, left, top, right, bottom, near)
+        close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
+        if close == 0:
+            who += 1
+            continue
+        if count + close > room:
+            break
+        if kind != last_kind:
+            rest[:], last_kind = 0, kind
+        step, rows = following[kind], bottom - top + 1
+        columns = (62 + right - left + 1) // 64 + 2
+        pixels = _laid(windows, first[kind], columns, step, rows, rest)
+        if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
+            pixels = _cut_off(rest, columns, step, left, top, rows, bounds[0], bounds[1], bounds[2], bounds[3])
+        n, item = 0, -1
+        for i in range(close):
+            if pixels == 0:
+                break
+            at = near[i]
+            low, high = max(box[at, 1], top), min(box[at, 3], bottom)
+            offset = box[at, 0] - left + 63
+            tile, word, shift = tile_begin[at] - box[at, 1], PAD + (offset >> 6) * step - top, offset & 63
+            if len(occluder) and occluder[at]:
+                pixels -= _take(tiles, tile, rest, word, step, shift, low, high)
+                continue
+            own, level = origin_x[who] - box[at, 0], origin_y[who]
+            samples, distance2, across, down = shared(tiles, tile, rest, word, step, shift, low, high, own, level)
+            if samples == 0:
+                continue
+            if not pierce:
+                pixels -= samples
+                if i + 1 < close:
+                    _take(tiles, tile, rest, word, step, shift, low, high)
+            new = key_of(distance2, across, down)
+            if rank[at] == item:
+                hit_samples[n - 1] += samples
+                if new < key[n - 1]:
+                    key[n - 1], nearest_x[n - 1] = new, across
+            else:
+                key[n], nearest_x[n], hit[n], hit_samples[n] = new, across, at, samples
+                item = rank[at]
+                n += 1
+        count = put_rows(
+            who, count, n, key, nearest_x, hit, hit_samples,
+            out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+        )  # fmt: skip
+        who += 1
+    return who, count
+
+
+NONE = np.zeros(0, np.int64)
+NOBODY = np.zeros((1, 0), np.int64)
+
+
+def front_to_back(
+    placed: Placed,
+    windows: Windows,
+    pile: Pile,
+    accept: Ints | int | None,
+    exclude: Ints | None,
+    pierce: bool,
+    bounds: Box | None,
+) -> Found:
+    """See `fronttoback.front_to_back`."""
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
+    accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
+    shots = (accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds)
+    who, count = (-1 if windows.shifted else 0), 0
+    out = np.empty((6, ROOM * len(placed.x) + len(pile.rank)), np.int64)
+    while who >= 0:
+        who, count = _front_to_back(who, count, *placed, *pattern, *pile, *shots, *out)
+        if who == len(placed.x):
+            return Found(*out[:, :count])
+        out = grown(out, count)
+    return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)

@@ -1,0 +1,97 @@
+"""The kernel of `lookup`, compiled: each placement by itself, in one pass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from planes import lookup
+from planes.bitrows import Beside, Found, Placed, Seen, Windows
+from planes.bitrows_jit import BOXES, INTS, OUT, WORDS, grown, is_far, key_of, put_rows, shared
+from planes.cells import Cells
+
+__all__ = ["looked_up"]
+
+ROOM = 8
+"""Rows a placement for which there is room at first; memory that is not written to costs nothing."""
+
+
+@njit(
+    [
+        types.UniTuple(types.int64, 2)(
+            types.int64, types.int64, *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS,
+            *[types.int64] * 5, INTS, INTS, *[OUT] * 6
+        )
+    ],
+    cache=True,
+    nogil=True,
+)  # fmt: skip
+def _looked_up(
+    who, count, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
+    out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+):  # fmt: skip
+    room = len(out_placement)
+    key, nearest_x = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
+    hit, hit_samples = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
+    while who < len(x):
+        column, row = (x[who] - cells_x) >> bits, (y[who] - cells_y) >> bits
+        if column < 0 or row < 0 or column >= wide or row >= high:
+            who += 1
+            continue
+        cell = row * wide + column
+        entry, last = begin[cell], begin[cell + 1]
+        if entry == last:
+            who += 1
+            continue
+        if count + last - entry > room:
+            break
+        kind, n, item = pattern[who], 0, -1
+        left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
+        right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
+        if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
+            return -1, 0
+        step = following[kind]
+        for place in range(entry, last):
+            at = listed[place]
+            low, lowest = max(box[at, 1], top), min(box[at, 3], bottom)
+            if (box[at, 0] > right) | (box[at, 2] < left) | (low > lowest):
+                continue
+            offset = box[at, 0] - left + 63
+            word = first[kind] + (offset >> 6) * step - top
+            own, level = origin_x[who] - box[at, 0], origin_y[who]
+            samples, distance2, across, down = shared(
+                tiles, tile_begin[at] - box[at, 1], windows, word, step, offset & 63, low, lowest, own, level
+            )
+            if samples:
+                if rank[at] == item:
+                    hit_samples[n - 1] += samples
+                    new = key_of(distance2, across, down)
+                    if new < key[n - 1]:
+                        key[n - 1], nearest_x[n - 1] = new, across
+                else:
+                    key[n], nearest_x[n] = key_of(distance2, across, down), across
+                    hit[n], hit_samples[n] = at, samples
+                    n += 1
+                    item = rank[at]
+        count = put_rows(
+            who, count, n, key, nearest_x, hit, hit_samples,
+            out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+        )  # fmt: skip
+        who += 1
+    return who, count
+
+
+def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
+    """See `lookup.looked_up`; `beside` is not needed."""
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
+    who, count = (-1 if windows.shifted else 0), 0
+    out = np.empty((6, ROOM * len(placed.x) + len(seen.rank)), np.int64)
+    while who >= 0:
+        who, count = _looked_up(
+            who, count, *placed, *pattern, seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells, *out
+        )
+        if who == len(placed.x):
+            return Found(*out[:, :count])
+        out = grown(out, count)
+    return lookup.looked_up(placed, windows, seen, cells, beside)
