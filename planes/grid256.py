@@ -33,7 +33,9 @@ def snap(values: object) -> Ints:
 
 def pixel(position_256: Ints) -> Ints:
     """Whole pixel that holds a position; on a pixel border, the one to the right or below."""
-    return (position_256 + HALF) >> 8
+    moved = position_256 + HALF
+    moved >>= 8  # in the same array
+    return moved
 
 
 def rounded_div(numerator: Ints, denominator: Ints | int) -> Ints:

@@ -21,6 +21,7 @@ from planes import ALL, InputError, Scene, Sprite
 from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire
 from weapons.arsenal import Plain
 from weapons.draws import disc_offsets
+from weapons.volley import Shots, checked_shots
 
 Pixel = tuple[int, int]
 Bounds = tuple[int, int, int, int]
@@ -664,3 +665,49 @@ def test_composed_needs_bounds() -> None:
             fire(scene, Disc(2, falloff="linear"), (0, 0), strategy="composed")
         for weapon in (Point(), Disc(2)):
             assert fire(scene, weapon, (1, 1), strategy="composed").object.tolist() == [item]
+
+
+def test_a_column_is_what_was_given_for_all(jit: bool) -> None:
+    """Shots whose arguments are one for all are those that are told one by one, also some of them."""
+    weapon, at = Beam(9, 2), np.arange(12.0).reshape(6, 2)
+    for one in ({}, {"aim": 30}, {"aim": 30, "accept": 5, "exclude": 3, "seed": 2**64 - 1}, {"toward": (50, 9)}):
+        each: dict[str, Any] = {name: [value] * 6 for name, value in one.items()}
+        each = {
+            "accept": [ALL] * 6,
+            "seed": [0] * 6,
+            "shot": range(6),
+            **({} if "toward" in one else {"aim": [0] * 6}),
+            **each,
+        }
+        shots = [checked(weapon, at, **how) for how in (one, each)]
+        for some in (slice(0, 6), slice(2, 5), slice(3, 3), np.array([4, 1])):
+            a, b = (both.pick(some) for both in shots)
+            c, d = (both.pick(np.array([1, 0])) for both in (a, b) if len(both) > 1) if len(a) > 1 else (a, b)
+            for got, expected in ((a, b), (c, d)):
+                assert len(got) == len(expected) and got.choosy == expected.choosy == bool("accept" in one)
+                for name in ("at_256", "direction", "accept", "exclude", "number", "seed", "row"):
+                    x, y = getattr(got, name), getattr(expected, name)
+                    assert x.dtype == y.dtype and np.array_equal(x, y), name
+        assert shots[0].nbytes <= (2 if "toward" in one else 1) * at.nbytes < shots[1].nbytes
+
+
+@pytest.mark.parametrize("laid", ["apart", "unaligned", "read-only", "big-endian", "float32", "list"])
+def test_positions_may_lie_anyhow(jit: bool, laid: str) -> None:
+    plain = np.arange(40.0).reshape(20, 2) / 8
+    raw = np.zeros(plain.nbytes + 1, np.uint8)[1:]
+    raw[:] = plain.view(np.uint8).reshape(-1)
+    fixed = plain.copy()
+    fixed.flags.writeable = False
+    at = {
+        "apart": np.repeat(plain, 3, axis=1)[:, ::3], "unaligned": raw.view(np.float64).reshape(20, 2),
+        "read-only": fixed, "big-endian": plain.astype(">f8"), "float32": plain.astype(np.float32),
+        "list": plain.tolist(),
+    }[laid]  # fmt: skip
+    shots = checked(Disc(2), at)
+    assert np.array_equal(shots.at_256, 256 * plain) and shots.at_256.dtype == np.int64
+
+
+def checked(weapon: Weapon, at: object, **how: Any) -> Shots:
+    """Checked shots, as `fire` has them."""
+    how = {"aim": None, "toward": None, "accept": ALL, "exclude": None, "seed": 0, "shot": None} | how
+    return checked_shots(weapon, at, **how)

@@ -1,7 +1,9 @@
 """The 1/256-px grid: one rounding of positions, directions correct to the last bit, turns and mirrors exact."""
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import oracle_raster as oracle
@@ -9,8 +11,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planes import grid256
+from planes import grid256, snapping, snapping_jit
 from planes.arrays import InputError
+from planes.constants import POSITION_MAX
 
 MANY = settings(max_examples=300, deadline=None)
 FEW = settings(max_examples=100, deadline=None)
@@ -76,6 +79,39 @@ def test_snap_is_odd(value: float) -> None:
 def test_snap_moves_with_the_world(v_256: int, shift_px: int) -> None:
     # on the grid the shifted float is exact, so the shift must come through exactly
     assert int(grid256.snap(v_256 / 256 + shift_px)) == v_256 + 256 * shift_px
+
+
+LAID: list[Callable[[list[float]], np.ndarray[Any, Any]]] = [
+    lambda values: np.array(values).reshape(-1, 2),
+    lambda values: np.array(values).reshape(-1, 2).T.copy().T,
+    lambda values: np.repeat(np.array(values).reshape(-1, 2), 2, axis=0)[::2],
+]
+"""Positions in one piece, by columns, and with gaps."""
+
+LIMIT = float(POSITION_MAX)
+IN_RANGE = st.one_of(st.floats(-LIMIT, LIMIT), st.integers(-(2**49), 2**49).map(lambda n: n / 512))
+
+
+@given(st.lists(IN_RANGE, min_size=2).filter(lambda values: len(values) % 2 == 0), st.sampled_from(LAID))
+@example([0.5 / 256, 1.5 / 256, -0.5 / 256, -2.5 / 256, LIMIT, -LIMIT], LAID[0])
+def test_positions_are_snapped_at_once_as_each_is_alone(
+    values: list[float], laid: Callable[[list[float]], np.ndarray[Any, Any]]
+) -> None:
+    at, expected = laid(values), [round(256 * Fraction(value)) for value in values]
+    for kernels in (snapping, snapping_jit):
+        found = kernels.snapped(at)
+        assert found is not None and found.dtype == np.int64
+        assert found.tolist() == np.reshape(expected, (-1, 2)).tolist() and at.tolist() == laid(values).tolist()
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, math.nextafter(LIMIT, math.inf), -1.01 * LIMIT])
+def test_positions_out_of_range_are_not_snapped(bad: float) -> None:
+    for kernels in (snapping, snapping_jit):
+        for place in np.ndindex(9, 2):
+            at = np.ones((9, 2))
+            at[place] = bad
+            assert kernels.snapped(at) is None
+        assert len(kernels.snapped(np.zeros((0, 2)))) == 0
 
 
 def test_snap_keeps_the_shape_and_the_input() -> None:

@@ -376,9 +376,9 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     scene.add(np.ones((5, 5), np.bool_), (20, 20))
     word, runs, hits = 8, 3 * 5 * 8, 3 * 5 * 8
     told = {
-        "shots": 8 * word,
+        "shots": 2 * word,
         "stack": 8 * word + 1,
-        "patterns": (3 * 5 + 2 + 1 + 4) * word + 6 * word,
+        "patterns": (3 * 5 + 2 + 1 + 4) * word + 2 * word,
         "plan": 0,
         "weights": (9 + 1) * word + 3 * word,
         "verdicts": 2 * 5 * word,
@@ -513,8 +513,8 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing poses rasterise"
-    " sampling scene scenefile schema spans sprite stack tiles twins visible"
+    "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing poses"
+    " rasterise sampling scene scenefile schema snapping spans sprite stack tiles twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns counting draws explain firing guns hits pattern plan resolve runfire volley"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -96,12 +95,6 @@ def _flips(volley: Volley, shot: Shots, sight: Sight) -> tuple[Bools, Ints]:
 def _shifted(volley: Volley, shift: Ints) -> Volley:
     """Place a volley once for each shift, with all placements as those of the first shot."""
     n = len(shift)
-    return replace(
-        volley,
-        pattern=np.tile(volley.pattern, n),
-        xy=np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley.shot), axis=0),
-        origin_xy=np.tile(volley.origin_xy, (n, 1)),
-        shot=np.tile(volley.shot, n),
-        round=np.tile(volley.round, n),
-        pellet=np.tile(volley.pellet, n),
-    )
+    whose = np.tile(volley.shot, n), np.tile(volley.round, n), np.tile(volley.pellet, n)
+    xy = np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley.shot), axis=0)
+    return Volley(volley.table, np.tile(volley.pattern, n), xy, np.tile(volley.origin_xy, (n, 1)), whose, volley.rounds)

@@ -147,7 +147,7 @@ class PatternTable:
         self._rows = int(self.y.max(initial=0)) - self._top + 1
         self._row = np.repeat(np.arange(len(patterns)), np.diff(self.begin)) * (self._rows + 2) + self.y - self._top
 
-    @property
+    @cached_property
     def nbytes(self) -> int:
         """Bytes of the spans and of what finds them, without those of the weights."""
         columns = (self.begin, self.count, self.box_xyxy)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -124,7 +124,7 @@ def pieces_of(
 ) -> list[Piece]:
     """Parts of a shot at the origin, which is aimed `toward` an offset, if any."""
     if offset_256 is not None:
-        shots = replace(shots, direction=np.stack(unit_toward(*offset_256)).reshape(1, 2))
+        shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
     volley = volley_of(weapon, shots)
     found: list[Piece] = []
     for number in np.unique(volley.round).tolist():

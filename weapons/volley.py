@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from planes import snapping
 from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
 from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
-from planes.poses import points
+from planes.poses import one_place, points
 from planes.twins import kernels_of
 from weapons import draws
 from weapons.arsenal import Plain, has_no_range, parts_of, pattern_of
@@ -21,105 +21,180 @@ from weapons.weapon import Weapon
 __all__ = ["Shots", "Volley", "check_aimed", "checked_shots", "placements_of", "recoiled", "volley_of"]
 
 OWNER_MAX = 2**31
-EVERY = np.int64(ALL)
-
-FEW = 1024
-"""Rows that are sooner written than spread."""
+STRAIGHT = (ONE, 0)
 
 
-@dataclass(frozen=True, eq=False)
 class Shots:
-    """A checked batch.
+    """A checked batch. What is the same for all shots is given once; its column is made when it is read.
 
     Parameters
     ----------
     at_256 : (N, 2) positions in 1/256 px
-    direction : (N, 2) cos and sin of the aim times 2**30
+    direction : (N, 2) cos and sin of the aim times 2**30, or those of all; None: toward their points
     toward_256 : (N, 2) from there to the points that they are aimed at, in 1/256 px; None if they have an angle
-    accept : (N,) category bits
-    exclude : (N, K) owners, -1 for none
-    number : (N,) shot numbers, for the draws
-    seed : (N,) uint64, of the draws
-    row : (N,) their places in the call, for errors
+    accept : (N,) category bits, or those of all
+    exclude : (N, K) owners, -1 for none, or those of all
+    number : (N,) shot numbers, for the draws, or that of the first, from which they count up
+    seed : (N,) uint64, of the draws, or that of all
+    row : (N,) their places in the call, for errors, or that of the first
     """
 
-    at_256: Ints
-    direction: Ints
-    toward_256: Ints | None
-    accept: Ints
-    exclude: Ints
-    number: Ints
-    seed: draws.Words
-    row: Ints
+    def __init__(
+        self,
+        at_256: Ints,
+        direction: Ints | tuple[int, int] | None,
+        toward_256: Ints | None,
+        accept: Ints | int,
+        exclude: Ints | tuple[int, ...],
+        number: Ints | int,
+        seed: draws.Words | int,
+        row: Ints | int,
+    ) -> None:
+        self.at_256, self.toward_256 = at_256, toward_256
+        self._direction, self._accept, self._exclude = direction, accept, exclude
+        self._number, self._seed, self._row = number, seed, row
 
     def __len__(self) -> int:
-        return len(self.number)
+        return len(self.at_256)
+
+    @property
+    def one_direction(self) -> tuple[int, int] | None:
+        """That of all, where one was given for all."""
+        return self._direction if isinstance(self._direction, tuple) else None
+
+    @cached_property
+    def direction(self) -> Ints:
+        """Cosine and sine (N, 2) of the aims, times 2**30."""
+        if self._direction is None and self.toward_256 is not None:
+            return np.stack(unit_toward(self.toward_256[:, 0], self.toward_256[:, 1]), axis=1)
+        return _spread(self._direction, len(self))
+
+    @cached_property
+    def accept(self) -> Ints:
+        """Category bits (N,)."""
+        return _spread(self._accept, len(self))
+
+    @cached_property
+    def exclude(self) -> Ints:
+        """Owners (N, K) that are passed over, -1 for none."""
+        return _spread(self._exclude, len(self))
+
+    @cached_property
+    def number(self) -> Ints:
+        """Shot numbers (N,), for the draws."""
+        return self._number + np.arange(len(self)) if isinstance(self._number, int) else self._number
+
+    @cached_property
+    def seed(self) -> draws.Words:
+        """Seeds (N,) of the draws."""
+        return np.broadcast_to(np.uint64(self._seed), len(self)) if isinstance(self._seed, int) else self._seed
+
+    @cached_property
+    def row(self) -> Ints:
+        """Places (N,) in the call."""
+        return self._row + np.arange(len(self)) if isinstance(self._row, int) else self._row
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the columns."""
-        toward = 0 if self.toward_256 is None else self.toward_256.nbytes
-        words = (self.at_256, self.direction, self.accept, self.exclude, self.number, self.seed, self.row)
-        return toward + sum(column.nbytes for column in words)
+        """Bytes of what is not the same for all."""
+        given = self._direction, self.toward_256, self._accept, self._exclude, self._number, self._seed, self._row
+        return self.at_256.nbytes + sum(column.nbytes for column in given if isinstance(column, np.ndarray))
 
     @cached_property
     def choosy(self) -> bool:
         """Whether any shot may refuse an item."""
+        if isinstance(self._accept, int) and isinstance(self._exclude, tuple):
+            return self._accept != ALL or bool(self._exclude)
         return bool((self.accept != ALL).any() or self.exclude.shape[1])
+
+    def aimed(self, direction: Ints) -> Shots:
+        """The same shots in other directions (N, 2)."""
+        rest = self._accept, self._exclude, self._number, self._seed, self._row
+        return Shots(self.at_256, direction, self.toward_256, *rest)
 
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
         return self if first == 0 and last >= len(self) else self.pick(slice(first, last))
 
     def pick(self, rows: Ints | slice) -> Shots:
-        """Some of the shots."""
-        columns: list[Any] = [getattr(self, f.name) for f in fields(self)]
-        some: list[Any] = [None if column is None else column[rows] for column in columns]
-        return Shots(*some)
+        """Some of the shots: those of rows (n,), or of a slice that has a beginning."""
+        begin = rows.start if isinstance(rows, slice) else rows
+
+        def some(column: Any) -> Any:
+            return column[rows] if isinstance(column, np.ndarray) else column
+
+        def counted(column: Ints | int) -> Ints | int:
+            return column[rows] if isinstance(column, np.ndarray) else column + begin
+
+        return Shots(
+            self.at_256[rows], some(self._direction), some(self.toward_256), some(self._accept), some(self._exclude),
+            counted(self._number), some(self._seed), counted(self._row),
+        )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
 class Volley:
     """Placed patterns, sorted by (shot, round, pellet), as columns.
 
     Parameters
     ----------
     table : the distinct patterns
-    pattern : (P,) which of them
+    pattern : (P,) which of them; None: all have the first
     xy : (P, 2) whole pixel it is placed on
     origin_xy : (P, 2) whole pixel of its round, from which distances are counted
-    shot, round, pellet : (P,) whose it is; `shot` counts from 0 within the batch
+    shot, round, pellet : (P,) whose it is; `shot` counts from 0 within the batch. Without them each is a shot
+    rounds : of a shot
     """
 
-    table: PatternTable
-    pattern: Ints
-    xy: Ints
-    origin_xy: Ints
-    shot: Ints
-    round: Ints
-    pellet: Ints
+    def __init__(
+        self,
+        table: PatternTable,
+        pattern: Ints | None,
+        xy: Ints,
+        origin_xy: Ints,
+        whose: tuple[Ints, Ints, Ints] | None = None,
+        rounds: int = 1,
+    ) -> None:
+        self.table, self.xy, self.origin_xy, self.rounds = table, xy, origin_xy, rounds
+        self._pattern, self._whose = pattern, whose
+
+    @cached_property
+    def pattern(self) -> Ints:
+        """Which of the patterns (P,) each has."""
+        return np.zeros(len(self.xy), np.int64) if self._pattern is None else self._pattern
+
+    @cached_property
+    def shot(self) -> Ints:
+        """Shot (P,) of each, counted from 0 within the batch."""
+        return np.arange(len(self.xy)) if self._whose is None else self._whose[0]
+
+    @cached_property
+    def round(self) -> Ints:
+        """Round (P,) of each."""
+        return np.zeros(len(self.xy), np.int64) if self._whose is None else self._whose[1]
+
+    @cached_property
+    def pellet(self) -> Ints:
+        """Pellet (P,) of each."""
+        return np.zeros(len(self.xy), np.int64) if self._whose is None else self._whose[2]
 
     @property
     def boxes(self) -> Ints:
         """Inclusive boxes (P, 4); an empty pattern has x_max < x_min."""
-        return np.asarray(self.table.box_xyxy[self.pattern] + np.concatenate([self.xy, self.xy], axis=1))
+        boxes = np.concatenate([self.xy, self.xy], axis=1)
+        boxes += self.table.box_xyxy if self._pattern is None else self.table.box_xyxy[self._pattern]
+        return boxes
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the table and the columns."""
-        columns = (self.pattern, self.origin_xy, self.shot, self.round, self.pellet)
-        scattered = 0 if self.xy is self.origin_xy else self.xy.nbytes
-        return self.table.nbytes + scattered + sum(column.nbytes for column in columns)
+        """Bytes of the table and of the columns that are there."""
+        words = self.origin_xy.size + (self.xy.size if self.scattered else 0)
+        words += (0 if self._pattern is None else self._pattern.size) + (3 * len(self.xy) if self._whose else 0)
+        return self.table.nbytes + 8 * words
 
     @property
     def count(self) -> Ints:
         """Samples (P,) of each."""
         return self.table.count[self.pattern]
-
-    @property
-    def rounds(self) -> int:
-        """Rounds of a shot."""
-        return int(self.round.max(initial=0)) + 1
 
     @property
     def scattered(self) -> bool:
@@ -140,42 +215,45 @@ def checked_shots(
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
     at_256, single = _places(at)
     n = len(at_256)
-    numbers = np.arange(n)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
     return Shots(
         at_256,
-        _directions(n, aim, offset),
+        _directions(n, aim) if offset is None else None,
         offset,
         _accepted(accept, n),
         _owners(exclude, n, single),
-        numbers if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
+        0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
-        numbers,
+        0,
     )
 
 
 def _places(at: object) -> tuple[Ints, bool]:
     """Positions (N, 2) in 1/256 px, and whether it was one shot's alone (2,)."""
-    plain = at if type(at) is np.ndarray and at.dtype == np.float64 and at.shape[1:] == (2,) else None
-    if plain is not None and (np.abs(plain) <= POSITION_MAX).all():  # NaN is not
-        return snap(plain), False
+    one = one_place(at)
+    if one is not None:
+        return np.array((one,), np.int64), True
+    if type(at) is np.ndarray and at.dtype == np.float64 and at.shape[1:] == (2,) and at.flags.aligned:
+        many: Ints | None = kernels_of(snapping).snapped(at)
+        if many is not None:
+            return many, False
     single = array_of("at", at).shape == (2,)
     return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 
 
-def _accepted(accept: object, n: int) -> Ints:
-    """Category bits (n,)."""
-    if accept is ALL:
-        return _spread(EVERY, n)
+def _accepted(accept: object, n: int) -> Ints | int:
+    """Category bits (n,), or those of all."""
+    if type(accept) is int and 0 <= accept <= ALL:
+        return accept
     return integers("accept", each("accept", accept, n), (n,), 0, ALL)
 
 
-def _spread(value: np.int64 | int | Ints, n: int) -> Ints:
-    """One value, or one row of values, for all of n shots; for many it is there once."""
-    one = np.asarray(value)
-    if n <= FEW:
-        return np.full((n, *one.shape), one)
+def _spread(column: Ints | int | tuple[int, ...] | None, n: int) -> Ints:
+    """A column as it is, or one value, or row of values, for all of n shots, which is there once."""
+    if isinstance(column, np.ndarray):
+        return column
+    one = np.array(column, np.int64)
     return np.broadcast_to(one, (n, *one.shape))
 
 
@@ -189,18 +267,18 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
     if not burst and not spread:
-        xy, none = pixel(shots.at_256), _spread(0, len(shots))
-        table, pattern = _patterns(plain, shots.direction)
-        return Volley(table, pattern, xy, xy, np.arange(len(shots)), none, none)
+        xy = pixel(shots.at_256)
+        return Volley(*_patterns(plain, shots.one_direction or shots.direction), xy, xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
     round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
     pellet = np.tile(np.arange(pellets), len(shots) * rounds)
     origin = shots.at_256[shot]
-    direction = shots.direction[shot] if plain.directed else _spread(np.zeros(2, np.int64), len(shot))
+    direction: Ints | tuple[int, int] = STRAIGHT
+    if plain.directed:
+        direction = recoiled(shots.direction[shot], round_, burst.recoil_deg if burst else 0)
     if burst:
         origin = origin + round_[:, None] * snap(burst.recoil_xy)
-        direction = recoiled(direction, round_, burst.recoil_deg) if plain.directed else direction
     origin_xy = pixel(origin)
     xy = origin_xy
     if spread:
@@ -208,28 +286,32 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
             int(snap(spread.radius)), shots.seed[shot], shots.number[shot], round_, pellet
         )
         xy = origin_xy + offsets
-    table, pattern = _patterns(plain, direction)
-    return Volley(table, pattern, xy, origin_xy, shot, round_, pellet)
+    return Volley(*_patterns(plain, direction), xy, origin_xy, (shot, round_, pellet), rounds)
 
 
-def _patterns(plain: Plain, direction: Ints) -> tuple[PatternTable, Ints]:
-    """Distinct patterns of directions (P, 2), and which is whose."""
-    if not plain.directed or not len(direction) or not direction.strides[0] or (direction == direction[0]).all():
-        c, s = direction[0].tolist() if plain.directed and len(direction) else (ONE, 0)
-        return pattern_of(plain, c, s).table, _spread(0, len(direction))
+def _patterns(plain: Plain, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:
+    """Distinct patterns of directions (P, 2), or of that of all, and which is whose; None if there is one."""
+    if not plain.directed or not len(direction):
+        direction = STRAIGHT
+    elif not isinstance(direction, tuple) and (direction == direction[0]).all():
+        c, s = direction[0].tolist()
+        direction = c, s
+    if isinstance(direction, tuple):
+        return pattern_of(plain, *direction).table, None
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
     c = (number + 2 * ONE) // (4 * ONE)
     pairs = zip(c.tolist(), (number - c * (4 * ONE)).tolist(), strict=True)
     return PatternTable([pattern_of(plain, c, s) for c, s in pairs]), which
 
 
-def _directions(n: int, aim: object, offset: Ints | None) -> Ints:
-    if offset is None and (aim is None or isinstance(aim, int | float)):
-        c, s = (ONE, 0) if aim is None else unit(reals("aim", aim, ()))
-        return _spread(np.array([int(c), int(s)]), n)
-    if offset is None:
-        return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
-    return np.stack(unit_toward(offset[:, 0], offset[:, 1]), axis=1)
+def _directions(n: int, aim: object) -> Ints | tuple[int, int]:
+    """Directions (n, 2) of aims, or that of all."""
+    if aim is None:
+        return STRAIGHT
+    if isinstance(aim, int | float):
+        c, s = unit(reals("aim", aim, ()))
+        return int(c), int(s)
+    return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
 
 
 def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
@@ -267,14 +349,14 @@ def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
     return turned(direction, c[round_], s[round_])
 
 
-def _seeds(seed: object, n: int) -> draws.Words:
-    """Seeds (n,): one for all, or one for each."""
-    # As objects: numpy would make float64 of a list with numbers on both sides of 2**63, and lose their last bits.
+def _seeds(seed: object, n: int) -> draws.Words | int:
+    """Seeds (n,), or that of all."""
     if type(seed) is int and 0 <= seed <= SEED_MAX:
-        return np.broadcast_to(np.uint64(seed), (n,))
+        return seed
+    # As objects: numpy would make float64 of a list with numbers on both sides of 2**63, and lose their last bits.
     given = seed if isinstance(seed, np.ndarray) else array_of("seed", seed, dtype=object)
     if given.ndim == 0:
-        return np.broadcast_to(np.uint64(integer("seed", given.item(), 0, SEED_MAX)), (n,))
+        return integer("seed", given.item(), 0, SEED_MAX)
     if given.shape != (n,):
         raise InputError(f"seed: expected one, or one for each of {n} shots, got shape {given.shape}")
     if given.dtype.kind != "u":
@@ -282,10 +364,12 @@ def _seeds(seed: object, n: int) -> draws.Words:
     return given.astype(np.uint64)
 
 
-def _owners(exclude: object, n: int, single: bool) -> Ints:
+def _owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, ...]:
     """Owners (n, K): a number, one for each shot (n,), or several for all (1, K) or for each (n, K); -1 for none."""
     if exclude is None:
-        return np.zeros((n, 0), np.int64)
+        return ()
+    if type(exclude) is int and -1 <= exclude <= OWNER_MAX:
+        return (exclude,)
     array = array_of("exclude", exclude)
     if array.ndim == 0:
         array = np.broadcast_to(array, (n, 1))

@@ -1,0 +1,30 @@
+"""Checked positions on the 1/256-px grid, many at once; `snapping_jit` has the compiled twin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes.arrays import Floats, Ints
+from planes.constants import POSITION_MAX, SUB
+
+__all__ = ["snapped"]
+
+LIMIT, SCALE = np.array(float(POSITION_MAX)), np.array(float(SUB))
+
+ROUNDING = np.array(1.5 * 2.0**52)
+"""A float64 of this size has no fraction: what is added to it is rounded to a whole number, half to even."""
+
+ROUNDING_BITS = ROUNDING.view(np.int64)
+"""Of the sum, beyond these, the bits are that whole number: so none is converted, which takes twice as long."""
+
+
+def snapped(at: Floats) -> Ints | None:
+    """Positions (N, 2), px, in 1/256 px, as `grid256.snap` rounds them; None if one is no number within the limits."""
+    made = np.abs(at)
+    if not made.max(initial=0) <= LIMIT:  # of which one is not a number, the largest is not
+        return None
+    np.multiply(at, SCALE, out=made)
+    made += ROUNDING
+    whole = made.view(np.int64)
+    whole -= ROUNDING_BITS
+    return whole

@@ -1,0 +1,28 @@
+"""The kernel of `snapping`, compiled: one pass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from planes.arrays import Floats, Ints
+from planes.constants import POSITION_MAX, SUB
+
+__all__ = ["snapped"]
+
+FLOATS = types.Array(types.float64, 1, "C", readonly=True)
+
+
+@njit([types.boolean(FLOATS, types.int64[::1])], cache=True, nogil=True)
+def _snapped(at, whole):
+    good = True
+    for i in range(len(at)):
+        good &= abs(at[i]) <= POSITION_MAX  # of what is not a number it is not
+        whole[i] = np.int64(np.rint(at[i] * SUB))
+    return good
+
+
+def snapped(at: Floats) -> Ints | None:
+    """See `snapping.snapped`."""
+    whole = np.empty(at.shape, np.int64)
+    return whole if _snapped(at.ravel(), whole.ravel()) else None
