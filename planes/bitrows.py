@@ -114,7 +114,7 @@ class Placed(NamedTuple):
 class Found(NamedTuple):
     """Pairs (n,) of a placement and a seen tile that share pixels, sorted; how many, and the nearest to the origin.
 
-    Of pixels as near as the nearest it is the first by (y, x).
+    Of pixels as near as the nearest it is the first by (y, x); where it lies in the world.
     """
 
     placement: Ints
@@ -192,10 +192,11 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
         hit = samples.nonzero()[0]
         who, at = who[hit], at[hit]
         if len(beside):
-            nearest = _nearest_seen(placed, seen, beside, who, at)
+            distance2, x, y = _nearest_seen(placed, seen, beside, who, at)
         else:
-            nearest = _nearest(rows[hit], left[now][hit] - placed.origin_x[who], top[now][hit] - placed.origin_y[who])
-        parts.append(Found(who, at, samples[hit], *nearest))
+            across, down = left[now][hit] - placed.origin_x[who], top[now][hit] - placed.origin_y[who]
+            distance2, x, y = _nearest(rows[hit], across, down)
+        parts.append(Found(who, at, samples[hit], distance2, x + placed.origin_x[who], y + placed.origin_y[who]))
     return Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

@@ -9,6 +9,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from planes import bitrows
 from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
 from planes.spans import Box
@@ -91,8 +92,14 @@ def is_far(origin_x, origin_y, left, top, right, bottom):
 
 
 @njit
-def put_rows(who, count, n, key, across, seen, samples, placement_out, seen_out, samples_out, distance2, x, y):
-    """Write n rows of a placement, sorted by their keys, and tell how many there are now."""
+def put_rows(count, n, key, across, seen, samples, placed, placement_out, seen_out, samples_out, distance2, x, y):
+    """Write n rows of a placement, sorted by their keys, and tell how many there are now.
+
+    Parameters
+    ----------
+    placed : which it is, and the pixel from which distances are counted
+    """
+    who, origin_x, origin_y = placed
     for i in range(n):
         j = count + i
         while j > count and distance2[j - 1] > key[i]:
@@ -101,8 +108,8 @@ def put_rows(who, count, n, key, across, seen, samples, placement_out, seen_out,
         distance2[j], y[j] = key[i], i
     for j in range(count, count + n):
         i = y[j]
-        placement_out[j], seen_out[j], samples_out[j], x[j] = who, seen[i], samples[i], across[i]
-        y[j] = ((distance2[j] >> 1) & (2 * SIDE - 1)) - SIDE
+        placement_out[j], seen_out[j], samples_out[j], x[j] = who, seen[i], samples[i], origin_x + across[i]
+        y[j] = origin_y + ((distance2[j] >> 1) & (2 * SIDE - 1)) - SIDE
         distance2[j] >>= SIDE_BITS
     return count + n
 
@@ -149,12 +156,12 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
 
 
 @njit(
-    [types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, types.int64, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6)],
+    [types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6)],
     cache=True,
     nogil=True,
 )
 def _found(
-    pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, shifted, box, begin, tiles,
+    pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, box, begin, tiles,
     placement, near, out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
 ):  # fmt: skip
     count = 0
@@ -169,23 +176,22 @@ def _found(
         column = left - pattern_left + 63
         shift, step = column & 63, following[kind]
         word = first[kind] + (column >> 6) * step - pattern_top
-        if shifted:
-            word += shift * shifted
-            shift = 0
         tile = begin[at] - top
         own, level = origin_x[who] - left, origin_y[who]
         samples, distance2, across, down = shared(tiles, tile, windows, word, step, shift, low, high, own, level)
         if samples:
             out_placement[count], out_seen[count], out_samples[count] = who, at, samples
-            out_distance2[count], out_x[count], out_y[count] = distance2, across, down
+            out_distance2[count], out_x[count], out_y[count] = distance2, origin_x[who] + across, origin_y[who] + down
             count += 1
     return count
 
 
 def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints, beside: Beside) -> Found:
-    """See `bitrows.found`; `beside` is not needed."""
+    """See `bitrows.found`; `beside` is not needed, nor are all shifts: a word takes two loads from a smaller table."""
+    if windows.shifted:
+        return bitrows.found(placed, windows, seen, placement, near, beside)
     out = np.empty((6, len(near)), np.int64)
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words, windows.shifted)
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
     count = _found(*placed, *pattern, seen.box_xyxy, seen.begin, seen.words, placement, near, *out)
     return Found(*out[:, :count])
 
@@ -214,16 +220,12 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
 
 
 @njit(
-    [
-        types.void(
-            INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, types.int64, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT
-        )
-    ],
+    [types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT)],
     cache=True,
     nogil=True,
 )
 def _union(
-    pattern, x, y, pattern_box, first, following, windows, shifted, box, begin, tiles, height, placement, near, group,
+    pattern, x, y, pattern_box, first, following, windows, box, begin, tiles, height, placement, near, group,
     out,
 ):  # fmt: skip
     together = np.zeros(height, np.uint64)
@@ -239,9 +241,6 @@ def _union(
             column = left - x[who] - pattern_box[kind, 0] + 63
             shift, step = column & 63, following[kind]
             word = first[kind] + (column >> 6) * step - pattern_top
-            if shifted:
-                word += shift * shifted
-                shift = 0
             for row in range(max(top, pattern_top), min(box[at, 3], y[who] + pattern_box[kind, 3]) + 1):
                 together[row - top] |= tiles[begin[at] + row - top] & _window(windows, word + row, step, shift)
         samples = 0
@@ -252,8 +251,10 @@ def _union(
 
 def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints, first: Ints) -> Ints:
     """See `bitrows.union`."""
+    if windows.shifted:
+        return bitrows.union(placed, windows, seen, placement, near, first)
     out = np.empty(len(first), np.int64)
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words, windows.shifted)
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
     tiles = (seen.box_xyxy, seen.begin, seen.words, seen.height)
     _union(*placed[:3], *pattern, *tiles, placement, near, first, out)
     return out

@@ -62,7 +62,7 @@ def front_to_back(
     Returns
     -------
     pairs of a placement and an item, `seen` the first of its tiles that is hit; `samples` of all of them; the nearest
-    pixel about the origin. Sorted by (placement, distance2, y, x, rank).
+    pixel to the origin. Sorted by (placement, distance2, y, x, rank).
     """
     boxes = windows.box_xyxy[placed.pattern] + np.stack([placed.x, placed.y] * 2, axis=1)
     placement, tile = met_boxes(boxes, pile.box_xyxy)
@@ -81,8 +81,9 @@ def front_to_back(
     samples = np.bitwise_count(rows).sum(axis=1, dtype=np.int64)
     hit = samples.nonzero()[0]
     who = placement[hit]
-    nearest = bitrows._nearest(rows[hit], left[hit] - placed.origin_x[who], top[hit] - placed.origin_y[who])
-    return _by_item(Found(who, tile[hit], samples[hit], *nearest), pile.rank)
+    origin_x, origin_y = placed.origin_x[who], placed.origin_y[who]
+    distance2, x, y = bitrows._nearest(rows[hit], left[hit] - origin_x, top[hit] - origin_y)
+    return _by_item(Found(who, tile[hit], samples[hit], distance2, x + origin_x, y + origin_y), pile.rank)
 
 
 def _accepted(pile: Pile, accept: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:

@@ -29,8 +29,8 @@ def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside
 
     Returns
     -------
-    Pairs of a placement and an item, told by the first tile of it that is hit; samples are those of all its tiles, x
-    and y about the origin; sorted by (placement, distance2, y, x, tile).
+    Pairs of a placement and an item, told by the first tile of it that is hit; samples are those of all its
+    tiles; sorted by (placement, distance2, y, x, tile).
     """
     placement, near = listed_at(cells, placed.x, placed.y)
     edges = [0, len(placement)]

@@ -75,7 +75,7 @@ def _looked_up(
                     n += 1
                     item = rank[at]
         count = put_rows(
-            who, count, n, key, nearest_x, hit, hit_samples,
+            count, n, key, nearest_x, hit, hit_samples, (who, origin_x[who], origin_y[who]),
             out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
         )  # fmt: skip
         who += 1

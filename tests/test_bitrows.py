@@ -108,7 +108,7 @@ class Case:
             if shared:
                 ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
                 best = min(((x - ox) ** 2 + (y - oy) ** 2, y - oy, x - ox) for x, y in shared)
-                told.append((who, at, len(shared), best[0], best[2], best[1]))
+                told.append((who, at, len(shared), best[0], ox + best[2], oy + best[1]))
         return told
 
 

@@ -116,7 +116,7 @@ class Case:
         for who in range(len(self.placed.x)):
             ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
             for item, pixels in self.hits(who):
-                nearest = min(((x - ox) ** 2 + (y - oy) ** 2, y - oy, x - ox) for x, y in pixels)
+                nearest = min(((x - ox) ** 2 + (y - oy) ** 2, y, x) for x, y in pixels)
                 tiles = [
                     k for k, (x0, y0, x1, y1) in enumerate(self.pile.box_xyxy.tolist())
                     if self.pile.rank[k] == item and any(x0 <= x <= x1 and y0 <= y <= y1 for x, y in pixels)

@@ -513,8 +513,8 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing poses"
-    " rasterise sampling scene scenefile schema snapping spans sprite stack tiles twins visible"
+    "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing"
+    " poses rasterise sampling scene scenefile schema snapping spans sprite stack tiles twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns counting draws explain firing guns hits pattern plan resolve runfire volley"
@@ -565,4 +565,4 @@ def test_each_thing_alone_adds_what_is_its_own() -> None:
     assert changed["occluders"] == {"stack", "tiles", "occluders", "samples"}
     assert changed["filter"] == {"filter", "samples"}
     by_runs = {"weights", "verdicts", "walk", "code plane"}
-    assert changed["falloff"] == {"patterns", "tiles", "visible", "composition", "samples", "rows"} | by_runs
+    assert changed["falloff"] == {"patterns", "tiles", "pre-filter", "composition", "samples", "rows"} | by_runs

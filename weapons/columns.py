@@ -14,6 +14,9 @@ __all__ = ["Columns"]
 
 C = TypeVar("C", bound="Columns")
 
+ZEROS, ONES = (np.broadcast_to(np.int64(value), 2**48) for value in (0, 1))
+"""A slice of one of them is a column of one value, that takes no memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class Columns:

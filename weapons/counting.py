@@ -13,6 +13,7 @@ from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
 from planes.constants import WEIGHT_FULL
 from planes.spans import Box, ragged
+from weapons.columns import ONES, ZEROS
 from weapons.hits import Rows
 from weapons.volley import Volley
 
@@ -36,12 +37,12 @@ def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
     ids : of the item of each tile
     """
     who, samples = found.placement, found.samples
-    xy = volley.origin_xy[who]
-    xy[:, 0] += found.x
-    xy[:, 1] += found.y
+    each = volley.each_is_a_shot
+    shot, round_ = (who, ZEROS[: len(who)]) if each else (volley.shot[who], volley.round[who])
+    first_xy = np.stack([found.x, found.y], axis=1)
     return Rows(
-        volley.shot[who], volley.round[who], ids[found.seen], samples, samples, samples * WEIGHT_FULL,
-        np.ones_like(samples), xy, found.distance2,
+        shot, round_, ids[found.seen], samples, samples, samples * WEIGHT_FULL, ONES[: len(who)], first_xy,
+        found.distance2,
     )  # fmt: skip
 
 
@@ -79,13 +80,10 @@ def counted(
         pellets = pellets[: len(best)]
     order = kernels.row_order(turn, found.distance2, found.y, found.x)
     placement, samples = found.placement[order], samples[order]
-    xy = volley.origin_xy[placement]
-    xy[:, 0] += found.x[order]
-    xy[:, 1] += found.y[order]
     return Rows(
         volley.shot[placement], volley.round[placement], ids[rank[order]], samples,
-        pixels[order] if volley.scattered else samples, samples * WEIGHT_FULL, pellets[order], xy,
-        found.distance2[order],
+        pixels[order] if volley.scattered else samples, samples * WEIGHT_FULL, pellets[order],
+        np.stack([found.x[order], found.y[order]], axis=1), found.distance2[order],
     )  # fmt: skip
 
 
@@ -97,8 +95,8 @@ def points(volley: Volley, codes: Codes, plane_xyxy: Box, objects: Bools, kernel
     objects : by id, whether it can be hit
     """
     place, item = kernels.front_at(codes, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
-    ones, none = (np.broadcast_to(np.int64(value), len(place)) for value in (1, 0))
-    shot, round_ = volley.shot[place], volley.round[place]
+    shot, round_ = (place, ZEROS[: len(place)]) if volley.each_is_a_shot else (volley.shot[place], volley.round[place])
+    ones, none = ONES[: len(place)], ZEROS[: len(place)]
     return Rows(shot, round_, item, ones, ones, ones * WEIGHT_FULL, ones, volley.xy[place], none)
 
 

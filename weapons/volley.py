@@ -15,6 +15,7 @@ from planes.poses import one_place, points
 from planes.twins import kernels_of
 from weapons import draws
 from weapons.arsenal import Plain, has_no_range, parts_of, pattern_of
+from weapons.columns import ZEROS
 from weapons.pattern import PatternTable
 from weapons.weapon import Weapon
 
@@ -160,7 +161,7 @@ class Volley:
     @cached_property
     def pattern(self) -> Ints:
         """Which of the patterns (P,) each has."""
-        return np.zeros(len(self.xy), np.int64) if self._pattern is None else self._pattern
+        return ZEROS[: len(self.xy)] if self._pattern is None else self._pattern
 
     @cached_property
     def shot(self) -> Ints:
@@ -170,12 +171,17 @@ class Volley:
     @cached_property
     def round(self) -> Ints:
         """Round (P,) of each."""
-        return np.zeros(len(self.xy), np.int64) if self._whose is None else self._whose[1]
+        return ZEROS[: len(self.xy)] if self._whose is None else self._whose[1]
 
     @cached_property
     def pellet(self) -> Ints:
         """Pellet (P,) of each."""
-        return np.zeros(len(self.xy), np.int64) if self._whose is None else self._whose[2]
+        return ZEROS[: len(self.xy)] if self._whose is None else self._whose[2]
+
+    @property
+    def each_is_a_shot(self) -> bool:
+        """Whether a shot is one placement."""
+        return self._whose is None
 
     @property
     def boxes(self) -> Ints:
