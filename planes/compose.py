@@ -12,10 +12,10 @@ import threading
 import numpy as np
 import numpy.typing as npt
 
-from planes import painting
+from planes import painting, steps
 from planes.arrays import Codes, InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
-from planes.items import Items, Stack, clipped
+from planes.items import NEVER, NO_IDS, Change, Items, Stack, clipped
 from planes.spans import Box
 from planes.twins import kernels_of
 
@@ -23,6 +23,9 @@ __all__ = ["CodePlane", "Codes", "area", "label_plane", "plane_fits"]
 
 PAINTED_NS = 1e4
 """What an item or a box takes to be drawn in numpy, at the most."""
+
+STEP_NS = 3e4
+"""What the step of an item takes in numpy."""
 
 
 def plane_fits(box_xyxy: Box) -> bool:
@@ -35,8 +38,46 @@ def label_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
     """Front-most item of each pixel of a box, as id + 1, and 0 where there is none."""
     _check_plane(box_xyxy)
     codes = np.empty((box_xyxy[3] - box_xyxy[1] + 1, box_xyxy[2] - box_xyxy[0] + 1), np.uint32)
-    _paint(codes, box_xyxy, stack, np.array([box_xyxy]))
+    kernels = kernels_of(painting, len(stack) * PAINTED_NS)
+    kernels.paint(codes, *box_xyxy[:2], np.array([box_xyxy]), painting.places_of(stack), stack.masks)
     return (codes >> 1).astype(np.int32)
+
+
+class Drawing:
+    """A code plane as it was drawn, and what it was drawn from: it follows items that only move.
+
+    Parameters
+    ----------
+    items : as they are now
+    box_xyxy : of the plane
+    """
+
+    def __init__(self, items: Items, box_xyxy: Box) -> None:
+        x, y, x_max, y_max = self.box_xyxy = box_xyxy
+        self.codes: Codes = np.empty((y_max - y + 1, x_max - x + 1), _kind(items))
+        self.draw(items.stack(), np.array([box_xyxy]))
+
+    def draw(self, stack: Stack, dirty: Ints) -> None:
+        """Draw boxes (n, 4) anew, from a stack that differs from the last one nowhere else."""
+        self.forms, self._rank_of, self._masks = stack.forms, stack.rank_of, stack.masks
+        self._places, self._near = painting.places_of(stack), NO_IDS
+        kernels = kernels_of(painting, (len(dirty) + len(stack)) * PAINTED_NS)
+        kernels.paint(self.codes, *self.box_xyxy[:2], dirty, self._places, self._masks)
+
+    def follow(self, ids: Ints | int, after: Ints | Box) -> int:
+        """Draw anew what the steps of items to other boxes change; tell how many pixels these and the old ones have."""
+        x, y = self.box_xyxy[:2]
+        if not len(self._near):
+            self._near = steps.near_of(self._places, x, y, *self.codes.shape)
+        if isinstance(after, tuple):
+            rank = self._rank_of.item(ids)
+            follow = kernels_of(steps, STEP_NS).follow
+            return follow(self.codes, x, y, rank, *after, self._places, self._near, self._masks) if rank >= 0 else 0
+        ranks = self._rank_of.take(ids)
+        some = np.flatnonzero(ranks >= 0)
+        ranks, now = ranks.take(some), after.take(some, axis=0)
+        kernels = kernels_of(steps, len(some) * STEP_NS)
+        return int(kernels.follow_all(self.codes, x, y, ranks, now, self._places, self._near, self._masks))
 
 
 class CodePlane:
@@ -48,18 +89,17 @@ class CodePlane:
     def __init__(self, box_xyxy: Box) -> None:
         _check_plane(box_xyxy)
         self.box_xyxy = box_xyxy
-        self.codes: Codes | None = None
+        self.size = (box_xyxy[2] - box_xyxy[0] + 1) * (box_xyxy[3] - box_xyxy[1] + 1)
         self.redrawn = 0
-        self._pending: list[Ints] = []
-        self._seen = -1
+        self._drawing: Drawing | None = None
+        self._drawn = self._counted = NEVER  # versions: of what is drawn, and of the cost
         self._cost = 0
         self._lock = threading.Lock()
 
     @property
-    def size(self) -> int:
-        """Pixels of the whole plane."""
-        x, y, x_max, y_max = self.box_xyxy
-        return (x_max - x + 1) * (y_max - y + 1)
+    def codes(self) -> Codes | None:
+        """Codes (h, w) as they were read last, if they were and can be kept up to date."""
+        return None if self._drawing is None else self._drawing.codes
 
     def cost(self, items: Items) -> int:
         """Pixels that must be drawn anew before the plane can be read; each change is looked at once."""
@@ -67,54 +107,58 @@ class CodePlane:
             return self._owed(items)
 
     def _owed(self, items: Items) -> int:
-        if self.codes is None or (self.codes.dtype == np.uint16 and items.count > ITEMS_UINT16):
+        changes = self._changes(items, self._counted)
+        for _, _, before, after in changes or ():
+            self._cost += _dirt(before, after, self.box_xyxy)[1]
+        self._counted = items.version
+        if changes is None or self._cost >= self.size:
+            self._drawing, self._cost = None, 0
             return self.size
-        if self._seen != items.version:
-            changes = items.changes(self._seen)
-            for _, _, before, after in changes or ():
-                self._note(before, after)
-            self._seen = items.version
-            if changes is None or self._cost >= self.size:
-                self.codes, self._pending, self._cost = None, [], 0
-                return self.size
         return self._cost
 
-    def _note(self, before: Ints | Box, after: Ints | Box) -> None:
-        """Note where items were and are; where that is nearly the same, it is drawn anew as one."""
-        if isinstance(before, tuple) and isinstance(after, tuple):
-            boxes = [box for box in (_cut(before, self.box_xyxy), _cut(after, self.box_xyxy)) if box]
-            pixels = sum(map(_pixels, boxes))
-            if len(boxes) == 2:
-                (x, y, x_max, y_max), (left, top, right, low) = boxes
-                hull = (min(x, left), min(y, top), max(x_max, right), max(y_max, low))
-                if _pixels(hull) <= pixels:
-                    boxes = [hull]
-            self._cost += pixels
-            if boxes:
-                self._pending.append(np.array(boxes))
-            return
-        old, new = clipped(np.asarray(before), self.box_xyxy), clipped(np.asarray(after), self.box_xyxy)
-        was, now = _areas(old), _areas(new)
-        around = np.concatenate([np.minimum(old[:, :2], new[:, :2]), np.maximum(old[:, 2:], new[:, 2:])], axis=1)
-        one = (was > 0) & (now > 0) & (_areas(around) <= was + now)
-        self._cost += int(was.sum() + now.sum())
-        self._pending += [around[one], old[~one & (was > 0)], new[~one & (now > 0)]]
+    def _changes(self, items: Items, version: int) -> list[Change] | None:
+        """What changed after a version, the last first; None if the whole plane must be drawn anew."""
+        if self._drawing is None or not items.knows(self._drawn):
+            return None
+        return items.changes(version) if self._drawing.codes.dtype == _kind(items) else None
 
     def read(self, items: Items) -> Codes:
         """Codes (h, w) of the present version; `redrawn` tells how many pixels, of old and new boxes, that concerns."""
         with self._lock:
-            self.redrawn = self._owed(items)
-            if self.codes is None or self.redrawn == self.size:
-                x, y, x_max, y_max = self.box_xyxy
-                kind = np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
-                self.codes = np.empty((y_max - y + 1, x_max - x + 1), kind)
-                self._pending = [np.array([self.box_xyxy])]
-            if self._pending:
-                dirty = self._pending[0] if len(self._pending) == 1 else np.concatenate(self._pending)
-                _paint(self.codes, self.box_xyxy, items.stack(), dirty)
-            self._seen = items.version
-            self._pending, self._cost = [], 0
-            return self.codes
+            changes = self._changes(items, self._drawn)
+            if changes and (len(changes) > 1 or not isinstance(changes[0][1], int)) and self._owed(items) == self.size:
+                changes = None
+            if changes is None or self._drawing is None:
+                self._drawing, self.redrawn = Drawing(items, self.box_xyxy), self.size
+            elif self._drawing.forms == items.arrangement:
+                self.redrawn = sum(self._drawing.follow(ids, after) for _, ids, _, after in reversed(changes))
+            elif changes:
+                dirt = [_dirt(before, after, self.box_xyxy) for _, _, before, after in changes]
+                self.redrawn = sum(pixels for _, pixels in dirt)
+                self._drawing.draw(items.stack(), np.concatenate([boxes for boxes, _ in dirt]))
+            self._drawn = self._counted = items.version
+            self._cost = 0
+            return self._drawing.codes
+
+
+def _kind(items: Items) -> type[np.uint16 | np.uint32]:
+    """Of the numbers of a code plane."""
+    return np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
+
+
+def _dirt(before: Ints | Box, after: Ints | Box, plane: Box) -> tuple[Ints, int]:
+    """Boxes (n, 4) of a plane that are drawn anew where items were and are; and the pixels of all, before and after.
+
+    Where the old and new box of an item are nearly the same, they are drawn as one.
+    """
+    if isinstance(before, tuple) and isinstance(after, tuple):
+        boxes, pixels = steps.joined(steps.cut(before, plane), steps.cut(after, plane))
+        return np.array(boxes, np.int64).reshape(-1, 4), pixels
+    old, new = clipped(np.asarray(before), plane), clipped(np.asarray(after), plane)
+    was, now = _areas(old), _areas(new)
+    around = np.concatenate([np.minimum(old[:, :2], new[:, :2]), np.maximum(old[:, 2:], new[:, 2:])], axis=1)
+    one = (was > 0) & (now > 0) & (_areas(around) <= was + now)
+    return np.concatenate([around[one], old[~one & (was > 0)], new[~one & (now > 0)]]), int(was.sum() + now.sum())
 
 
 def area(boxes_xyxy: Ints) -> int:
@@ -127,25 +171,6 @@ def _areas(boxes_xyxy: Ints) -> Ints:
     """Pixels of each inclusive box; 0 of one that is nowhere."""
     sides = np.maximum(boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1, 0)
     return np.asarray(sides[:, 0] * sides[:, 1])
-
-
-def _pixels(box: Box) -> int:
-    return (box[2] - box[0] + 1) * (box[3] - box[1] + 1)
-
-
-def _cut(box: Box, plane: Box) -> Box | None:
-    """The part of a box that lies in a plane."""
-    x, y, x_max, y_max = box
-    left, top, right, low = plane
-    x, y = x if x > left else left, y if y > top else top
-    x_max, y_max = x_max if x_max < right else right, y_max if y_max < low else low
-    return (x, y, x_max, y_max) if x <= x_max and y <= y_max else None
-
-
-def _paint(codes: Codes, plane_xyxy: Box, stack: Stack, dirty: Ints) -> None:
-    """Draw boxes (n, 4) of a plane anew."""
-    kernels = kernels_of(painting, (len(dirty) + len(stack)) * PAINTED_NS)
-    kernels.paint(codes, *plane_xyxy[:2], dirty, stack.ids, stack.box_xyxy, stack.offset, stack.masks)
 
 
 def _check_plane(box_xyxy: Box) -> None:

@@ -282,11 +282,20 @@ class Items:
         changes = self.changes(version)
         return None if changes is None else np.unique(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
 
+    def knows(self, version: int) -> bool:
+        """Whether all that changed after a version is still known."""
+        return version >= self._forgotten
+
     def changes(self, version: int) -> list[Change] | None:
         """Journal after a version, the last first; None if that is forgotten."""
         if version < self._forgotten:
             return None
-        return list(itertools.takewhile(lambda change: change[0] > version, reversed(self._journal)))
+        found = []
+        for change in reversed(self._journal):
+            if change[0] <= version:
+                break
+            found.append(change)
+        return found
 
     def boxes(self, ids: Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of items; x_max < x_min where nothing is there to be met."""

@@ -17,9 +17,9 @@ ORDER = {
         "fronttoback", "fronttoback_jit", "tiles", "bigrows", "rasterise", "rings", "volumes", "parts",
         "axes", "overlap", "boxes", "grids", "quadtree", "bvh", "broadphase", "triangles", "slabs",
         "image", "kept", "sprite", "hull", "cover", "outline", "fit", "bounding", "placing",
-        "placing_jit", "items", "visible", "index", "painting", "painting_jit", "compose", "jumps",
-        "jumps_jit", "clearance", "labels", "poses", "scenefile", "scene", "loading", "history",
-        "render", "sampling",
+        "placing_jit", "items", "visible", "index", "painting", "painting_jit", "steps", "steps_jit",
+        "compose", "jumps", "jumps_jit", "clearance", "labels", "poses", "scenefile", "scene",
+        "loading", "history", "render", "sampling",
     ),
     "weapons": (
         "draws", "draws_jit", "weapon", "columns", "pattern", "windows", "guns", "arsenal", "volley",

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_compose import brute_codes, random_scene
 
-from planes import Scene, painting
+from planes import Scene, compose, painting, steps
 from planes.compose import CodePlane, label_plane
 
 BOX = (-9, 4, 40, 33)
@@ -53,7 +53,7 @@ def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, each: bool,
         if each:
             patch.setattr(painting, "GROUPED_AREA", int(rng.choice([0, 100])))
         codes = np.full(truth.shape, 999, kind)
-        kernels.paint(codes, BOX[0], BOX[1], dirty, stack.ids, stack.box_xyxy, stack.offset, stack.masks)
+        kernels.paint(codes, BOX[0], BOX[1], dirty, painting.places_of(stack), stack.masks)
     drawn = np.zeros(truth.shape, np.bool_)
     for x, y, x_max, y_max in dirty.tolist():
         drawn[y - BOX[1] : y_max - BOX[1] + 1, x - BOX[0] : x_max - BOX[0] + 1] = True
@@ -77,21 +77,17 @@ def test_planes_follow_many_moves(jit: bool) -> None:
     assert np.array_equal(labels, brute_codes(scene, BOX) >> 1)
 
 
-def dirty_of(plane: CodePlane, scene: Scene) -> list[list[int]]:
-    """Boxes that are due, once the cost was asked for."""
-    plane.cost(scene.items)
-    return np.concatenate([np.zeros((0, 4), np.int64), *plane._pending]).tolist()
-
-
 @pytest.mark.parametrize("many", [False, True])
-def test_a_short_step_is_drawn_as_one_box(many: bool) -> None:
-    """The boxes before and after are joined where that is no more to draw."""
+def test_a_short_step_is_drawn_as_one_box(many: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The boxes before and after are joined where that is no more to draw, also with those whose form changed."""
+    drawn: list[list[int]] = []
+    monkeypatch.setattr(steps, "draw", lambda _, box, __, ___: drawn.append(list(box)))
     scene = Scene((100, 60))
     ids = [scene.add(np.ones((4, 10), np.bool_), (20.5, 10.5))]
     ids += [scene.add(np.ones((4, 10), np.bool_), role="mover")] if many else []
     plane = scene.code_plane()
     assert plane is not None
-    steps: list[tuple[tuple[float, float], list[list[int]]]] = [
+    wanted: list[tuple[tuple[float, float], list[list[int]]]] = [
         ((22.5, 11.5), [[16, 9, 27, 13]]),  # 60 px, and 80 in two
         ((32.5, 11.5), [[18, 10, 37, 13]]),  # side by side
         ((42.5, 12.5), [[28, 10, 37, 13], [38, 11, 47, 14]]),  # 100 px, and 80 in two
@@ -101,7 +97,11 @@ def test_a_short_step_is_drawn_as_one_box(many: bool) -> None:
         ((98.5, 57.5), [[94, 56, 99, 59]]),
         ((97.5, 58.5), [[93, 56, 99, 59]]),
     ]
-    for (x, y), boxes in steps:
-        plane.read(scene.items)
+    plane.read(scene.items)
+    for (x, y), boxes in wanted:
         scene.move(ids if many else ids[0], (x, y))
-        assert dirty_of(plane, scene) == boxes
+        (_, _, before, after), *_ = scene.items.changes(scene.version - 1)  # type: ignore[misc]
+        plane.read(scene.items)
+        assert drawn == boxes
+        assert compose._dirt(before, after, plane.box_xyxy)[0].tolist() == boxes
+        drawn.clear()
