@@ -36,7 +36,7 @@ OUT = types.int64[::1]
 ALL = np.uint64(2**64 - 1)
 FAR = np.int64(2**62)
 ONE = np.uint64(1)
-ROW_BITS, ROWS = 6, 63
+ROW_BITS, ROWS = 7, 127
 SIDE, SIDE_BITS = np.int64(2**17), 19  # no pixel of a pattern is so far from its origin
 
 
@@ -121,6 +121,31 @@ def grown(out: Ints, count: int) -> Ints:
     return more
 
 
+@njit(inline="always")
+def columns_about(own):
+    """A column of a tile as the columns before and after it are told by shifts; and how far beyond the tile it is."""
+    column = min(max(own, 0), 63)
+    return np.uint64(column), np.uint64(63 - column), abs(own - column)
+
+
+@njit(inline="always")
+def row_key(met, row, down, ahead, behind, beyond):
+    """A number that sorts the nearest pixels of rows by (squared distance, row); its last bit tells it lies after."""
+    after, before = _lowest(met >> ahead), _above(met << behind)
+    across = beyond + min(after, before)
+    key = ((across * across + down * down) << ROW_BITS) | (row << 1) | (after < before)
+    return key if met else FAR
+
+
+@njit(inline="always")
+def pixel_of(key, own, top):
+    """Squared distance, x and y of the pixel of a `row_key` about an origin in column `own`, `top` px above row 0."""
+    distance2, down = key >> ROW_BITS, top + ((key & ROWS) >> 1)
+    column = min(max(own, 0), 63)
+    along = np.int64(np.sqrt(distance2 - down * down)) - abs(own - column)  # of a square that a float holds
+    return distance2, column - own + (along if key & 1 else -along), down
+
+
 @njit
 def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     """What a tile shares with a window, in rows from `low` to `high` of the world.
@@ -130,29 +155,18 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     samples, and of the nearest to the origin at (own, level) by (y, x): squared distance, x and y about it. All rows
     are worked on alike, without a branch, so that eight of them are one instruction each.
     """
-    count = (high - low + 8) & -8
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)
-    column = min(max(own, 0), 63)
-    beyond = abs(own - column)
-    ahead, behind = np.uint64(column), np.uint64(63 - column)
+    ahead, behind, beyond = columns_about(own)
     samples, nearest = np.int64(0), FAR
-    for i in range(count):
+    for i in range((high - low + 8) & -8):
         row = np.uint64(i)
         met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
         samples += bits_of(met)
-        across = beyond + min(_lowest(met >> ahead), _above(met << behind))
-        down = low - level + i
-        key = ((across * across + down * down) << ROW_BITS) | i
-        nearest = min(nearest, key if met else FAR)
+        nearest = min(nearest, row_key(met, i, low - level + i, ahead, behind, beyond))
     if samples == 0:
         return samples, FAR, np.int64(0), np.int64(0)
-    i = nearest & ROWS
-    row = np.uint64(i)
-    met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
-    after, before = _lowest(met >> ahead), _above(met << behind)
-    across = column - before if before <= after else column + after
-    return samples, nearest >> ROW_BITS, across - own, low - level + i
+    return samples, *pixel_of(nearest, own, low - level)
 
 
 @njit(

@@ -11,16 +11,20 @@ from planes.bitrows import Found, Placed, Windows
 from planes.bitrows_jit import (
     ALL,
     BOXES,
+    FAR,
     FLAGS,
     INTS,
     ONE,
     OUT,
     WORDS,
     bits_of,
+    columns_about,
     grown,
     is_far,
     key_of,
+    pixel_of,
     put_rows,
+    row_key,
     shared,
 )
 from planes.fronttoback import Pile
@@ -161,6 +165,26 @@ def _take(tiles, tile, rest, word, step, shift, low, high):
     return taken
 
 
+@njit
+def _struck(tiles, tile, rest, word, step, shift, low, high, own, level):
+    """What a tile shares with what is left of a pattern, told as by `shared`; that is taken away."""
+    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
+    right, left = np.uint64(shift), np.uint64(63 - shift)
+    ahead, behind, beyond = columns_about(own)
+    samples, nearest = np.int64(0), FAR
+    for i in range((high - low + 8) & -8):
+        row = np.uint64(i)
+        pixels, near, far = tiles[tile + row], rest[word + row], rest[following + row]
+        met = pixels & ((near >> right) | (far << left << ONE))
+        rest[word + row] = near & ~(pixels << right)
+        rest[following + row] = far & ~(pixels >> left >> ONE)
+        samples += bits_of(met)
+        nearest = min(nearest, row_key(met, i, low - level + i, ahead, behind, beyond))
+    if samples == 0:
+        return samples, FAR, np.int64(0), np.int64(0)
+    return samples, *pixel_of(nearest, own, low - level)
+
+
 @njit(inline="always")
 def _refused(tile, categories, owner, accept, exclude, who):
     """Whether a shot refuses the item of a tile; what there is one of is for all shots."""
@@ -243,13 +267,13 @@ def _front_to_back(
                 pixels -= _take(tiles, tile, rest, word, step, shift, low, high)
                 continue
             own, level = origin_x[who] - box[at, 0], origin_y[who]
-            samples, distance2, across, down = shared(tiles, tile, rest, word, step, shift, low, high, own, level)
+            if pierce:
+                samples, distance2, across, down = shared(tiles, tile, rest, word, step, shift, low, high, own, level)
+            else:
+                samples, distance2, across, down = _struck(tiles, tile, rest, word, step, shift, low, high, own, level)
+                pixels -= samples
             if samples == 0:
                 continue
-            if not pierce:
-                pixels -= samples
-                if i + 1 < close:
-                    _take(tiles, tile, rest, word, step, shift, low, high)
             new = key_of(distance2, across, down)
             if rank[at] == item:
                 hit_samples[n - 1] += samples
