@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,12 @@ from planes import bitrows
 from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
 from planes.spans import Box
+from planes.twins import in_parts
 
 __all__ = [
     "bits_of",
     "found",
     "front_at",
-    "grown",
     "is_far",
     "key_of",
     "put_rows",
@@ -33,10 +34,14 @@ BOXES = types.Array(types.int64, 2, "C", readonly=True)
 WORDS = types.Array(types.uint64, 1, "C", readonly=True)
 FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 OUT = types.int64[::1]
+ROWS_OUT = types.int64[:, ::1]
 ALL = np.uint64(2**64 - 1)
 FAR = np.int64(2**62)
 ONE = np.uint64(1)
 ROW_BITS, ROWS = 7, 127
+ROOM, ROOM_LEAST = 8, 64
+"""Rows for each placement, and beside, for which there is room at first."""
+
 SIDE, SIDE_BITS = np.int64(2**17), 19  # no pixel of a pattern is so far from its origin
 
 
@@ -114,11 +119,34 @@ def put_rows(count, n, key, across, seen, samples, placed, placement_out, seen_o
     return count + n
 
 
-def grown(out: Ints, count: int) -> Ints:
-    """Columns (6, n) for twice as many rows, the first of which are there."""
-    more = np.empty((6, 2 * out.shape[1]), np.int64)
-    more[:, :count] = out[:, :count]
-    return more
+Kernel = Callable[[int, int, int, Ints], tuple[int, int]]
+"""Goes on with a placement, before a last one, after so many rows; tells where it stopped, -1 if it cannot decide."""
+
+
+def rows_by(kernel: Kernel, count: int, least: float) -> Found | None:
+    """Rows of all placements, in threads if there are enough of them; None if the kernel cannot decide them.
+
+    Parameters
+    ----------
+    least : placements that are worth a thread
+    """
+    parts = in_parts(count, least, lambda first, last: _filled(kernel, first, last))
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    return Found(*(known[0] if len(known) == 1 else np.concatenate(known, axis=1)))
+
+
+def _filled(kernel: Kernel, who: int, last: int) -> Ints | None:
+    """Columns (6, n) of the rows of some placements; room that is not written to costs nothing."""
+    count, out = 0, np.empty((6, ROOM * (last - who) + ROOM_LEAST), np.int64)
+    while True:
+        who, count = kernel(who, last, count, out)
+        if who == last or who < 0:
+            return out[:, :count] if who >= 0 else None
+        more = np.empty((6, 2 * out.shape[1]), np.int64)
+        more[:, :count] = out[:, :count]
+        out = more
 
 
 @njit(inline="always")

@@ -16,15 +16,16 @@ from planes.bitrows_jit import (
     INTS,
     ONE,
     OUT,
+    ROWS_OUT,
     WORDS,
     bits_of,
     columns_about,
-    grown,
     is_far,
     key_of,
     pixel_of,
     put_rows,
     row_key,
+    rows_by,
     shared,
 )
 from planes.fronttoback import Pile
@@ -32,8 +33,8 @@ from planes.spans import Box
 
 __all__ = ["front_to_back"]
 
-ROOM = 16
-"""Rows a placement for which there is room at first; memory that is not written to costs nothing."""
+PART = 400
+"""Placements that are worth a thread."""
 
 FEW = 4
 """So few placements look at every tile; for more, tiles are put into cells of the world first."""
@@ -214,28 +215,28 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
 @njit(
     [
         types.UniTuple(types.int64, 2)(
-            types.int64, types.int64, *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
-            INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4), *[OUT] * 6
+            types.int64, types.int64, types.int64, ROWS_OUT,
+            *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
+            INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4)
         )
     ],
     cache=True,
     nogil=True,
 )  # fmt: skip
 def _front_to_back(
-    who, count, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
     rank, box, tile_begin, tiles, occluder, categories, owner, accept, exclude, pierce, bounds,
-    out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
 ):  # fmt: skip
-    room, most = len(out_placement), 0
+    room, most = out.shape[1], 0
     for kind in range(len(first)):
         most = max(most, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
     begin = listed = cells = np.zeros(0, np.int64)
-    if len(x) > FEW and len(box):
+    if end - who > FEW and len(box):
         begin, listed, cells = _binned(box)
     near, rest, last_kind = np.empty(len(box), np.int64), np.empty(most, np.uint64), -1
     key, nearest_x = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
     hit, hit_samples = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
-    while who < len(x):
+    while who < end:
         kind = pattern[who]
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
@@ -285,7 +286,7 @@ def _front_to_back(
                 n += 1
         count = put_rows(
             count, n, key, nearest_x, hit, hit_samples, (who, origin_x[who], origin_y[who]),
-            out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+            out[0], out[1], out[2], out[3], out[4], out[5],
         )  # fmt: skip
         who += 1
     return who, count
@@ -305,14 +306,16 @@ def front_to_back(
     bounds: Box | None,
 ) -> Found:
     """See `fronttoback.front_to_back`."""
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
     accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
-    shots = (accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds)
-    who, count = (-1 if windows.shifted else 0), 0
-    out = np.empty((6, ROOM * len(placed.x) + len(pile.rank)), np.int64)
-    while who >= 0:
-        who, count = _front_to_back(who, count, *placed, *pattern, *pile, *shots, *out)
-        if who == len(placed.x):
-            return Found(*out[:, :count])
-        out = grown(out, count)
-    return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)
+    arrays = (
+        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, *pile,
+        accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
+    )  # fmt: skip
+
+    def kernel(who: int, end: int, count: int, out: Ints) -> tuple[int, int]:
+        return _front_to_back(who, end, count, out, *arrays)
+
+    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART)
+    if found is None:
+        return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)
+    return found

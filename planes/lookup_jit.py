@@ -6,35 +6,36 @@ import numpy as np
 from numba import njit, types
 
 from planes import lookup
+from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
-from planes.bitrows_jit import BOXES, INTS, OUT, WORDS, grown, is_far, key_of, put_rows, shared
+from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_far, key_of, put_rows, rows_by, shared
 from planes.cells import Cells
 
 __all__ = ["looked_up"]
 
-ROOM = 8
-"""Rows a placement for which there is room at first; memory that is not written to costs nothing."""
+PART_NS, PLACEMENT_NS, LISTED_NS = 2e5, 10.0, 40.0
+"""What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
 
 
 @njit(
     [
         types.UniTuple(types.int64, 2)(
-            types.int64, types.int64, *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS,
-            *[types.int64] * 5, INTS, INTS, *[OUT] * 6
+            types.int64, types.int64, types.int64, ROWS_OUT,
+            *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS,
+            *[types.int64] * 5, INTS, INTS,
         )
     ],
     cache=True,
     nogil=True,
 )  # fmt: skip
 def _looked_up(
-    who, count, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
     rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
-    out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
 ):  # fmt: skip
-    room = len(out_placement)
+    room = out.shape[1]
     key, nearest_x = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
     hit, hit_samples = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
-    while who < len(x):
+    while who < end:
         column, row = (x[who] - cells_x) >> bits, (y[who] - cells_y) >> bits
         if column < 0 or row < 0 or column >= wide or row >= high:
             who += 1
@@ -76,7 +77,7 @@ def _looked_up(
                     item = rank[at]
         count = put_rows(
             count, n, key, nearest_x, hit, hit_samples, (who, origin_x[who], origin_y[who]),
-            out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+            out[0], out[1], out[2], out[3], out[4], out[5],
         )  # fmt: skip
         who += 1
     return who, count
@@ -84,14 +85,14 @@ def _looked_up(
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
     """See `lookup.looked_up`; `beside` is not needed."""
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
-    who, count = (-1 if windows.shifted else 0), 0
-    out = np.empty((6, ROOM * len(placed.x) + len(seen.rank)), np.int64)
-    while who >= 0:
-        who, count = _looked_up(
-            who, count, *placed, *pattern, seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells, *out
-        )
-        if who == len(placed.x):
-            return Found(*out[:, :count])
-        out = grown(out, count)
-    return lookup.looked_up(placed, windows, seen, cells, beside)
+    arrays = (
+        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words,
+        seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells,
+    )  # fmt: skip
+
+    def kernel(who: int, end: int, count: int, out: Ints) -> tuple[int, int]:
+        return _looked_up(who, end, count, out, *arrays)
+
+    each = PLACEMENT_NS + LISTED_NS * len(cells.listed) / max(len(cells.begin) - 1, 1)
+    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART_NS / each)
+    return lookup.looked_up(placed, windows, seen, cells, beside) if found is None else found
