@@ -7,7 +7,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -667,28 +667,22 @@ def test_composed_needs_bounds() -> None:
             assert fire(scene, weapon, (1, 1), strategy="composed").object.tolist() == [item]
 
 
-def test_a_column_is_what_was_given_for_all(jit: bool) -> None:
+@pytest.mark.parametrize(
+    "one", [{}, {"aim": 30}, {"accept": 5, "seed": 2**64 - 1}, {"exclude": 3}, {"toward": (50, 9)}]
+)
+def test_a_column_is_what_was_given_for_all(jit: bool, one: dict[str, Any]) -> None:
     """Shots whose arguments are one for all are those that are told one by one, also some of them."""
     weapon, at = Beam(9, 2), np.arange(12.0).reshape(6, 2)
-    for one in ({}, {"aim": 30}, {"aim": 30, "accept": 5, "exclude": 3, "seed": 2**64 - 1}, {"toward": (50, 9)}):
-        each: dict[str, Any] = {name: [value] * 6 for name, value in one.items()}
-        each = {
-            "accept": [ALL] * 6,
-            "seed": [0] * 6,
-            "shot": range(6),
-            **({} if "toward" in one else {"aim": [0] * 6}),
-            **each,
-        }
-        shots = [checked(weapon, at, **how) for how in (one, each)]
-        for some in (slice(0, 6), slice(2, 5), slice(3, 3), np.array([4, 1])):
-            a, b = (both.pick(some) for both in shots)
-            c, d = (both.pick(np.array([1, 0])) for both in (a, b) if len(both) > 1) if len(a) > 1 else (a, b)
-            for got, expected in ((a, b), (c, d)):
-                assert len(got) == len(expected) and got.choosy == expected.choosy == bool("accept" in one)
-                for name in ("at_256", "direction", "accept", "exclude", "number", "seed", "row"):
-                    x, y = getattr(got, name), getattr(expected, name)
-                    assert x.dtype == y.dtype and np.array_equal(x, y), name
-        assert shots[0].nbytes <= (2 if "toward" in one else 1) * at.nbytes < shots[1].nbytes
+    default: dict[str, Any] = {"accept": ALL, "seed": 0} if "toward" in one else {"aim": 0, "accept": ALL, "seed": 0}
+    each = {name: [value] * 6 for name, value in (default | one).items()} | {"shot": range(6)}
+    shots = [checked(weapon, at, **how) for how in (one, each)]
+    for some in ([slice(0, 6)], [slice(2, 5)], [slice(2, 5), np.array([1, 0])], [np.array([4, 1]), slice(1, 2)]):
+        got, expected = (reduce(Shots.pick, some, both) for both in shots)
+        assert len(got) == len(expected) and got.choosy == expected.choosy == ("accept" in one or "exclude" in one)
+        for name in ("at_256", "direction", "accept", "exclude", "number", "seed", "row"):
+            x, y = getattr(got, name), getattr(expected, name)
+            assert x.dtype == y.dtype and np.array_equal(x, y), name
+    assert shots[0].nbytes <= (2 if "toward" in one else 1) * at.nbytes < shots[1].nbytes
 
 
 @pytest.mark.parametrize("laid", ["apart", "unaligned", "read-only", "big-endian", "float32", "list"])

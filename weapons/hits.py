@@ -57,6 +57,12 @@ class HitRow(NamedTuple):
     distance2: int
 
 
+ROW_BYTES = 8 * (len(HitRow._fields) + 1)
+"""Of whole numbers in all columns, of which one has two."""
+
+COLUMNS = frozenset(HitRow._fields)
+
+
 class OwnerRow(NamedTuple):
     """One body hit by one shot: the rows of all its parts and all rounds added up."""
 
@@ -80,6 +86,11 @@ class Rows(Columns):
     pellets: Ints
     first_xy: Ints
     distance2: Ints
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return ROW_BYTES * len(self.shot)
 
     @classmethod
     def none(cls) -> Rows:
@@ -105,6 +116,18 @@ class Hits:
     weapon, shots : what was fired
     """
 
+    shot: Ints
+    round: Ints
+    object: Ints
+    samples: Ints
+    pixels: Ints
+    weight: Ints
+    pellets: Ints
+    first_xy: Ints
+    distance2: Ints
+    _scenes: list[Scene] | None = None
+    _walked: tuple[int, Any] | None = None
+
     def __init__(
         self, rows: Rows, counted: Callable[[], Ints], scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
@@ -112,20 +135,22 @@ class Hits:
         self._counted = counted
 
     def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
-        self.shot, self.round, self.object = rows.shot, rows.round, rows.object
-        self.samples, self.pixels, self.weight = rows.samples, rows.pixels, rows.weight
-        self.pellets, self.first_xy, self.distance2 = rows.pellets, rows.first_xy, rows.distance2
-        self.weapon, self.shots, self.plan = weapon, shots, plan
+        self._rows, self.weapon, self.shots, self.plan = rows, weapon, shots, plan
         self.scene, self.version = scene, scene.version
-        self._scenes: list[Scene] | None = None
-        self._walked: tuple[int, Any] | None = None
-        for name in HitRow._fields:
-            getattr(self, name).flags.writeable = False
+
+    def __getattr__(self, name: str) -> Any:
+        """Hand out a column, read-only, when it is first asked for."""
+        if name not in COLUMNS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        column = getattr(self._rows, name)
+        column.flags.writeable = False
+        setattr(self, name, column)
+        return column
 
     @property
     def nbytes(self) -> int:
         """Bytes of the columns."""
-        return sum(int(getattr(self, name).nbytes) for name in HitRow._fields)
+        return self._rows.nbytes
 
     @cached_property
     def starts(self) -> Ints:
@@ -149,17 +174,17 @@ class Hits:
         return fired
 
     def __len__(self) -> int:
-        return len(self.shot)
+        return len(self._rows)
 
     def __bool__(self) -> bool:
-        return len(self.shot) > 0
+        return len(self._rows) > 0
 
     def __iter__(self) -> Iterator[HitRow]:
         columns = [getattr(self, name).tolist() for name in HitRow._fields]
         for row in zip(*columns, strict=True):
             yield _named(row)
 
-    def __eq__(self, other: object) -> bool:
+    def __eq__(self, other: Any) -> bool:
         if not isinstance(other, Hits):
             return NotImplemented
         names = (*HitRow._fields, "verdicts")
@@ -299,8 +324,7 @@ class Hits:
 
     @staticmethod
     def _gathered_rows(parts: Sequence[Hits], rows: Sequence[Ints]) -> Rows:
-        each = [Rows(*(getattr(part, name) for name in HitRow._fields)) for part in parts]
-        return Rows.gathered(each, rows)
+        return Rows.gathered([part._rows for part in parts], rows)
 
     def _remember(self, parts: Sequence[Hits], rows: Sequence[Ints]) -> None:
         """Keep the scene of each shot."""

@@ -112,14 +112,9 @@ class OneShot(Hits):
 
     def __getattr__(self, name: str) -> Any:
         """Make what is not there yet."""
-        if name in ROWS:
-            present = self._present
-            self._keep(self._made_rows(), present.scene, present.weapon, self.shots, self.plan)
-            self.version = present.version
-        elif name in MADE:
-            setattr(self, name, MADE[name](self))
-        else:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        if name not in MADE:
+            return super().__getattr__(name)
+        setattr(self, name, MADE[name](self))
         return getattr(self, name)
 
     def _made_rows(self) -> Rows:
@@ -184,17 +179,15 @@ def _gathered(met: list[Tile]) -> list[Tile]:
     return list(every.values())
 
 
-ROWS = frozenset(HitRow._fields)
 MADE: dict[str, Callable[[OneShot], Any]] = {
     "scene": lambda one: one._present.scene,
     "version": lambda one: one._present.version,
     "weapon": lambda one: one._present.weapon,
     "shots": lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told),
     "plan": OneShot._planned,
+    "_rows": OneShot._made_rows,
     "_met": OneShot._walk,
     "_listed": OneShot._list,
     "_pieces": lambda one: one._present.straight,
-    "_scenes": lambda one: None,
-    "_walked": lambda one: None,
 }
 """What an answer has beside its rows, and how it is made when it is first asked for."""

@@ -52,7 +52,7 @@ class RayHits(Hits):
         self, rows: Rows, told: Told, rays: int, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self.rays, self._told, self._rows = rays, told, rows
+        self.rays, self._told = rays, told
 
     @cached_property
     def passes(self) -> Passes:
