@@ -7,6 +7,7 @@ y = 1   # # # # #      (1, 0, 4)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -131,7 +132,7 @@ class Spans:
         """Pixels of the set."""
         return int(self.lengths.sum())
 
-    @property
+    @cached_property
     def box_xyxy(self) -> Box | None:
         """(x_min, y_min, x_max, y_max), inclusive; None for the empty set."""
         if not len(self):

@@ -9,7 +9,6 @@ pellets that scatter, and where a pre-filter is asked for, with what can be seen
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -81,14 +80,14 @@ def fired_by_bits(
     sight = Sight(stack, scene.bounds, pierce, candidates, plan)
     plan.run("plan", f"{name}: {why}")
     read, first, most = _reader(scene, name, view, point, alone, sight)
-    parts = [Rows.none()]
+    parts: list[Rows] = []
     for begin, part, volley, windows in _parts(weapon, shots, first // each, most // each, candidates):
         plan.run("patterns", f"{len(volley.table.count)} distinct", volley.nbytes)
         rows = read(part, volley, windows)
-        parts.append(replace(rows, shot=rows.shot + begin) if begin else rows)
-    rows = Rows.joined(parts[1:] or parts)
+        parts.append(rows.later(begin))
+    rows = Rows.joined(parts)
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
-    plan.run("rows", "in their order", rows.nbytes if len(parts) > 2 else 0)
+    plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     leave_out_uncounted(plan, scene, candidates, may_refuse(stack, shots), name, why)
     plan.run("plan", "")
     return hits
@@ -134,7 +133,7 @@ def _parts(
         if len(part) > 1 and not fits(volley.table.patterns):
             step = len(part) // 2
             continue
-        yield begin, part, volley, windows_of(volley.table.patterns, 0 if compiled else len(volley.shot))
+        yield begin, part, volley, windows_of(volley.table.patterns, 0 if compiled else len(volley))
         begin += len(part)
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
 
@@ -164,7 +163,7 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
             plan.run("pre-filter", "", placement.nbytes + near.nbytes)
             return _counted(volley, windows, placement, near, seen, sight)
         kernels, beside = kernels_of(lookup), NOT_BESIDE
-        many = len(seen.rank) < len(volley.shot) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
+        many = len(seen.rank) < len(volley) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
         if many and kernels is lookup and _is_disc(volley):
             beside = composition.beside
         found = kernels.looked_up(placed_of(volley), windows, seen, listed, beside)
@@ -218,7 +217,7 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
 def _near_objects(shots: Shots, volley: Volley, sight: Sight) -> tuple[Ints, Ints]:
     """Placements and ranks of the objects that they may touch and accept."""
     stack, plan = sight.stack, sight.plan
-    placement, rank = near_pairs(volley, np.arange(len(volley.shot)), volley.boxes, sight)
+    placement, rank = near_pairs(volley, np.arange(len(volley)), volley.boxes, sight)
     if stack.has_occluders:
         objects = ~stack.occluder[rank]
         placement, rank = placement[objects], rank[objects]

@@ -11,9 +11,7 @@ import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
-from planes.constants import WEIGHT_FULL
 from planes.spans import Box, ragged
-from weapons.columns import ONES, ZEROS
 from weapons.hits import Rows
 from weapons.volley import Volley
 
@@ -36,14 +34,9 @@ def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
     found : a pair for each row, in the order of rows
     ids : of the item of each tile
     """
-    who, samples = found.placement, found.samples
-    each = volley.each_is_a_shot
-    shot, round_ = (who, ZEROS[: len(who)]) if each else (volley.shot[who], volley.round[who])
+    shot, round_ = volley.turn_of(found.placement)
     first_xy = np.stack([found.x, found.y], axis=1)
-    return Rows(
-        shot, round_, ids[found.seen], samples, samples, samples * WEIGHT_FULL, ONES[: len(who)], first_xy,
-        found.distance2,
-    )  # fmt: skip
+    return Rows(shot, round_, ids[found.seen], found.samples, None, None, None, first_xy, found.distance2)
 
 
 def counted(
@@ -81,9 +74,8 @@ def counted(
     order = kernels.row_order(turn, found.distance2, found.y, found.x)
     placement, samples = found.placement[order], samples[order]
     return Rows(
-        volley.shot[placement], volley.round[placement], ids[rank[order]], samples,
-        pixels[order] if volley.scattered else samples, samples * WEIGHT_FULL, pellets[order],
-        np.stack([found.x[order], found.y[order]], axis=1), found.distance2[order],
+        *volley.turn_of(placement), ids[rank[order]], samples, pixels[order] if volley.scattered else None, None,
+        pellets[order], np.stack([found.x[order], found.y[order]], axis=1), found.distance2[order],
     )  # fmt: skip
 
 
@@ -95,9 +87,7 @@ def points(volley: Volley, codes: Codes, plane_xyxy: Box, objects: Bools, kernel
     objects : by id, whether it can be hit
     """
     place, item = kernels.front_at(codes, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
-    shot, round_ = (place, ZEROS[: len(place)]) if volley.each_is_a_shot else (volley.shot[place], volley.round[place])
-    ones, none = ONES[: len(place)], ZEROS[: len(place)]
-    return Rows(shot, round_, item, ones, ones, ones * WEIGHT_FULL, ones, volley.xy[place], none)
+    return Rows(*volley.turn_of(place), item, None, None, None, None, volley.xy[place], None)
 
 
 def _sums(values: Ints, first: Ints) -> Ints:

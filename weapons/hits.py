@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planes.arrays import InputError, Ints, integer
+from planes.constants import WEIGHT_FULL
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Spans, merged_runs
-from weapons.columns import Columns
+from weapons.columns import ONES, ZEROS, Columns
 from weapons.explain import (
     Blocked,
     Detail,
@@ -57,9 +58,6 @@ class HitRow(NamedTuple):
     distance2: int
 
 
-ROW_BYTES = 8 * (len(HitRow._fields) + 1)
-"""Of whole numbers in all columns, of which one has two."""
-
 COLUMNS = frozenset(HitRow._fields)
 
 
@@ -74,9 +72,13 @@ class OwnerRow(NamedTuple):
     objects: tuple[int, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Rows(Columns):
-    """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack)."""
+    """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack).
+
+    Columns that are not given are made when they are read: rows are of round 0, of one sample, of as many pixels as
+    samples, of full weight, of one pellet, at distance 0.
+    """
 
     round: Ints
     object: Ints
@@ -87,16 +89,74 @@ class Rows(Columns):
     first_xy: Ints
     distance2: Ints
 
+    def __init__(
+        self,
+        shot: Ints,
+        round: Ints | None,  # noqa: A002
+        object: Ints,  # noqa: A002
+        samples: Ints | None,
+        pixels: Ints | None,
+        weight: Ints | None,
+        pellets: Ints | None,
+        first_xy: Ints,
+        distance2: Ints | None,
+    ) -> None:
+        given = shot, round, object, samples, pixels, weight, pellets, first_xy, distance2
+        vars(self).update(
+            [(name, column) for name, column in zip(HitRow._fields, given, strict=True) if column is not None]
+        )
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a column that was not given."""
+        if name not in DEFAULTS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        column = vars(self)[name] = DEFAULTS[name](self)
+        return column
+
     @property
     def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return ROW_BYTES * len(self.shot)
+        """Bytes of the columns that are there."""
+        return 8 * len(self.shot) * (len(vars(self)) + 1)  # one has two numbers a row
+
+    def take(self, rows: Ints | slice) -> Rows:
+        """Some of the rows."""
+        return Rows._of({name: column[rows] for name, column in vars(self).items()})
+
+    def later(self, shots: int) -> Rows:
+        """The same rows of shots that come so many later."""
+        return Rows._of({**vars(self), "shot": self.shot + shots}) if shots else self
+
+    @classmethod
+    def joined(cls, parts: Sequence[Rows]) -> Rows:
+        """All rows of some parts."""
+        if len(parts) == 1:
+            return parts[0]
+        given = [name for name in HitRow._fields if any(name in vars(part) for part in parts)]
+        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in given}
+        return cls._of(columns) if parts else cls.none()
 
     @classmethod
     def none(cls) -> Rows:
         """No rows."""
         none = np.zeros(0, np.int64)
-        return cls(none, none, none, none, none, none, none, np.zeros((0, 2), np.int64), none)
+        return cls._of({"shot": none, "object": none, "first_xy": np.zeros((0, 2), np.int64)})
+
+    @classmethod
+    def _of(cls, columns: dict[str, Ints]) -> Rows:
+        rows = object.__new__(cls)
+        vars(rows).update(columns)
+        return rows
+
+
+DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
+    "round": lambda rows: ZEROS[: len(rows)],
+    "samples": lambda rows: ONES[: len(rows)],
+    "pixels": lambda rows: rows.samples,
+    "weight": lambda rows: rows.samples * WEIGHT_FULL,
+    "pellets": lambda rows: ONES[: len(rows)],
+    "distance2": lambda rows: ZEROS[: len(rows)],
+}
+"""What columns of rows hold where they are not given."""
 
 
 class Hits:

@@ -52,7 +52,7 @@ def fired_by_runs(
         plan.run("rows", "", rows[-1].nbytes)
         verdicts.append(met.counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
         plan.run("verdicts", "", verdicts[-1].nbytes)
-    hits = Hits(Rows.joined(rows or [Rows.none()]), lambda: np.concatenate(verdicts), scene, weapon, shots, plan)
+    hits = Hits(Rows.joined(rows), lambda: np.concatenate(verdicts), scene, weapon, shots, plan)
     plan.run("rows", "")
     leave_out_unused(plan, scene, candidates, first.table, may_refuse(stack, shots), why)
     plan.run("plan", "")

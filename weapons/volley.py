@@ -158,6 +158,9 @@ class Volley:
         self.table, self.xy, self.origin_xy, self.rounds = table, xy, origin_xy, rounds
         self._pattern, self._whose = pattern, whose
 
+    def __len__(self) -> int:
+        return len(self.xy)
+
     @cached_property
     def pattern(self) -> Ints:
         """Which of the patterns (P,) each has."""
@@ -178,10 +181,11 @@ class Volley:
         """Pellet (P,) of each."""
         return ZEROS[: len(self.xy)] if self._whose is None else self._whose[2]
 
-    @property
-    def each_is_a_shot(self) -> bool:
-        """Whether a shot is one placement."""
-        return self._whose is None
+    def turn_of(self, placement: Ints) -> tuple[Ints, Ints | None]:
+        """Shots and rounds of some placements (n,); no rounds where each shot has one placement."""
+        if self._whose is None:
+            return placement, None
+        return self._whose[0][placement], self._whose[1][placement]
 
     @property
     def boxes(self) -> Ints:
