@@ -6,6 +6,7 @@ import numpy as np
 
 from planes.arrays import Floats, Ints
 from planes.constants import POSITION_MAX, SUB
+from planes.grid256 import pixel
 
 __all__ = ["snapped"]
 
@@ -18,8 +19,11 @@ ROUNDING_BITS = ROUNDING.view(np.int64)
 """Of the sum, beyond these, the bits are that whole number: so none is converted, which takes twice as long."""
 
 
-def snapped(at: Floats) -> Ints | None:
-    """Positions (N, 2), px, in 1/256 px, as `grid256.snap` rounds them; None if one is no number within the limits."""
+def snapped(at: Floats) -> tuple[Ints, Ints] | None:
+    """Positions (N, 2), px, in 1/256 px, as `grid256.snap` rounds them, and the whole pixels that hold them.
+
+    None if one is no number within the limits.
+    """
     made = np.abs(at)
     if not made.max(initial=0) <= LIMIT:  # of which one is not a number, the largest is not
         return None
@@ -27,4 +31,4 @@ def snapped(at: Floats) -> Ints | None:
     made += ROUNDING
     whole = made.view(np.int64)
     whole -= ROUNDING_BITS
-    return whole
+    return whole, pixel(whole)

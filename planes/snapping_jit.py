@@ -6,23 +6,24 @@ import numpy as np
 from numba import njit, types
 
 from planes.arrays import Floats, Ints
-from planes.constants import POSITION_MAX, SUB
+from planes.constants import HALF, POSITION_MAX, SUB
 
 __all__ = ["snapped"]
 
 FLOATS = types.Array(types.float64, 1, "C", readonly=True)
 
 
-@njit([types.boolean(FLOATS, types.int64[::1])], cache=True, nogil=True)
-def _snapped(at, whole):
+@njit([types.boolean(FLOATS, types.int64[::1], types.int64[::1])], cache=True, nogil=True)
+def _snapped(at, whole, pixel):
     good = True
     for i in range(len(at)):
         good &= abs(at[i]) <= POSITION_MAX  # of what is not a number it is not
         whole[i] = np.int64(np.rint(at[i] * SUB))
+        pixel[i] = (whole[i] + HALF) >> 8
     return good
 
 
-def snapped(at: Floats) -> Ints | None:
+def snapped(at: Floats) -> tuple[Ints, Ints] | None:
     """See `snapping.snapped`."""
-    whole = np.empty(at.shape, np.int64)
-    return whole if _snapped(at.ravel(), whole.ravel()) else None
+    whole, pixel = np.empty(at.shape, np.int64), np.empty(at.shape, np.int64)
+    return (whole, pixel) if _snapped(at.ravel(), whole.ravel(), pixel.ravel()) else None

@@ -86,6 +86,14 @@ class Stack:
         return ranks
 
     @cached_property
+    def is_object(self) -> Bools:
+        """Whether an id of the scene (count,) is of an item in the stack that can be hit."""
+        objects = np.zeros(self.count, np.bool_)
+        objects[self.ids[~self.occluder]] = True
+        objects.flags.writeable = False
+        return objects
+
+    @cached_property
     def has_occluders(self) -> bool:
         """Whether any item is an occluder."""
         return bool(self.occluder.any())

@@ -376,9 +376,9 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     scene.add(np.ones((5, 5), np.bool_), (20, 20))
     word, runs, hits = 8, 3 * 5 * 8, 3 * 5 * 8
     told = {
-        "shots": 2 * word,
+        "shots": 2 * 2 * word,
         "stack": 8 * word + 1,
-        "patterns": (3 * 5 + 2 + 1 + 4) * word + 2 * word,
+        "patterns": (3 * 5 + 2 + 1 + 4) * word,
         "plan": 0,
         "weights": (9 + 1) * word + 3 * word,
         "verdicts": 2 * 5 * word,

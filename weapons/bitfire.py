@@ -19,7 +19,7 @@ from planes.bitrows import WORD, Seen, Windows
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
-from planes.items import HITTABLE, Items, Stack
+from planes.items import Items, Stack
 from planes.scene import Scene
 from planes.tiles import Tiles
 from planes.twins import expect, kernels_of
@@ -107,7 +107,7 @@ def _reader(
     """
     plane = scene.code_plane() if point and name == "composed" else None
     if plane is not None:
-        return _by_plane(plane, scene.items, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
+        return _by_plane(plane, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if name == "composed" and view is not None:
         kept = scene.compositions().kept(view, scene.version) is not None
         composition = scene.compositions().read(view, scene.items, scene.bounds)
@@ -138,11 +138,11 @@ def _parts(
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
 
 
-def _by_plane(plane: CodePlane, items: Items, sight: Sight) -> Reader:
+def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
     """Read what lies in front at each placement of one pixel."""
-    codes = plane.read(items)
+    codes = plane.read(sight.candidates.items)
     sight.plan.run("code plane", f"{plane.redrawn} px drawn anew", plane.redrawn * codes.itemsize)
-    objects = items.role[: items.count] == HITTABLE
+    objects = sight.stack.is_object
 
     def read(_: Shots, volley: Volley, __: Windows) -> Rows:
         rows = points(volley, codes, plane.box_xyxy, objects, kernels_of(bitrows))

@@ -101,10 +101,12 @@ class Rows(Columns):
         first_xy: Ints,
         distance2: Ints | None,
     ) -> None:
-        given = shot, round, object, samples, pixels, weight, pellets, first_xy, distance2
-        vars(self).update(
-            [(name, column) for name, column in zip(HitRow._fields, given, strict=True) if column is not None]
-        )
+        columns = vars(self)
+        columns["shot"], columns["object"], columns["first_xy"] = shot, object, first_xy
+        rest = round, samples, pixels, weight, pellets, distance2
+        for name, column in zip(DEFAULTS, rest, strict=True):
+            if column is not None:
+                columns[name] = column
 
     def __getattr__(self, name: str) -> Any:
         """Make a column that was not given."""

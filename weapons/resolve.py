@@ -35,7 +35,7 @@ SPARSE = 4
 """Items that fill less than one part in so many of the box around them are laid under one by one."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Sight:
     """What a volley looks at, how, and where what was done is recorded."""
 

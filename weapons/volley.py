@@ -38,6 +38,7 @@ class Shots:
     number : (N,) shot numbers, for the draws, or that of the first, from which they count up
     seed : (N,) uint64, of the draws, or that of all
     row : (N,) their places in the call, for errors, or that of the first
+    xy : (N, 2) whole pixels that they are on, where they are known
     """
 
     def __init__(
@@ -50,13 +51,21 @@ class Shots:
         number: Ints | int,
         seed: draws.Words | int,
         row: Ints | int,
+        xy: Ints | None = None,
     ) -> None:
         self.at_256, self.toward_256 = at_256, toward_256
         self._direction, self._accept, self._exclude = direction, accept, exclude
         self._number, self._seed, self._row = number, seed, row
+        if xy is not None:
+            self.xy = xy
 
     def __len__(self) -> int:
         return len(self.at_256)
+
+    @cached_property
+    def xy(self) -> Ints:
+        """Whole pixels (N, 2) that they are on."""
+        return pixel(self.at_256)
 
     @property
     def one_direction(self) -> tuple[int, int] | None:
@@ -98,8 +107,19 @@ class Shots:
     @property
     def nbytes(self) -> int:
         """Bytes of what is not the same for all."""
-        given = self._direction, self.toward_256, self._accept, self._exclude, self._number, self._seed, self._row
-        return self.at_256.nbytes + sum(column.nbytes for column in given if isinstance(column, np.ndarray))
+        made = 2 * self.at_256.nbytes
+        for column in (
+            self._direction,
+            self.toward_256,
+            self._accept,
+            self._exclude,
+            self._number,
+            self._seed,
+            self._row,
+        ):
+            if isinstance(column, np.ndarray):
+                made += column.nbytes
+        return made
 
     @cached_property
     def choosy(self) -> bool:
@@ -129,7 +149,7 @@ class Shots:
 
         return Shots(
             self.at_256[rows], some(self._direction), some(self.toward_256), some(self._accept), some(self._exclude),
-            counted(self._number), some(self._seed), counted(self._row),
+            counted(self._number), some(self._seed), counted(self._row), self.xy[rows],
         )  # fmt: skip
 
 
@@ -196,9 +216,10 @@ class Volley:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the table and of the columns that are there."""
-        words = self.origin_xy.size + (self.xy.size if self.scattered else 0)
-        words += (0 if self._pattern is None else self._pattern.size) + (3 * len(self.xy) if self._whose else 0)
+        """Bytes of the table and of the columns, without those of the shots."""
+        words = 0 if self._pattern is None else self._pattern.size
+        if self._whose is not None:
+            words += 3 * len(self) + self.origin_xy.size + (self.xy.size if self.scattered else 0)
         return self.table.nbytes + 8 * words
 
     @property
@@ -223,7 +244,7 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    at_256, single = _places(at)
+    at_256, xy, single = _places(at)
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -236,20 +257,23 @@ def checked_shots(
         0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
         0,
+        xy,
     )
 
 
-def _places(at: object) -> tuple[Ints, bool]:
-    """Positions (N, 2) in 1/256 px, and whether it was one shot's alone (2,)."""
+def _places(at: object) -> tuple[Ints, Ints, bool]:
+    """Positions (N, 2) in 1/256 px, their whole pixels, and whether it was one shot's alone (2,)."""
+    if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
+        many: tuple[Ints, Ints] | None = kernels_of(snapping).snapped(at)
+        if many is not None:
+            return *many, False
     one = one_place(at)
     if one is not None:
-        return np.array((one,), np.int64), True
-    if type(at) is np.ndarray and at.dtype == np.float64 and at.shape[1:] == (2,) and at.flags.aligned:
-        many: Ints | None = kernels_of(snapping).snapped(at)
-        if many is not None:
-            return many, False
+        at_256 = np.array((one,), np.int64)
+        return at_256, pixel(at_256), True
     single = array_of("at", at).shape == (2,)
-    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+    at_256 = snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2)
+    return at_256, pixel(at_256), single
 
 
 def _accepted(accept: object, n: int) -> Ints | int:
@@ -277,8 +301,7 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
     if not burst and not spread:
-        xy = pixel(shots.at_256)
-        return Volley(*_patterns(plain, shots.one_direction or shots.direction), xy, xy)
+        return Volley(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
     round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
