@@ -8,6 +8,7 @@ The code plane answers "what does a sample meet first" in one read:
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from planes import painting, steps
 from planes.arrays import Codes, InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
-from planes.items import NEVER, NO_IDS, Change, Items, Stack, clipped
+from planes.items import NEVER, NO_BOXES, Change, Items, Stack, clipped
 from planes.spans import Box
 from planes.twins import kernels_of
 
@@ -26,6 +27,9 @@ PAINTED_NS = 1e4
 
 STEP_NS = 3e4
 """What the step of an item takes in numpy."""
+
+FEW = 16
+"""Items that are drawn anew one by one, without asking whether the whole plane is cheaper."""
 
 
 def plane_fits(box_xyxy: Box) -> bool:
@@ -53,31 +57,37 @@ class Drawing:
     """
 
     def __init__(self, items: Items, box_xyxy: Box) -> None:
-        x, y, x_max, y_max = self.box_xyxy = box_xyxy
+        x, y, x_max, y_max = box_xyxy
+        self._corner = x, y
         self.codes: Codes = np.empty((y_max - y + 1, x_max - x + 1), _kind(items))
+        self._near: Ints | None = None
         self.draw(items.stack(), np.array([box_xyxy]))
 
     def draw(self, stack: Stack, dirty: Ints) -> None:
         """Draw boxes (n, 4) anew, from a stack that differs from the last one nowhere else."""
         self.forms, self._rank_of, self._masks = stack.forms, stack.rank_of, stack.masks
-        self._places, self._near = painting.places_of(stack), NO_IDS
+        self._places, self._near = painting.places_of(stack), None
         kernels = kernels_of(painting, (len(dirty) + len(stack)) * PAINTED_NS)
-        kernels.paint(self.codes, *self.box_xyxy[:2], dirty, self._places, self._masks)
+        kernels.paint(self.codes, *self._corner, dirty, self._places, self._masks)
 
-    def follow(self, ids: Ints | int, after: Ints | Box) -> int:
-        """Draw anew what the steps of items to other boxes change; tell how many pixels these and the old ones have."""
-        x, y = self.box_xyxy[:2]
-        if not len(self._near):
-            self._near = steps.near_of(self._places, x, y, *self.codes.shape)
-        if isinstance(after, tuple):
-            rank = self._rank_of.item(ids)
-            follow = kernels_of(steps, STEP_NS).follow
-            return follow(self.codes, x, y, rank, *after, self._places, self._near, self._masks) if rank >= 0 else 0
-        ranks = self._rank_of.take(ids)
-        some = np.flatnonzero(ranks >= 0)
-        ranks, now = ranks.take(some), after.take(some, axis=0)
-        kernels = kernels_of(steps, len(some) * STEP_NS)
-        return int(kernels.follow_all(self.codes, x, y, ranks, now, self._places, self._near, self._masks))
+    def follow(self, changes: Sequence[Change]) -> int:
+        """Draw anew what the steps of items, the last first, change; tell how many pixels their boxes have."""
+        if self._near is None:
+            self._near = steps.near_of(self._places, *self._corner, *self.codes.shape)
+        pixels = 0
+        for _, ids, _, after in reversed(changes):
+            if isinstance(after, tuple):
+                rank = self._rank_of.item(ids)
+                if rank >= 0:
+                    follow = kernels_of(steps, STEP_NS).follow
+                    pixels += follow(self.codes, *self._corner, rank, *after, self._places, self._near, self._masks)
+            else:
+                ranks = self._rank_of.take(ids)
+                some = np.flatnonzero(ranks >= 0)
+                many = ranks.take(some), np.asarray(after).take(some, axis=0)
+                follow = kernels_of(steps, len(some) * STEP_NS).follow_all
+                pixels += follow(self.codes, *self._corner, *many, self._places, self._near, self._masks)
+        return pixels
 
 
 class CodePlane:
@@ -107,7 +117,7 @@ class CodePlane:
             return self._owed(items)
 
     def _owed(self, items: Items) -> int:
-        changes = self._changes(items, self._counted)
+        changes = self._changes(items, self._counted) if items.knows(self._drawn) else None
         for _, _, before, after in changes or ():
             self._cost += _dirt(before, after, self.box_xyxy)[1]
         self._counted = items.version
@@ -118,24 +128,25 @@ class CodePlane:
 
     def _changes(self, items: Items, version: int) -> list[Change] | None:
         """What changed after a version, the last first; None if the whole plane must be drawn anew."""
-        if self._drawing is None or not items.knows(self._drawn):
+        drawing = self._drawing
+        if drawing is None or (drawing.forms != items.arrangement and drawing.codes.dtype != _kind(items)):
             return None
-        return items.changes(version) if self._drawing.codes.dtype == _kind(items) else None
+        return items.changes(version)
 
     def read(self, items: Items) -> Codes:
         """Codes (h, w) of the present version; `redrawn` tells how many pixels, of old and new boxes, that concerns."""
         with self._lock:
             changes = self._changes(items, self._drawn)
-            if changes and (len(changes) > 1 or not isinstance(changes[0][1], int)) and self._owed(items) == self.size:
+            if changes is not None and not _are_few(changes) and self._owed(items) == self.size:
                 changes = None
             if changes is None or self._drawing is None:
                 self._drawing, self.redrawn = Drawing(items, self.box_xyxy), self.size
             elif self._drawing.forms == items.arrangement:
-                self.redrawn = sum(self._drawing.follow(ids, after) for _, ids, _, after in reversed(changes))
-            elif changes:
+                self.redrawn = self._drawing.follow(changes)
+            else:
                 dirt = [_dirt(before, after, self.box_xyxy) for _, _, before, after in changes]
                 self.redrawn = sum(pixels for _, pixels in dirt)
-                self._drawing.draw(items.stack(), np.concatenate([boxes for boxes, _ in dirt]))
+                self._drawing.draw(items.stack(), np.concatenate([NO_BOXES, *(boxes for boxes, _ in dirt)]))
             self._drawn = self._counted = items.version
             self._cost = 0
             return self._drawing.codes
@@ -144,6 +155,14 @@ class CodePlane:
 def _kind(items: Items) -> type[np.uint16 | np.uint32]:
     """Of the numbers of a code plane."""
     return np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
+
+
+def _are_few(changes: Sequence[Change]) -> bool:
+    """Whether so little changed that the whole plane need not be thought of."""
+    rows = 0
+    for _, ids, _, _ in changes:
+        rows += 1 if isinstance(ids, int) else len(ids)
+    return rows <= FEW
 
 
 def _dirt(before: Ints | Box, after: Ints | Box, plane: Box) -> tuple[Ints, int]:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from struct import Struct
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,6 +55,9 @@ PLACED_NS = 30
 
 NEVER = -1
 """A version before all others."""
+
+PLACE, BOX = Struct("=2q"), Struct("=4q")
+"""A row of positions and one of boxes, as one item is read and written without an array."""
 
 NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
@@ -250,14 +254,18 @@ class Items:
         self._note(ids.copy(), before, after, len(ids))
         return True
 
-    def move_one(self, item: int, x_256: int, y_256: int) -> None:
-        """Place one item at a new position: as `move`, without an array."""
-        before = x, y, x_max, y_max = tuple(self._box[item].tolist())
+    def move_one(self, item: int, x_256: int, y_256: int) -> bool:
+        """Place one item at a new position, as `move` does, and tell whether it is in the scene; else do nothing."""
+        if not (0 <= item < self.count and self.alive.item(item)):
+            return False
+        before = x, y, x_max, y_max = BOX.unpack_from(self._box, BOX.size * item)  # type: ignore[arg-type]
         variant = self.variants[item]
         left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
         after = (left, top, left + x_max - x, top + y_max - y)
-        self.position_256[item], self._box[item] = (x_256, y_256), after
+        PLACE.pack_into(self.position_256, PLACE.size * item, x_256, y_256)  # type: ignore[arg-type]
+        BOX.pack_into(self._box, BOX.size * item, *after)  # type: ignore[arg-type]
         self._note(item, before, after, 1)
+        return True
 
     def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
         """Write n changes into the journal, as a new version."""

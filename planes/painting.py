@@ -23,7 +23,7 @@ GROUP = 8
 GROUPED_AREA = 2**14
 """Pixels of a box up to which groups pay; in larger ones each item is drawn by itself."""
 
-PLACES = np.arange(GROUP, dtype=np.uint8)[:, None]
+WEIGHTS = np.array([1 << k for k in range(GROUP)], np.uint64)
 
 
 def _entry(bits: int) -> int:
@@ -74,7 +74,13 @@ def _met(dirty: Ints, boxes: Ints) -> tuple[list[int], Ints]:
 
 
 def draw(block: Codes, box: Box, rows: list[list[int]], masks: Bools) -> None:
-    """Draw the part of a plane in a box anew, with the items that meet it: rows of their places, front to back."""
+    """Draw the part of a plane in a box anew.
+
+    Parameters
+    ----------
+    block : that part, changed in place
+    rows : places of all items that meet it, front to back, and perhaps of others
+    """
     if block.size <= GROUPED_AREA:
         _draw_grouped(block, box, rows, masks)
     else:
@@ -112,17 +118,19 @@ def _row_of(width: int) -> np.dtype[np.void]:
 def _bits(shape: tuple[int, ...], box: Box, group: list[list[int]], masks: Bools) -> npt.NDArray[np.uint8]:
     """Which of up to eight items cover each pixel of a box: the lowest bit is the first."""
     (height, width), (left, top, right, low) = shape, box
-    planes = np.zeros((len(group), height * width), np.uint8)
+    words = (height * width + 7) // 8
+    planes = np.zeros((len(group), words), np.uint64)  # a byte for each pixel, 0 or 1: eight at a time are added up
     begin = -top * width - left
     for x, y, x_max, y_max, offset, _ in group:
         x0, y0 = x if x > left else left, y if y > top else top
         x1, y1 = x_max if x_max < right else right, y_max if y_max < low else low
-        rows, row, own = (y1 - y0 + 1,), _row_of(x1 - x0 + 1), x_max - x + 1
-        source = np.ndarray(rows, row, masks, offset + (y0 - y) * own + x0 - x, (own,))
-        np.ndarray(rows, row, planes, begin + y0 * width + x0, (width,))[:] = source
-        begin += height * width
-    planes <<= PLACES[: len(group)]
-    return np.asarray(np.bitwise_or.reduce(planes, axis=0)).reshape(shape)
+        if x0 <= x1 and y0 <= y1:
+            rows, row, own = (y1 - y0 + 1,), _row_of(x1 - x0 + 1), x_max - x + 1
+            source = np.ndarray(rows, row, masks, offset + (y0 - y) * own + x0 - x, (own,))
+            np.ndarray(rows, row, planes, begin + y0 * width + x0, (width,))[:] = source
+        begin += 8 * words
+    bits = WEIGHTS[: len(group)] @ planes
+    return bits.view(np.uint8)[: height * width].reshape(shape)
 
 
 def _draw_each(block: Codes, box: Box, rows: list[list[int]], masks: Bools) -> None:
@@ -132,6 +140,8 @@ def _draw_each(block: Codes, box: Box, rows: list[list[int]], masks: Bools) -> N
     for x, y, x_max, y_max, offset, code in reversed(rows):
         width = x_max - x + 1
         x0, y0, x1, y1 = max(left, x), max(top, y), min(right, x_max), min(low, y_max)
+        if x0 > x1 or y0 > y1:
+            continue
         mask = masks[offset + (y0 - y) * width : offset + (y1 - y + 1) * width].reshape(-1, width)
         part = block[y0 - top : y1 - top + 1, x0 - left : x1 - left + 1]
         more = (part != 0) + block.dtype.type(code)

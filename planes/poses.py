@@ -13,6 +13,7 @@ __all__ = ["are_rows", "changed_forms", "one_place", "points", "scale_pair"]
 
 ONE = 1 << SCALE_BITS
 NUMBERS = frozenset((int, float, np.float64))
+FLOAT64 = np.dtype(np.float64)
 
 
 def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> Floats:
@@ -31,7 +32,9 @@ def are_rows(ids: object, xy: object) -> bool:
 
 def one_place(xy: object) -> tuple[int, int] | None:
     """One position in range on the 1/256-px grid, rounded as `snap` does; None of anything else, bad or good."""
-    if isinstance(xy, np.ndarray) and xy.shape == (2,) and xy.dtype == np.float64 and type(xy) is np.ndarray:
+    if type(xy) is np.ndarray:
+        if xy.dtype != FLOAT64 or xy.shape != (2,):
+            return None
         x, y = xy.tolist()
     elif isinstance(xy, tuple | list) and len(xy) == 2 and type(xy[0]) in NUMBERS and type(xy[1]) in NUMBERS:
         x, y = xy

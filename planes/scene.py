@@ -190,11 +190,11 @@ class Scene:
 
     def move(self, ids: int | Sequence[int] | Ints, xy: object) -> None:
         """Place objects at new positions: ids (n,) and xy (n, 2), or one position for all of them, px."""
-        one = one_place(xy) if isinstance(ids, int | np.integer) and not isinstance(ids, bool) else None
-        if one is not None and 0 <= ids < self.items.count and self.items.alive[ids]:  # type: ignore[operator]
-            self.items.move_one(int(ids), *one)  # type: ignore[arg-type]
-            return
-        if are_rows(ids, xy) and self.items.move_risen(ids, xy):  # type: ignore[arg-type]
+        if type(ids) is int or isinstance(ids, np.integer):
+            one = one_place(xy)
+            if one is not None and self.items.move_one(int(ids), *one):
+                return
+        elif are_rows(ids, xy) and self.items.move_risen(ids, xy):  # type: ignore[arg-type]
             return
         rows = self._existing(ids)
         self.items.move(rows, snap(points("position_xy", xy, len(rows))))

@@ -68,24 +68,22 @@ def follow(
     """
     height, width = codes.shape
     edge = (x, y, x + width - 1, y + height - 1)
-    place = places[rank]
-    old, new = cut(place.tolist(), edge), cut((left, top, right, low), edge)
-    place[:4] = left, top, right, low
-    near[rank] = _fields(*new, x, y) if new else NOWHERE
-    boxes, pixels = joined(old, new)
-    for box in boxes:
-        x0, y0, x1, y1 = box
-        limits = _fields(x1, y1, x0, y0, x, y) | GUARDS
+    place, box = places[rank], (left, top, right, low)
+    boxes, pixels = joined(cut(place.tolist(), edge), new := cut(box, edge))
+    place[:4] = box
+    near[rank] = _fields(new, x, y) if new else NOWHERE
+    for left, top, right, low in boxes:
+        limits = _fields((right, low, left, top), x, y) | GUARDS
         found = ((limits - near) & GUARDS == GUARDS).nonzero()[0]
-        rows = [row for row in places.take(found, axis=0).tolist() if cut(row, box)]
-        draw(codes[y0 - y : y1 - y + 1, x0 - x : x1 - x + 1], box, rows, masks)
+        block = codes[top - y : low - y + 1, left - x : right - x + 1]
+        draw(block, (left, top, right, low), places.take(found, axis=0).tolist(), masks)
     return pixels
 
 
-def _fields(x: int, y: int, x_max: int, y_max: int, left: int, top: int) -> int:
-    """Four numbers of pixels as fields; the pixel [0, 0] of the plane is (left, top)."""
-    right, low = FIELD - (x_max - left >> 2), FIELD - (y_max - top >> 2)
-    return x - left >> 2 | y - top >> 2 << 15 | right << 30 | low << 45
+def _fields(box: Box, x: int, y: int) -> int:
+    """Four numbers of pixels as fields; (x, y) is the pixel [0, 0] of the plane."""
+    left, top, right, low = box
+    return left - x >> 2 | top - y >> 2 << 15 | FIELD - (right - x >> 2) << 30 | FIELD - (low - y >> 2) << 45
 
 
 def cut(place: Sequence[int], edge: Box) -> Box | None:
@@ -97,15 +95,18 @@ def cut(place: Sequence[int], edge: Box) -> Box | None:
     return (x, y, x_max, y_max) if x <= x_max and y <= y_max else None
 
 
-def joined(old: Box | None, new: Box | None) -> tuple[list[Box], int]:
+def joined(old: Box | None, new: Box | None) -> tuple[Sequence[Box], int]:
     """Boxes to be drawn where an item was and is, one where that is no more to draw; and the pixels of both."""
-    boxes = [box for box in (old, new) if box]
-    pixels = sum(map(_pixels, boxes))
-    if old and new:
-        around = (min(old[0], new[0]), min(old[1], new[1]), max(old[2], new[2]), max(old[3], new[3]))
-        if _pixels(around) <= pixels:
-            boxes = [around]
-    return boxes, pixels
+    if not old or not new:
+        one = old or new
+        return ((one,), _pixels(one)) if one else ((), 0)
+    pixels = _pixels(old) + _pixels(new)
+    (x, y, x_max, y_max), (left, top, right, low) = old, new
+    around = (
+        x if x < left else left, y if y < top else top,
+        x_max if x_max > right else right, y_max if y_max > low else low,
+    )  # fmt: skip
+    return (around,) if _pixels(around) <= pixels else (old, new), pixels
 
 
 def _pixels(box: Box) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from planes.arrays import Bools, Codes, Ints
@@ -65,10 +66,14 @@ def _fields(x: Any, y: Any, x_max: Any, y_max: Any) -> Any:
 
 @njit(cache=True)
 def _draw(codes: Codes, x: int, y: int, box: Any, places: Ints, near: Ints, masks: Bools) -> None:
-    """Draw a box anew: of the items near it those that meet it, back to front."""
+    """Draw a box anew, with the items near it, back to front."""
     left, top, right, low = box
     codes[top - y : low - y + 1, left - x : right - x + 1] = 0
     limits = _fields(right - x, low - y, left - x, top - y) | GUARDS
-    for rank in range(len(near) - 1, -1, -1):
+    found, count = np.empty(len(near), np.int64), 0
+    for rank in range(len(near)):
         if (limits - near[rank]) & GUARDS == GUARDS:
-            paint_item(codes, x, y, left, top, right, low, places[rank], masks)
+            found[count] = rank
+            count += 1
+    for i in range(count - 1, -1, -1):
+        paint_item(codes, x, y, left, top, right, low, places[found[i]], masks)

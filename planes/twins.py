@@ -31,7 +31,7 @@ THREADS_MOST = 64
 
 _asked: list[bool] = []
 _threads: list[int] = []
-_twins: dict[str, ModuleType] = {}
+_twins: dict[ModuleType, ModuleType] = {}
 
 
 def use_jit(on: bool | None = True) -> None:
@@ -101,9 +101,10 @@ def expect(ns: float) -> None:
 
 def kernels_of(module: ModuleType, expected_ns: float = 0.0) -> ModuleType:
     """The module of kernels itself, or its compiled twin, for work that is expected to take so long in numpy."""
-    expect(expected_ns)
+    if expected_ns > LOADING_NS:
+        expect(expected_ns)
     if not _asked or not _asked[0]:
         return module
-    if module.__name__ not in _twins:
-        _twins[module.__name__] = import_module(f"{module.__name__}_jit")
-    return _twins[module.__name__]
+    if module not in _twins:
+        _twins[module] = import_module(f"{module.__name__}_jit")
+    return _twins[module]

@@ -170,13 +170,16 @@ def test_more_dirt_than_plane_is_a_whole_plane() -> None:
     assert plane.redrawn == 36
 
 
-def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planes.items.JOURNAL_ROWS", 3)
     scene = random_scene(np.random.default_rng(1), 6)
     plane = CodePlane(BOUNDS)
     plane.read(scene.items)
     for x in range(5):
         scene.move(1, (x, 5))
+        if asked:
+            plane.cost(scene.items)
     assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
     assert np.array_equal(plane.read(scene.items), brute_codes(scene))
 

@@ -60,6 +60,47 @@ def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, each: bool,
     assert np.array_equal(codes, np.where(drawn, truth, 999))
 
 
+@pytest.fixture(params=["planes.steps", "planes.steps_jit"])
+def stepping(request: pytest.FixtureRequest) -> Any:
+    if request.param.endswith("jit"):
+        pytest.importorskip("numba")
+    return importlib.import_module(request.param)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([1, 3, 60, 10**9]))
+@pytest.mark.parametrize("kind", [np.uint16, np.uint32])
+def test_a_plane_that_follows_steps_is_what_each_pixel_says(
+    monkeypatch: pytest.MonkeyPatch, stepping: Any, kind: Any, seed: int, count: int, reach: int
+) -> None:
+    """Short and long ones, over the edge and off it, of one item and of many."""
+    rng = np.random.default_rng(seed)
+    scene, (x, y, x_max, y_max) = heap(rng, count), BOX
+    stack, size = scene.items.stack(), (y_max - y + 1, x_max - x + 1)
+    places = painting.places_of(stack)
+    near, codes = stepping.near_of(places, x, y, *size), brute_codes(scene, BOX).astype(kind)
+    monkeypatch.setattr(painting, "GROUPED_AREA", int(rng.choice([0, 2**14])))
+    for _ in range(6 if len(stack) else 0):
+        rank = rng.permutation(len(stack))[: rng.choice([1, 1, 4])]
+        old = places[rank, :4]
+        now = old + np.tile(rng.integers(-reach, reach + 1, (len(rank), 2)), 2)
+        scene.move(stack.ids[rank], scene.items.position_256[stack.ids[rank]] / 256 + (now - old)[:, :2])
+        if len(rank) == 1:
+            pixels = stepping.follow(codes, x, y, int(rank[0]), *now[0].tolist(), places, near, stack.masks)
+        else:
+            pixels = stepping.follow_all(codes, x, y, rank, now, places, near, stack.masks)
+        assert np.array_equal(codes, brute_codes(scene, BOX))
+        assert pixels == sum(inside(box).sum() for box in [*old.tolist(), *now.tolist()])
+        assert np.array_equal(places, painting.places_of(scene.items.stack()))
+        assert np.array_equal(near, stepping.near_of(places, x, y, *size))
+
+
+def inside(box: list[int]) -> Any:
+    """Pixels of BOX that are in a box."""
+    column, row = np.meshgrid(np.arange(BOX[0], BOX[2] + 1), np.arange(BOX[1], BOX[3] + 1))
+    return (box[0] <= column) & (column <= box[2]) & (box[1] <= row) & (row <= box[3])
+
+
 def test_planes_follow_many_moves(jit: bool) -> None:
     """One object or many, near and far, once or twice before the plane is read."""
     rng = np.random.default_rng(jit)
