@@ -11,9 +11,14 @@ from planes.jumps import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 
 __all__ = ["clearance_of", "first_taken"]
 
-COLUMNS = 12
-BLOCK = 256
+BLOCK = 128
 """Rays that go on together, so that none waits for another's look: their columns fit the fastest cache."""
+
+ROUNDS = 3
+"""Jumps of each ray of a block, before those that are done make room for others."""
+
+N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
+"""Columns of a block: after how many crossings a ray looks next, and the others as of `jumps._ways`."""
 
 
 @njit(cache=True)
@@ -46,52 +51,98 @@ def _spread_along(row: Clearance) -> None:
         row[x] = min(row[x], row[x + 1] + 1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
     """See `jumps.first_taken`."""
     count, flat = len(start_256), clearance.reshape(-1)
     height, width = clearance.shape
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
-    columns, at = np.empty((BLOCK, COLUMNS)), np.empty(BLOCK)
-    rays, live = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
-    for begin in range(0, count, BLOCK):
-        left = 0
-        for ray in range(begin, min(begin + BLOCK, count)):
+    block, look, jump = np.empty((COLUMNS, BLOCK)), np.empty(BLOCK, np.int32), np.empty(BLOCK, np.uint8)
+    left = ray = 0
+    while left or ray < count:
+        while left < BLOCK and ray < count:
             x, y = start_256[ray, 0], start_256[ray, 1]
-            first = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], columns, left)
-            if first < 0:
-                entry[ray] = first
-            elif first == 0 and _between(flat, columns, left, x, y):
-                entry[ray], cell[ray], several[ray] = 0, np.int64(columns[left, 5]), True
+            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, left)
+            if why < 0:
+                entry[ray] = why
+            elif block[N, left] == 0 and _between(flat, block, left, x, y):
+                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, left]), True
             else:
-                rays[left], live[left], at[left] = ray, left, first
+                block[RAY, left] = ray
                 left += 1
-        _follow(flat, columns, at, rays, live, left, entry, cell, several)
+            ray += 1
+        for _ in range(ROUNDS):
+            _look(block, left, look)
+            _jump(flat, block, left, look, jump)
+        left = _left(block, left, look, jump, width, start_256, step_256, entry, cell, several)
     return entry, cell, several
 
 
+@njit(cache=True, error_model="numpy")
+def _look(block, count, look):  # type: ignore[no-untyped-def]
+    """Places of the cells that rays look at: at a corner ~place, one less than what is taken from 0."""
+    for one in range(count):
+        n = block[N, one]
+        quotient = (block[A, one] * n + block[C, one]) / block[B, one]
+        i = np.floor(quotient)
+        place = np.int32(block[BASE, one] + i * block[ALONG, one] + n * block[ACROSS, one])
+        look[one] = ~place if i == quotient else place
+
+
 @njit(cache=True)
-def _between(flat, columns, one, x_256, y_256):  # type: ignore[no-untyped-def]
+def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
+    """Let rays jump, up to their ends."""
+    for one in range(count):
+        place = look[one]
+        if place < 0:
+            far = min(flat[~place], flat[~place - np.int32(block[ASIDE, one])])
+        else:
+            far = flat[np.uint32(place)]
+        jump[one] = far
+        block[N, one] = min(block[N, one] + far, block[STOP, one])
+
+
+@njit(cache=True)
+def _left(block, count, look, jump, width, start_256, step_256, entry, cell, several):  # type: ignore[no-untyped-def]
+    """Tell where rays came to something, and move those that go on to the front; how many they are."""
+    left = 0
+    for one in range(count):
+        if block[N, one] < block[STOP, one]:
+            if jump[one]:
+                for column in range(COLUMNS):
+                    block[column, left] = block[column, one]
+                left += 1
+            else:
+                ray, place = np.int64(block[RAY, one]), np.int64(look[one])
+                several[ray] = place < 0
+                cell[ray] = place = max(place, ~place)
+                entry[ray] = _entry(place % width, place // width, start_256[ray], step_256[ray])
+    return left
+
+
+@njit(cache=True)
+def _entry(x, y, start_256, step_256):  # type: ignore[no-untyped-def]
+    """When a ray enters a cell."""
+    ahead_x, ahead_y = SUB * x - start_256[0], SUB * y - start_256[1]
+    dx, dy = step_256[0], step_256[1]
+    ahead_x, ahead_y = ahead_x if dx >= 0 else -ahead_x, ahead_y if dy >= 0 else -ahead_y
+    return max((ahead_x - HALF) * max(abs(dy), 1), (ahead_y - HALF) * max(abs(dx), 1), 0)
+
+
+@njit(cache=True)
+def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
     """Whether a ray starts on a border of cells, of which another than the one that it goes into is taken."""
     on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
     if not (on_x or on_y):
         return False
-    across, base = np.int64(columns[one, 4]), np.int64(columns[one, 5])
-    step = np.int64(columns[one, 3]) + across
+    across, base = np.int64(block[ACROSS, one]), np.int64(block[BASE, one])
+    step = np.int64(block[ALONG, one]) + across
     if on_x and flat[base - step] == 0:
         return True
     return on_y and (flat[base - across] == 0 or (on_x and flat[base - step - across] == 0))
 
 
-@njit(cache=True)
-def _entry(i, j, columns, one):  # type: ignore[no-untyped-def]
-    """When a ray enters a cell that lies so many columns and rows ahead."""
-    dx, dy = np.int64(columns[one, 7]), np.int64(columns[one, 8])
-    ax, ay = np.int64(columns[one, 9]), np.int64(columns[one, 10])
-    return max((SUB * i - HALF - ax) * max(dy, 1), (SUB * j - HALF - ay) * max(dx, 1), 0)
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _over(numerator, denominator):  # type: ignore[no-untyped-def]
     """The quotient of whole numbers, rounded down; division in floats is several times as fast."""
     if abs(numerator) < EXACT:
@@ -99,36 +150,9 @@ def _over(numerator, denominator):  # type: ignore[no-untyped-def]
     return numerator // denominator
 
 
-@njit(cache=True)
-def _follow(flat, columns, at, rays, live, count, entry, cell, several):  # type: ignore[no-untyped-def]
-    """Let the rays of a block go on, one jump each in turn, until all are done."""
-    while count:
-        left = 0
-        for place in range(count):
-            one = live[place]
-            n, along = at[one], columns[one, 3]
-            quotient = (columns[one, 0] * n + columns[one, 2]) / columns[one, 1]
-            i = np.floor(quotient)
-            look = np.int64(columns[one, 5] + i * along + n * columns[one, 4])
-            jump = flat[look]
-            if i == quotient:
-                jump = min(jump, flat[look - np.int64(columns[one, 11])])
-            at[one] = n + jump
-            live[left] = one
-            left += jump > 0 and n + jump < columns[one, 6]
-            if jump == 0:
-                ray = rays[one]
-                entry[ray] = _entry(np.int64(i), np.int64(n - i), columns, one)
-                cell[ray], several[ray] = look, i == quotient
-        count = left
-
-
-@njit(cache=True)
-def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ignore[no-untyped-def]
-    """Crossings after which a ray comes to the plane, or why it has none.
-
-    Its column is A, B and so on as of `jumps._ways`, and |dx|, |dy|, ax and ay before the last.
-    """
+@njit(cache=True, error_model="numpy")
+def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: ignore[no-untyped-def]
+    """Put the columns of a ray into its block; or tell why it has none, below 0."""
     dx, dy = abs(step_x), abs(step_y)
     x, y = (x_256 + HALF - (step_x < 0)) >> 8, (y_256 + HALF - (step_y < 0)) >> 8
     ax, ay = x_256 - (x << 8), y_256 - (y << 8)
@@ -143,11 +167,11 @@ def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ig
     a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
     across = width if step_y >= 0 else -width
     along = (1 if step_x >= 0 else -1) - across
-    columns[one, 11] = along
+    block[ASIDE, one] = along
     if dx == 0 and ax == -HALF:
-        columns[one, 11] = 1
+        block[ASIDE, one] = 1
     if dy == 0 and ay == -HALF:
-        columns[one, 11], c = width, 0
+        block[ASIDE, one], c = width, 0
     first, stop = 0, last_x + last_y + 1
     if last_x > room_x:
         stop = min(stop, -_over(c - b * (room_x + 1), a))
@@ -159,8 +183,7 @@ def _way(height, width, x_256, y_256, step_x, step_y, columns, one):  # type: ig
         first = max(first, _over(c + b * (owed_y - 1), SUB * dy) + 1)
     if float(a) * stop + c >= EXACT:
         return UNDECIDED
-    columns[one, 0], columns[one, 1], columns[one, 2] = a, b, c
-    columns[one, 3], columns[one, 4] = along, across
-    columns[one, 5], columns[one, 6] = y * width + x, stop
-    columns[one, 7], columns[one, 8], columns[one, 9], columns[one, 10] = dx, dy, ax, ay
-    return first if first < stop else NOTHING
+    block[A, one], block[B, one], block[C, one] = a, b, c
+    block[ALONG, one], block[ACROSS, one], block[BASE, one] = along, across, y * width + x
+    block[N, one], block[STOP, one] = first, stop
+    return 0 if first < stop else NOTHING
