@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from planes.spans import Spans as Spans
     from planes.sprite import Sprite as Sprite
     from planes.twins import use_jit as use_jit
+    from planes.twins import use_threads as use_threads
 
 _HOME = {
     "ALL": "constants",
@@ -33,12 +34,13 @@ _HOME = {
     "load_scene": "loading",
     "read_png": "image",
     "use_jit": "twins",
+    "use_threads": "twins",
     "write_png": "image",
 }
 
 __all__ = [
     "ALL", "History", "InputError", "PastScene", "Planes", "Role", "Scene", "Spans", "Sprite", "load_scene",
-    "read_png", "use_jit", "write_png",
+    "read_png", "use_jit", "use_threads", "write_png",
 ]  # fmt: skip
 
 

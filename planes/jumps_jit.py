@@ -94,10 +94,8 @@ def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
     """Let rays jump, up to their ends."""
     for one in range(count):
         place = look[one]
-        if place < 0:
-            far = min(flat[~place], flat[~place - np.int32(block[ASIDE, one])])
-        else:
-            far = flat[np.uint32(place)]
+        two = place < 0
+        far = min(flat[~place], flat[~place - np.int32(block[ASIDE, one])]) if two else flat[np.uint32(place)]
         jump[one] = far
         block[N, one] = min(block[N, one] + far, block[STOP, one])
 
