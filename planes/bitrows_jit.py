@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 from planes import bitrows
 from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
+from planes.compiled import compiled
 from planes.spans import Box
 from planes.twins import in_parts
 
@@ -197,11 +198,7 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     return samples, *pixel_of(nearest, own, low - level)
 
 
-@njit(
-    [types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6)],
-    cache=True,
-    nogil=True,
-)
+@compiled(types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6))
 def _found(
     pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, box, begin, tiles,
     placement, near, out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
@@ -238,7 +235,7 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     return Found(*out[:, :count])
 
 
-@njit([types.void(WORDS, INTS, INTS, INTS, INTS, types.uint64[:, ::1])], cache=True, nogil=True)
+@compiled(types.void(WORDS, INTS, INTS, INTS, INTS, types.uint64[:, ::1]))
 def _visible(words, begin, of, front, right, seen):
     height = seen.shape[1]
     for tile in range(len(begin)):
@@ -261,11 +258,7 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     return seen
 
 
-@njit(
-    [types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT)],
-    cache=True,
-    nogil=True,
-)
+@compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT))
 def _union(
     pattern, x, y, pattern_box, first, following, windows, box, begin, tiles, height, placement, near, group,
     out,
@@ -311,7 +304,7 @@ def _sooner(a, b, distance2, y, x):
     return x[a] < x[b] if x[a] != x[b] else a < b
 
 
-@njit([types.void(*[INTS] * 4, OUT)], cache=True, nogil=True)
+@compiled(types.void(*[INTS] * 4, OUT))
 def _row_order(group, distance2, y, x, order):
     begin = 0
     while begin < len(order):
@@ -340,13 +333,11 @@ def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
     return order
 
 
-@njit(
-    [
+@compiled(
+    *(
         types.int64(types.Array(kind, 2, "C", readonly=True), *[types.int64] * 2, INTS, INTS, FLAGS, OUT, OUT)
         for kind in (types.uint16, types.uint32)
-    ],
-    cache=True,
-    nogil=True,
+    )
 )
 def _front_at(codes, left, top, x, y, objects, place, item):
     count = 0

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes.arrays import Ints
 from planes.cells import Cells, coarse_enough
+from planes.compiled import compiled
 
 __all__ = ["cells_of", "listed_at", "met_boxes"]
 
@@ -18,7 +19,7 @@ BRUTE_PAIRS = 2**14
 """Pairs of boxes that are compared one by one: to list some 1000 boxes and to read the lists takes as long."""
 
 
-@njit([OUT(BOXES, types.int64, types.int64, OUT)], cache=True, nogil=True)
+@compiled(OUT(BOXES, types.int64, types.int64, OUT))
 def _listed(spans, wide, cells, begin):
     for box in range(len(spans)):
         for row in range(spans[box, 1], spans[box, 3] + 1):
@@ -53,11 +54,7 @@ def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:
     return Cells(x, y, bits, wide, high, begin, _listed(spans, wide, wide * high, begin))
 
 
-@njit(
-    [types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT)],
-    cache=True,
-    nogil=True,
-)
+@compiled(types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT))
 def _at(x, y, bits, wide, high, begin, listed, at_x, at_y, place, box):
     count, room = 0, len(place)
     for i in range(len(at_x)):
@@ -83,7 +80,7 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         room = count
 
 
-@njit([types.int64(BOXES, BOXES, OUT, OUT)], cache=True, nogil=True)
+@compiled(types.int64(BOXES, BOXES, OUT, OUT))
 def _met(asked, boxes, rows, others):
     count, room = 0, len(rows)
     for row in range(len(asked)):
@@ -96,7 +93,7 @@ def _met(asked, boxes, rows, others):
     return count
 
 
-@njit([types.int64(BOXES, BOXES, INTS, INTS, OUT, OUT)], cache=True, nogil=True)
+@compiled(types.int64(BOXES, BOXES, INTS, INTS, OUT, OUT))
 def _met_of(asked, boxes, row, box, rows, others):
     count = 0
     for pair in range(len(row)):

@@ -28,6 +28,7 @@ from planes.bitrows_jit import (
     rows_by,
     shared,
 )
+from planes.compiled import compiled
 from planes.fronttoback import Pile
 from planes.spans import Box
 
@@ -51,7 +52,7 @@ OWNERS = types.Array(types.int64, 2, "A", readonly=True)
 OUT_WORDS = types.uint64[::1]
 
 
-@njit(types.Tuple((OUT, OUT, OUT))(BOXES), cache=True, nogil=True)
+@compiled(types.Tuple((OUT, OUT, OUT))(BOXES))
 def _binned(box):
     """Tiles by the cell of their first corner: where each list begins, the lists, and the cells' place and size."""
     count = len(box)
@@ -212,16 +213,12 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
     return objects
 
 
-@njit(
-    [
-        types.UniTuple(types.int64, 2)(
+@compiled(
+    types.UniTuple(types.int64, 2)(
             types.int64, types.int64, types.int64, ROWS_OUT,
             *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
             INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4)
-        )
-    ],
-    cache=True,
-    nogil=True,
+    )
 )  # fmt: skip
 def _front_to_back(
     who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,

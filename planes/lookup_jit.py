@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes import lookup
 from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
 from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_far, key_of, put_rows, rows_by, shared
 from planes.cells import Cells
+from planes.compiled import compiled
 
 __all__ = ["looked_up"]
 
@@ -17,16 +18,12 @@ PART_NS, PLACEMENT_NS, LISTED_NS = 2e5, 10.0, 40.0
 """What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
 
 
-@njit(
-    [
-        types.UniTuple(types.int64, 2)(
+@compiled(
+    types.UniTuple(types.int64, 2)(
             types.int64, types.int64, types.int64, ROWS_OUT,
             *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS,
             *[types.int64] * 5, INTS, INTS,
-        )
-    ],
-    cache=True,
-    nogil=True,
+    )
 )  # fmt: skip
 def _looked_up(
     who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,

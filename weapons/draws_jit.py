@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit, types
 
 from planes.arrays import Ints
+from planes.compiled import compiled
 from planes.constants import SUB
 from weapons.draws import Words
 
@@ -23,11 +24,7 @@ def _mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(
-    [types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, INTS, types.int64[:, ::1])],
-    cache=True,
-    nogil=True,
-)
+@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, INTS, INTS, INTS, types.int64[:, ::1]))
 def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
     for row in range(len(shot)):
         state = _mixed(seed[row])
