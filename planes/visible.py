@@ -65,6 +65,7 @@ class Composition:
         objects = np.flatnonzero((there & ~stack.occluder)[tiles.rank])
         blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
         self.seen = cropped(seen_of(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks)))
+        self.ids = stack.ids[self.seen.rank]
         self._cells: dict[tuple[int, ...], Cells] = {}
 
     @cached_property

@@ -52,6 +52,9 @@ BESIDE_BYTES_MOST = 2**26
 PAIRS_AT_ONCE = 2**16
 """Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
 
+OF_ALL = View(False, ALL, ()), View(True, ALL, ())
+"""What shots see that refuse nothing: the front, and all that they pierce."""
+
 REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
 
@@ -70,21 +73,19 @@ def fired_by_bits(
     """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
     pierce, each = pierces(weapon), placements_of(weapon)
-    view = view_of(pierce, shots)
+    view, placements = view_of(pierce, shots), each * len(shots)
     point = is_point(weapon, view, stack)
     alone = parts_of(weapon)[1] is None and (prefilter, broadphase) == ("auto", "auto")
-    expect(each * len(shots) * (SHOT_NS + len(stack) * ITEM_NS))
-    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, each * len(shots))
-    asked = 0 if alone or name == "composed" else each * len(shots)
+    expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
+    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
+    asked = 0 if alone or name == "composed" else placements
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
     sight = Sight(stack, scene.bounds, pierce, candidates, plan)
     plan.run("plan", f"{name}: {why}")
     read, first, most = _reader(scene, name, view, point, alone, sight)
     parts: list[Rows] = []
-    for begin, part, volley, windows in _parts(weapon, shots, first // each, most // each, candidates):
-        plan.run("patterns", f"{len(volley.table.count)} distinct", volley.nbytes)
-        rows = read(part, volley, windows)
-        parts.append(rows.later(begin))
+    for begin, part, volley in _parts(weapon, shots, first // each, most // each, candidates):
+        parts.append(read(part, volley).later(begin))
     rows = Rows.joined(parts)
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
@@ -93,7 +94,7 @@ def fired_by_bits(
     return hits
 
 
-Reader = Callable[[Shots, Volley, Windows], Rows]
+Reader = Callable[[Shots, Volley], Rows]
 
 
 def _reader(
@@ -109,8 +110,9 @@ def _reader(
     if plane is not None:
         return _by_plane(plane, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if name == "composed" and view is not None:
-        kept = scene.compositions().kept(view, scene.version) is not None
-        composition = scene.compositions().read(view, scene.items, scene.bounds)
+        known = scene.compositions()
+        kept = known.kept(view, scene.version)
+        composition = kept or known.read(view, scene.items, scene.bounds)
         sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
         return _by_composition(composition, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if alone:
@@ -121,21 +123,33 @@ def _reader(
 
 def _parts(
     weapon: Weapon, shots: Shots, first: int, most: int, candidates: Candidates
-) -> Iterator[tuple[int, Shots, Volley, Windows]]:
+) -> Iterator[tuple[int, Shots, Volley]]:
     """Parts of a batch, and where each begins: as many shots as have pairs and patterns that fit their chunks.
 
     Parts grow as long as their placements meet few items.
     """
-    begin, step, compiled = 0, first, kernels_of(bitrows) is not bitrows
+    begin, step = 0, first
     while begin < len(shots):
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         volley = volley_of(weapon, part)
-        if len(part) > 1 and not fits(volley.table.patterns):
+        if len(part) > 1 < len(volley.table.patterns) and not fits(volley.table.patterns):
             step = len(part) // 2
             continue
-        yield begin, part, volley, windows_of(volley.table.patterns, 0 if compiled else len(volley))
+        yield begin, part, volley
         begin += len(part)
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
+
+
+def _windows(volley: Volley, plan: Plan) -> Windows:
+    """Windows of the patterns of placements."""
+    compiled = kernels_of(bitrows) is not bitrows
+    windows = windows_of(volley.table.patterns, 0 if compiled else len(volley))
+    _tell_patterns(volley, plan)
+    return windows
+
+
+def _tell_patterns(volley: Volley, plan: Plan) -> None:
+    plan.run("patterns", f"{len(volley.table.patterns)} distinct", volley.nbytes)
 
 
 def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
@@ -144,7 +158,8 @@ def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
     sight.plan.run("code plane", f"{plane.redrawn} px drawn anew", plane.redrawn * codes.itemsize)
     objects = sight.stack.is_object
 
-    def read(_: Shots, volley: Volley, __: Windows) -> Rows:
+    def read(_: Shots, volley: Volley) -> Rows:
+        _tell_patterns(volley, sight.plan)
         rows = points(volley, codes, plane.box_xyxy, objects, kernels_of(bitrows))
         sight.plan.run("read", "one code for each sample", rows.nbytes)
         return rows
@@ -155,8 +170,10 @@ def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
 def _by_composition(composition: Composition, sight: Sight) -> Reader:
     """Count what placements cover of what can be seen of all objects."""
 
-    def read(_: Shots, volley: Volley, windows: Windows) -> Rows:
-        listed, seen, plan = composition.cells(_reach(windows.box_xyxy)), composition.seen, sight.plan
+    def read(_: Shots, volley: Volley) -> Rows:
+        seen, plan = composition.seen, sight.plan
+        windows = _windows(volley, plan)
+        listed = composition.cells(_reach(windows.box_xyxy))
         plan.run("pre-filter", f"cells of {1 << listed.bits} px")
         if volley.scattered:
             placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
@@ -167,7 +184,7 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
         if many and kernels is lookup and _is_disc(volley):
             beside = composition.beside
         found = kernels.looked_up(placed_of(volley), windows, seen, listed, beside)
-        rows = rows_of(volley, found, sight.stack.ids[seen.rank])
+        rows = rows_of(volley, found, composition.ids)
         plan.run("samples", "counted by bit rows", rows.nbytes)
         return rows
 
@@ -180,7 +197,8 @@ def _by_pile(items: Items, sight: Sight) -> Reader:
     pile = tiles.pile(stack)
     sight.plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else pile.box_xyxy.nbytes)
 
-    def read(shots: Shots, volley: Volley, windows: Windows) -> Rows:
+    def read(shots: Shots, volley: Volley) -> Rows:
+        windows = _windows(volley, sight.plan)
         accept, exclude = None, None
         if may_refuse(stack, shots):
             accept, exclude = shots.accept[volley.shot], shots.exclude[volley.shot]
@@ -200,7 +218,8 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
     boxes = tiles.boxes(sight.stack.box_xyxy)
     sight.plan.run("tiles", "bit rows of the masks", boxes.nbytes)
 
-    def read(shots: Shots, volley: Volley, windows: Windows) -> Rows:
+    def read(shots: Shots, volley: Volley) -> Rows:
+        windows = _windows(volley, sight.plan)
         placement, rank = _near_objects(shots, volley, sight)
         pair, tile = tiles.of(rank)
         if view is None:
@@ -262,7 +281,7 @@ def _distinct(values: Ints, most: int) -> tuple[Ints, Ints]:
 def view_of(pierce: bool, shots: Shots) -> View | None:
     """What all shots accept; None if they differ in it."""
     if not shots.choosy or not len(shots):
-        return View(pierce, ALL, ())
+        return OF_ALL[pierce]
     accept, exclude = shots.accept, shots.exclude
     if (accept != accept[0]).any() or (exclude != exclude[0]).any():
         return None
@@ -272,7 +291,7 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
 def is_point(weapon: Weapon, view: View | None, stack: Stack) -> bool:
     """Whether a shot is the pixel that it is placed on, and ends at the first item there."""
     burst, spread, plain = parts_of(weapon)
-    if burst or spread or plain.directed or view != View(False, ALL, ()) or stack.has_unmet:
+    if burst or spread or plain.directed or view != OF_ALL[False] or stack.has_unmet:
         return False
     return pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
 
@@ -300,7 +319,7 @@ def _counted(volley: Volley, windows: Windows, placement: Ints, near: Ints, seen
 
 def _reach(boxes_xyxy: Ints) -> Ints:
     """Box around patterns; of several a little larger, so that the cells made for it serve the next call, too."""
+    if len(boxes_xyxy) == 1:
+        return np.asarray(boxes_xyxy[0])
     low, high = boxes_xyxy[:, :2].min(axis=0), boxes_xyxy[:, 2:].max(axis=0)
-    if len(boxes_xyxy) > 1:
-        low, high = low >> SHOT_BITS << SHOT_BITS, -(-high >> SHOT_BITS << SHOT_BITS)
-    return np.concatenate([low, high])
+    return np.concatenate([low >> SHOT_BITS << SHOT_BITS, -(-high >> SHOT_BITS << SHOT_BITS)])

@@ -23,7 +23,10 @@ NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
 
 def placed_of(volley: Volley) -> Placed:
     """Placements as the kernels take them."""
-    return Placed(volley.pattern, *volley.xy.T, *volley.origin_xy.T)
+    x, y = volley.xy[:, 0], volley.xy[:, 1]
+    if not volley.scattered:
+        return Placed(volley.pattern, x, y, x, y)
+    return Placed(volley.pattern, x, y, *volley.origin_xy.T)
 
 
 def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
@@ -35,7 +38,8 @@ def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
     ids : of the item of each tile
     """
     shot, round_ = volley.turn_of(found.placement)
-    first_xy = np.stack([found.x, found.y], axis=1)
+    first_xy = np.empty((len(found.x), 2), np.int64)
+    first_xy[:, 0], first_xy[:, 1] = found.x, found.y
     return Rows(shot, round_, ids[found.seen], found.samples, None, None, None, first_xy, found.distance2)
 
 
