@@ -336,12 +336,12 @@ def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, 
 
 def _parts_of(weapon: object) -> Parts:
     """Parts of a weapon, of patterns and of rays; they are kept with it, as it does not change."""
-    if not isinstance(weapon, Weapon):
-        return None, None
-    kept = vars(weapon)
-    if "_parts" not in kept:
-        kept["_parts"] = _apart(weapon)
-    return kept["_parts"]  # type: ignore[no-any-return]
+    kept: Parts | None = getattr(weapon, "_parts", None)
+    if kept is None:
+        kept = _apart(weapon) if isinstance(weapon, Weapon) else (None, None)
+        if isinstance(weapon, Weapon):
+            weapon._keep("_parts", kept)
+    return kept
 
 
 def _apart(weapon: Weapon) -> Parts:

@@ -24,7 +24,7 @@ from planes.scene import Scene
 from planes.tiles import Tiles
 from planes.twins import expect, kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
-from weapons.arsenal import parts_of, pattern_of, pierces
+from weapons.arsenal import Plain, parts_of, pattern_of
 from weapons.candidates import Candidates, may_refuse, refused
 from weapons.counting import NOT_BESIDE, counted, placed_of, points, rows_of
 from weapons.hits import Hits, Rows
@@ -72,15 +72,16 @@ def fired_by_bits(
 ) -> Hits:
     """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
-    pierce, each = pierces(weapon), placements_of(weapon)
-    view, placements = view_of(pierce, shots), each * len(shots)
-    point = is_point(weapon, view, stack)
-    alone = parts_of(weapon)[1] is None and (prefilter, broadphase) == ("auto", "auto")
+    burst, spread, plain = parts_of(weapon)
+    each = placements_of(weapon)
+    view, placements = view_of(plain.pierce, shots), each * len(shots)
+    point = not burst and not spread and is_point(plain, view, stack)
+    alone = spread is None and (prefilter, broadphase) == ("auto", "auto")
     expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
     asked = 0 if alone or name == "composed" else placements
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
-    sight = Sight(stack, scene.bounds, pierce, candidates, plan)
+    sight = Sight(stack, scene.bounds, plain.pierce, candidates, plan)
     plan.run("plan", f"{name}: {why}")
     read, first, most = _reader(scene, name, view, point, alone, sight)
     parts: list[Rows] = []
@@ -288,10 +289,9 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
     return View(pierce, int(accept[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
 
 
-def is_point(weapon: Weapon, view: View | None, stack: Stack) -> bool:
-    """Whether a shot is the pixel that it is placed on, and ends at the first item there."""
-    burst, spread, plain = parts_of(weapon)
-    if burst or spread or plain.directed or view != OF_ALL[False] or stack.has_unmet:
+def is_point(plain: Plain, view: View | None, stack: Stack) -> bool:
+    """Whether what is placed is one pixel, and ends at the first item there."""
+    if plain.directed or view != OF_ALL[False] or stack.has_unmet:
         return False
     return pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
 

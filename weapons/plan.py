@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from time import perf_counter_ns
 from typing import Any
 
@@ -110,6 +111,10 @@ class Plan:
     def leave_out(self, name: str, why: str) -> None:
         """Record that a stage was not needed; nothing of one that ran, or of which that is known."""
         self._notes.append((name, why))
+
+    def leave_out_all(self, told: Iterable[tuple[str, str]]) -> None:
+        """Record names of stages that were not needed, each with why."""
+        self._notes.extend(told)
 
     @property
     def ran(self) -> list[Stage]:
@@ -432,16 +437,22 @@ def leave_out_uncounted(plan: Plan, scene: Scene, candidates: Candidates, choosy
 
 def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, choosy: bool) -> None:
     """Record what neither the shots nor the scene have."""
-    if not weighted:
-        plan.leave_out("weights", "the weapon has no falloff")
-    if scene.bounds is None:
-        plan.leave_out("outside", "the scene has no bounds")
-    if not stack.has_occluders:
-        plan.leave_out("occluders", "the scene has none")
-    if not stack.layered:
-        plan.leave_out("layers", "all items lie on one")
-    if not choosy:
-        plan.leave_out("filter", "all is accepted, and nobody excluded")
+    plan.leave_out_all(_absent(weighted, scene.bounds is not None, stack.has_occluders, stack.layered, choosy))
+
+
+@cache
+def _absent(*there: bool) -> list[tuple[str, str]]:
+    """What is told of what is not there, of those in ABSENT."""
+    return [told for told, present in zip(ABSENT, there, strict=True) if not present]
+
+
+ABSENT = (
+    ("weights", "the weapon has no falloff"),
+    ("outside", "the scene has no bounds"),
+    ("occluders", "the scene has none"),
+    ("layers", "all items lie on one"),
+    ("filter", "all is accepted, and nobody excluded"),
+)
 
 
 def leave_out_imagery(plan: Plan, scene: Scene) -> None:
