@@ -146,15 +146,14 @@ def test_each_pixel_ends_at_the_first_item_that_the_shot_accepts(jit: bool) -> N
 
 
 def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
-    """Tiles of 64 x 64 px lie side by side: shots at all their corners hit the one that they lie on."""
-    masks = [np.ones((64, 64), np.bool_)] * 9
-    tiles = TileAtlas().tiles(enumerate(masks), np.arange(9), 1)
-    corner = 64 * np.array([(x, y) for y in range(3) for x in range(3)])
-    every, none = np.full(9, 1), np.zeros(0, np.bool_)
-    pile = Pile(tiles.rank, np.concatenate([corner, corner + 63], axis=1), tiles.begin, tiles.words, none, every, every)
-    side = np.array([0, 63, 64, 127, 128, 191])
-    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
-    placed = Placed(0 * x, x, y, x, y)
+    """A tile of 64 x 64 px is hit at its corners wherever it lies among the cells, which begin with another tile."""
+    tiles = TileAtlas().tiles(enumerate([np.ones((64, 64), np.bool_)] * 2), np.arange(2), 1)
+    every, none = np.full(2, 1), np.zeros(0, np.bool_)
     dot = windows._made([Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0))], False)
-    found = kernels_of(fronttoback).front_to_back(placed, dot, pile, None, None, False, None)
-    assert found.placement.tolist() == list(range(36)) and (found.seen == y // 64 * 3 + x // 64).all()
+    for offset in range(64):
+        corner = np.array([(-64, -128), (offset, offset)])
+        boxes = np.concatenate([corner, corner + 63], axis=1)
+        pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, none, every, every)
+        x, y = offset + np.array([(0, 0, 63, 63, 64, -1), (0, 63, 0, 63, 0, 0)])
+        found = kernels_of(fronttoback).front_to_back(Placed(0 * x, x, y, x, y), dot, pile, None, None, False, None)
+        assert found.placement.tolist() == [0, 1, 2, 3] and found.seen.tolist() == [1] * 4
