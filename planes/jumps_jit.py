@@ -14,8 +14,8 @@ __all__ = ["clearance_of", "first_taken"]
 BLOCK = 128
 """Rays that go on together, so that none waits for another's look: their columns fit the fastest cache."""
 
-ROUNDS = 3
-"""Jumps of each ray of a block, before those that are done make room for others."""
+ROUNDS = 4
+"""Jumps of each ray of a block, before others take the places of those that are done."""
 
 N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
 """Columns of a block: after how many crossings a ray looks next, and the others as of `jumps._ways`."""
@@ -57,25 +57,55 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     count, flat = len(start_256), clearance.reshape(-1)
     height, width = clearance.shape
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
-    block, look, jump = np.empty((COLUMNS, BLOCK)), np.empty(BLOCK, np.int32), np.empty(BLOCK, np.uint8)
-    left = ray = 0
-    while left or ray < count:
-        while left < BLOCK and ray < count:
-            x, y = start_256[ray, 0], start_256[ray, 1]
-            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, left)
+    block, look, jump = np.zeros((COLUMNS, BLOCK)), np.empty(BLOCK, np.int32), np.zeros(BLOCK, np.uint8)
+    free = np.arange(BLOCK)
+    left = holes = BLOCK
+    ray = 0
+    while left:
+        while holes and ray < count:
+            x, y, one = start_256[ray, 0], start_256[ray, 1], free[holes - 1]
+            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, one)
             if why < 0:
                 entry[ray] = why
-            elif block[N, left] == 0 and _between(flat, block, left, x, y):
-                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, left]), True
+            elif block[N, one] == 0 and _between(flat, block, one, x, y):
+                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, one]), True
             else:
-                block[RAY, left] = ray
-                left += 1
+                block[RAY, one] = ray
+                holes -= 1
             ray += 1
+        left = _closed(block, left, free, holes)
         for _ in range(ROUNDS):
             _look(block, left, look)
             _jump(flat, block, left, look, jump)
-        left = _left(block, left, look, jump, width, start_256, step_256, entry, cell, several)
+        holes = _done(block, left, jump, free)
+        for hole in range(holes):
+            one = free[hole]
+            if block[N, one] < block[STOP, one]:
+                done, place = np.int64(block[RAY, one]), np.int64(look[one])
+                several[done] = place < 0
+                cell[done] = place = max(place, ~place)
+                entry[done] = _entry(place, width, start_256[done], step_256[done])
     return entry, cell, several
+
+
+@njit(cache=True)
+def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
+    """Let the last rays of a block take the places that are free; how many rays there are."""
+    for hole in range(holes - 1, -1, -1):
+        left -= 1
+        for column in range(COLUMNS):
+            block[column, free[hole]] = block[column, left]
+    return left
+
+
+@njit(cache=True)
+def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
+    """Places of rays that came to something, or to their ends; how many they are."""
+    holes = 0
+    for one in range(left):
+        free[holes] = one
+        holes += (jump[one] == 0) | (block[N, one] >= block[STOP, one])
+    return holes
 
 
 @njit(cache=True, error_model="numpy")
@@ -94,34 +124,17 @@ def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
     """Let rays jump, up to their ends."""
     for one in range(count):
         place = look[one]
-        two = place < 0
-        far = min(flat[~place], flat[~place - np.int32(block[ASIDE, one])]) if two else flat[np.uint32(place)]
+        far = flat[np.int64(max(place, ~place))]
+        if place < 0:
+            far = min(far, flat[~place - np.int32(block[ASIDE, one])])
         jump[one] = far
         block[N, one] = min(block[N, one] + far, block[STOP, one])
 
 
 @njit(cache=True)
-def _left(block, count, look, jump, width, start_256, step_256, entry, cell, several):  # type: ignore[no-untyped-def]
-    """Tell where rays came to something, and move those that go on to the front; how many they are."""
-    left = 0
-    for one in range(count):
-        if block[N, one] < block[STOP, one]:
-            if jump[one]:
-                for column in range(COLUMNS):
-                    block[column, left] = block[column, one]
-                left += 1
-            else:
-                ray, place = np.int64(block[RAY, one]), np.int64(look[one])
-                several[ray] = place < 0
-                cell[ray] = place = max(place, ~place)
-                entry[ray] = _entry(place % width, place // width, start_256[ray], step_256[ray])
-    return left
-
-
-@njit(cache=True)
-def _entry(x, y, start_256, step_256):  # type: ignore[no-untyped-def]
+def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
     """When a ray enters a cell."""
-    ahead_x, ahead_y = SUB * x - start_256[0], SUB * y - start_256[1]
+    ahead_x, ahead_y = SUB * (place % width) - start_256[0], SUB * (place // width) - start_256[1]
     dx, dy = step_256[0], step_256[1]
     ahead_x, ahead_y = ahead_x if dx >= 0 else -ahead_x, ahead_y if dy >= 0 else -ahead_y
     return max((ahead_x - HALF) * max(abs(dy), 1), (ahead_y - HALF) * max(abs(dx), 1), 0)
@@ -151,37 +164,34 @@ def _over(numerator, denominator):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: ignore[no-untyped-def]
     """Put the columns of a ray into its block; or tell why it has none, below 0."""
+    back_x, back_y = step_x < 0, step_y < 0
     dx, dy = abs(step_x), abs(step_y)
-    x, y = (x_256 + HALF - (step_x < 0)) >> 8, (y_256 + HALF - (step_y < 0)) >> 8
-    ax, ay = x_256 - (x << 8), y_256 - (y << 8)
-    ax, ay = ax if step_x >= 0 else -ax, ay if step_y >= 0 else -ay
+    x, y = (x_256 + HALF - back_x) >> 8, (y_256 + HALF - back_y) >> 8
+    ax, ay = (x_256 - (x << 8)) * (1 - 2 * back_x), (y_256 - (y << 8)) * (1 - 2 * back_y)
     if dx + dy == 0 or dx > LONGEST or dy > LONGEST:
         return UNDECIDED
     last_x, last_y = (dx + ax + HALF) >> 8, (dy + ay + HALF) >> 8
-    room_x, owed_x = (width - 2 - x, 1 - x) if step_x >= 0 else (x - 1, x - width + 2)
-    room_y, owed_y = (height - 2 - y, 1 - y) if step_y >= 0 else (y - 1, y - height + 2)
-    if room_x < 0 or room_y < 0 or owed_x > last_x or owed_y > last_y:
+    behind_x, behind_y = back_x * (width - 1 - 2 * x) + x, back_y * (height - 1 - 2 * y) + y
+    room_x, room_y = width - 2 - behind_x, height - 2 - behind_y
+    if room_x < 0 or room_y < 0 or 1 - behind_x > last_x or 1 - behind_y > last_y:
         return NOTHING
     a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
-    across = width if step_y >= 0 else -width
-    along = (1 if step_x >= 0 else -1) - across
-    block[ASIDE, one] = along
+    across = width * (1 - 2 * back_y)
+    aside = along = 1 - 2 * back_x - across
     if dx == 0 and ax == -HALF:
-        block[ASIDE, one] = 1
+        aside = 1
     if dy == 0 and ay == -HALF:
-        block[ASIDE, one], c = width, 0
+        aside, c = width, 0
     first, stop = 0, last_x + last_y + 1
-    if last_x > room_x:
-        stop = min(stop, -_over(c - b * (room_x + 1), a))
-    if last_y > room_y:
-        stop = min(stop, _over(c + b * room_y, SUB * dy) + 1)
-    if owed_x > 0:
-        first = max(first, -_over(c - b * owed_x, a))
-    if owed_y > 0:
-        first = max(first, _over(c + b * (owed_y - 1), SUB * dy) + 1)
+    off_x, off_y = -_over(c - b * (room_x + 1), max(a, 1)), _over(c + b * room_y, max(SUB * dy, 1)) + 1
+    stop = min(stop, off_x if last_x > room_x else stop, off_y if last_y > room_y else stop)
+    if behind_x < 1:
+        first = max(first, -_over(c - b * (1 - behind_x), a))
+    if behind_y < 1:
+        first = max(first, _over(c - b * behind_y, SUB * dy) + 1)
     if float(a) * stop + c >= EXACT:
         return UNDECIDED
     block[A, one], block[B, one], block[C, one] = a, b, c
-    block[ALONG, one], block[ACROSS, one], block[BASE, one] = along, across, y * width + x
-    block[N, one], block[STOP, one] = first, stop
+    block[ALONG, one], block[ACROSS, one], block[ASIDE, one] = along, across, aside
+    block[BASE, one], block[N, one], block[STOP, one] = y * width + x, first, stop
     return 0 if first < stop else NOTHING
