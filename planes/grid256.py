@@ -7,20 +7,20 @@ it is the same on every machine, and so that quarter turns and mirrors are exact
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
-from planes.arrays import Floats, InputError, Ints
+from planes import sines
+from planes.arrays import InputError, Ints
 from planes.constants import HALF, SUB, TRIG_BITS
+from planes.twins import kernels_of
 
 __all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "scaled", "snap", "turned", "unit", "unit_toward"]
 
 ONE = 1 << TRIG_BITS
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
-_DOUBT = 2.0**-12  # numpy's sine is within a few ulp (2**-21 after the scaling); nearer to a tie than this, ask again
 
 ANGLES_KEPT = 2**12
 """Angles whose directions are kept: objects turn by the same steps again and again."""
@@ -59,23 +59,14 @@ def isqrt(values: Ints) -> Ints:
 def unit(degrees: object) -> tuple[Ints, Ints]:
     """(cos, sin) times 2**30 of angles in degrees, correctly rounded.
 
-    The angle is folded into [0, 45] by differences that are exact in float64, so a quarter turn swaps the two numbers
-    and a mirror changes a sign, to the last bit. A value too near to a tie for the float sine is worked out in
-    integers.
+    A value too near to a tie for the float sine is worked out in integers.
     """
     angle = np.asarray(degrees, np.float64)
-    folded = np.abs(np.fmod(angle, 360.0))
-    down = folded > 180
-    folded = np.where(down, 360 - folded, folded)
-    left = folded > 90
-    folded = np.where(left, 180 - folded, folded)
-    steep = folded > 45
-    folded = np.where(steep, 90 - folded, folded)
-    radians = np.radians(folded)
-    near = _rounded(np.cos(radians) * ONE, folded, _exact_cos)
-    far = _rounded(np.sin(radians) * ONE, folded, _exact_sin)
-    c, s = np.where(steep, far, near), np.where(steep, near, far)
-    return np.where(left, -c, c), np.where(down ^ (angle < 0), -s, s)
+    each = angle.ravel()
+    c, s, doubt = kernels_of(sines).nearest(each)
+    for i in doubt.tolist():
+        c[i], s[i] = _exactly(float(each[i]))
+    return c.reshape(angle.shape), s.reshape(angle.shape)
 
 
 def unit_toward(dx: Ints | int, dy: Ints | int) -> tuple[Ints, Ints]:
@@ -112,25 +103,16 @@ def _over_one(numerator: Ints) -> Ints:
     return np.asarray((numerator + (ONE // 2 - 1) + ((numerator >> TRIG_BITS) & 1)) >> TRIG_BITS)
 
 
-def _rounded(scaled: Floats, folded: Floats, exactly: Callable[[float], int]) -> Ints:
-    """Round to integers; where the float is nearer to a tie than its error, decide in integers."""
-    rounded = np.rint(scaled)
-    doubt = np.abs(scaled - rounded) > 0.5 - _DOUBT
-    nearest = rounded.astype(np.int64)
-    if not doubt.any():
-        return nearest
-    flat = nearest.ravel()
-    for i in np.flatnonzero(doubt):
-        flat[i] = exactly(float(folded.flat[i]))
-    return flat.reshape(nearest.shape)
-
-
-def _exact_sin(degrees: float) -> int:
-    return _taylor(degrees, first=1)
-
-
-def _exact_cos(degrees: float) -> int:
-    return _taylor(degrees, first=0)
+def _exactly(degrees: float) -> tuple[int, int]:
+    """As `unit`, of one angle, in integers."""
+    folded = math.fmod(abs(degrees), 360.0)
+    down = folded > 180
+    folded = 360 - folded if down else folded
+    left = folded > 90
+    folded = 180 - folded if left else folded
+    steep = folded > 45
+    s, c = (_taylor(90 - folded if steep else folded, first) for first in (1 - steep, int(steep)))
+    return -c if left else c, -s if down ^ (degrees < 0) else s
 
 
 def _taylor(degrees: float, first: int) -> int:

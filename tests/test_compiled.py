@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 
-CALLING = '''
+CALLING = """
 from numba import types
 from planes.called_jit import told
 from planes.compiled import compiled
@@ -19,14 +19,14 @@ from planes.compiled import compiled
 @compiled(types.int64(types.int64))
 def asked(number):
     return told(number)
-'''
-CALLED = '''
+"""
+CALLED = """
 from numba import njit
 
 @njit
 def told(number):
     return number + {}
-'''
+"""
 ASK = "from planes.calling_jit import asked as a; print(a(1), sum(a.stats.cache_hits.values()), end='')"
 
 

@@ -213,8 +213,16 @@ def test_unit_is_correctly_rounded(degrees: float) -> None:
     assert unit(degrees) == oracle.unit(degrees)
 
 
-def test_unit_is_correctly_rounded_all_round() -> None:
-    degrees = np.concatenate([np.arange(-1080, 1081) / 3.0, np.random.default_rng(5).uniform(-400, 400, 4000)])
+TIES = [
+    math.degrees(arc((k + 0.5) / 2**30)) for k in range(-(2**30), 2**30, 5 * 10**7) for arc in (math.acos, math.asin)
+]
+"""Angles whose sine or cosine lies as near to half-way between two whole numbers as an angle's can."""
+
+
+def test_unit_is_correctly_rounded_all_round(jit: bool) -> None:
+    degrees = np.concatenate(
+        [np.arange(-1080, 1081) / 3.0, np.array(TIES), np.random.default_rng(5).uniform(-400, 400, 4000)]
+    )
     c, s = grid256.unit(degrees)
     assert c.dtype == s.dtype == np.int64
     assert list(zip(c.tolist(), s.tolist(), strict=True)) == [oracle.unit(d) for d in degrees.tolist()]
