@@ -514,7 +514,7 @@ START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
     "arrays bitrows cells compose constants fronttoback grid256 image index items kept labels lookup painting placing"
-    " poses rasterise sampling scene scenefile schema snapping spans sprite stack steps tiles twins visible"
+    " poses rasterise sampling scene scenefile schema sines snapping spans sprite stack steps tiles twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns counting draws explain firing guns hits pattern plan resolve runfire volley"

@@ -13,12 +13,15 @@ import numpy as np
 from planes.arrays import Floats, Ints
 from planes.grid256 import pixel
 from planes.items import Stack
+from weapons.columns import ONES
 from weapons.ends import Ends, Reason
+from weapons.guns import Traced
 from weapons.hits import Rows
 from weapons.passes import Passes, Stops, normals_at, points_at, weights_at
 from weapons.rayhits import groups_of, rows_of_passes
 from weapons.rays import Rays
 from weapons.trace import Lines
+from weapons.tracing import lines_of
 
 __all__ = ["FirstHits"]
 
@@ -29,22 +32,26 @@ class FirstHits:
 
     Parameters
     ----------
-    rays, lines : (R,) the rays
+    rays : (R,) the rays, and
+    ray : the weapon that they are of
     ends : (R,)
     stack : what they went through, at that version
-    falloff : of the weapon
     """
 
     rays: Rays
-    lines: Lines
+    ray: Traced
     ends: Ends
     stack: Stack
-    falloff: str | None
 
     @property
     def hit(self) -> Ints:
         """Rays that hit an object."""
         return np.flatnonzero(self.ends.reason == Reason.HITS)
+
+    @cached_property
+    def lines(self) -> Lines:
+        """The rays (R,) about the whole pixels that they begin on."""
+        return lines_of(self.rays, self.ray)
 
     @cached_property
     def parts(self) -> Floats:
@@ -61,11 +68,11 @@ class FirstHits:
             return rows_of_passes(passes, np.concatenate([group[:, None], passes.entry_xy], axis=1), self.rays)
         hit = self.hit
         x, y = self.ends.x[hit], self.ends.y[hit]
-        one = np.ones(len(hit), np.int64)
+        one = ONES[: len(hit)]
         weight = self._weights(hit)
         return Rows(
-            self.rays.shot[hit], self.rays.round[hit], self.stack.ids[self.ends.rank[hit]], one, one.copy(), weight,
-            one.copy(), np.stack([x, y], axis=1) + self.rays.origin_xy[hit], x * x + y * y,
+            self.rays.shot[hit], self.rays.round[hit], self.stack.ids[self.ends.rank[hit]], one, one, weight, one,
+            np.stack([x, y], axis=1) + self.rays.origin_xy[hit], x * x + y * y,
         )  # fmt: skip
 
     @cached_property
@@ -104,8 +111,8 @@ class FirstHits:
         )  # fmt: skip
 
     def _weights(self, hit: Ints) -> Ints:
-        scale = self.lines.scale[hit] if self.falloff else np.ones(len(hit), np.int64)
-        return weights_at(self.ends.time[hit], scale, self.falloff)
+        falloff = self.ray.fades
+        return weights_at(self.ends.time[hit], self.lines.scale[hit] if falloff else ONES[: len(hit)], falloff)
 
     def _cells(self, some: Ints) -> Ints:
         """Cells in which rays end, about the pixel that they begin on."""

@@ -45,9 +45,14 @@ class _Seen:
     clearance: Clearance
     plan: Plan
 
+    def place(self, cell: Ints) -> tuple[Ints, Ints]:
+        """Columns and rows of cells; numpy divides by one number several times as fast as `divmod` does."""
+        y = cell // self.clearance.shape[1]
+        return cell - y * self.clearance.shape[1], y
+
     def front(self, cell: Ints) -> tuple[Ints, Codes]:
         """Rank of the front of taken cells, and their codes."""
-        y, x = np.divmod(cell, self.clearance.shape[1])
+        x, y = self.place(cell)
         code = self.codes.reshape(-1).take((y - PAD) * self.codes.shape[1] + (x - PAD))
         return self.stack.rank_by_code.take(code >> 1), code
 
@@ -82,17 +87,17 @@ def ends_by_jumps(
         cells = _cells_at_once(cell[at], entry[at] == 0, rays.start_256[at], rays.step_256[at], seen.clearance.shape[1])
         cell[at], others = _first_of(cells, seen, plane.corner_xy)
         unsure[at] = others & choosy
-    rank, _ = seen.front(cell[met])
+    place = cell[met]
+    rank, _ = seen.front(place)
     if choosy:
         unsure[met] |= seen.refuses(met, rank)
     if ray.inside != "hit":
         unsure |= entry == 0
-    y, x = np.divmod(cell[met], seen.clearance.shape[1])
-    ends, aside = endless(len(rays)), plane.corner_xy - rays.origin_xy
-    ends.x[met], ends.y[met] = x + aside[met, 0], y + aside[met, 1]
-    ends.rank[met], ends.time[met], ends.reason[met] = rank, entry[met], Reason.HITS
-    if stack.has_occluders:
-        ends.reason[met[stack.occluder[rank]]] = Reason.OCCLUDER
+    (x, y), aside = seen.place(place), plane.corner_xy - rays.origin_xy.take(met, axis=0)
+    ends = endless(len(rays))
+    ends.x[met], ends.y[met] = x + aside[:, 0], y + aside[:, 1]
+    ends.rank[met], ends.time[met] = rank, entry[met]
+    ends.reason[met] = np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
     plan.run("jumps", "each to the first cell that is taken", ends.nbytes)
     return ends, np.flatnonzero(unsure)
 
@@ -159,8 +164,8 @@ def _first_of(cells: Ints, seen: _Seen, corner_xy: Ints) -> tuple[Ints, Bools]:
         rank, code = seen.front(cells[taken])
         in_front = seen.stack.occluder[rank]
         behind = np.flatnonzero(~in_front & (code & 1 == 1))
-        y, x = np.divmod(cells[taken][behind], seen.clearance.shape[1])
-        in_front[behind] = _has_occluder(seen.stack, np.stack([x, y], axis=1) + corner_xy)
+        xy = np.stack(seen.place(cells[taken][behind]), axis=1) + corner_xy
+        in_front[behind] = _has_occluder(seen.stack, xy)
         blocked[taken] = in_front
     last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
     best = np.argmin((~taken * 2 + ~blocked) * seen.clearance.size + cells, axis=1)

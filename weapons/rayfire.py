@@ -28,7 +28,7 @@ from weapons.rayhits import RayHits, Told, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
 from weapons.rayways import chosen_way, ends_at_first, jumps_at_all
 from weapons.trace import Lines
-from weapons.tracing import Range, expected_cells, lines_of, trace
+from weapons.tracing import Range, expected_cells, trace
 from weapons.volley import Shots
 from weapons.weapon import Weapon
 
@@ -78,7 +78,7 @@ def fired_rays(
         plan.run("rays", "both ends on the grid", rays.nbytes)
         if ends_at_first(ray):
             ends = _first_ends(rays, ray, some, through, plane, choose)
-            first = FirstHits(rays, lines_of(rays, ray), ends, stack, ray.fades)
+            first = FirstHits(rays, ray, ends, stack)
             rows.append(first.rows(len(some)))
             found.append((begin, first))
             plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)

@@ -12,6 +12,7 @@ from planes.grid256 import pixel, scaled, snap, turned, unit
 from planes.twins import kernels_of
 from weapons import draws
 from weapons.arsenal import Rounds, Spread
+from weapons.columns import ZEROS
 from weapons.guns import Sweep, Traced
 from weapons.volley import Shots, recoiled
 
@@ -61,10 +62,11 @@ def rays_of(parts: Parts, shots: Shots) -> Rays:
     """Place every pellet of every round of every shot; `parts` are those of the weapon."""
     burst, several, _ = parts
     rounds, pellets = burst.count if burst else 1, several.count if several else 1
-    shot = np.repeat(np.arange(len(shots)), rounds * pellets)
-    round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
-    pellet = np.tile(np.arange(pellets), len(shots) * rounds)
-    start = shots.at_256 if rounds * pellets == 1 else shots.at_256[shot]
+    shot = np.arange(len(shots)).repeat(rounds * pellets)
+    one = rounds * pellets == 1
+    round_ = ZEROS[: len(shots)] if one else np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
+    pellet = ZEROS[: len(shots)] if one else np.tile(np.arange(pellets), len(shots) * rounds)
+    start = shots.at_256 if one else shots.at_256[shot]
     if burst:
         start = start + round_[:, None] * snap(burst.recoil_xy)
     step = _steps(parts, shots, shot, round_, pellet)
