@@ -388,11 +388,14 @@ class Items:
 
     def tiles(self) -> Tiles:
         """Bit rows of the masks of the stack."""
+        stack = self.stack()
+        known = self._tiles[0].known(stack.forms) if self._tiles else None
+        if known is not None:
+            return known
         from planes.tiles import TileAtlas  # what nothing is fired at needs none
 
         if not self._tiles:
             self._tiles.append(TileAtlas())
-        stack = self.stack()
         used = ((variant.uid, variant.mask) for variant in self.variants)
         return self._tiles[0].tiles(used, self.mask[stack.ids], stack.forms)
 

@@ -90,6 +90,11 @@ class TileAtlas:
         self._last: tuple[int, Tiles] | None = None
         self._lock = threading.Lock()
 
+    def known(self, forms: int) -> Tiles | None:
+        """Tiles of the last stack, if it was of these forms."""
+        last = self._last
+        return last[1] if last is not None and last[0] == forms else None
+
     def tiles(self, masks: Iterable[tuple[int, Bools]], number: Ints, forms: int) -> Tiles:
         """Tiles of the items of a stack.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -26,7 +25,6 @@ OFTEN = 64
 WINDOW_CACHE_BYTES = 2**26
 """Windows kept for the next call, bytes."""
 
-_placed: WeakKeyDictionary[Pattern, int] = WeakKeyDictionary()
 _kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
     WINDOW_CACHE_BYTES, lambda windows: windows.words.nbytes + windows.box_xyxy.nbytes
 )
@@ -47,8 +45,9 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
     """
     often = len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
     if often:
-        _placed[patterns[0]] = _placed.get(patterns[0], 0) + placements
-        often = _placed[patterns[0]] > OFTEN
+        told = vars(patterns[0])
+        told["placed"] = placed = told.get("placed", 0) + placements
+        often = placed > OFTEN
     return _kept.get((tuple(patterns), often), lambda: _made([pattern.spans for pattern in patterns], often))
 
 
