@@ -8,7 +8,7 @@ Every function is from arrays to arrays; `bitrows_jit` has the same ones, compil
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ __all__ = [
     "Windows",
     "Words",
     "found",
+    "nearest",
     "beside_of",
     "front_at",
     "packed",
@@ -33,10 +34,12 @@ __all__ = [
     "rows_of",
     "union",
     "visible",
+    "windows_at",
 ]
 
 Words = npt.NDArray[np.uint64]
 Beside = npt.NDArray[np.uint8]
+Kind = TypeVar("Kind", bound=np.generic)
 
 WORD = 64
 """Columns of a tile, and rows at most."""
@@ -44,8 +47,11 @@ WORD = 64
 PAD = 16
 """Empty rows between seen tiles: patterns of so few rows are counted by their own."""
 
-NOWHERE = 255
-"""Instead of the distance along a row that has no pixel."""
+NOWHERE, NOWHERE_LOSES = 255, 240
+"""Instead of the distance along a row that has no pixel; and how near the origin lies if that loses to any pixel, px.
+
+A pixel is within 63 columns, and (255 + a)**2 - (63 + a)**2 > 240**2.
+"""
 
 WORDS_AT_ONCE = 2**15
 """Words of pairs worked on at a time: 256 KB, which stay in the level-2 cache with their windows and counts."""
@@ -56,8 +62,10 @@ _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _SUM = np.uint64(0x0001000100010001)
 _NONE = 2**16 - 1
-_FAR, _FAR_SMALL = 2**22, 2**14
-"""Farther from the origin than any pixel of a pattern, px; and of one whose squares fit int32, with a sum of two."""
+_FAR_SMALL = 2**14
+"""So far from the origin squares fit int32, with a sum of two, px."""
+
+_MOST = {kind: np.iinfo(kind).max for kind in (np.int32, np.int64)}
 
 
 class Seen(NamedTuple):
@@ -89,9 +97,9 @@ class Windows(NamedTuple):
     ----------
     box_xyxy : (n, 4) boxes of the patterns about the pixel that they are placed on
     first : (n,) the word of each pattern's box corner, at its first column of words
-    rows : (n,) words from one column to the next
+    rows : (n,) words from one column of words to the next
     words : flat
-    shifted : words from one of all 64 shifts to the next; 0 if none are made
+    shifted : words from the window at one column to that at the next; 0 if not all 64 shifts of each word are made
     """
 
     box_xyxy: Ints
@@ -130,14 +138,14 @@ def packed(mask: Bools) -> Words:
     return np.asarray((mask * _PLACES[: mask.shape[1]]).sum(axis=1, dtype=np.uint64))
 
 
-def rows_of(words: Words, height: int, begin: Ints) -> Words:
+def rows_of(words: npt.NDArray[Kind], height: int, begin: Ints) -> npt.NDArray[Kind]:
     """Rows (n, height) of a flat array from each of (n,) places on."""
     return np.asarray(_every(words, height)[begin])
 
 
-def _every(words: Words, height: int) -> Words:
-    """Rows of a view, of which each begins a word after the one before."""
-    return np.lib.stride_tricks.as_strided(words, (len(words) - height + 1, height), (8, 8), writeable=False)
+def _every(words: npt.NDArray[Kind], height: int) -> npt.NDArray[Kind]:
+    """Rows of a view, of which each begins a number after the one before."""
+    return np.ndarray((len(words) - height + 1, height), words.dtype, words, 0, words.strides * 2)
 
 
 def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right: Ints) -> Words:
@@ -176,39 +184,48 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     beside : of the seen tiles, if each pattern holds all pixels that are nearer to its origin than one of its own; or
         empty
     """
-    met = _meets(placed, windows, seen, placement, near).nonzero()[0]
-    placement, near = placement[met], near[met]
-    height, top = _rows_counted(placed, windows, seen, placement, near)
-    left = seen.box_xyxy[near, 0]
-    tile = seen.begin[near] + top - seen.box_xyxy[near, 1]
+    height = _rows_counted(windows, seen)
+    low, step = height < seen.height, WORDS_AT_ONCE // height
+    x, y = placed.x - placed.origin_x, placed.y - placed.origin_y
     parts = [Found(*[np.zeros(0, np.int64)] * 6)]
-    step = WORDS_AT_ONCE // height
     for first in range(0, len(near), step):
         now = slice(first, first + step)
-        who, at = placement[now], near[now]
-        rows = _every(seen.words, height)[tile[now]]
-        rows &= _windows(placed, windows, height, who, left[now], top[now])
+        who, at, pattern, left, top = _meeting(placed, windows, seen, placement[now], near[now])
+        begin = seen.begin[at]
+        if low:
+            begin -= top
+            top = np.full_like(top, windows.box_xyxy[pattern, 1])
+            begin += top
+        rows = rows_of(seen.words, height, begin)
+        rows &= windows_at(windows, height, pattern, left, top)
         samples = _sums(np.bitwise_count(rows))
         hit = samples.nonzero()[0]
         who, at = who[hit], at[hit]
-        if len(beside):
-            distance2, x, y = _nearest_seen(placed, seen, beside, who, at)
+        left, top = left[hit] + x[who], top[hit] + y[who]
+        if low or not len(beside):
+            distance2, across, down = nearest(rows[hit], left, top)
         else:
-            across, down = left[now][hit] - placed.origin_x[who], top[now][hit] - placed.origin_y[who]
-            distance2, x, y = _nearest(rows[hit], across, down)
-        parts.append(Found(who, at, samples[hit], distance2, x + placed.origin_x[who], y + placed.origin_y[who]))
+            distance2, across, down = _nearest_seen(seen, beside, at, left, top)
+        across += placed.origin_x[who]
+        down += placed.origin_y[who]
+        parts.append(Found(who, at, samples[hit], distance2, across, down))
     return Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _meets(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints) -> Bools:
-    """Whether the boxes of pairs share a pixel."""
-    pattern, boxes = _which(placed, windows, placement), windows.box_xyxy
-    x, y, tiles = placed.x[placement], placed.y[placement], seen.box_xyxy[near]
-    met = tiles[:, 0] - x <= boxes[pattern, 2]
+def _meeting(
+    placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints
+) -> tuple[Ints, Ints, Ints | int, Ints, Ints]:
+    """Pairs whose boxes share a pixel: placement, tile, pattern, and the tile's corner about the placement."""
+    pattern = _which(placed, windows, placement)
+    x, y, tiles, boxes = placed.x[placement], placed.y[placement], seen.box_xyxy[near], windows.box_xyxy
+    left, top = tiles[:, 0] - x, tiles[:, 1] - y
+    met = left <= boxes[pattern, 2]
+    met &= top <= boxes[pattern, 3]
     met &= tiles[:, 2] - x >= boxes[pattern, 0]
-    met &= tiles[:, 1] - y <= boxes[pattern, 3]
     met &= tiles[:, 3] - y >= boxes[pattern, 1]
-    return np.asarray(met)
+    some = met.nonzero()[0]
+    placement = placement[some]
+    return placement, near[some], _which(placed, windows, placement), left[some], top[some]
 
 
 def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
@@ -216,28 +233,30 @@ def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
     return placed.pattern[placement] if len(windows.first) > 1 else 0
 
 
-def _rows_counted(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints) -> tuple[int, Ints]:
-    """How many rows are compared, and the first (n,) of each pair: the tile's, or the pattern's if it is low."""
+def _rows_counted(windows: Windows, seen: Seen) -> int:
+    """How many rows are compared: the tiles', or the patterns' if they are low."""
     box = windows.box_xyxy
     high = -(-int((box[:, 3] - box[:, 1]).max(initial=0) + 1) // 8) * 8
-    if high <= PAD and high < seen.height:
-        return high, placed.y[placement] + box[_which(placed, windows, placement), 1]
-    return seen.height, seen.box_xyxy[near, 1]
+    return high if high <= PAD and high < seen.height else seen.height
 
 
-def _windows(placed: Placed, windows: Windows, height: int, placement: Ints, left: Ints, top: Ints) -> Words:
-    """Windows (n, height) of placed patterns: of 64 columns from `left` on, of rows from `top` on, in the world."""
-    pattern = _which(placed, windows, placement)
-    column = left - placed.x[placement] - windows.box_xyxy[pattern, 0] + WORD - 1
-    row = top - placed.y[placement] - windows.box_xyxy[pattern, 1]
-    word, shift = column >> 6, column & (WORD - 1)
-    begin = windows.first[pattern] + word * windows.rows[pattern] + row
+def windows_at(windows: Windows, height: int, pattern: Ints | int, left: Ints, top: Ints) -> Words:
+    """Windows (n, height) of patterns: of 64 columns from `left` on, of rows from `top` on, about their pixel."""
+    column = left - (windows.box_xyxy[pattern, 0] - (WORD - 1))
+    begin = top - (windows.box_xyxy[pattern, 1] - windows.first[pattern])
     rows = _every(windows.words, height)
     if windows.shifted:
-        return np.asarray(rows[begin + shift * windows.shifted])
-    by = shift.astype(np.uint64)[:, None]
+        column *= windows.shifted
+        begin += column
+        return np.asarray(rows[begin])
+    shift = (column & (WORD - 1)).view(np.uint64)[:, None]
+    column >>= 6
+    begin += column * windows.rows[pattern]
     low, high = rows[begin], rows[begin + windows.rows[pattern]]
-    return np.asarray((low >> by) | (high << (np.uint64(WORD) - by)))
+    low >>= shift
+    high <<= np.uint64(WORD) - shift
+    low |= high
+    return np.asarray(low)
 
 
 def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints, first: Ints) -> Ints:
@@ -248,9 +267,9 @@ def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     placement, near : (n,) pairs, those of one group and so of one tile after one another
     first : (g,) where each group begins
     """
-    left, top = seen.box_xyxy[near, 0], seen.box_xyxy[near, 1]
-    rows = _every(seen.words, seen.height)[seen.begin[near]]
-    rows &= _windows(placed, windows, seen.height, placement, left, top)
+    left, top = seen.box_xyxy[near, 0] - placed.x[placement], seen.box_xyxy[near, 1] - placed.y[placement]
+    rows = rows_of(seen.words, seen.height, seen.begin[near])
+    rows &= windows_at(windows, seen.height, _which(placed, windows, placement), left, top)
     together = np.bitwise_or.reduceat(rows, first, axis=0)
     return np.asarray(np.bitwise_count(together).sum(axis=1, dtype=np.int64))
 
@@ -325,28 +344,29 @@ def beside_of(seen: Seen) -> Beside:
     return made
 
 
-def _nearest_seen(placed: Placed, seen: Seen, beside: Beside, placement: Ints, near: Ints) -> tuple[Ints, Ints, Ints]:
-    """Like `_nearest`, of all visible pixels of tiles: a disc that hits any of them hits the nearest."""
-    left, top = seen.box_xyxy[near, 0] - placed.origin_x[placement], seen.box_xyxy[near, 1] - placed.origin_y[placement]
+def _nearest_seen(seen: Seen, beside: Beside, near: Ints, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
+    """Like `nearest`, of all visible pixels of tiles: a disc that hits any of them hits the nearest."""
     column = np.minimum(np.maximum(-left, 0), WORD - 1)
-    across, away = beside[near, column], np.abs(left + column)
-    far = max(int(away.max(initial=0)) + WORD, int(np.abs(top).max(initial=0)) + WORD)
-    kind = np.uint16 if 2 * far * far < _NONE else np.int64
-    distance2: npt.NDArray[Any] = across + away.astype(kind)[:, None]
-    np.square(distance2, out=distance2)
-    down = np.abs(top[:, None] + np.arange(seen.height)).astype(kind)
-    distance2 += np.square(down, out=down)
-    distance2[across == NOWHERE] = np.iinfo(kind).max
+    away = left + column
+    across = beside.reshape(-1, seen.height)[near * WORD + column]
+    up = -min(int(np.minimum.reduce(top, initial=0)), 0)
+    squares = np.arange(-up, max(int(np.maximum.reduce(top, initial=0)), 0) + seen.height) ** 2
+    most = max(int(squares[0]), int(squares[-1]), int(np.maximum.reduce(np.square(away), initial=0)))
+    kind = np.int32 if most <= NOWHERE_LOSES**2 else np.int64
+    distance2: npt.NDArray[Any] = np.abs(away).astype(kind)[:, None]
+    distance2 = across + distance2
+    distance2 *= distance2
+    distance2 += rows_of(squares.astype(kind), seen.height, top + up)
+    if most > NOWHERE_LOSES**2:
+        distance2[across == NOWHERE] = _MOST[kind]
     row = distance2.argmin(axis=1)
     every = np.arange(len(near))
     step = across[every, row].astype(np.int64)
-    word = seen.words[seen.begin[near] + row]
-    before = (word >> np.maximum(column - step, 0).astype(np.uint64)) & _ONE
-    x = np.where((before == 1) & (step <= column), column - step, column + step) + left
-    return distance2[every, row].astype(np.int64), x, row + top
+    before = (seen.words[seen.begin[near] + row] >> (column - step).view(np.uint64)) & _ONE
+    return distance2[every, row].astype(np.int64), away + np.where(before, -step, step), row + top
 
 
-def _nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
+def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     """Pixel of each set (n, height), none empty, that is nearest to the origin; of those as near the least (y, x).
 
     Parameters
@@ -357,50 +377,42 @@ def _nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     -------
     squared distance, x, y, about the origin
     """
-    kind = np.int32 if _small(left, top, met.shape[1]) else np.int64
-    distance = np.empty(met.shape, kind)
-    beyond, ahead = left >= 0, left <= 1 - WORD
-    for some, sides in ((beyond, (_after,)), (ahead, (_before,)), (~(beyond | ahead), (_before, _after))):
-        pairs = some.nonzero()[0]
-        if len(pairs):
-            word, column = met[pairs], -left[pairs, None]
-            parts = [side(word, column, kind) for side in sides]
-            distance[pairs] = parts[0] if len(parts) == 1 else np.minimum(*parts)
-    row, distance2 = _least(distance, top, kind)
-    word = met[np.arange(len(met)), row]
-    before, after = _before(word, -left, np.int64), _after(word, -left, np.int64)
-    return distance2, np.where(before <= after, -before, after), row + top
-
-
-def _small(left: Ints, top: Ints, height: int) -> bool:
-    """Whether squared distances from the origin fit int32."""
-    return max(int(np.abs(left).max(initial=0)), int(np.abs(top).max(initial=0))) + WORD < _FAR_SMALL
-
-
-def _least(distance: npt.NDArray[Any], top: Ints, kind: type) -> tuple[Ints, Ints]:
-    """Row of least distance from the origin, of distances (n, height) along the rows, and its square."""
-    down: npt.NDArray[Any] = top.astype(kind)[:, None] + np.arange(distance.shape[1], dtype=kind)
-    np.square(distance, out=distance)
-    np.square(down, out=down)
+    column = np.minimum(np.maximum(-left, 0), WORD - 1)  # the nearest to the origin
+    away = left + column
+    across = np.abs(away)
+    far = max(int(np.maximum.reduce(side, initial=0)) for side in (across, top, -top))
+    kind = np.int32 if far + WORD < _FAR_SMALL else np.int64
+    step = np.minimum(_after(met, column), _before(met, column))
+    distance: npt.NDArray[Any] = step + across.astype(kind)[:, None]
+    distance *= distance
+    down: npt.NDArray[Any] = np.arange(met.shape[1], dtype=kind)
+    down = top.astype(kind)[:, None] + down
+    down *= down
     distance += down
+    distance[step == WORD] = _MOST[kind]
     row = distance.argmin(axis=1)
-    return row, distance[np.arange(len(row)), row].astype(np.int64)
+    every = np.arange(len(met))
+    step = step[every, row].astype(np.int64)
+    before = (met[every, row] >> (column - step).view(np.uint64)) & _ONE
+    return distance[every, row].astype(np.int64), away + np.where(before, -step, step), row + top
 
 
-def _after(word: Words, column: Ints, kind: type) -> npt.NDArray[Any]:
-    """Distance from a column to the nearest pixel of words at or after it; far if none is."""
-    right = word & (_FULL << np.minimum(np.maximum(column, 0), WORD).astype(np.uint64))
-    distance = np.bitwise_count((right - _ONE) & ~right).astype(kind)
-    distance -= column.astype(kind)
-    distance[right == 0] = _FAR if kind is np.int64 else _FAR_SMALL
-    return np.asarray(distance)
+def _after(words: Words, column: Ints) -> npt.NDArray[np.uint8]:
+    """Distance (n, height) from a column (n,) of words to the nearest pixel at or after it; 64 if none is."""
+    right = words >> column.view(np.uint64)[:, None]
+    below = right - _ONE
+    np.invert(right, out=right)
+    below &= right
+    return np.asarray(np.bitwise_count(below))
 
 
-def _before(word: Words, column: Ints, kind: type) -> npt.NDArray[Any]:
-    """Distance from a column to the nearest pixel of words at or before it; far if none is."""
-    left = word & ~(_FULL << np.minimum(np.maximum(column + 1, 0), WORD).astype(np.uint64))
+def _before(words: Words, column: Ints) -> npt.NDArray[np.uint16]:
+    """Distance from a column of words to the nearest pixel at or before it; more than 64 if none is."""
+    left = words << (WORD - 1 - column).view(np.uint64)[:, None]
+    below = left >> _ONE
+    np.invert(below, out=below)
+    left &= below
     # The exponent of a float is the place of the highest bit, once no bit below it can round it up.
-    top = (left & ~(left >> _ONE)).astype(np.float64).view(np.int64) >> 52
-    distance = np.subtract(column + 1023, top, dtype=np.int64).astype(kind)
-    distance[left == 0] = _FAR if kind is np.int64 else _FAR_SMALL
-    return np.asarray(distance)
+    exponent = left.astype(np.float64).view(np.int64)
+    exponent >>= 52
+    return np.asarray(np.uint16(1023 + WORD - 1) - exponent.astype(np.uint16))

@@ -119,26 +119,35 @@ def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         return row[met], box[met]
     every = max(1, len(boxes_xyxy))
     asked, boxes = _compact(asked_xyxy, boxes_xyxy)
-    found = [np.zeros(0, np.int64)]
     step = max(1, PAIRS_AT_ONCE // every)
-    for first in range(0, len(asked), step):
-        left, top, right, bottom = (side[:, None] for side in asked[first : first + step].T)
-        met = left <= boxes[2]
-        met &= right >= boxes[0]
-        met &= top <= boxes[3]
-        met &= bottom >= boxes[1]
-        found.append(np.flatnonzero(met) + first * every)
-    pair = np.concatenate(found)
+    found = [_met(asked[first : first + step], boxes) + first * every for first in range(0, len(asked), step)]
+    pair = found[0] if len(found) == 1 else np.concatenate([np.zeros(0, np.int64), *found])
     row = pair // every
     return row, pair - row * every
+
+
+def _met(asked: npt.NDArray[Any], boxes: npt.NDArray[Any]) -> Ints:
+    """Pairs of boxes (n, 4) and others, by their sides (4, m), that share a pixel; pair k is row k // m."""
+    left, top, right, bottom = asked.T
+    met = boxes[0] <= right[:, None]
+    met &= boxes[2] >= left[:, None]
+    met &= boxes[1] <= bottom[:, None]
+    met &= boxes[3] >= top[:, None]
+    return np.asarray(met.reshape(-1).nonzero()[0])
 
 
 def _compact(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Boxes (n, 4), and the sides of others (4, m), in the least type of number that holds them about a corner."""
     if not len(asked_xyxy) or not len(boxes_xyxy):
         return asked_xyxy, boxes_xyxy.T
-    low = np.minimum(asked_xyxy.min(axis=0), boxes_xyxy.min(axis=0)).reshape(2, 2).min(axis=0)
-    size = int((np.maximum(asked_xyxy.max(axis=0), boxes_xyxy.max(axis=0)).reshape(2, 2).max(axis=0) - low).max())
+    both = (asked_xyxy, boxes_xyxy)
+    low = min(int(np.minimum.reduce(boxes, axis=None)) for boxes in both)
+    high = max(int(np.maximum.reduce(boxes, axis=None)) for boxes in both)
+    if low >= -(2**15) and high < 2**15:  # most worlds, and many calls less than about a corner
+        return asked_xyxy.astype(np.int16), boxes_xyxy.T.astype(np.int16, order="C")
+    corner = np.minimum(asked_xyxy.min(axis=0), boxes_xyxy.min(axis=0)).reshape(2, 2).min(axis=0)
+    most = np.maximum(asked_xyxy.max(axis=0), boxes_xyxy.max(axis=0)).reshape(2, 2).max(axis=0)
+    size = int((most - corner).max())
     kind = np.int16 if size < 2**15 else np.int32 if size < 2**31 else np.int64
-    corner = np.concatenate([low, low])
-    return (asked_xyxy - corner).astype(kind), np.ascontiguousarray((boxes_xyxy - corner).astype(kind).T)
+    corner = np.concatenate([corner, corner])
+    return (asked_xyxy - corner).astype(kind), (boxes_xyxy - corner).T.astype(kind, order="C")

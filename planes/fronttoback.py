@@ -6,17 +6,27 @@ items. Functions from arrays to arrays; `fronttoback_jit` has the same ones, com
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from planes import bitrows
 from planes.arrays import Bools, Ints
-from planes.bitrows import WORD, WORDS_AT_ONCE, Found, Placed, Windows, Words
+from planes.bitrows import WORD, Found, Placed, Windows, Words
 from planes.cells import met_boxes
 from planes.spans import Box, ragged
 
 __all__ = ["Pile", "front_to_back"]
+
+WORDS_AT_ONCE = 2**14
+"""Words of pairs worked on at a time: 128 KB, which stay in the level-2 cache with all that is made of them."""
+
+FRONTS_AT_ONCE = 2**14
+"""Pairs of tiles near one placement that are compared one by one; in a larger crowd only those that meet are listed."""
+
+_FULL = np.uint64(2**64 - 1)
 
 
 class Pile(NamedTuple):
@@ -39,6 +49,26 @@ class Pile(NamedTuple):
     occluder: Bools
     categories: Ints
     owner: Ints
+
+
+class Near(NamedTuple):
+    """Pairs (n,) of a placement and a tile near it, sorted.
+
+    Parameters
+    ----------
+    placement, tile : which
+    left, top : (n,) the corner of the rows that are looked at, px: the tile's, or on its columns the pattern's if it is
+        low
+    """
+
+    placement: Ints
+    tile: Ints
+    left: Ints
+    top: Ints
+
+    def at(self, rows: Ints | slice) -> Near:
+        """Some of the pairs."""
+        return Near(*[column[rows] for column in self])
 
 
 def front_to_back(
@@ -64,26 +94,39 @@ def front_to_back(
     pairs of a placement and an item, `seen` the first of its tiles that is hit; `samples` of all of them; the nearest
     pixel to the origin. Sorted by (placement, distance2, y, x, rank).
     """
-    boxes = windows.box_xyxy[placed.pattern] + np.stack([placed.x, placed.y] * 2, axis=1)
-    placement, tile = met_boxes(boxes, pile.box_xyxy)
-    if accept is not None:
-        some = _accepted(pile, accept, exclude, placement, tile)
-        placement, tile = placement[some], tile[some]
-    left, top = pile.box_xyxy[tile, 0], pile.box_xyxy[tile, 1]
-    height = -(-int((pile.box_xyxy[:, 3] - pile.box_xyxy[:, 1]).max(initial=0) + 1) // 8) * 8
-    rows = bitrows.rows_of(pile.words, height, pile.begin[tile])
-    rows &= bitrows._windows(placed, windows, height, placement, left, top)
-    if bounds is not None:
-        rows &= _inside(left, top, height, bounds)
-    _take_away_front(rows, pile, accept, exclude, pierce, placement, tile)
-    if len(pile.occluder):
-        rows[pile.occluder[tile]] = 0
-    samples = np.bitwise_count(rows).sum(axis=1, dtype=np.int64)
-    hit = samples.nonzero()[0]
-    who = placement[hit]
-    origin_x, origin_y = placed.origin_x[who], placed.origin_y[who]
-    distance2, x, y = bitrows._nearest(rows[hit], left[hit] - origin_x, top[hit] - origin_y)
-    return _by_item(Found(who, tile[hit], samples[hit], distance2, x + origin_x, y + origin_y), pile.rank)
+    near, height = _near(placed, windows, pile, accept, exclude)
+    parts = []
+    for part in _parts(near, max(WORDS_AT_ONCE // height, 1)):
+        some, rows = _shared(placed, windows, pile, part, height)
+        if len(rows):
+            _hide(rows, pile, some, pierce)
+            if bounds is not None:
+                _cut_off(rows, some, bounds)
+            parts.append(_counted(placed, pile, some, rows))
+    if not parts:
+        return Found(*[np.zeros(0, np.int64)] * 6)
+    found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    found = _by_item(found, pile.rank)
+    x, y = found.x + placed.origin_x[found.placement], found.y + placed.origin_y[found.placement]
+    return Found(*found[:4], x, y)
+
+
+def _near(
+    placed: Placed, windows: Windows, pile: Pile, accept: Ints | int | None, exclude: Ints | None
+) -> tuple[Near, int]:
+    """Pairs whose boxes share a pixel, of tiles that are there for the placement; and how many rows are looked at."""
+    box = windows.box_xyxy if len(windows.box_xyxy) == 1 else windows.box_xyxy[placed.pattern]
+    asked = np.empty((len(placed.x), 4), np.int64)
+    asked[:, 0::2], asked[:, 1::2] = placed.x[:, None], placed.y[:, None]
+    asked += box
+    placement, tile = met_boxes(asked, pile.box_xyxy)
+    left, top = pile.box_xyxy[:, 0], pile.box_xyxy[:, 1]
+    high = int(np.maximum.reduce(pile.box_xyxy[:, 3] - top, initial=0)) + 1
+    low = int(np.maximum.reduce(box[:, 3] - box[:, 1], initial=0)) + 1
+    near = Near(placement, tile, left[tile], top[tile] if low >= high else asked[placement, 1])
+    if accept is None:
+        return near, min(high, low)
+    return near.at(_accepted(pile, accept, exclude, placement, tile).nonzero()[0]), min(high, low)
 
 
 def _accepted(pile: Pile, accept: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
@@ -96,56 +139,152 @@ def _accepted(pile: Pile, accept: Ints | int, exclude: Ints | None, placement: I
     return np.asarray(accepted)
 
 
-def _inside(left: Ints, top: Ints, height: int, bounds: Box) -> Words:
-    """Pixels (n, height) of tiles that lie within bounds."""
-    x, y, x_max, y_max = bounds
-    first, last = (np.clip(edge - left, 0, WORD).astype(np.uint64) for edge in (x, x_max + 1))
-    full = np.uint64(2**64 - 1)
-    columns = (full << first) & ~(full << last)
-    row = top[:, None] + np.arange(height)
-    return np.where((row >= y) & (row <= y_max), columns[:, None], np.uint64(0))
+def _parts(near: Near, most: int) -> Iterator[Near]:
+    """Pairs, so many at a time or a little more, all of a placement together."""
+    count, begin = len(near.tile), 0
+    while begin == 0 or begin < count:
+        end = min(begin + most, count)
+        if end < count:
+            end = int(near.placement.searchsorted(near.placement[end], side="right"))
+        yield near if end - begin == count else near.at(slice(begin, end))
+        begin = max(end, 1)
 
 
-def _take_away_front(
-    rows: Words, pile: Pile, accept: Ints | int | None, exclude: Ints | None, pierce: bool, placement: Ints, tile: Ints
-) -> None:
-    """Take away of the pixels of tiles (n, height) those on which one lies that ends the placement's pixels before."""
-    distinct, which = np.unique(tile, return_inverse=True)
+def _shared(placed: Placed, windows: Windows, pile: Pile, near: Near, height: int) -> tuple[Near, Words]:
+    """Pairs that share pixels at all, and those pixels (n, height)."""
+    rows = bitrows.rows_of(pile.words, height, _first(pile, near.tile, near.top))
+    who = near.placement
+    pattern = placed.pattern[who] if len(windows.first) > 1 else 0
+    rows &= bitrows.windows_at(windows, height, pattern, near.left - placed.x[who], near.top - placed.y[who])
+    some = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
+    return near.at(some), rows[some]
+
+
+def _first(pile: Pile, tile: Ints, top: Ints) -> Ints:
+    """The row (n,) of tiles at a height in the world; up to WORD before their first one or behind their last."""
+    return np.asarray((pile.begin - pile.box_xyxy[:, 1])[tile] + top)
+
+
+def _hide(rows: Words, pile: Pile, near: Near, pierce: bool) -> None:
+    """Take away of pixels (n, height) those on which a tile lies that ends the placement's pixels before."""
+    of, front, right = _fronts(pile, near, rows.shape[1])
+    if pierce:
+        ends = pile.occluder[front].nonzero()[0] if len(pile.occluder) else np.zeros(0, np.int64)
+        of, front, right = of[ends], front[ends], right[ends]
+    height = rows.shape[1]
+    step = max(WORDS_AT_ONCE // height, 1)
+    for first in range(0, len(of), step):
+        now = slice(first, first + step)
+        own, by = of[now], right[now]
+        cover = bitrows.rows_of(pile.words, height, _first(pile, front[now], near.top[own]))
+        cover <<= np.maximum(by, 0).view(np.uint64)[:, None]
+        cover >>= np.maximum(-by, 0).view(np.uint64)[:, None]
+        np.invert(cover, out=cover)
+        new = _begins(own).nonzero()[0]
+        if len(new) < len(own):
+            own, cover = own[new], np.bitwise_and.reduceat(cover, new, axis=0)
+        rows[own] &= cover
+
+
+def _begins(group: Ints) -> Bools:
+    """Where groups (n,) begin, n > 0."""
+    new = np.empty(len(group), np.bool_)
+    new[0] = True
+    np.not_equal(group[1:], group[:-1], out=new[1:])
+    return new
+
+
+def _fronts(pile: Pile, near: Near, height: int) -> tuple[Ints, Ints, Ints]:
+    """Tiles in front of those of pairs (n,), near the same placement, as (pair, tile, columns to its right), sorted."""
+    count = len(near.tile)
+    start = near.placement.searchsorted(near.placement)
+    before = np.arange(count) - start
+    end = before.cumsum()
+    total = int(end[-1])
+    if total > FRONTS_AT_ONCE:
+        return _fronts_of_many(pile, near)
+    of = np.arange(count).repeat(before)
+    other = np.arange(total) - (end - before - start).repeat(before)
+    right, down = near.left[other] - near.left[of], near.top[other] - near.top[of]
+    wide = int(np.maximum.reduce(pile.box_xyxy[:, 2] - pile.box_xyxy[:, 0])) + 1
+    met = ((np.abs(right) < wide) & (np.abs(down) < height)).nonzero()[0]
+    return of[met], near.tile[other[met]], right[met]
+
+
+def _fronts_of_many(pile: Pile, near: Near) -> tuple[Ints, Ints, Ints]:
+    """The same, of tiles that meet: where many of them lie near a placement, most do not meet each other."""
+    distinct, which = np.unique(near.tile, return_inverse=True)
     boxes = pile.box_xyxy[distinct]
     own, other = met_boxes(boxes, boxes)
     before = (other < own).nonzero()[0]
     own, other = own[before], other[before]
-    begin = np.searchsorted(own, np.arange(len(distinct) + 1))
-    pair, place = ragged((begin[1:] - begin[:-1])[which])
-    front = distinct[other[begin[which][pair] + place]]
-    if accept is not None:
-        ends = _accepted(pile, accept, exclude, placement[pair], front)
-        pair, front = pair[ends], front[ends]
-    if pierce:
-        ends = pile.occluder[front] if len(pile.occluder) else np.zeros(len(front), np.bool_)
-        pair, front = pair[ends], front[ends]
+    begin = own.searchsorted(np.arange(len(distinct) + 1))
+    of, place = ragged((begin[1:] - begin[:-1])[which])
+    front = distinct[other[begin[which][of] + place]]
+    pairs = near.placement * len(pile.rank) + near.tile
+    asked = near.placement[of] * len(pile.rank) + front
+    there = (pairs[pairs.searchsorted(asked, side="right") - 1] == asked).nonzero()[0]
+    of, front = of[there], front[there]
+    return of, front, pile.box_xyxy[front, 0] - near.left[of]
+
+
+def _cut_off(rows: Words, near: Near, bounds: Box) -> None:
+    """Take away of pixels (n, height) what lies beyond the bounds."""
+    x, y, x_max, y_max = bounds
     height = rows.shape[1]
-    step = max(WORDS_AT_ONCE // height, 1)
-    for first in range(0, len(pair), step):
-        of, by = (column[first : first + step] for column in (pair, front))
-        right, down = (pile.box_xyxy[by, axis] - pile.box_xyxy[tile[of], axis] for axis in (0, 1))
-        cover = bitrows.rows_of(pile.words, height, pile.begin[by] - down)
-        cover <<= np.maximum(right, 0).astype(np.uint64)[:, None]
-        cover >>= np.maximum(-right, 0).astype(np.uint64)[:, None]
-        group = np.flatnonzero(np.diff(of, prepend=-1))
-        rows[of[group]] &= ~np.bitwise_or.reduceat(cover, group, axis=0)
+    over = (near.left < x) | (near.left > x_max - WORD + 1)
+    over |= (near.top < y) | (near.top > y_max - height + 1)
+    at = over.nonzero()[0]
+    if not len(at):
+        return
+    left, row = near.left[at], near.top[at][:, None] + np.arange(height)
+    first, last = (np.maximum(far, 0).view(np.uint64) for far in (x - left, left + (WORD - 1 - x_max)))
+    inside = (row >= y) & (row <= y_max)
+    rows[at] &= ((_FULL << first) & (_FULL >> last))[:, None] * inside
+
+
+def _counted(placed: Placed, pile: Pile, near: Near, rows: Words) -> Found:
+    """What is left of objects, of their pixels (n, height); the nearest is told about the origin."""
+    samples = np.add.reduce(np.bitwise_count(rows), axis=1, dtype=np.int64)
+    if len(pile.occluder):
+        samples[pile.occluder[near.tile]] = 0
+    hit = samples.nonzero()[0]
+    if len(hit) < len(samples):
+        near, rows, samples = near.at(hit), rows[hit], samples[hit]
+    who = near.placement
+    left, top = near.left - placed.origin_x[who], near.top - placed.origin_y[who]
+    return Found(who, near.tile, samples, *bitrows.nearest(rows, left, top))
 
 
 def _by_item(found: Found, rank: Ints) -> Found:
     """Pairs of placements and tiles, sorted, as those of placements and items in the order of rows."""
-    item = rank[found.seen]
-    order = np.lexsort((found.x, found.y, found.distance2, item, found.placement))
-    new = (np.diff(found.placement[order], prepend=-1) != 0) | (np.diff(item[order], prepend=-1) != 0)
-    first = np.flatnonzero(new)
-    samples, seen = found.samples[order], found.seen[order]
-    if len(first):
-        samples, seen = np.add.reduceat(samples, first), np.minimum.reduceat(seen, first)
+    item, who = rank[found.seen], found.placement
+    same = (item[1:] == item[:-1]) & (who[1:] == who[:-1])
+    if not np.logical_or.reduce(same):
+        order = _row_order(found)
+        return Found(who, *[column[order] for column in found[1:]])
+    first = np.concatenate(([True], ~same)).nonzero()[0]
+    order = np.lexsort((found.x, found.y, found.distance2, np.cumsum(np.concatenate(([0], ~same)))))
     best = order[first]
-    one = Found(found.placement[best], seen, samples, found.distance2[best], found.x[best], found.y[best])
-    order = np.lexsort((item[best], one.x, one.y, one.distance2, one.placement))
-    return Found(*(column[order] for column in one))
+    return _by_item(
+        Found(
+            who[first], found.seen[first], np.add.reduceat(found.samples, first),
+            found.distance2[best], found.x[best], found.y[best],
+        ),
+        rank,
+    )  # fmt: skip
+
+
+def _row_order(found: Found) -> Ints:
+    """Order by (placement, distance2, y, x, place) of rows (n,) that are sorted by placement."""
+    most = int(np.maximum.reduce(found.distance2, initial=0))
+    high = isqrt(most) + 1
+    if len(found.seen) and (int(found.placement[-1]) + 1) * (most + 1) * (2 * high) * 2 >= 2**63:
+        return np.lexsort((found.x, found.y, found.distance2, found.placement))
+    key = found.placement * (most + 1)
+    key += found.distance2
+    key *= 2 * high
+    key += found.y
+    key += key
+    key += found.x > 0  # of pixels as far in the same row there is at most one on each side
+    return key.argsort(kind="stable")

@@ -126,12 +126,13 @@ class Case:
 
 
 @settings(max_examples=250, deadline=None)
-@given(st.integers(0, 2**32), st.sampled_from([64, 2**15]))
-def judged(seed: int, at_once: int) -> None:
+@given(st.integers(0, 2**32), st.sampled_from([64, 2**15]), st.sampled_from([0, 2**14]))
+def judged(seed: int, at_once: int, crowd: int) -> None:
     case = Case(seed)
     kernels = kernels_of(fronttoback)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fronttoback, "WORDS_AT_ONCE", at_once)
+        patch.setattr(fronttoback, "FRONTS_AT_ONCE", crowd)
         found = kernels.front_to_back(
             case.placed, case.windows, case.pile, case.accept, case.exclude, case.pierce, case.bounds
         )

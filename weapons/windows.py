@@ -57,9 +57,9 @@ def _made(patterns: Sequence[Spans], often: bool) -> Windows:
     rows = np.array([words.shape[1] for words in columns])
     if often:
         words = columns[0]
-        shifts = np.arange(WORD, dtype=np.uint64)[:, None, None]
-        table = (words[:-1] >> shifts) | (words[1:] << (np.uint64(WORD) - shifts))
-        return Windows(np.array(boxes), np.array([WORD]), rows, table.reshape(-1), int(words[:-1].size))
+        shifts = np.arange(WORD, dtype=np.uint64)[:, None]
+        table = (words[:-1, None] >> shifts) | (words[1:, None] << (np.uint64(WORD) - shifts))
+        return Windows(np.array(boxes), np.array([WORD]), WORD * rows, table.reshape(-1), words.shape[1])
     first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
     return Windows(np.array(boxes), first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0)
 
