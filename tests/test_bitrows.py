@@ -260,10 +260,11 @@ def test_no_box_that_meets_is_missing_in_a_cell(name: str, seed: int, far: int, 
     SEEDS,
     st.sampled_from([5, 90, 2**14, 40_000, 2**30, 2**31, 2**40]),
     st.sampled_from([0, 10, 2**20]),
+    st.sampled_from([0, 2**14]),
     st.sampled_from([1, 2**17]),
 )
 @pytest.mark.parametrize("name", ["cells", "cells_jit"])
-def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, at_once: int) -> None:
+def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, few: int, at_once: int) -> None:
     if name.endswith("jit"):
         pytest.importorskip("numba")
     kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
@@ -273,6 +274,7 @@ def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, at_once: in
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "BRUTE_PAIRS", brute)
         patch.setattr(cells, "PAIRS_AT_ONCE", at_once)
+        patch.setattr(cells, "FEW_PAIRS", few)
         row, box = kernels.met_boxes(a, b)
     truth = [
         (i, k)
