@@ -17,7 +17,7 @@ import planes.visible
 import weapons.bitfire
 import weapons.firing
 import weapons.windows
-from planes import History, Scene
+from planes import History, Scene, Sprite
 from planes.arrays import Bools
 from planes.bitrows import WORD
 from planes.constants import ALL
@@ -267,3 +267,24 @@ def test_far_from_the_origin_of_the_world(kernels: str) -> None:
     for weapon, strategy in itertools.product((Point(), Disc(40), Spread(Disc(3), 4, 9)), STRATEGIES):
         hits = fire(scene, weapon, at, strategy=strategy)
         assert hits == by_runs(scene, weapon, at) and hits.object.tolist() == ids
+
+
+def test_points_hit_no_occluder(jit: bool) -> None:
+    """One code tells the item in front; which ids are objects follows roles, ids that went, and those that came."""
+    scene = Scene((40, 20))
+    for x in (5, 15, 25, 35):
+        scene.add(Sprite.box(9, 9), (x, 9), role="occluder" if x in (15, 35) else "hittable")
+    at = np.array([[5.0, 9], [15, 9], [25, 9], [35, 9]])
+
+    def hit() -> list[int]:
+        hits = fire(scene, Point(), at, strategy="composed")
+        assert hits.plan.has_run("read")
+        return hits.object.tolist()
+
+    assert hit() == [0, 2]
+    scene.set([1], role="hittable")
+    scene.set([2], role="occluder")
+    assert hit() == [0, 1]
+    scene.remove(1)
+    scene.add(Sprite.box(9, 9), (15, 9))
+    assert hit() == [0, 4]
