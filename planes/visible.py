@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planes import bitrows, cells
+from planes import bitrows, cells, cropping
 from planes.arrays import Bools, Ints
 from planes.bitrows import PAD, WORD, Beside, Seen, Words, beside_of
 from planes.cells import Cells
@@ -64,7 +64,8 @@ class Composition:
         boxes = tiles.boxes(stack.box_xyxy)
         objects = np.flatnonzero((there & ~stack.occluder)[tiles.rank])
         blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
-        self.seen = cropped(seen_of(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks)))
+        rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
+        self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
         self.ids = stack.ids[self.seen.rank]
         self._cells: dict[tuple[int, ...], Cells] = {}
 
@@ -157,13 +158,18 @@ def seen_of(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of:
     which : (V,) those asked for
     of, front : (n,) which of those, sorted, is covered by which tile
     """
+    return _laid_out(tiles.rank[which], boxes_xyxy[which], _rows(tiles, boxes_xyxy, bounds, which, of, front))
+
+
+def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Words:
+    """Rows (V, height) of the visible pixels of some tiles; see `seen_of`."""
     height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
     rows = kernels_of(bitrows).visible(tiles.words, height, tiles.begin[which], of, tiles.begin[front] - down, right)
     if bounds is not None:
         _cut_off(rows, boxes, bounds)
-    return _laid_out(tiles.rank[which], boxes, rows)
+    return np.asarray(rows)
 
 
 def _cut_off(rows: Words, boxes_xyxy: Ints, bounds: Box) -> None:
@@ -180,23 +186,24 @@ def _cut_off(rows: Words, boxes_xyxy: Ints, bounds: Box) -> None:
     rows[over] &= np.where((row >= y) & (row <= y_max), columns[:, None], np.uint64(0))
 
 
-def cropped(seen: Seen) -> Seen:
-    """The same without tiles of which no pixel can be seen, each in the box of what can."""
-    rows = bitrows.rows_of(seen.words, seen.height, seen.begin)
-    some = rows != 0
-    kept = np.flatnonzero(some.any(axis=1))
-    some, rows = some[kept], rows[kept]
-    top, bottom = some.argmax(axis=1), seen.height - 1 - some[:, ::-1].argmax(axis=1)
-    columns = np.bitwise_or.reduce(rows, axis=1)
-    left = np.bitwise_count(~columns & (columns - np.uint64(1))).astype(np.int64)
-    right = np.array([word.bit_length() - 1 for word in columns.tolist()], np.int64)
-    height = -(-int((bottom - top).max(initial=0) + 1) // 8) * 8
-    row = top[:, None] + np.arange(height)
-    inside = row <= bottom[:, None]
-    rows = np.take_along_axis(rows, np.where(inside, row, 0), axis=1) >> left.astype(np.uint64)[:, None]
-    rows[~inside] = 0
-    x, y = seen.box_xyxy[kept, 0], seen.box_xyxy[kept, 1]
-    return _laid_out(seen.rank[kept], np.stack([x + left, y + top, x + right, y + bottom], axis=1), rows)
+def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> Seen:
+    """Tiles of which a pixel can be seen, each in the box of what can.
+
+    Parameters
+    ----------
+    rank : (V,) place in the stack of the item of each tile
+    boxes_xyxy : (V, 4) of the tiles
+    rows : (V, height) of what can be seen of them
+    """
+    kernels = kernels_of(cropping)
+    sides = kernels.sides_of(rows)
+    kept = np.flatnonzero(sides[:, 2] >= 0)
+    sides = sides[kept]
+    height = -(-int((sides[:, 3] - sides[:, 1]).max(initial=0) + 1) // 8) * 8
+    corner = boxes_xyxy[kept, :2]
+    return _laid_out(
+        rank[kept], sides + np.concatenate([corner, corner], axis=1), kernels.moved(rows, kept, sides, height)
+    )
 
 
 def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> Seen:

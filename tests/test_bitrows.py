@@ -333,13 +333,44 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
         if bounds:
             left = {(x, y) for x, y in left if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
         truth.append((int(tiles.rank[tile]), left))
-    for one, kept in ((seen, truth), (visible.cropped(seen), [(rank, left) for rank, left in truth if left])):
+    cropped = visible.cropped(seen.rank, seen.box_xyxy, bitrows.rows_of(seen.words, seen.height, seen.begin))
+    for one, kept in ((seen, truth), (cropped, [(rank, left) for rank, left in truth if left])):
         told = zip(one.rank.tolist(), one.begin.tolist(), *one.box_xyxy[:, :2].T.tolist(), strict=True)
         assert [(rank, pixels_in(one.words, b, x, y, one.height)) for rank, b, x, y in told] == kept
         assert len(one.words) == PAD + len(one.rank) * (one.height + PAD) and one.height % 8 == 0
-    for own, (_, left) in zip(visible.cropped(seen).box_xyxy.tolist(), [t for t in truth if t[1]], strict=True):
+    for own, (_, left) in zip(cropped.box_xyxy.tolist(), [t for t in truth if t[1]], strict=True):
         xs, ys = zip(*left, strict=True)
         assert own == [min(xs), min(ys), max(xs), max(ys)]
+
+
+@pytest.mark.parametrize("name", ["planes.cropping", "planes.cropping_jit"])
+@given(st.integers(0, 2**32))
+@settings(max_examples=30, deadline=None)
+def test_rows_are_cropped_to_their_pixels(name: str, seed: int) -> None:
+    """Few pixels, many or none, also in the first and last row and column."""
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    kernels, rng = importlib.import_module(name), random.Random(seed)
+    height = 8 * rng.randint(1, 8)
+    spots = [
+        (rng.choice([0, 63, rng.randrange(64)]), rng.choice([0, height - 1, rng.randrange(height)])) for _ in "abc"
+    ]
+    tiles = [set(rng.sample(spots, rng.randint(0, 3))) for _ in range(rng.randint(0, 9))]
+    tiles.append({(x, y) for x in range(64) for y in range(height)})
+    rows = np.zeros((len(tiles), height), np.uint64)
+    for tile, pixels in enumerate(tiles):
+        for x, y in pixels:
+            rows[tile, y] |= np.uint64(1 << x)
+    before, sides = rows.copy(), kernels.sides_of(rows)
+    for pixels, side in zip(tiles, sides.tolist(), strict=True):
+        xs, ys = zip(*pixels, strict=True) if pixels else ((), ())
+        assert side == ([min(xs), min(ys), max(xs), max(ys)] if pixels else [0, 0, -1, -1])
+    kept = np.array([tile for tile, pixels in enumerate(tiles) if pixels])
+    found = kernels.moved(rows, kept, sides[kept], height)
+    for tile, own in zip(kept.tolist(), found.tolist(), strict=True):
+        left, top = sides[tile, :2].tolist()
+        assert {(x + left, y + top) for y, word in enumerate(own) for x in range(64) if word >> x & 1} == tiles[tile]
+    assert np.array_equal(rows, before)
 
 
 def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None:
