@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
 from planes.arrays import Bools, Codes, Ints
+from planes.compiled import compiled
 
 __all__ = ["paint", "paint_item"]
 
 
-@njit(cache=True)
+@compiled()
 def paint(codes: Codes, x: int, y: int, dirty: Ints, places: Ints, masks: Bools) -> None:
     """Draw boxes of a code plane anew, back to front; see `planes.painting.paint`."""
     for d in range(len(dirty)):
@@ -23,7 +22,7 @@ def paint(codes: Codes, x: int, y: int, dirty: Ints, places: Ints, masks: Bools)
                 paint_item(codes, x, y, left, top, right, low, place, masks)
 
 
-@njit(cache=True)
+@compiled()
 def paint_item(
     codes: Codes, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
 ) -> None:

@@ -8,13 +8,14 @@ import numpy as np
 from numba import njit
 
 from planes.arrays import Bools, Codes, Ints
+from planes.compiled import compiled
 from planes.painting_jit import paint_item
 from planes.steps import FIELD, GUARDS, NOWHERE, near_of
 
 __all__ = ["follow", "follow_all", "near_of"]
 
 
-@njit(cache=True)
+@compiled()
 def follow_all(codes: Codes, x: int, y: int, rank: Ints, now: Ints, places: Ints, near: Ints, masks: Bools) -> int:
     """Let many items take their steps; see `planes.steps.follow_all`."""
     pixels = 0
@@ -23,7 +24,7 @@ def follow_all(codes: Codes, x: int, y: int, rank: Ints, now: Ints, places: Ints
     return pixels
 
 
-@njit(cache=True)
+@compiled()
 def follow(
     codes: Codes, x: int, y: int, rank: int, left: int, top: int, right: int, low: int, places: Ints, near: Ints,
     masks: Bools,
@@ -64,7 +65,7 @@ def _fields(x: Any, y: Any, x_max: Any, y_max: Any) -> Any:
     return x >> 2 | y >> 2 << 15 | (FIELD - (x_max >> 2)) << 30 | (FIELD - (y_max >> 2)) << 45
 
 
-@njit(cache=True)
+@compiled()
 def _draw(codes: Codes, x: int, y: int, box: Any, places: Ints, near: Ints, masks: Bools) -> None:
     """Draw a box anew, with the items near it, back to front."""
     left, top, right, low = box
