@@ -66,11 +66,11 @@ def rays_of(parts: Parts, shots: Shots) -> Rays:
     one = rounds * pellets == 1
     round_ = ZEROS[: len(shots)] if one else np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
     pellet = ZEROS[: len(shots)] if one else np.tile(np.arange(pellets), len(shots) * rounds)
-    start = shots.at_256 if one else shots.at_256[shot]
+    start, origin_xy = (shots.at_256, shots.xy) if one else (shots.at_256[shot], shots.xy[shot])
     if burst:
         start = start + round_[:, None] * snap(burst.recoil_xy)
-    step = _steps(parts, shots, shot, round_, pellet)
-    return Rays(start, step, pixel(start), shot, round_, pellet)
+        origin_xy = pixel(start)
+    return Rays(start, _steps(parts, shots, shot, round_, pellet), origin_xy, shot, round_, pellet)
 
 
 def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
