@@ -24,9 +24,10 @@ Pixel = tuple[int, int]
 def mask_of(rng: random.Random, most: int) -> np.ndarray:
     """Dense, sparse, with an empty stripe, or without any pixel; cropped."""
     width, height = rng.randint(1, most), rng.randint(1, rng.choice([5, most]))
-    chance = rng.choice([0, 0.02, 0.5, 0.9, 1, 1])
+    chance = rng.choice([0.02, 0.3, 0.6, 0.9, 1, 1, 1])
     mask = np.array([[rng.random() < chance for _ in range(width)] for _ in range(height)])
     mask[rng.randrange(height)] &= rng.random() < 0.5
+    mask[rng.randrange(height), rng.randrange(width)] = rng.random() < 0.9
     rows, columns = mask.any(axis=1).nonzero()[0], mask.any(axis=0).nonzero()[0]
     return mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else mask
 
@@ -41,14 +42,17 @@ class Case:
     def __init__(self, seed: int) -> None:
         rng = random.Random(seed)
         far = rng.choice([0, 0, 2**15, 2**33, -(2**40)])
-        spread, most = rng.choice([(10, 20), (40, 60), (60, 150)])
-        masks = [mask_of(rng, most) for _ in range(rng.randint(0, 9))]
+        spread, most = rng.choice([(3, 3), (8, 20), (20, 60), (50, 150)])
+        masks = [mask_of(rng, most) for _ in range(rng.choice([0, 1, 4, 9, 14, 14]))]
+        if masks and rng.random() < 0.3:  # all alike, so that what is said of the largest tile holds of each
+            masks = [np.ones_like(masks[0])] * len(masks)
         corners = [(far + rng.randint(-spread, spread), rng.randint(-spread, spread)) for _ in masks]
         tiles = TileAtlas().tiles(enumerate(masks), np.arange(len(masks)), 1)
         boxes = np.array(
             [(x, y, x + m.shape[1] - 1, y + m.shape[0] - 1) for m, (x, y) in zip(masks, corners, strict=True)], np.int64
         )
-        self.occluder = [rng.random() < 0.3 for _ in masks]
+        share = rng.choice([0, 0.3])
+        self.occluder = [rng.random() < share for _ in masks]
         self.categories = [rng.choice([1, 1, 1, 2, 6, 0]) for _ in masks]
         self.owner = [rng.randint(0, 3) for _ in masks]
         told = (
@@ -61,29 +65,32 @@ class Case:
             *(column[tiles.rank] if len(column) else column for column in told),
         )  # fmt: skip
         self.items = [pixels_of(mask, *corner) for mask, corner in zip(masks, corners, strict=True)]
-        self._place(rng, far)
+        self._place(rng, far, spread, most)
 
-    def _place(self, rng: random.Random, far: int) -> None:
-        most = rng.choice([3, 12, 40, 150])
+    def _place(self, rng: random.Random, far: int, spread: int, size: int) -> None:
+        most = rng.choice([3, size, size, 150])
         self.patterns = [
-            (mask_of(rng, most), rng.randint(-20, 5), rng.randint(-20, 5)) for _ in range(rng.randint(1, 3))
+            (mask_of(rng, most), -rng.randint(0, most // 2), -rng.randint(0, most // 2))
+            for _ in range(rng.randint(1, 3))
         ]
         spans = [Spans.from_mask(mask, (left, top)) for mask, left, top in self.patterns]
         self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
-        count = rng.choice([0, 1, 1, 2, 5])
+        count = 0 if rng.random() < 0.05 else rng.choice([1, 2, 5])
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)], np.int64)
-        x, y = np.array([[rng.randint(-60, 60) for _ in range(count)] for _ in range(2)], np.int64)
-        apart = rng.choice([0, 9, 5000, 2**21])
+        x, y = np.array([[rng.randint(-spread, spread) for _ in range(count)] for _ in range(2)], np.int64)
+        apart = rng.choice([0, 0, 9, 5000, 2**21])
         off = np.array([[rng.randint(-apart, apart) for _ in range(count)] for _ in range(2)], np.int64)
         x += far
         self.placed = Placed(pattern, x, y, x + off[0], y + off[1])
-        self.accept: np.ndarray | int | None = rng.choice([None, 2**32 - 1, 1, 3])
+        self.accept: np.ndarray | int | None = rng.choice([None, None, 2**32 - 1, 1, 3])
         if rng.random() < 0.3:
             self.accept = np.array([rng.choice([1, 2, 4, 7]) for _ in range(count)], np.int64)
         owners = np.array([[rng.randint(-1, 3) for _ in range(2)] for _ in range(max(count, 1))], np.int64)
         self.exclude = rng.choice([None, owners[:1, : rng.randint(0, 2)], owners[:count, : rng.randint(0, 2)]])
         self.pierce = rng.random() < 0.3
-        self.bounds = rng.choice([None, None, (far - 30, -20, far + 100, 90), (far, 0, far, 0), (5 * 10**12,) * 4])
+        low, high = [-rng.randint(0, 40) for _ in range(2)], [rng.randint(0, 90) for _ in range(2)]
+        tight = (far + low[0], low[1], far + high[0], high[1])
+        self.bounds = rng.choice([None, tight, tight, (5 * 10**12,) * 4 if rng.random() < 0.1 else None])
 
     def refuses(self, who: int, item: int) -> bool:
         if self.accept is None:
@@ -158,3 +165,28 @@ def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
         x, y = offset + np.array([(0, 0, 63, 63, 64, -1), (0, 63, 0, 63, 0, 0)])
         found = kernels_of(fronttoback).front_to_back(Placed(0 * x, x, y, x, y), dot, pile, None, None, False, None)
         assert found.placement.tolist() == [0, 1, 2, 3] and found.seen.tolist() == [1] * 4
+
+
+def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: bool) -> None:
+    """Twelve items of a pixel on one circle, in any order of the stack, and the last rows of a tall one cut off."""
+    around = [(x, y) for x in range(-5, 6) for y in range(-5, 6) if x * x + y * y == 25]
+    tall, none = np.ones((20, 1), np.bool_), np.zeros(0, np.int64)
+    spans = Spans.from_mask(np.ones((41, 41), np.bool_), (-20, -20))
+    zero = np.zeros(1, np.int64)
+    for seed in range(9):
+        corners = random.Random(seed).sample(around, len(around))
+        masks = [tall, *[np.ones((1, 1), np.bool_)] * len(corners)]
+        tiles = TileAtlas().tiles(enumerate(masks), np.arange(len(masks)), 1)
+        boxes = np.array([(9, 0, 9, 19), *[(x, y, x, y) for x, y in corners]])
+        pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
+        found = kernels_of(fronttoback).front_to_back(
+            Placed(zero, zero, zero, zero, zero),
+            windows._made([spans], False),
+            pile,
+            None,
+            None,
+            False,
+            (-20, -20, 20, 10),
+        )
+        rows = list(zip(found.y.tolist(), found.x.tolist(), found.samples.tolist(), strict=True))
+        assert rows == [*((y, x, 1) for y, x in sorted((y, x) for x, y in around)), (0, 9, 11)]
