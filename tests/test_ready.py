@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -25,8 +26,8 @@ from test_fire import Volley, expected, some_battle, some_place, some_pose, told
 import weapons.pieces
 import weapons.ready
 import weapons.squares
-from planes import InputError, Scene, Sprite
-from planes.bigrows import packed, pixels_of, rows_of_spans, shared, spans_of, struck_from, window
+from planes import InputError, Scene, Sprite, use_jit
+from planes.bigrows import pixels_of, rows_of_spans
 from planes.grid256 import pixel, snap
 from planes.spans import Spans
 from weapons import Beam, Box, Disc, Hits, Laser, Pistol, Point, Rounds, Spread, Stencil, Weapon, fire, prepare
@@ -67,12 +68,26 @@ def same(got: Hits, truth: Hits) -> None:
     assert got.starts.tolist() == truth.starts.tolist()
 
 
-@settings(max_examples=80, deadline=None)
-@given(st.integers(0, 10**6))
-def test_random_scenes_against_the_oracle(seed: int) -> None:
+@pytest.mark.parametrize("compiled", [False, True])
+def test_random_scenes_against_the_oracle(compiled: bool) -> None:
     """Small crowded worlds, any weapon but rays, filters, falloff, targets and aims, and changes between the shots."""
-    with mock.patch.object(weapons.squares, "OFTEN", 1 + seed % 2), mock.patch.object(weapons.pieces, "OFTEN", 2):
-        check_random_scene(seed)
+    if compiled:
+        squares = pytest.importorskip("weapons.squares_jit")
+
+    @settings(max_examples=40, deadline=None)
+    @given(st.integers(0, 10**6))
+    def check(seed: int) -> None:
+        with ExitStack() as patches:
+            patches.enter_context(mock.patch.object(weapons.pieces, "OFTEN", 2))
+            if compiled and seed % 2:
+                patches.enter_context(mock.patch.multiple(squares, ROWS=1, LISTED_NS=0, CELLS_NS=seed % 32))
+            check_random_scene(seed)
+
+    use_jit(compiled)
+    try:
+        check()
+    finally:
+        use_jit(None)
 
 
 def check_random_scene(seed: int) -> None:
@@ -139,16 +154,27 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 }
 
 
+def small_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let compiled kernels begin with a small buffer, and list all tiles by cells soon."""
+    for name, value in {"ROWS": 1, "LISTED_NS": 0, "CELLS_NS": 60}.items():
+        monkeypatch.setattr(f"weapons.squares_jit.{name}", value)
+
+
 @pytest.mark.parametrize("name", WEAPONS)
-@pytest.mark.parametrize("bounded", [True, False])
-def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
+    if jit:
+        small_and_listed(monkeypatch)
+    for bounded in (True, False):
+        check_weapon(name, bounded, monkeypatch)
+
+
+def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(weapons.pieces, "OFTEN", 1 if bounded else 3)
-    monkeypatch.setattr(weapons.squares, "OFTEN", 1)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0
-    for k in range(24):
+    for k in range(14):
         at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
         how = [{}, {"aim": 22.5}, {"toward": (at[0] - 3, at[1] + 1)}, {"shot": 9}, {"aim": -90.0, "shot": 9}, {}][k % 6]
         if name == "line of sight":
@@ -165,37 +191,21 @@ def test_every_weapon_in_a_crowd(name: str, bounded: bool, monkeypatch: pytest.M
     assert rows > 1 or name == "nothing"
 
 
-@pytest.mark.parametrize(
-    "name, objects",
-    [("point", 40), ("piercing point", 40), ("disc", 40), ("piercing", 90), ("piercing", 400), ("shotgun", 40)],
-)
-def test_every_pixel_of_squares_that_are_shot_at_often(
-    name: str, objects: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(weapons.squares, "OFTEN", 1)
-    monkeypatch.setattr(weapons.squares, "BYTE", 4 if objects == 90 else 256)
+@pytest.mark.parametrize("name", ["point", "piercing point", "disc", "piercing", "shotgun"])
+def test_every_pixel_of_some_squares(name: str, jit: bool) -> None:
+    """All that squares tell, also that nothing is near, is so from each of their pixels."""
     weapon, options = WEAPONS[name]
-    scene = crowd(12, WORLD, objects)
-    ready: Any = prepare(scene, weapon, **options)
-    places = [(float(x), float(y)) for x in range(-20, 76) for y in range(130, 194, 3)]
-    for x in range(-32, 96, 32):
-        for y in range(128, 224, 32):
-            for _ in range(3):
-                ready.fire((x, y))
-    how = options | ({"exclude": np.reshape(options["exclude"], (1, -1))} if "exclude" in options else {})
-    truth = fire(scene, weapon, places, shot=0, **how)
-    expected = [[] for _ in places]
-    for row in truth:
-        expected[row.shot].append(row.object)
-    for at, ids in zip(places, expected, strict=True):
-        got = ready.fire(at)
-        assert sorted(one if isinstance(one, int) else one[1] for one in got._found) == sorted(ids), at
-    tables = [square[1] for column in ready._cells.made.values() for square in column.values()]
-    kinds = {type(table) for table in tables}
-    assert {40: bytes, 90: memoryview, 400: type(None)}[objects] in kinds
+    scene = crowd(12, (400, 300))
+    ready = prepare(scene, weapon, **options)
+    places = [(x, y) for x in range(150, 340, 2) for y in range(120, 300, 5)]
+    truth = fire(scene, weapon, np.array(places, float), shot=0, **options)
+    rows = [truth.of(shot) for shot in range(len(places))]
+    for at, truly in zip(places, rows, strict=True):
+        assert [row[1:] for row in ready.fire(at)] == [row[1:] for row in truly], at
+    assert {bool(one) for one in rows} == {True, False}
 
 
-def test_what_is_asked_of_a_shot() -> None:
+def test_what_is_asked_of_a_shot(jit: bool) -> None:
     """Whatever reads an answer of `fire` reads this one."""
     scene = crowd(2)
     ready = prepare(scene, Disc(30), exclude=3)
@@ -218,7 +228,7 @@ def test_what_is_asked_of_a_shot() -> None:
             got.nothing  # noqa: B018
 
 
-def test_a_shot_of_the_past_is_still_what_it_was() -> None:
+def test_a_shot_of_the_past_is_still_what_it_was(jit: bool) -> None:
     """Rows and verdicts are those of the scene when it was fired, though they are worked out later."""
     scene, rng = crowd(4), np.random.default_rng(4)
     ready = prepare(scene, Disc(25))
@@ -246,8 +256,8 @@ def test_only_what_lies_near_a_change_is_made_anew(monkeypatch: pytest.MonkeyPat
     for at in every:
         ready.fire(at)
     made: list[tuple[int, int]] = []
-    real = weapons.squares.Cells._found
-    monkeypatch.setattr(weapons.squares.Cells, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j))
+    real = weapons.squares.Squares._found
+    monkeypatch.setattr(weapons.squares.Squares, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j))
     for at in every:
         ready.fire(at)
     assert not made
@@ -281,9 +291,9 @@ def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for k in range(300):
         at, aim = (float(7 * k % 220), float(11 * k % 160)), float(k % 97)
         assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
-        kept = ready._cells.nbytes if "squares" in limit else ready._aims_bytes
+        kept = ready._squares.nbytes if "squares" in limit else ready._aims_bytes
         assert kept < 60_000
-        assert sum(map(len, ready._cells.made.values())) * weapons.squares.CELL_BYTES < 60_000 or "ready" in limit
+        assert sum(map(len, ready._squares.made.values())) * weapons.squares.CELL_BYTES < 60_000 or "ready" in limit
         assert len(ready._told) <= 100
 
 
@@ -410,7 +420,7 @@ def test_a_batch_goes_the_way_of_fire() -> None:
     assert prepare(scene, weapon, exclude=[1, 2], seed=4).fire(at) == fire(scene, weapon, at, exclude=[[1, 2]], seed=4)
 
 
-def test_of_pixels_that_are_pierced_the_front_one_comes_first() -> None:
+def test_of_pixels_that_are_pierced_the_front_one_comes_first(jit: bool) -> None:
     scene = Scene()
     for layer in (1, 0, 2, 1):
         scene.add(Sprite.circle(4), (9, 9), layer=layer)
@@ -419,7 +429,7 @@ def test_of_pixels_that_are_pierced_the_front_one_comes_first() -> None:
     same(ready.fire((4, 9)), fire(scene, Disc(6, pierce=True), (4, 9)))
 
 
-def test_far_away() -> None:
+def test_far_away(jit: bool) -> None:
     """At the ends of the range, and where the world begins at any place."""
     for x, y in ((2**40, -(2**40)), (10**9, 10**9), (-(2**40) + 3, 7)):
         scene = Scene()
@@ -433,7 +443,7 @@ def test_far_away() -> None:
             ready.fire((math.nextafter(2.0**40, math.inf), 0.0))
 
 
-def test_a_scene_that_is_filled_after_the_first_shot() -> None:
+def test_a_scene_that_is_filled_after_the_first_shot(jit: bool) -> None:
     scene = Scene()
     ready = prepare(scene, Disc(6))
     assert not ready.fire((0, 0))
@@ -443,7 +453,7 @@ def test_a_scene_that_is_filled_after_the_first_shot() -> None:
         same(ready.fire(at), fire(scene, Disc(6), at))
 
 
-def test_threads_that_fire_one_at_once_agree() -> None:
+def test_threads_that_fire_one_at_once_agree(jit: bool) -> None:
     scene, rng = crowd(9), np.random.default_rng(5)
     ready = prepare(scene, Disc(9))
 
@@ -457,6 +467,45 @@ def test_threads_that_fire_one_at_once_agree() -> None:
             asked = [pool.submit(shoot, places) for _ in range(4)]
             truth = [tuple(row.object for row in fire(scene, Disc(9), at)) for at in places]
             assert all(answer.result() == truth for answer in asked)
+
+
+def test_kernels_may_be_changed_between_two_versions() -> None:
+    pytest.importorskip("numba")
+    scene, weapon = crowd(9), Beam(90, 20)
+    ready = prepare(scene, weapon)
+    try:
+        for compiled in (False, True, True, False, True):
+            use_jit(compiled)
+            scene.move(scene.ids()[:3], (60.0, 50.0))
+            for how in ({}, {"aim": 30.0}, {"aim": 30.0}, {}):
+                same(ready.fire((50.0, 50.0), **how), fire(scene, weapon, (50.0, 50.0), **how))
+    finally:
+        use_jit(None)
+
+
+def test_squares_that_are_forgotten_are_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    monkeypatch.setattr("weapons.squares_jit.SQUARES_MOST", 3)
+    scene = crowd(9)
+    ready: Any = prepare(scene, Disc(9))
+    try:
+        use_jit(True)
+        for x in range(-64, 250, 16):
+            same(ready.fire((x, 90)), fire(scene, Disc(9), (x, 90)))
+            assert sum(map(len, ready._squares.made.values())) <= 3
+    finally:
+        use_jit(None)
+
+
+def test_many_rows_at_once(jit: bool) -> None:
+    """More than a buffer has room for at first; all as near as each other, or none."""
+    scene, rng = Scene(), np.random.default_rng(2)
+    for xy in rng.integers(0, 60, (700, 2)).tolist():
+        scene.add(MASK, xy, layer=int(rng.integers(3)))
+    ready = prepare(scene, Disc(60, pierce=True))
+    for at in ((30, 30), (31, 7)):
+        assert len(ready.fire(at)) > 600
+        same(ready.fire(at), fire(scene, Disc(60, pierce=True), at))
 
 
 def test_shots_that_are_not_kept_leave_nothing() -> None:
@@ -478,31 +527,6 @@ def test_the_example_of_the_readme() -> None:
 
 
 # Integer rows
-
-
-@given(st.integers(0, 2**30), st.integers(1, 9), st.integers(1, 9), st.integers(-30, 30), st.integers(-30, 30))
-def test_places_from_where_a_pattern_would_meet_pixels(seed: int, side: int, w: int, x: int, y: int) -> None:
-    rng = np.random.default_rng(seed)
-    target, pattern = rng.random((w, 7)) < 0.3, rng.random((side, side)) < rng.random()
-    stride, spans = 7 + side + 3, Spans.from_mask(pattern)
-    found = struck_from(packed(target, stride), spans, side, stride)
-    on, of = (np.argwhere(mask)[:, ::-1].tolist() for mask in (target, pattern))
-    truth = {(tx - px + side - 1, ty - py + side - 1) for tx, ty in on for px, py in of}
-    assert set(map(tuple, pixels_of(found, stride).tolist())) == truth
-    seen = {(x + i, y + j) for j, i in np.argwhere(window(found, x, y, 8, stride)).tolist()}
-    assert seen == {(i, j) for i, j in truth if x <= i < x + 8 and y <= j < y + 8}
-    assert spans_of(packed(pattern, stride), stride) == spans
-
-
-@given(st.integers(0, 2**30), st.integers(1, 9), st.integers(1, 9), st.integers(-12, 12), st.integers(-12, 12))
-def test_rows_share_what_pixels_share(seed: int, w: int, h: int, dx: int, dy: int) -> None:
-    """One mask on another, at any place where their boxes are near, by shift and &; against sets of pixels."""
-    rng = np.random.default_rng(seed)
-    a, b = rng.random((h, w)) < 0.5, rng.random((w, h)) < 0.5
-    stride = w + h + 24
-    near = {(x + dx, y + dy) for y, x in np.argwhere(a).tolist()} & {(x, y) for y, x in np.argwhere(b).tolist()}
-    found = shared(packed(a, stride), packed(b, stride), dy * stride + dx)
-    assert set(map(tuple, pixels_of(found, stride).tolist())) == near
 
 
 def test_rows_of_spans_begin_at_a_corner() -> None:

@@ -1,18 +1,14 @@
-"""What one prepared shot hit: as little as tells it, and all that `Hits` has made of it when it is asked for."""
+"""What one prepared shot hit: its rows, and all that `Hits` has beside them when it is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from planes.arrays import Ints, integer
-from planes.constants import HALF, SUB, WEIGHT_FULL
-from planes.grid256 import snap
 from planes.items import Stack
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
@@ -20,20 +16,15 @@ from planes.spans import Box
 from weapons.arsenal import parts_of, pierces
 from weapons.candidates import Candidates
 from weapons.hits import HitRow, Hits, Rows, rows_of_met
-from weapons.pieces import Piece
 from weapons.plan import Plan
 from weapons.resolve import Met, Sight, direct
 from weapons.volley import Shots, Volley, checked_shots, volley_of
 from weapons.weapon import Weapon
 
-__all__ = ["Filter", "OneShot", "Present", "Told"]
+__all__ = ["Answer", "Filter", "OneShot", "Present", "Told", "Uneven", "answer_of"]
 
 Told = tuple[object, object, object]
 """Aim of a shot, what it was aimed toward, and its number."""
-
-
-Tile = tuple[int, int, int, int, int, int]
-"""Of what a piece shares with a tile of an object: round, squared distance, y and x of the nearest, id, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,47 +51,25 @@ class Present:
     bounds: Box | None
     weapon: Weapon
     filter: Filter
-    stride: int
-    straight: list[Piece]
-
-    @cached_property
-    def even(self) -> bool:
-        """Whether each sample is a pixel of full weight: its rows can be told from the pixels that were shared."""
-        _, spread, plain = parts_of(self.weapon)
-        return spread is None and plain.falloff is None
-
-    @cached_property
-    def recoil_xy(self) -> tuple[int, int]:
-        """Whole pixels from each round to the next."""
-        burst = parts_of(self.weapon)[0]
-        x, y = (snap(burst.recoil_xy) // SUB).tolist() if burst else (0, 0)
-        return x, y
 
 
-class OneShot(Hits):
-    """What one shot of a prepared weapon hit: equal to what `fire` gives, and made when it is asked for.
+class Answer(Hits):
+    """What one shot of a prepared weapon hit: equal to what `fire` gives.
 
-    How many rows there are is known. Their columns, the verdict counts and the plan are worked out from the scene as it
-    was, also if it has changed since.
+    How many rows there are is known. The columns, the verdict counts and the plan are made when they are asked for,
+    from the scene as it was, also if it has changed since.
     """
 
     _present: Present
     _at: tuple[float, float]
-    _found: Any
-    _pieces: list[Piece]
-    _cells: Any
     _told: Told = (None, None, None)
 
-    __init__ = object.__init__  # one in Python would take a third of the time of a shot
+    def append(self, row: HitRow) -> None:
+        """Tell a row, the next in order, while the shot is looked up."""
+        raise NotImplementedError
 
-    def __len__(self) -> int:
-        return len(self._found)
-
-    def __bool__(self) -> bool:
-        return bool(self._found)
-
-    def __iter__(self) -> Iterator[HitRow]:
-        return iter(self._listed) if self._found else iter(())
+    def _columns(self) -> Rows:
+        raise NotImplementedError
 
     def of(self, shot: int) -> list[HitRow]:
         """Rows of the shot, whose number in the batch is 0."""
@@ -116,41 +85,6 @@ class OneShot(Hits):
             return super().__getattr__(name)
         setattr(self, name, MADE[name](self))
         return getattr(self, name)
-
-    def _made_rows(self) -> Rows:
-        if not self._found:
-            return Rows.none()
-        if self._present.even:
-            return Rows(*(np.array(column, np.int64) for column in zip(*self._listed, strict=True)))
-        volley, met = self._met
-        return rows_of_met(met, volley, self._present.stack.ids, 0)
-
-    def _list(self) -> list[HitRow]:
-        """Rows in their order."""
-        present = self._present
-        if not present.even:
-            return list(super().__iter__())
-        x, y = ((round(SUB * v) + HALF) >> 8 for v in self._at)
-        met: list[Tile] = []
-        cells = self._cells if isinstance(self._cells, list) else [self._cells]
-        for (dx, dy, rows, number, depths), cell in zip(self._pieces, cells, strict=True):
-            place = (y + dy) * present.stride + x + dx
-            for item, bits, base in cell:
-                shift = place - base
-                hit = (bits >> shift if shift >= 0 else bits << -shift) & rows
-                if hit:
-                    met.append((number, *depths.nearest(hit), item, hit.bit_count()))
-        if len(met) > len(self._found):
-            met = _gathered(met)
-        met.sort()
-        if any(one[:4] == other[:4] for one, other in pairwise(met)):  # pixels that are pierced: the front one first
-            met.sort(key=lambda one: (*one[:4], present.stack.rank_of[one[4]]))
-        shift_x, shift_y = present.recoil_xy
-        row = HitRow._make
-        return [
-            row((0, n, item, count, count, count * WEIGHT_FULL, 1, (x + dx + n * shift_x, y + dy + n * shift_y), near))
-            for n, near, dy, dx, item, count in met
-        ]
 
     def _walk(self) -> tuple[Volley, Met]:
         """Walk the samples of the shot through the stack as it was."""
@@ -169,25 +103,68 @@ class OneShot(Hits):
         return plan
 
 
-def _gathered(met: list[Tile]) -> list[Tile]:
-    """Add up what lies in several tiles, or pieces, by round and object."""
-    every: dict[tuple[int, int], Tile] = {}
-    for one in met:
-        key = one[0], one[4]
-        other = every.get(key)
-        every[key] = one if other is None else (*min(one[:4], other[:4]), one[4], one[5] + other[5])
-    return list(every.values())
+class OneShot(Answer, list[HitRow]):
+    """One of a weapon whose samples are pixels of full weight: the list of its rows.
+
+    A list is made, counted and read without a call of a function in Python; each would take a tenth of the time of a
+    shot.
+    """
+
+    __slots__ = ("_at", "_present")  # what is set at each shot
+
+    __init__ = list.__init__
+    __len__ = list.__len__
+    __iter__ = list.__iter__
+    append = list.append  # type: ignore[assignment]
+
+    def __bool__(self) -> bool:
+        return len(self) > 0
+
+    def _columns(self) -> Rows:
+        return Rows(*(np.array(column, np.int64) for column in zip(*self, strict=True))) if self else Rows.none()
 
 
-MADE: dict[str, Callable[[OneShot], Any]] = {
+class Uneven(Answer):
+    """One of a weapon of several pellets, or whose samples weigh less the farther they are.
+
+    Its rows are walked when they are read; those that are looked up only tell how many they are.
+    """
+
+    _count = 0
+
+    __init__ = object.__init__
+
+    def append(self, _: HitRow) -> None:
+        """Count a row: it has the round and the object, but not all samples."""
+        self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __bool__(self) -> bool:
+        return self._count > 0
+
+    def _columns(self) -> Rows:
+        if not self._count:
+            return Rows.none()
+        volley, met = self._met
+        return rows_of_met(met, volley, self._present.stack.ids, 0)
+
+
+def answer_of(weapon: Weapon) -> Callable[[], Answer]:
+    """The kind of answer of a weapon."""
+    _, spread, plain = parts_of(weapon)
+    kinds: tuple[Callable[[], Answer], ...] = (OneShot, Uneven)
+    return kinds[spread is not None or plain.falloff is not None]
+
+
+MADE: dict[str, Callable[[Answer], Any]] = {
     "scene": lambda one: one._present.scene,
     "version": lambda one: one._present.version,
     "weapon": lambda one: one._present.weapon,
     "shots": lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told),
-    "plan": OneShot._planned,
-    "_rows": OneShot._made_rows,
-    "_met": OneShot._walk,
-    "_listed": OneShot._list,
-    "_pieces": lambda one: one._present.straight,
+    "plan": Answer._planned,
+    "_met": Answer._walk,
+    "_rows": lambda one: one._columns(),
 }
 """What an answer has beside its rows, and how it is made when it is first asked for."""

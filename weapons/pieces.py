@@ -1,9 +1,10 @@
-"""A shot's pixels as integer rows, in parts that fit the squares in which they are looked up."""
+"""A shot's rounds as sets of pixels; and as integer rows, in parts that fit the squares in which they are looked up."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from weapons.arsenal import parts_of
 from weapons.volley import Shots, volley_of
 from weapons.weapon import Weapon
 
-__all__ = ["Depths", "Frame", "Piece", "frame_of", "pieces_of"]
+__all__ = ["Depths", "Frame", "Piece", "Round", "frame_of", "pieces_of", "rounds_of"]
 
 WHOLE = 96
 """A pattern within a box of this side is looked up as a whole, px: of a larger one most is empty where an object is."""
@@ -67,7 +68,7 @@ class Depths:
                 x, y = pixels[first].tolist()
                 return int(distance2[first]), y, x
         assert self._sets is not None
-        within = bits & self._sets[bisect_left(self._sets, True, key=lambda one: one & bits != 0)]
+        within = bits & self._sets[bisect_left(self._sets, 1, key=bits.__and__)]
         y, x = divmod((within ^ within - 1).bit_length() - 1, self._stride)
         x, y = x + self._x, y + self._y
         return x * x + y * y, y, x
@@ -92,22 +93,36 @@ class Depths:
         return True
 
 
-Piece = tuple[int, int, int, int, Depths]
-"""A part of a shot: the pixel (x, y) where it is looked up, from the shot's; its pixels as integer rows; its round; and
-the order of its pixels."""
+class Round(NamedTuple):
+    """A round of a shot at the origin: its pixel (x, y), its number, and its pixels about that."""
+
+    x: int
+    y: int
+    number: int
+    spans: Spans
+
+
+Piece = tuple[int, int, int, Depths]
+"""A part of a round: the pixel (x, y) where it is looked up, from the round's; its pixels as integer rows; and their
+order."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The box that a part lies in, about the pixel where it is looked up; larger patterns are cut into tiles."""
+    """What the pixels of each round lie within: so many px from its own; and how they are looked up as integer rows.
 
+    A part lies in a box of some side that begins at (corner, corner) from the pixel where it is looked up; patterns
+    larger than that are cut into tiles.
+    """
+
+    reach: int
     corner: int
     side: int
     tiled: bool
 
 
 def frame_of(weapon: Weapon) -> Frame | None:
-    """The box of the pieces of a weapon of patterns; None if they are too many, or depend on the place in its pixel."""
+    """What a weapon of patterns lies within; None if that is too large, or depends on the place in its pixel."""
     burst, spread, plain = parts_of(weapon)
     if burst and (snap(burst.recoil_xy) % SUB).any():
         return None
@@ -115,44 +130,43 @@ def frame_of(weapon: Weapon) -> Frame | None:
     reach += int(snap(spread.radius)) // SUB if spread else 0
     side = 2 * reach + 1
     if side <= WHOLE:
-        return Frame(-reach, side, False)
-    return Frame(0, TILE, True) if (side // TILE + 1) ** 2 <= PARTS_MAX else None
+        return Frame(reach, -reach, side, False)
+    return Frame(reach, 0, TILE, True) if (side // TILE + 1) ** 2 <= PARTS_MAX else None
 
 
-def pieces_of(
-    weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None, frame: Frame, stride: int
-) -> list[Piece]:
-    """Parts of a shot at the origin, which is aimed `toward` an offset, if any."""
+def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
+    """Rounds of a shot at the origin, which is aimed `toward` an offset, if any; none that has no pixel."""
     if offset_256 is not None:
         shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
     volley = volley_of(weapon, shots)
-    found: list[Piece] = []
+    found: list[Round] = []
     for number in np.unique(volley.round).tolist():
         pellets = np.flatnonzero(volley.round == number)
         x, y = volley.origin_xy[pellets[0]].tolist()
         placed = zip(volley.pattern[pellets].tolist(), volley.xy[pellets].tolist(), strict=True)
         sets = [volley.table.patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed]
         runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
-        found += _cut(Spans.from_runs(*runs), (x, y), number, frame, stride)
+        spans = Spans.from_runs(*runs)
+        if len(spans):
+            found.append(Round(x, y, number, spans))
     return found
 
 
-def _cut(spans: Spans, at_xy: tuple[int, int], number: int, frame: Frame, stride: int) -> list[Piece]:
-    """The pixels of one round, whole or cut into tiles."""
-    x, y = at_xy
+def pieces_of(spans: Spans, frame: Frame, stride: int) -> list[Piece]:
+    """The pixels of one round as integer rows, whole or cut into tiles."""
     box = spans.box_xyxy
     if box is None:
         return []
     if not frame.tiled:
         rows = rows_of_spans(spans, (frame.corner, frame.corner), stride)
-        return [(x, y, rows, number, Depths(rows, stride, frame.corner, frame.corner))]
+        return [(0, 0, rows, Depths(rows, stride, frame.corner, frame.corner))]
     found: list[Piece] = []
     for top in range(box[1], box[3] + 1, TILE):
         for left in range(box[0], box[2] + 1, TILE):
             part = _clipped(spans, left, top)
             if len(part):
                 rows = rows_of_spans(part, (left, top), stride)
-                found.append((x + left, y + top, rows, number, Depths(rows, stride, left, top)))
+                found.append((left, top, rows, Depths(rows, stride, left, top)))
     return found
 
 

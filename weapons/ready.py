@@ -1,6 +1,6 @@
 """A weapon made ready for a scene: the thin path for one shot a call.
 
-scene, weapon -> pieces and squares -> one look-up a shot -> hits
+scene, weapon -> rounds and squares -> one look-up a shot -> hits
 """
 
 from __future__ import annotations
@@ -8,21 +8,22 @@ from __future__ import annotations
 import math
 import threading
 from math import floor
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from planes.arrays import InputError
-from planes.bigrows import spans_of
 from planes.constants import ALL, HALF, POSITION_MAX, SUB
 from planes.scene import Scene
-from planes.spans import Spans
+from planes.twins import kernels_of
+from weapons import squares
 from weapons.arsenal import has_no_range, parts_of, ray_parts_of
 from weapons.firing import category_bits, fire
 from weapons.hits import Hits
-from weapons.oneshot import Filter, OneShot, Present, Told
-from weapons.pieces import Frame, Piece, frame_of, pieces_of
-from weapons.squares import CELL_SHIFT, SIDE, Cell, Cells, Squares
+from weapons.oneshot import Answer, Filter, Present, Told, answer_of
+from weapons.pieces import Frame, frame_of, rounds_of
+from weapons.squares import CELL_SHIFT, EDGE, SIDE, Look
 from weapons.volley import checked_shots
 from weapons.weapon import Weapon
 
@@ -37,11 +38,15 @@ ODD = math.nextafter(1 - PIXEL, 0)
 AIMS_BYTES = 32 * 2**20
 """Patterns of other aims and numbers that are kept as integer rows, bytes."""
 
-PIECE_BYTES = 200
-"""What a piece costs beside its pixels, bytes."""
+FARTHEST = SIDE * EDGE // 2
+"""Positions beyond it, px, go the way of `fire`."""
 
-IN_SIDE = SIDE - 1
-NOT_TOLD: Told = (None, None, None)
+AIM_BYTES = 200
+"""What an aim or a number costs beside what is looked up with it, bytes."""
+
+Looks = list[tuple[int, int, Look]]
+"""Of each round of a shot its pixel, from the shot's, and the function that looks up what it hits."""
+
 PLAIN = float, int
 NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
 
@@ -75,13 +80,14 @@ class Ready:
 
     What makes a shot cheap is found out when the first shot needs it, and once:
 
-    - the pattern of each aim, and of each number of a `Spread`, as integers of which a bit is a pixel;
-    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit; and of those
-      that are shot at often, without aim or number, what each pixel would hit.
+    - the pattern of each aim, and of each number of a `Spread`, with a bit for a pixel;
+    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit. With
+      compiled kernels a square only tells if any is near, and one call of a kernel walks the items there.
 
     Every shot compares the version of the scene, which counts its changes, with that of what was found out. If the
     scene has changed, the squares near the old and the new places of what changed are forgotten first (all of them, if
-    the scene no longer knows what changed): no answer is of an older scene.
+    the scene no longer knows what changed): no answer is of an older scene. Then, too, it is decided if compiled
+    kernels are used.
 
     Patterns of up to 96 px, and of up to 1000 px cut into tiles, at a position given as two numbers, are answered like
     this. Rays, larger patterns, bursts whose recoil is not of whole pixels, batches and bad input go the way of `fire`.
@@ -108,17 +114,17 @@ class _ReadyPattern(Ready):
         super().__init__(scene, weapon, kept)
         _, spread, plain = parts_of(weapon)
         self._frame, self._directed, self._drawn = frame, plain.directed, spread is not None
-        shots = kept.shots(weapon, (0, 0), (None, None, None))
-        self._cells = Cells(scene, shots, plain.pierce, frame.corner, frame.side)
+        self._pierce, self._answer = plain.pierce, answer_of(weapon)
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
-        self._aims: dict[object, list[Piece]] = {}
-        self._told: dict[tuple[object, object], list[Piece]] = {}
-        self._aims_bytes = 0
-        self._quick: Squares = {}
-        self._one: list[Piece] = []
-        self._pattern: Spans
+        self._kernels: ModuleType | None = None
+        self._squares: Any
         self._present: Present
+        self._aims: dict[object, Looks] = {}
+        self._told: dict[tuple[object, object], Looks] = {}
+        self._aims_bytes = 0
+        self._quick: dict[int, dict[int, Any]] = {}
+        self._straight: Look
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
@@ -126,73 +132,52 @@ class _ReadyPattern(Ready):
             self._follow()
         try:
             x, y = at
-            if (
-                at.__class__ is tuple
-                and (x.__class__ is float or x.__class__ is int)
-                and (y.__class__ is float or y.__class__ is int)
-                and x != ODD
-                and y != ODD
-            ):
-                x, y = floor(x + PIXEL), floor(y + PIXEL)
-                if aim is not None or toward is not None or shot is not None:
-                    return self._through(x, y, self._known(aim, toward, shot), self._cells.made, at, (aim, None, shot))
-                i, j = x >> CELL_SHIFT, y >> CELL_SHIFT
-                near, table, answers = self._quick[i][j]
-                if table is None:
-                    self._cells.count(i, j, self._pattern)
-                    return self._through(x, y, self._one, self._quick, at, NOT_TOLD)
-                hits: OneShot = OneShot()
-                hits._present, hits._at, hits._cells = self._present, at, near
-                hits._found = answers[table[(y & IN_SIDE) << CELL_SHIFT | x & IN_SIDE]]
-                return hits
+            if type(at) is tuple:
+                if type(x) is not int or type(y) is not int:
+                    if type(x) is float and type(y) is float and x != ODD and y != ODD:
+                        x, y = floor(x + PIXEL), floor(y + PIXEL)
+                    else:
+                        return self._looked_up(at, aim, toward, shot)
+                if aim is None and toward is None and shot is None:
+                    near = self._quick[x >> CELL_SHIFT][y >> CELL_SHIFT]
+                    hits = self._answer()
+                    hits._present, hits._at = self._present, at
+                    if near:
+                        self._straight(x, y, hits)
+                    return hits
+                if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST:
+                    return self._told_of(at, (aim, None, shot), x, y, self._known(aim, toward, shot))
         except (KeyError, TypeError, ValueError, OverflowError):
             pass
         return self._looked_up(at, aim, toward, shot)
 
     def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
-        """Fire at a square, or with an aim or number, that is not known yet, or at what is no tuple of floats."""
+        """Fire at a square, or with an aim or number, that is not known yet, or at what is no tuple of numbers."""
         place = plain_pair(at)
-        pieces = None if place is None else self._pieces(place, aim, toward, shot)
-        if place is None or pieces is None:
+        looks = None if place is None else self._looks(place, aim, toward, shot)
+        if place is None or looks is None or max(map(abs, place)) > FARTHEST:
             return super().fire(at, aim, toward, shot)
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
-        made: Squares = {}
-        for dx, dy, *_ in pieces:
-            i, j = (x + dx) >> CELL_SHIFT, (y + dy) >> CELL_SHIFT
-            made.setdefault(i, {})[j] = self._cells.square(i, j)
-        return self._through(x, y, pieces, made, place, (aim, None if toward is None else plain_pair(toward), shot))
+        told = aim, None if toward is None else plain_pair(toward), shot
+        return self._told_of(place, told, x, y, looks)
 
-    def _through(
-        self, x: int, y: int, pieces: list[Piece], made: Squares, at: tuple[float, float], told: Told
-    ) -> OneShot:
-        """Look up piece by piece, in squares that are there."""
-        found: dict[tuple[int, int], None] = {}
-        stride = self._cells.stride
-        cells: list[Cell] = []
-        for dx, dy, rows, number, _ in pieces:
-            left, top = x + dx, y + dy
-            cell = made[left >> CELL_SHIFT][top >> CELL_SHIFT][0]
-            cells.append(cell)
-            if cell:
-                place = top * stride + left
-                for item, bits, base in cell:
-                    shift = place - base
-                    if bits >> shift & rows if shift >= 0 else rows >> -shift & bits:
-                        found[number, item] = None
-        hits: OneShot = OneShot()
+    def _told_of(self, at: tuple[float, float], told: Told, x: int, y: int, looks: Looks) -> Answer:
+        """Look up all rounds of a shot at a pixel."""
+        hits = self._answer()
         hits._present, hits._at, hits._told = self._present, at, told
-        hits._found, hits._pieces, hits._cells = found, pieces, cells
+        for dx, dy, look in looks:
+            look(x + dx, y + dy, hits)
         return hits
 
-    def _known(self, aim: object, toward: object, shot: object) -> list[Piece]:
-        """Pieces of an aim and a number that were asked for before."""
-        plain = toward is None and (aim.__class__ is float or aim is None or aim.__class__ is int)
-        if plain and (shot is None or shot.__class__ is int):  # True is no number, though it is found under that of 1
+    def _known(self, aim: object, toward: object, shot: object) -> Looks:
+        """Looks of an aim and a number that were asked for before."""
+        plain = toward is None and (type(aim) is float or aim is None or type(aim) is int)
+        if plain and (shot is None or type(shot) is int):  # True is no number, though it is found under that of 1
             return self._told[aim, shot]
         raise KeyError
 
-    def _pieces(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> list[Piece] | None:
-        """Pieces of a shot; None if an argument is not as plain as that."""
+    def _looks(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> Looks | None:
+        """Looks of a shot; None if an argument is not as plain as that."""
         number, offset = 0, None
         if shot is not None:
             if type(shot) is not int or not 0 <= shot < 2**63:
@@ -208,25 +193,28 @@ class _ReadyPattern(Ready):
         elif aim is not None and not (isinstance(aim, float | int) and type(aim) in PLAIN and abs(aim) <= POSITION_MAX):
             return None
         key = (number, aim, offset) if self._directed else number
-        pieces = self._aims.get(key)
-        if pieces is None:
-            pieces = self._made_pieces(key, aim, offset, number)
-        if pieces and toward is None:
-            self._told[aim, shot] = pieces
-            self._grow(PIECE_BYTES)
-        return pieces
+        looks = self._aims.get(key)
+        if looks is None:
+            looks = self._made_looks(key, aim, offset, number)
+        if looks and toward is None:
+            self._told[aim, shot] = looks
+            self._grow(AIM_BYTES)
+        return looks
 
-    def _made_pieces(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> list[Piece]:
+    def _made_looks(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> Looks:
+        """Make the looks of a shot; those of a shot of which nothing is told are found fastest."""
         shots = self._filter.shots(self.weapon, (0, 0), (aim, None, number))
-        pieces = pieces_of(self.weapon, shots, offset, self._frame, self._cells.stride)
-        self._grow(PIECE_BYTES + sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _, _ in pieces))
-        self._aims[key] = pieces
+        looks: Looks = []
+        for one in rounds_of(self.weapon, shots, offset):
+            look, size = self._squares.look(one)
+            looks.append((one.x, one.y, look))
+            self._grow(size)
+        self._grow(AIM_BYTES)
+        self._aims[key] = looks
         straight = (0, None, None) if self._directed else 0
-        if key == straight and len(pieces) == 1 and pieces[0][:2] == (0, 0):
-            self._pattern = spans_of(pieces[0][2], self._cells.stride)
-            self._one[:] = pieces
-            self._quick = self._cells.made
-        return pieces
+        if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0) and self._squares.whole:
+            self._straight, self._quick = looks[0][2], self._squares.made
+        return looks
 
     def _grow(self, size: int) -> None:
         """Count what is kept of aims, and give it up if it is too much."""
@@ -236,16 +224,19 @@ class _ReadyPattern(Ready):
                 self._aims, self._told, self._aims_bytes = {}, {}, size
 
     def _follow(self) -> None:
-        """Read the scene as it is now."""
+        """Read the scene as it is now, by the kernels that are to be used now."""
         with self._lock:
             version = self._items.version
             if version == self._version:
                 return
+            kernels = kernels_of(squares)
+            if kernels is not self._kernels:
+                self._kernels = kernels
+                self._squares = kernels.Squares(self.scene, self.weapon, self._pierce, self._filter, self._frame)
+                self._aims, self._told, self._quick = {}, {}, {}
             stack = self._items.stack()
-            self._cells.follow(stack)
-            self._present = Present(
-                self.scene, version, stack, self.scene.bounds, self.weapon, self._filter, self._cells.stride, self._one
-            )  # fmt: skip
+            self._squares.follow(stack)
+            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
             self._version = version
 
 

@@ -1,26 +1,33 @@
 """Squares of shot positions, each with the objects that a pattern fired from there may hit, and what is seen of them.
 
 A square is made when the first shot falls into it, and what is seen of an object when the first square needs it: its
-mask without what lies before it. After a change of the scene those near what changed are made anew.
+mask without what lies before it, as integer rows. After a change of the scene those near what changed are made anew.
+`squares_jit` walks the stack instead, compiled.
 """
 
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from planes.arrays import Bools, Ints
-from planes.bigrows import packed, struck_from, window
-from planes.constants import POSITION_MAX
+from planes.bigrows import packed
+from planes.constants import POSITION_MAX, WEIGHT_FULL
 from planes.items import Stack
 from planes.scene import Scene
-from planes.spans import Box, Spans, meets
+from planes.spans import Box, meets
 from weapons.candidates import refused
-from weapons.volley import Shots
+from weapons.hits import HitRow
+from weapons.oneshot import Answer, Filter
+from weapons.pieces import Frame, Round, pieces_of
+from weapons.weapon import Weapon
 
-__all__ = ["CELL_SHIFT", "Cell", "Cells", "Seen", "Square", "Squares"]
+__all__ = ["CELL_SHIFT", "EDGE", "SIDE", "Cell", "Look", "Made", "Seen", "Shared", "Squares", "new"]
+
+Kind = TypeVar("Kind")
 
 CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
@@ -32,39 +39,34 @@ BLOCK_SHIFT = 2
 TILE_MIN, TILE = 32, 64
 """Objects are looked up whole, or in tiles of so many px a side: of a larger one most is empty where a shot falls."""
 
-OFTEN = 16
-"""Shots into a square after which their answers are tabled: that takes some 100 us, and saves up to 5 us a shot."""
-
-TABLED_MAX = 62
-"""Objects near a square whose answers are tabled: a bit for each in an int64."""
-
 KEPT_BYTES = 64 * 2**20
 """Squares and objects kept for one prepared weapon, bytes; beyond it all are made anew."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
-"""Squares so near to the largest position are not kept: a shot that finds one needs no check of its range."""
+"""Squares beyond it are not made: a shot that finds one needs no check of its range."""
 
-NOWHERE = bytes(SIDE * SIDE)
-"""Table of a square from where nothing is hit."""
+CELL_BYTES, SEEN_BYTES = 400, 400
+"""What a square costs, and what is seen of an object beside its pixels, bytes."""
 
-CELL_BYTES, SEEN_BYTES, ANSWER_BYTES = 400, 300, 60
-"""What a square costs, what is seen of an object beside its pixels, and an answer, bytes."""
+PIECE_BYTES = 200
+"""What a piece costs beside its pixels, bytes."""
 
-BYTE = 256
-"""Answers whose numbers fit one byte."""
-
-
-Seen = tuple[int, int, int]
-"""Of a tile of an object: id, what is seen of it as integer rows, and its place as a number of bits in the world."""
+Seen = tuple[int, int, int, int, int, int, int]
+"""Of a tile of an object: the least and greatest x, and y, where a part of a shot is looked up whose box meets it; what
+is seen of it as integer rows, and their place as a number of bits in the world; and the id."""
 
 Cell = tuple[Seen, ...]
 
-Square = tuple[Cell, bytes | memoryview | None, tuple[tuple[int, ...], ...]]
-"""Of a square of shot positions: what is seen of the objects around it; for each of its pixels the number of its
-answer, if it was shot at often; and these answers, sets of objects that are hit. (Plain tuples are read fastest.)"""
 
-Squares = dict[int, dict[int, Square]]
-"""Squares (i, j): of the pixels from 32 i and 32 j on."""
+Shared = tuple[int, int, int, int, int, int]
+"""What a round shares with an object: of the nearest pixel the squared distance, y and x, from the round's pixel; a
+number that rises front to back; id of the object; and how many pixels."""
+
+Look = Callable[[int, int, Answer], None]
+"""Of a round whose pixel is x and y, tell an answer what it hits, in order."""
+
+new = tuple.__new__
+"""It makes a row in half the time that `HitRow` takes."""
 
 
 class Near(NamedTuple):
@@ -79,31 +81,85 @@ class Near(NamedTuple):
     blocks: bool
 
 
-class Cells:
-    """Squares of one scene for patterns within one box, for one filter.
+class Made(dict[int, "Column[Kind]"], Generic[Kind]):
+    """Squares as [i][j], each made when it is first asked for; none is so near to the ends of the range.
+
+    Parameters
+    ----------
+    make : of i and j; it keeps what it made here, if it likes
+    """
+
+    def __init__(self, make: Callable[[int, int], Kind]) -> None:
+        super().__init__()
+        self.make = make
+
+    def __missing__(self, i: int) -> Column[Kind]:
+        if not -EDGE < i < EDGE:
+            raise KeyError(i)
+        return self.setdefault(i, Column(self, i))
+
+
+class Column(dict[int, Kind]):
+    """Squares of one i."""
+
+    def __init__(self, made: Made[Kind], i: int) -> None:
+        super().__init__()
+        self.made, self.i = made, i
+
+    def __missing__(self, j: int) -> Kind:
+        if not -EDGE < j < EDGE:
+            raise KeyError(j)
+        return self.made.make(self.i, j)
+
+
+class Squares:
+    """Squares of one scene, and of a weapon with its filter.
 
     A pattern's row `stride` bits long is shifted by `y * stride + x - place` to lie on a tile of an object.
 
     Parameters
     ----------
-    scene, shots, pierce : what is fired at, one shot with its filter, and whether it goes through objects
-    corner, side : the box of the pattern begins at (corner, corner) from the pixel where it is looked up
+    made : tiles near each square, where a whole round is looked up
+    whole : whether rounds are
     """
 
-    def __init__(self, scene: Scene, shots: Shots, pierce: bool, corner: int, side: int) -> None:
-        self.made: Squares = {}
+    def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
+        self.made: Made[Cell] = Made(self._square)
         self.stride = self._tile = 0
-        self._scene, self._shots, self._pierce = scene, shots, pierce
-        self._corner, self._side = corner, side
+        self._scene, self._shots, self._pierce = scene, kept.shots(weapon, (0, 0), (None, None, None)), pierce
+        self._frame, self._corner, self._side = frame, frame.corner, frame.side
         self._stack: Stack | None = None
         self._seen = -1
         self._blocks: dict[tuple[int, int], list[Near]] = {}
         self._tiles: dict[int, dict[tuple[int, int], Seen]] = {}
-        self._place_of: dict[Seen, tuple[int, int]] = {}
-        self._struck: dict[Seen, int] = {}
-        self._shot_at: dict[tuple[int, int], int] = {}
+        self.whole = not frame.tiled
+        self._cut = frame.tiled  # whether an object, or a round, may be met in several parts
         self.nbytes = 0
         self._lock = threading.Lock()
+
+    def look(self, one: Round) -> tuple[Look, int]:
+        """A function that looks up what a round hits; and how many bytes are kept for it."""
+        made, stride, number = self.made, self.stride, one.number
+        pieces = pieces_of(one.spans, self._frame, stride)
+
+        def look(x: int, y: int, hits: Answer) -> None:
+            shared: list[Shared] = []
+            for dx, dy, rows, depths in pieces:
+                left, top = x + dx, y + dy
+                for x_min, x_max, y_min, y_max, bits, place, item in made[left >> CELL_SHIFT][top >> CELL_SHIFT]:
+                    if x_min <= left <= x_max and y_min <= top <= y_max:
+                        shift = top * stride + left - place
+                        hit = (bits >> shift if shift >= 0 else bits << -shift) & rows
+                        if hit:
+                            shared.append((*depths.nearest(hit), len(shared), item, hit.bit_count()))  # front to back
+            if len(shared) > 1:
+                if self._cut:
+                    shared = _gathered(shared)
+                shared.sort()
+            for distance2, dy, dx, _, item, n in shared:
+                hits.append(new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
+
+        return look, sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _ in pieces)
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""
@@ -112,7 +168,7 @@ class Cells:
             if self._stack is None:
                 largest = int((stack.box_xyxy[:, 2:] - stack.box_xyxy[:, :2]).max(initial=0)) + 1
                 self._tile = min(max(largest, TILE_MIN), TILE) if len(stack) else TILE
-                self.stride = self._side + self._tile + SIDE
+                self.stride = self._side + self._tile - 1
             boxes, ids = items.changed_boxes(self._seen), items.changed_ids(self._seen)
             if boxes is None or ids is None or not self._forget(boxes, ids, stack):
                 self._clear()
@@ -121,8 +177,7 @@ class Cells:
 
     def _clear(self) -> None:
         self.made.clear()
-        for kept in (self._tiles, self._place_of, self._struck, self._shot_at):
-            kept.clear()
+        self._tiles.clear()
         self.nbytes = 0
 
     def _forget(self, boxes_xyxy: Ints, ids: Ints, stack: Stack) -> bool:
@@ -133,66 +188,28 @@ class Cells:
         hidden = meets(boxes_xyxy[:, None], stack.box_xyxy).any(axis=0)
         for item in (*ids.tolist(), *stack.ids[hidden].tolist()):
             for seen in self._tiles.pop(item, {}).values():
-                self._place_of.pop(seen, None)
-                self.nbytes -= _bytes(seen[1]) + _bytes(self._struck.pop(seen, 0))
+                self.nbytes -= _bytes(seen)
         for x, y, x_max, y_max in np.concatenate([boxes_xyxy, stack.box_xyxy[hidden]]).tolist():
             for i in range(
                 (x - self._corner - self._side + 1) >> CELL_SHIFT, ((x_max - self._corner) >> CELL_SHIFT) + 1
             ):
-                column = self.made.get(i, {})
+                column: dict[int, Cell] = self.made.get(i, {})
                 first, last = (y - self._corner - self._side + 1) >> CELL_SHIFT, (y_max - self._corner) >> CELL_SHIFT
                 for j in range(first, last + 1) if column else ():
-                    self._shot_at.pop((i, j), None)
                     if j in column:
                         self.nbytes -= _size(column.pop(j))
         return True
 
-    def square(self, i: int, j: int) -> Square:
-        """The square (i, j), which is made if it is not there."""
+    def _square(self, i: int, j: int) -> Cell:
+        """Make the square (i, j), if it is not there."""
         with self._lock:
             if self.nbytes > KEPT_BYTES:
                 self._clear()
-            column = self.made.get(i, {})
-            if j in column:
-                return column[j]
-            near = self._found(i, j)
-            square: Square = (near, None if near else NOWHERE, ((),))
-            if max(abs(i), abs(j)) < EDGE:
-                self.made.setdefault(i, column)[j] = square
-                self.nbytes += _size(square)
-            return square
-
-    def count(self, i: int, j: int, pattern: Spans) -> None:
-        """Note a shot into a square without a table; of one that is shot at often the answers are tabled."""
-        shots = self._shot_at[i, j] = self._shot_at.get((i, j), 0) + 1
-        if shots < OFTEN:
-            return
-        with self._lock:
-            square = self.made.get(i, {}).get(j)
-            if square is not None and square[1] is None and len(square[0]) <= TABLED_MAX:
-                tabled = self.made[i][j] = self._tabled(i * SIDE, j * SIDE, square[0], pattern)
-                self.nbytes += _size(tabled) - _size(square)
-
-    def _tabled(self, x: int, y: int, near: Cell, pattern: Spans) -> Square:
-        """A square with the answer of each pixel, for a pattern in the box."""
-        codes = np.zeros((SIDE, SIDE), np.int64)
-        for bit, seen in enumerate(near):
-            left, top = self._place_of[seen]
-            struck = self._struck.get(seen)
-            if struck is None:
-                struck = self._struck[seen] = struck_from(seen[1], pattern, self._side, self.stride)
-                self.nbytes += _bytes(struck)
-            across, down = x - left + self._side - 1, y - top + self._side - 1
-            codes |= window(struck, across, down, SIDE, self.stride).astype(np.int64) << bit
-        distinct, which = np.unique(codes, return_inverse=True)
-        items = [item for item, _, _ in near]
-        answers = tuple(
-            tuple(dict.fromkeys(item for bit, item in enumerate(items) if code >> bit & 1))
-            for code in distinct.tolist()
-        )
-        if len(distinct) <= BYTE:
-            return near, which.astype(np.uint8).tobytes(), answers
-        return near, memoryview(which.astype(np.uint16).tobytes()).cast("H"), answers
+            column = self.made[i]
+            if j not in column:
+                column[j] = self._found(i, j)
+                self.nbytes += _size(column[j])
+            return column[j]
 
     def _found(self, i: int, j: int) -> Cell:
         """What is seen of the objects in the surroundings of a square."""
@@ -209,7 +226,7 @@ class Cells:
                     seen = tiles.get((column, row))
                     if seen is None:
                         seen = tiles[column, row] = self._tile_of(one, column, row, near)
-                    if seen[1]:
+                    if seen[4]:
                         found.append(seen)
         return tuple(found)
 
@@ -231,25 +248,30 @@ class Cells:
 
     def _tile_of(self, one: Near, column: int, row: int, near: list[Near]) -> Seen:
         """A tile of an object without what lies before it, or out of the bounds."""
+        self._cut |= column > 0 or row > 0
         x, y = one.x + column * self._tile, one.y + row * self._tile
-        box = x, y, min(one.x_max, x + self._tile - 1), min(one.y_max, y + self._tile - 1)
-        mask = self._part(one, box).copy()
+        x_max, y_max = min(one.x_max, x + self._tile - 1), min(one.y_max, y + self._tile - 1)
+        mask = self._part(one, (x, y, x_max, y_max)).copy()
         for other in near:
-            if other.rank >= one.rank:
+            left, top, right, low, rank, _, blocks = other
+            if rank >= one.rank:
                 break
-            if other.blocks or not self._pierce:
-                part = max(x, other.x), max(y, other.y), min(box[2], other.x_max), min(box[3], other.y_max)
-                if part[0] <= part[2] and part[1] <= part[3]:
-                    mask[part[1] - y : part[3] - y + 1, part[0] - x : part[2] - x + 1] &= ~self._part(other, part)
+            if left <= x_max and right >= x and top <= y_max and low >= y and (blocks or not self._pierce):
+                part = max(x, left), max(y, top), min(x_max, right), min(y_max, low)
+                mask[part[1] - y : part[3] - y + 1, part[0] - x : part[2] - x + 1] &= ~self._part(other, part)
         if self._scene.bounds is not None:
             left, top, right, low = self._scene.bounds
             mask[: max(top - y, 0)] = mask[max(low - y + 1, 0) :] = False
             mask[:, : max(left - x, 0)] = mask[:, max(right - x + 1, 0) :] = False
-        left, top = x - self._corner, y - self._corner
-        seen = one.item, packed(mask, self.stride), top * self.stride + left
-        self._place_of[seen] = left, top
-        self.nbytes += _bytes(seen[1])
+        seen = self._placed(packed(mask, self.stride), x - self._corner, y - self._corner, x_max - x, one.item)
+        self.nbytes += _bytes(seen)
         return seen
+
+    def _placed(self, bits: int, x: int, y: int, across: int, item: int) -> Seen:
+        """What is seen of a tile, without its empty rows; a part looked up at (x, y) begins at its first pixel."""
+        first, last = ((bits & -bits).bit_length() - 1) // self.stride, (bits.bit_length() - 1) // self.stride
+        box = x - self._side + 1, x + across, y + first - self._side + 1, y + last
+        return (*box, bits >> max(first, 0) * self.stride, (y + first) * self.stride + x, item)
 
     def _part(self, one: Near, box: Box) -> Bools:
         """Mask of an item in a box inside of its own."""
@@ -258,15 +280,20 @@ class Cells:
         return self._stack.mask(one.rank)[y - one.y : y_max - one.y + 1, x - one.x : x_max - one.x + 1]
 
 
-def _bytes(bits: int) -> int:
-    """Bytes of what is kept of a tile of an object; none of nothing."""
-    return SEEN_BYTES + bits.bit_length() // 7 if bits else 0
+def _gathered(shared: list[Shared]) -> list[Shared]:
+    """Add up what lies in several tiles, or pieces, by object."""
+    every: dict[int, Shared] = {}
+    for one in shared:
+        other = every.get(one[4])
+        every[one[4]] = one if other is None else (*min(one[:4], other[:4]), one[4], one[5] + other[5])
+    return list(every.values())
 
 
-def _size(square: Square) -> int:
+def _bytes(seen: Seen) -> int:
+    """Bytes of what is kept of a tile of an object."""
+    return SEEN_BYTES + seen[4].bit_length() // 7
+
+
+def _size(cell: Cell) -> int:
     """Bytes of a square."""
-    near, table, answers = square
-    size = CELL_BYTES + 8 * len(near)
-    if table is not None and table is not NOWHERE:
-        size += 2 * SIDE * SIDE + sum(ANSWER_BYTES + 8 * len(answer) for answer in answers)
-    return size
+    return CELL_BYTES + 8 * len(cell)

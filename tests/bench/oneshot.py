@@ -1,29 +1,29 @@
 """One shot a call, prepared, against pygame-ce: nanoseconds, mean, median, 99th percentile.
 
-python tests/bench/oneshot.py
+python tests/bench/oneshot.py [--jit]
 
 A is a function of its good user for each shot: `collidelistall`, the pattern without what blocks, front to back
 `overlap_area` and `erase`; it gives (object, samples). We give all rows with their first pixels, in order of distance,
-and verdicts when they are asked for: `fire` is the call alone, which knows how many rows there are, `rows` the call and
-the reading of all rows. Mean and median are the least of the rounds, a ratio is the median of theirs. `first` is the
-mean of the first shots of all, from `prepare` on; after them all squares are shot at so often that they have tables.
+and verdicts when they are asked for: `fire` is the call alone, `rows` the call and the reading of all rows. Mean and
+median are the least of the rounds, a ratio is the median of theirs. `first` is the mean of the first shots of all, from
+`prepare` on; after them all squares are known.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
-from planes import Scene
+from planes import Scene, use_jit
 from planes.arrays import Bools
 from planes.grid256 import unit
 from weapons import Beam, Disc, Point, Stencil, Weapon, prepare
 from weapons.arsenal import Plain, pattern_of
-from weapons.squares import OFTEN
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
@@ -152,6 +152,7 @@ def shots_of(name: str, rng: np.random.Generator, count: int) -> Iterator[tuple[
 
 def main() -> None:
     """Print the table."""
+    use_jit("--jit" in sys.argv)
     weapons: dict[str, Weapon] = {
         "point": Point(),
         "shotgun": shotgun(),
@@ -180,10 +181,9 @@ def compare(name: str, weapon: Any, scene: Scene, peer: Peer, objects: int) -> N
         ours(*shot)
     first = (time.perf_counter_ns() - begin) / FIRST
     patterns = [rendered(weapon, a) for a in range(AIMS if aimed else 1)]
-    for _ in range(1 if aimed else OFTEN + 1):
-        for x in range(16, 1920, 32):
-            for y in range(16, 1080, 32):
-                ours((x, y), float((x + y) % AIMS))
+    for x in range(16, 1920, 32):
+        for y in range(16, 1080, 32):
+            ours((x, y), float((x + y) % AIMS))
     kinds: dict[str, list[list[float]]] = {"A": [], "fire": [], "rows": []}
     theirs, total = (peer.point() if name == "point" else peer.area()), 0
     for _ in range(ROUNDS):
