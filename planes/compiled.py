@@ -24,11 +24,11 @@ def _stamp() -> str:
     return hashlib.sha256(repr(kernels).encode()).hexdigest()
 
 
-def compiled(*signatures: Any) -> Callable[[Callable[..., Any]], Any]:
+def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile a kernel for its signatures, or without any for those of its calls; it lets other threads run."""
 
     def made(kernel: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True)(kernel)
+        dispatcher = njit(nogil=True, **options)(kernel)
         dispatcher.enable_caching()
         dispatcher._cache._cache_file._source_stamp = _stamp()
         for signature in signatures:

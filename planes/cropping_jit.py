@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes.arrays import Ints
 from planes.bitrows import Words
+from planes.compiled import compiled
 
 __all__ = ["moved", "sides_of"]
 
@@ -15,7 +16,7 @@ INTS = types.Array(types.int64, 1, "C", readonly=True)
 BOXES = types.Array(types.int64, 2, "C", readonly=True)
 
 
-@njit([types.int64[:, ::1](ROWS)], cache=True, nogil=True)
+@compiled(types.int64[:, ::1](ROWS))
 def sides_of(rows: Words) -> Ints:
     """Inclusive boxes (V, 4) of the pixels of tiles; see `planes.cropping.sides_of`."""
     zero, one = np.uint64(0), np.uint64(1)
@@ -38,7 +39,7 @@ def sides_of(rows: Words) -> Ints:
     return sides
 
 
-@njit([types.uint64[:, ::1](ROWS, INTS, BOXES, types.int64)], cache=True, nogil=True)
+@compiled(types.uint64[:, ::1](ROWS, INTS, BOXES, types.int64))
 def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
     """Rows of some tiles with the first pixel of each in row 0 and in column 0; see `planes.cropping.moved`."""
     found = np.zeros((len(kept), height), np.uint64)

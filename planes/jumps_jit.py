@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planes.arrays import Bools, Ints
+from planes.compiled import compiled
 from planes.constants import HALF, SUB
 from planes.jumps import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 
@@ -21,7 +21,7 @@ N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
 """Columns of a block: after how many crossings a ray looks next, and the others as of `jumps._ways`."""
 
 
-@njit(cache=True)
+@compiled()
 def clearance_of(taken: Bools) -> Clearance:
     """See `jumps.clearance_of`."""
     h, w = taken.shape
@@ -42,7 +42,7 @@ def clearance_of(taken: Bools) -> Clearance:
     return distance
 
 
-@njit(cache=True)
+@compiled()
 def _spread_along(row: Clearance) -> None:
     """Let each cell of a row be at most 1 farther than those beside it."""
     for x in range(1, len(row)):
@@ -51,7 +51,7 @@ def _spread_along(row: Clearance) -> None:
         row[x] = min(row[x], row[x + 1] + 1)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
     """See `jumps.first_taken`."""
     count, flat = len(start_256), clearance.reshape(-1)
@@ -88,7 +88,7 @@ def first_taken(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     return entry, cell, several
 
 
-@njit(cache=True)
+@compiled()
 def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
     """Let the last rays of a block take the places that are free; how many rays there are."""
     for hole in range(holes - 1, -1, -1):
@@ -98,7 +98,7 @@ def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
     return left
 
 
-@njit(cache=True)
+@compiled()
 def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
     """Places of rays that came to something, or to their ends; how many they are."""
     holes = 0
@@ -108,7 +108,7 @@ def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
     return holes
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _look(block, count, look):  # type: ignore[no-untyped-def]
     """Places of the cells that rays look at: at a corner ~place, one less than what is taken from 0."""
     for one in range(count):
@@ -119,7 +119,7 @@ def _look(block, count, look):  # type: ignore[no-untyped-def]
         look[one] = ~place if i == quotient else place
 
 
-@njit(cache=True)
+@compiled()
 def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
     """Let rays jump, up to their ends."""
     for one in range(count):
@@ -131,7 +131,7 @@ def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
         block[N, one] = min(block[N, one] + far, block[STOP, one])
 
 
-@njit(cache=True)
+@compiled()
 def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
     """When a ray enters a cell."""
     ahead_x, ahead_y = SUB * (place % width) - start_256[0], SUB * (place // width) - start_256[1]
@@ -140,7 +140,7 @@ def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
     return max((ahead_x - HALF) * max(abs(dy), 1), (ahead_y - HALF) * max(abs(dx), 1), 0)
 
 
-@njit(cache=True)
+@compiled()
 def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
     """Whether a ray starts on a border of cells, of which another than the one that it goes into is taken."""
     on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
@@ -153,7 +153,7 @@ def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
     return on_y and (flat[base - across] == 0 or (on_x and flat[base - step - across] == 0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _over(numerator, denominator):  # type: ignore[no-untyped-def]
     """The quotient of whole numbers, rounded down; division in floats is several times as fast."""
     if abs(numerator) < EXACT:
@@ -161,7 +161,7 @@ def _over(numerator, denominator):  # type: ignore[no-untyped-def]
     return numerator // denominator
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: ignore[no-untyped-def]
     """Put the columns of a ray into its block; or tell why it has none, below 0."""
     back_x, back_y = step_x < 0, step_y < 0

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from planes.arrays import Floats, Ints
+from planes.compiled import compiled
 from planes.constants import POSITION_MAX, SUB
 
 __all__ = ["place"]
 
 
-@njit(cache=True)
+@compiled()
 def place(
     ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
 ) -> bool:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes.arrays import Floats, Ints
+from planes.compiled import compiled
 from planes.sines import DOUBT, ONE
 
 __all__ = ["nearest"]
@@ -22,7 +23,7 @@ RADIAN = math.pi / 180
 FLOATS = types.Array(types.float64, 1, "C", readonly=True)
 
 
-@njit([types.boolean(FLOATS, types.int64[::1], types.int64[::1], types.boolean[::1])], cache=True, nogil=True)
+@compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1], types.boolean[::1]))
 def _nearest(degrees, cosine, sine, doubt):
     folded, any_doubt = np.abs(degrees), False
     for i in range(len(folded)):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes.arrays import Floats, Ints
+from planes.compiled import compiled
 from planes.constants import HALF, POSITION_MAX, SUB
 
 __all__ = ["snapped"]
@@ -13,7 +14,7 @@ __all__ = ["snapped"]
 FLOATS = types.Array(types.float64, 1, "C", readonly=True)
 
 
-@njit([types.boolean(FLOATS, types.int64[::1], types.int64[::1])], cache=True, nogil=True)
+@compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1]))
 def _snapped(at, whole, pixel):
     good = True
     for i in range(len(at)):

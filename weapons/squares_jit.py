@@ -21,6 +21,7 @@ from planes.arrays import Ints
 from planes.bitrows import WORD, Words
 from planes.bitrows_jit import shared
 from planes.cells import Cells
+from planes.compiled import compiled
 from planes.constants import WEIGHT_FULL
 from planes.items import Stack
 from planes.scene import Scene
@@ -152,7 +153,7 @@ def _noted(found, at, new, distance2, y, x, samples):
         found[at], found[at + 1], found[at + 2] = distance2, y, x
 
 
-@njit([types.int64(*[types.int64] * 5)], cache=True)
+@compiled(types.int64(*[types.int64] * 5))
 def _shot(scene_at, round_at, x, y, buffer_at):
     """Rows of a round placed on a pixel, which may be more than the buffer has room for; -1 if cells are worth it."""
     scene, shape, buffer = _ints(scene_at), _ints(round_at), _ints(buffer_at)
@@ -205,7 +206,7 @@ def _shot(scene_at, round_at, x, y, buffer_at):
     return count
 
 
-@njit([types.boolean(*[types.int64] * 5)], cache=True)
+@compiled(types.boolean(*[types.int64] * 5))
 def _any_near(scene_at, left, top, right, bottom):
     """Whether any tile of an object meets a box."""
     scene = _ints(scene_at)
