@@ -429,6 +429,15 @@ def test_of_pixels_that_are_pierced_the_front_one_comes_first(jit: bool) -> None
     same(ready.fire((4, 9)), fire(scene, Disc(6, pierce=True), (4, 9)))
 
 
+@pytest.mark.parametrize("dx, dy", [(0, -4), (0, 4), (-4, 0), (4, 0), (4, -4)])
+def test_what_covers_but_one_row_or_column(dx: int, dy: int, jit: bool) -> None:
+    scene = Scene()
+    scene.add(np.ones((5, 5), bool), (10, 10))
+    scene.add(np.ones((5, 5), bool), (10 + dx, 10 + dy), layer=1)
+    ready = prepare(scene, Disc(20))
+    same(ready.fire((9, 9)), fire(scene, Disc(20), (9, 9)))
+
+
 def test_far_away(jit: bool) -> None:
     """At the ends of the range, and where the world begins at any place."""
     for x, y in ((2**40, -(2**40)), (10**9, 10**9), (-(2**40) + 3, 7)):
