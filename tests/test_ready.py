@@ -438,6 +438,14 @@ def test_what_covers_but_one_row_or_column(dx: int, dy: int, jit: bool) -> None:
     same(ready.fire((9, 9)), fire(scene, Disc(20), (9, 9)))
 
 
+@pytest.mark.parametrize("at", [(2**41, 0), (0.0, -(2.0**40) - 1), (0, math.nextafter(2.0**40, math.inf))])
+def test_a_known_aim_lets_no_position_pass(at: tuple[float, float], jit: bool) -> None:
+    ready = prepare(crowd(6), Beam(9, 2))
+    ready.fire((4.0, 4.0), aim=1.0)
+    with pytest.raises(InputError, match="within"):
+        ready.fire(at, aim=1.0)
+
+
 def test_far_away(jit: bool) -> None:
     """At the ends of the range, and where the world begins at any place."""
     for x, y in ((2**40, -(2**40)), (10**9, 10**9), (-(2**40) + 3, 7)):
@@ -481,13 +489,14 @@ def test_threads_that_fire_one_at_once_agree(jit: bool) -> None:
 def test_kernels_may_be_changed_between_two_versions() -> None:
     pytest.importorskip("numba")
     scene, weapon = crowd(9), Beam(90, 20)
-    ready = prepare(scene, weapon)
+    ready: Any = prepare(scene, weapon)
     try:
         for compiled in (False, True, True, False, True):
             use_jit(compiled)
             scene.move(scene.ids()[:3], (60.0, 50.0))
             for how in ({}, {"aim": 30.0}, {"aim": 30.0}, {}):
                 same(ready.fire((50.0, 50.0), **how), fire(scene, weapon, (50.0, 50.0), **how))
+            assert type(ready._squares).__module__.endswith("_jit") == compiled
     finally:
         use_jit(None)
 
