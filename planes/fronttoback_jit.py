@@ -34,8 +34,8 @@ from planes.spans import Box
 
 __all__ = ["front_to_back"]
 
-PART = 400
-"""Placements that are worth a thread."""
+PART_NS, PLACEMENT_NS, TILE_NS = 8e5, 150.0, 0.7
+"""What a thread must have to do to be worth it; about what a placement takes, and more for each tile there is."""
 
 FEW = 4
 """So few placements look at every tile; for more, tiles are put into cells of the world first."""
@@ -312,7 +312,8 @@ def front_to_back(
     def kernel(who: int, end: int, count: int, out: Ints) -> tuple[int, int]:
         return _front_to_back(who, end, count, out, *arrays)
 
-    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART)
+    each = PLACEMENT_NS + TILE_NS * len(pile.rank)
+    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART_NS / each)
     if found is None:
         return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)
     return found

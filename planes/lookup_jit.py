@@ -14,7 +14,7 @@ from planes.compiled import compiled
 
 __all__ = ["looked_up"]
 
-PART_NS, PLACEMENT_NS, LISTED_NS = 2e5, 10.0, 40.0
+PART_NS, PLACEMENT_NS, LISTED_NS = 8e5, 10.0, 40.0
 """What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
 
 

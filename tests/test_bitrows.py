@@ -400,6 +400,7 @@ def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:
     assert few.shifted == 0 and windows.windows_of([pattern], 2) is few
     often = windows.windows_of([pattern], 2)
     assert often.shifted > 0 and windows.windows_of([pattern], 1) is often
+    assert windows.windows_of([pattern], 1).shifted and not windows.windows_of([pattern], 0).shifted
     assert windows.windows_of([pattern, other], 10**6).shifted == 0
     assert windows.windows_of([other], windows.OFTEN).shifted == 0
     assert windows.fits([pattern, other]) and windows.fits([])

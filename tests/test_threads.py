@@ -31,7 +31,7 @@ def test_rows_hang_on_no_number_of_threads(threads: int, monkeypatch: pytest.Mon
 
     rng = np.random.default_rng(threads)
     monkeypatch.setattr(lookup_jit, "PART_NS", 1.0)
-    monkeypatch.setattr(fronttoback_jit, "PART", 1)
+    monkeypatch.setattr(fronttoback_jit, "PART_NS", 1.0)
     monkeypatch.setattr(bitrows_jit, "ROOM", 0)
     monkeypatch.setattr(bitrows_jit, "ROOM_LEAST", 1)
     used: set[str] = set()

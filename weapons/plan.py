@@ -7,16 +7,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from time import perf_counter_ns
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from planes import bitrows
 from planes.arrays import InputError, choice
 from planes.compose import area
 from planes.constants import SUB
 from planes.index import STRUCTURES
 from planes.items import Stack
 from planes.scene import Scene
+from planes.twins import kernels_of
 from planes.visible import View
 from weapons.candidates import BOX, Candidates, prefilter_of
 from weapons.pattern import PatternTable
@@ -46,15 +48,33 @@ DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
 COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
 REDRAW_PIXEL_NS = 0.5
 SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
-DIRECT_CALL_NS, DIRECT_STACK_NS, DIRECT_ITEM_NS = 150_000.0, 200.0, 2000.0
-DIRECT_SHOT_NS, DIRECT_BOX_NS = 500.0, 1.0
-ITEMS_A_SHOT = 5
-DRAWN_NS, DRAWN_ITEM_NS = 100_000.0, 5000.0
-COMPOSE_NS, COMPOSE_ITEM_NS = 500_000.0, 6500.0
 BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 """Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
 ratios only."""
 
+
+class Costs(NamedTuple):
+    """What a call counted by bit rows costs, ns.
+
+    Parameters
+    ----------
+    call, placement, pair : more of a call, of each placement, and of each with each item, without a composition
+    compose, item : of a composition, and of each item
+    draw, pixel : of a code plane: of each item that is drawn, and of each pixel
+    """
+
+    call: float
+    placement: float
+    pair: float
+    compose: float
+    item: float
+    draw: float
+    pixel: float
+
+
+IN_NUMPY = Costs(50_000, 1400, 5.0, 1_000_000, 10_000, 13_000, REDRAW_PIXEL_NS)
+COMPILED = Costs(5000, 120, 0.3, 100_000, 1500, 400, 0.05)
+"""Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 READING = threading.RLock()
 """Held while stages are made of the notes of a plan."""
@@ -304,13 +324,12 @@ def chosen_form(
     known = scene.compositions()
     if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
         return "composed", "it is there"
-    lost = DIRECT_CALL_NS + len(stack) * DIRECT_STACK_NS
-    lost += min(len(stack), ITEMS_A_SHOT * placements) * DIRECT_ITEM_NS
-    lost += placements * (DIRECT_SHOT_NS + len(stack) * DIRECT_BOX_NS)
-    cost = COMPOSE_NS + len(stack) * COMPOSE_ITEM_NS
+    costs = IN_NUMPY if kernels_of(bitrows) is bitrows else COMPILED
+    lost = costs.call + placements * (costs.placement + len(stack) * costs.pair)
+    cost = costs.compose + len(stack) * costs.item
     if plane is not None:
-        drawn = DRAWN_NS + len(stack) * DRAWN_ITEM_NS if plane.codes is None else 0
-        cost = plane.cost(scene.items) * REDRAW_PIXEL_NS + drawn
+        drawn = len(stack) * costs.draw if plane.codes is None else 0
+        cost = plane.cost(scene.items) * costs.pixel + drawn
     told = f"about {cost / 1e3:.0f} us to compose, {lost / 1e3:.0f} us more without it"
     return "composed" if known.pays(view, scene.version, lost, cost) else "direct", told
 

@@ -41,9 +41,9 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
 
     Parameters
     ----------
-    placements : for which all shifts would serve
+    placements : for which all shifts would serve; 0: they would not
     """
-    often = len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
+    often = bool(placements) and len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
     if often:
         told = vars(patterns[0])
         told["placed"] = placed = told.get("placed", 0) + placements
