@@ -187,7 +187,9 @@ def test_the_plan_tells_what_was_tested() -> None:
     assert why(told.left_out, "volumes") == "no pre-filter"
     assert why(told.left_out, "broad phase") == "no box is compared"
     auto, asked = (fire(scene, Disc(3), (60, 60), broadphase=b, strategy="direct").plan for b in ("auto", "none"))
-    assert why(auto.left_out, "broad phase") == "few pairs: every box is compared"
+    assert why(auto.left_out, "broad phase") == "boxes are compared as samples are counted"
+    fading = fire(scene, Disc(3, falloff="linear"), (60, 60), strategy="direct").plan
+    assert why(fading.left_out, "broad phase") == "few pairs: every box is compared"
     assert why(asked.left_out, "broad phase") == "as asked for"
     (row,) = (stage for stage in told.to_dict()["ran"] if stage["stage"] == "pre-filter")
     assert row["pairs"] == [count, count]
@@ -210,11 +212,11 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
     for shots in (1, 1000):
         fire(scene, Disc(1), np.full((shots, 2), 50.0), strategy="direct")
     assert scene.index("bvh").boxes is None
-    many = crowd(4, 3000, 2000)
+    many, fading = crowd(4, 3000, 2000), Disc(1, falloff="linear")
     at = np.random.default_rng(1).uniform(0, 2000, (3000, 2))
-    hits = fire(many, Disc(1), at, strategy="direct")
+    hits = fire(many, fading, at, strategy="direct")
     assert why(hits.plan.ran, "broad phase").startswith(f"bvh: {len(many.items.stack())} boxes")
-    assert hits == fire(many, Disc(1), at, strategy="direct", broadphase="none")
+    assert hits == fire(many, fading, at, strategy="direct", broadphase="none")
 
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,11 +228,14 @@ def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: py
     assert due > 2
     made = []
     for _ in range(due + 2):
-        fire(scene, Point(), (3, 3), strategy="direct")
+        fire(scene, Point(falloff="linear"), (3, 3), strategy="direct")
         made.append(scene.index("bvh").boxes is not None)
     assert made.index(True) == due - 1
     scene.move(scene.ids(), (5, 5))  # to follow all would cost more than the shot saves
-    assert not why(fire(scene, Point(), (3, 3), strategy="direct").plan.ran, "broad phase") or lost > 250.0 * 600
+    assert (
+        not why(fire(scene, Point(falloff="linear"), (3, 3), strategy="direct").plan.ran, "broad phase")
+        or lost > 250.0 * 600
+    )
 
 
 def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:

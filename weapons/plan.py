@@ -362,7 +362,8 @@ def chosen_candidates(
         return Candidates(scene.items, stack, wanted, None, told)
     if structure == "auto":
         if not asked or not _bvh_pays(scene, len(stack), asked):
-            return Candidates(scene.items, stack, wanted, None, told, "few pairs: every box is compared")
+            why = "few pairs: every box is compared" if asked else "boxes are compared as samples are counted"
+            return Candidates(scene.items, stack, wanted, None, told, why)
         structure = "bvh"
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
 
