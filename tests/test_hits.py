@@ -524,7 +524,7 @@ def test_direct_makes_no_plane() -> None:
     ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
     plane = scene.code_plane()
     assert plane is not None and plane.codes is None
-    assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "pre-filter", "visible", "samples", "rows"]
+    assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "samples", "rows"]
     assert left_out["composition"] == "direct: asked for"
     ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="direct"))
     assert plane.codes is None
