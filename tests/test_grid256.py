@@ -1,8 +1,10 @@
 """The 1/256-px grid: one rounding of positions, directions correct to the last bit, turns and mirrors exact."""
 
+import importlib
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planes import grid256, snapping, snapping_jit
+from planes import grid256, snapping
 from planes.arrays import InputError
 from planes.constants import POSITION_MAX
+
+SNAPPING = [snapping, *([importlib.import_module("planes.snapping_jit")] if find_spec("numba") else [])]
 
 MANY = settings(max_examples=300, deadline=None)
 FEW = settings(max_examples=100, deadline=None)
@@ -98,7 +102,7 @@ def test_positions_are_snapped_at_once_as_each_is_alone(
     values: list[float], laid: Callable[[list[float]], np.ndarray[Any, Any]]
 ) -> None:
     at, expected = laid(values), [round(256 * Fraction(value)) for value in values]
-    for kernels in (snapping, snapping_jit):
+    for kernels in SNAPPING:
         found = kernels.snapped(at)
         assert found is not None and found[0].dtype == found[1].dtype == np.int64
         assert found[0].tolist() == np.reshape(expected, (-1, 2)).tolist() and at.tolist() == laid(values).tolist()
@@ -107,7 +111,7 @@ def test_positions_are_snapped_at_once_as_each_is_alone(
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, math.nextafter(LIMIT, math.inf), -1.01 * LIMIT])
 def test_positions_out_of_range_are_not_snapped(bad: float) -> None:
-    for kernels in (snapping, snapping_jit):
+    for kernels in SNAPPING:
         for place in np.ndindex(9, 2):
             at = np.ones((9, 2))
             at[place] = bad
