@@ -22,7 +22,7 @@ from planes.broadphase import Grid
 from planes.constants import INDEX_SLACK
 from planes.index import STRUCTURES, Index
 from planes.spans import meets
-from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, fire, plan
+from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, costs, fire
 from weapons.arsenal import Plain, pattern_of
 from weapons.candidates import Candidates, prefilter_of
 from weapons.plan import Stage
@@ -221,10 +221,10 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
     """As long as no shot alone pays for it none is made; then what was lost adds up."""
-    monkeypatch.setattr(plan, "BOX_PAIR_NS", 400.0)
+    monkeypatch.setattr(costs, "BOX_PAIR_NS", 400.0)
     scene = crowd(7, 600, 900)
-    lost = 400.0 * len(scene.items.stack()) - plan.BVH_PLACEMENT_NS - plan.BVH_CALL_NS
-    due = math.floor(len(scene.items.stack()) * plan.BVH_BUILT_NS / lost) + 1
+    lost = 400.0 * len(scene.items.stack()) - costs.BVH_PLACEMENT_NS - costs.BVH_CALL_NS
+    due = math.floor(len(scene.items.stack()) * costs.BVH_BUILT_NS / lost) + 1
     assert due > 2
     made = []
     for _ in range(due + 2):
@@ -257,7 +257,7 @@ UNUSED = ("planes.fit", "planes.volumes", "planes.overlap", "planes.bounding", "
 LOADED = f"""
 import sys
 from planes import Scene
-from weapons import Beam, Disc, fire
+from weapons import Beam, Disc, costs, fire
 scene = Scene((99, 99))
 ids = [scene.add([[True]], (i, i)) for i in range(40)]
 fire(scene, Disc(3), [(9, 9)] * 20, strategy="direct")

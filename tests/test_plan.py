@@ -518,8 +518,8 @@ OF_SCENES = (
     " twins visible"
 )
 OF_FIRE = (
-    "arsenal bitfire candidates columns counting draws explain firing guns hits pattern plan resolve runfire volley"
-    " weapon windows"
+    "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"
+    " volley weapon windows"
 )
 OF_A_RAY = "ends firsthits flight meetings passes rayexplain rayfire rayhits rays rayways trace tracing"
 

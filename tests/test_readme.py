@@ -20,8 +20,8 @@ from weapons import arsenal_of
 from weapons.arsenal import KINDS
 from weapons.candidates import PREFILTERS
 from weapons.cli import main
+from weapons.costs import BROADPHASES
 from weapons.orders import fire_order, orders_of
-from weapons.plan import BROADPHASES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -26,9 +26,10 @@ from planes.twins import expect, kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
 from weapons.arsenal import Plain, parts_of, pattern_of
 from weapons.candidates import Candidates, may_refuse, refused
+from weapons.costs import chosen_candidates, chosen_form
 from weapons.counting import NOT_BESIDE, counted, placed_of, points, rows_of
 from weapons.hits import Hits, Rows
-from weapons.plan import Plan, chosen_candidates, chosen_form, leave_out_uncounted
+from weapons.plan import Plan, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
 from weapons.runfire import verdicts_of
 from weapons.volley import Shots, Volley, placements_of, volley_of

@@ -1,4 +1,4 @@
-"""What a call does and what it leaves out: the cost model that chooses a strategy, and the record of it."""
+"""What a call does and what it leaves out: the record of it, as it is told."""
 
 from __future__ import annotations
 
@@ -7,74 +7,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from time import perf_counter_ns
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from planes import bitrows
-from planes.arrays import InputError, choice
-from planes.compose import area
-from planes.constants import SUB
-from planes.index import STRUCTURES
 from planes.items import Stack
 from planes.scene import Scene
-from planes.twins import kernels_of
-from planes.visible import View
-from weapons.candidates import BOX, Candidates, prefilter_of
+from weapons.candidates import BOX, Candidates
 from weapons.pattern import PatternTable
 
 __all__ = [
-    "BROADPHASES",
-    "STRATEGIES",
     "Plan",
     "PlanSum",
     "Stage",
-    "chosen_candidates",
-    "chosen_form",
-    "chosen_strategy",
     "leave_out_absent",
     "leave_out_imagery",
     "leave_out_uncounted",
     "leave_out_unused",
     "plan_lines",
     "read_stack",
-    "sweep_pays",
 ]
-
-STRATEGIES = ("auto", "direct", "composed")
-BROADPHASES = ("auto", *STRUCTURES)
-
-DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
-COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
-REDRAW_PIXEL_NS = 0.5
-SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
-BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
-"""Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; the choice hangs on their
-ratios only."""
-
-
-class Costs(NamedTuple):
-    """What a call counted by bit rows costs, ns.
-
-    Parameters
-    ----------
-    call, placement, pair : more of a call, of each placement, and of each with each item, without a composition
-    compose, item : of a composition, and of each item
-    draw, pixel : of a code plane: of each item that is drawn, and of each pixel
-    """
-
-    call: float
-    placement: float
-    pair: float
-    compose: float
-    item: float
-    draw: float
-    pixel: float
-
-
-IN_NUMPY = Costs(50_000, 1400, 5.0, 1_000_000, 10_000, 13_000, REDRAW_PIXEL_NS)
-COMPILED = Costs(5000, 120, 0.3, 100_000, 1500, 400, 0.05)
-"""Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 READING = threading.RLock()
 """Held while stages are made of the notes of a plan."""
@@ -271,148 +221,6 @@ def _why(stage: Mapping[str, Any], calls: int) -> str:
     often = f"{stage['calls']} of {calls} calls: " if calls != 1 else ""
     kept, of = stage.get("pairs", (0, 0))
     return f"{often}{stage['why']}" + (f"; {kept:,} of {of:,} pairs left" if of else "")
-
-
-def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTable, placements: int) -> tuple[str, str]:
-    """Strategy of a call and why: the one asked for, or the cheaper by the cost model.
-
-    Raises
-    ------
-    InputError
-        If the composed strategy is asked for where no whole plane can be made.
-    """
-    choice("strategy", strategy, STRATEGIES)
-    plane = scene.code_plane()
-    if strategy == "composed" and plane is None:
-        raise InputError("strategy: expected bounds that fit one plane for 'composed', got a scene without them")
-    if strategy != "auto":
-        return strategy, "asked for"
-    if plane is None:
-        return "direct", "no bounds that fit one plane"
-    patterns = max(len(table.count), 1)
-    samples = placements * int(table.count.sum()) / patterns
-    spans = placements * len(table.y) / patterns
-    composed = COMPOSED_CALL_NS + placements * COMPOSED_PLACEMENT_NS + spans * COMPOSED_SPAN_NS
-    composed += samples * COMPOSED_PIXEL_NS + plane.cost(scene.items) * REDRAW_PIXEL_NS
-    x, y, x_max, y_max = plane.box_xyxy
-    density = area(stack.box_xyxy) / ((x_max - x + 1) * (y_max - y + 1))
-    direct = placements * DIRECT_PLACEMENT_NS + min(_box_costs(scene, len(stack), placements))
-    direct += samples * density * DIRECT_PIXEL_NS
-    name = "composed" if composed < direct else "direct"
-    return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
-
-
-def chosen_form(
-    strategy: str, how: tuple[str, str], scene: Scene, stack: Stack, view: View | None, point: bool, placements: int
-) -> tuple[str, str]:
-    """Strategy of a call that is counted by bit rows, and why: the one asked for, or the cheaper by the cost model.
-
-    Parameters
-    ----------
-    how : pre-filter and broad phase that were asked for: they are of the direct strategy
-    view : what all shots accept; None if they differ in it
-    point : whether one read of the code plane tells what a placement hits
-    """
-    choice("strategy", strategy, STRATEGIES)
-    if view is None:
-        return "direct", "shots accept different items"
-    if strategy != "auto":
-        return strategy, "asked for"
-    if how != ("auto", "auto"):
-        return "direct", "a pre-filter was asked for"
-    plane = scene.code_plane() if point else None
-    known = scene.compositions()
-    if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
-        return "composed", "it is there"
-    costs = IN_NUMPY if kernels_of(bitrows) is bitrows else COMPILED
-    lost = costs.call + placements * (costs.placement + len(stack) * costs.pair)
-    cost = costs.compose + len(stack) * costs.item
-    if plane is not None:
-        drawn = len(stack) * costs.draw if plane.codes is None else 0
-        cost = plane.cost(scene.items) * costs.pixel + drawn
-    told = f"about {cost / 1e3:.0f} us to compose, {lost / 1e3:.0f} us more without it"
-    return "composed" if known.pays(view, scene.version, lost, cost) else "direct", told
-
-
-def chosen_candidates(
-    prefilter: object, broadphase: object, scene: Scene, stack: Stack, swept: bool, asked: int
-) -> Candidates:
-    """Pre-filter and broad phase of a call, and why: those asked for, or the cheaper ones by the cost model.
-
-    Parameters
-    ----------
-    swept : whether capsules pay, as `sweep_pays` tells
-    asked : placements that will be asked for
-
-    Raises
-    ------
-    InputError
-        If one is not known, or boxes are asked for in a broad phase and not as a pre-filter.
-    """
-    wanted = prefilter_of(prefilter)
-    structure = choice("broadphase", broadphase, BROADPHASES)
-    if wanted.name == "none":
-        if structure not in ("auto", "none"):
-            raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
-        return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
-    if wanted.name == "auto":
-        wanted = prefilter_of("swept") if swept else BOX
-    told = "box" if wanted == BOX else f"box, then {wanted}"
-    if structure == "none":
-        return Candidates(scene.items, stack, wanted, None, told)
-    if structure == "auto":
-        if not asked or not _bvh_pays(scene, len(stack), asked):
-            why = "few pairs: every box is compared" if asked else "boxes are compared as samples are counted"
-            return Candidates(scene.items, stack, wanted, None, told, why)
-        structure = "bvh"
-    return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
-
-
-def sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
-    """Whether capsules around long, slanting patterns drop enough of what their boxes meet.
-
-    Expected pairs are those of items of the mean size, spread evenly over the box around all.
-
-    Parameters
-    ----------
-    table : patterns of the first shot; the others' are about alike
-    asked : placements that will be asked for
-    """
-    pattern = table.patterns[0] if table.patterns else None
-    if pattern is None or pattern.swept is None or asked * len(stack) * SWEPT_DROPPED_NS < SWEPT_CALL_NS:
-        return False
-    a, b, radius = pattern.swept
-    item_wh, world_wh = stack.sizes
-    box_wh = np.minimum((np.abs(b - a) + 2 * radius) / SUB + item_wh, world_wh)
-    width = 2 * radius / SUB + float(np.sqrt((item_wh**2).sum()))
-    length = float(np.sqrt((((b - a) / SUB) ** 2).sum())) + width
-    pairs = asked * len(stack) * float((box_wh / world_wh).prod())
-    dropped = pairs * (1 - min(length * width / float(box_wh.prod()), 1))
-    return dropped * SWEPT_DROPPED_NS > pairs * SWEPT_PAIR_NS + SWEPT_CALL_NS
-
-
-def _box_costs(scene: Scene, items: int, placements: int) -> tuple[float, float]:
-    """Nanoseconds to find the boxes that placements meet: one by one, and by a BVH that is there or must be made."""
-    one_by_one = placements * items * BOX_PAIR_NS
-    answer = placements * BVH_PLACEMENT_NS + BVH_CALL_NS
-    if answer >= one_by_one:
-        return one_by_one, answer
-    index = scene.index("bvh")
-    return one_by_one, answer + index.owed(scene.items) * (BVH_BUILT_NS if index.boxes is None else BVH_MOVED_NS)
-
-
-def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
-    """Whether a BVH answers sooner than all boxes one by one, with what it costs to bring it up to date.
-
-    One that is not there is made when what it would have saved so far is as much as it costs: never more than twice
-    the cost of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
-    """
-    one_by_one, by_bvh = _box_costs(scene, items, placements)
-    index = scene.index("bvh")
-    if one_by_one > by_bvh or index.boxes is not None:
-        return one_by_one > by_bvh
-    index.missed += max(one_by_one - placements * BVH_PLACEMENT_NS - BVH_CALL_NS, 0)
-    return index.missed > items * BVH_BUILT_NS
 
 
 def read_stack(scene: Scene, plan: Plan) -> Stack:

@@ -17,13 +17,14 @@ from planes.arrays import Ints
 from planes.constants import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
 from planes.scene import Scene
 from weapons.candidates import Candidates, may_refuse
+from weapons.costs import chosen_candidates
 from weapons.ends import Ends
 from weapons.firsthits import FirstHits
 from weapons.guns import Traced
 from weapons.hits import Rows
 from weapons.meetings import Meetings
 from weapons.passes import Passes, Stops, passes_of, stops_of
-from weapons.plan import Plan, chosen_candidates, leave_out_absent, leave_out_imagery, read_stack
+from weapons.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from weapons.rayhits import RayHits, Told, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
 from weapons.rayways import chosen_way, ends_at_first, jumps_at_all

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from planes.arrays import InputError, choice
 from planes.items import Stack
 from planes.scene import Scene
+from weapons.costs import REDRAW_PIXEL_NS, STRATEGIES
 from weapons.guns import Projectile, Traced
-from weapons.plan import REDRAW_PIXEL_NS, STRATEGIES
 
 if TYPE_CHECKING:
     from planes.clearance import ClearancePlane

@@ -16,8 +16,9 @@ from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from weapons.arsenal import pierces
 from weapons.candidates import Candidates, may_refuse
+from weapons.costs import chosen_candidates, chosen_strategy, sweep_pays
 from weapons.hits import Hits, Rows, rows_of_met
-from weapons.plan import Plan, chosen_candidates, chosen_strategy, leave_out_unused, sweep_pays
+from weapons.plan import Plan, leave_out_unused
 from weapons.resolve import Sight, composed, direct
 from weapons.volley import Shots, Volley, volley_of
 from weapons.weapon import Weapon
