@@ -40,7 +40,7 @@ def boxes_in(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.stack([x[0], y[0], x[1], y[1]], axis=1)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.sampled_from([0, 1, 3, 7, 8, 9, 16, 17, 40]), st.integers(0, 9))
 @pytest.mark.parametrize("each", [False, True])
 @pytest.mark.parametrize("kind", [np.uint16, np.uint32])

@@ -346,7 +346,7 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
     weapon, how, _ = CALLS[name]
     how = {key: value for key, value in how.items() if key != "prefilter"}
     scene, at = yard((400, 300), full=True), np.random.default_rng(5).uniform(0, 80, (2000, 2))
-    fire(scene, weapon, at[:9], **how)
+    fire(scene, weapon, at, **how)  # windows of patterns are kept beside what a call makes
     scene.move(0, (21, 25))
     held: dict[str, int] = {}
     run, before, whole = Plan.run, [0], [0]
@@ -367,7 +367,7 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
     made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
     for stage in made.keys() - SELECTING:
         assert made[stage] - SLACK <= 1.5 * held[stage] and held[stage] <= MOST * made[stage] + SLACK, stage
-    assert sum(made.values()) / 3 < whole[0] < 4 * sum(made.values()) + AT_ONCE * ("bit rows" in name)
+    assert sum(made.values()) / 3 < whole[0] < 3 * sum(made.values()) + AT_ONCE * ("bit rows" in name)
 
 
 def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
