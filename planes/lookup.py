@@ -5,8 +5,6 @@ A function from arrays to arrays; `lookup_jit` has the same one, compiled, in on
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from planes.arrays import Ints
@@ -14,9 +12,6 @@ from planes.bitrows import Beside, Found, Placed, Seen, Windows, found, row_orde
 from planes.cells import Cells, listed_at
 
 __all__ = ["looked_up", "merged"]
-
-PAIRS_AT_ONCE = 2**16
-"""Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
 
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
@@ -33,13 +28,7 @@ def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside
     tiles; sorted by (placement, distance2, y, x, tile).
     """
     placement, near = listed_at(cells, placed.x, placed.y)
-    edges = [0, len(placement)]
-    if len(placement) > PAIRS_AT_ONCE:
-        wanted = placement[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
-        edges = [0, *np.unique(np.searchsorted(placement, wanted)).tolist(), len(placement)]
-    parts = [found(placed, windows, seen, placement[a:b], near[a:b], beside) for a, b in pairwise(edges)]
-    every = parts[0] if len(parts) == 1 else Found(*map(np.concatenate, zip(*parts, strict=True)))
-    return merged(every, seen.rank)
+    return merged(found(placed, windows, seen, placement, near, beside), seen.rank)
 
 
 def merged(every: Found, rank: Ints) -> Found:
