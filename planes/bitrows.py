@@ -296,21 +296,16 @@ def front_at(codes: Codes, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) ->
 def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
     """Places of rows in the order of (group, distance2, y, x, place); groups are sorted already."""
     keys = (group, distance2, y, x)
-    count = len(group)
-    least = [int(key.min(initial=0)) for key in keys]
-    bits = [int(key.max(initial=0) - low).bit_length() for key, low in zip(keys, least, strict=True)]
-    place = max(count - 1, 0).bit_length()
-    if sum(bits) + place >= WORD - 1:
+    least = [int(np.minimum.reduce(key, initial=0)) for key in keys]
+    most = [int(np.maximum.reduce(key, initial=0)) for key in keys]
+    bits = [(high - low).bit_length() for low, high in zip(least, most, strict=True)]
+    if sum(bits) >= WORD:
         return np.lexsort(keys[::-1])
     number = group - least[0]
     for key, low, size in zip(keys[1:], least[1:], bits[1:], strict=True):
         number <<= size
         number |= key - low
-    number <<= place
-    number |= np.arange(count)
-    number.sort()
-    number &= (1 << place) - 1
-    return number
+    return number.argsort(kind="stable")
 
 
 def _sums(counts: npt.NDArray[np.uint8]) -> Ints:
