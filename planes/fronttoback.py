@@ -7,7 +7,6 @@ items. Functions from arrays to arrays; `fronttoback_jit` has the same ones, com
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from planes import bitrows
 from planes.arrays import Bools, Ints
 from planes.bitrows import WORD, Found, Placed, Windows, Words
 from planes.cells import met_boxes
+from planes.itemrows import item_rows
 from planes.spans import Box, ragged
 
 __all__ = ["Pile", "front_to_back"]
@@ -109,9 +109,7 @@ def front_to_back(
     if not parts:
         return Found(*[np.zeros(0, np.int64)] * 6)
     found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-    found = _by_item(found, pile.rank)
-    x, y = found.x + placed.origin_x[found.placement], found.y + placed.origin_y[found.placement]
-    return Found(*found[:4], x, y)
+    return item_rows(found, placed, pile.rank)
 
 
 def _near(
@@ -252,7 +250,7 @@ def _cut_off(rows: Words, near: Near, bounds: Box) -> None:
 
 
 def _counted(placed: Placed, pile: Pile, near: Near, rows: Words) -> Found:
-    """What is left of objects, of their pixels (n, height); the nearest is told about the origin."""
+    """What is left of objects, of their pixels (n, height)."""
     samples = np.add.reduce(np.bitwise_count(rows), axis=1, dtype=np.int64)
     if len(pile.occluder):
         samples[pile.occluder[near.tile]] = 0
@@ -260,39 +258,6 @@ def _counted(placed: Placed, pile: Pile, near: Near, rows: Words) -> Found:
     if len(hit) < len(samples):
         near, rows, samples = near.at(hit), rows[hit], samples[hit]
     who = near.placement
-    left, top = near.left - placed.origin_x[who], near.top - placed.origin_y[who]
-    return Found(who, near.tile, samples, *bitrows.nearest(rows, left, top))
-
-
-def _by_item(found: Found, rank: Ints) -> Found:
-    """Pairs of placements and tiles, sorted, as those of placements and items in the order of rows."""
-    item, who = rank[found.seen], found.placement
-    same = (item[1:] == item[:-1]) & (who[1:] == who[:-1])
-    if not np.logical_or.reduce(same):
-        order = _row_order(found)
-        return Found(who, *[column[order] for column in found[1:]])
-    first = np.concatenate(([True], ~same)).nonzero()[0]
-    order = np.lexsort((found.x, found.y, found.distance2, np.cumsum(np.concatenate(([0], ~same)))))
-    best = order[first]
-    return _by_item(
-        Found(
-            who[first], found.seen[first], np.add.reduceat(found.samples, first),
-            found.distance2[best], found.x[best], found.y[best],
-        ),
-        rank,
-    )  # fmt: skip
-
-
-def _row_order(found: Found) -> Ints:
-    """Order by (placement, distance2, y, x, place) of rows (n,) that are sorted by placement."""
-    most = int(np.maximum.reduce(found.distance2, initial=0))
-    high = isqrt(most) + 1
-    if len(found.seen) and (int(found.placement[-1]) + 1) * (most + 1) * (2 * high) * 2 >= 2**63:
-        return np.lexsort((found.x, found.y, found.distance2, found.placement))
-    key = found.placement * (most + 1)
-    key += found.distance2
-    key *= 2 * high
-    key += found.y
-    key += key
-    key += found.x > 0  # of pixels as far in the same row there is at most one on each side
-    return key.argsort(kind="stable")
+    origin_x, origin_y = placed.origin_x[who], placed.origin_y[who]
+    distance2, x, y = bitrows.nearest(rows, near.left - origin_x, near.top - origin_y)
+    return Found(who, near.tile, samples, distance2, x + origin_x, y + origin_y)

@@ -5,13 +5,11 @@ A function from arrays to arrays; `lookup_jit` has the same one, compiled, in on
 
 from __future__ import annotations
 
-import numpy as np
-
-from planes.arrays import Ints
-from planes.bitrows import Beside, Found, Placed, Seen, Windows, found, row_order
+from planes.bitrows import Beside, Found, Placed, Seen, Windows, found
 from planes.cells import Cells, listed_at
+from planes.itemrows import item_rows
 
-__all__ = ["looked_up", "merged"]
+__all__ = ["looked_up"]
 
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
@@ -28,23 +26,4 @@ def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside
     tiles; sorted by (placement, distance2, y, x, tile).
     """
     placement, near = listed_at(cells, placed.x, placed.y)
-    return merged(found(placed, windows, seen, placement, near, beside), seen.rank)
-
-
-def merged(every: Found, rank: Ints) -> Found:
-    """Pairs of placements and tiles as rows of placements and items.
-
-    Parameters
-    ----------
-    every : sorted by (placement, tile)
-    rank : (V,) place in the stack of the item of each tile, rising
-    """
-    if (rank[1:] == rank[:-1]).any():
-        item = rank[every.seen]
-        group = np.cumsum((np.diff(every.placement, prepend=-1) != 0) | (np.diff(item, prepend=-1) != 0))
-        first = np.flatnonzero(np.diff(group, prepend=0))
-        nearest = row_order(group, every.distance2, every.y, every.x)[first]
-        samples = np.add.reduceat(every.samples, first) if len(first) else every.samples
-        every = Found(every.placement[first], every.seen[first], samples, *(c[nearest] for c in every[3:]))
-    order = row_order(every.placement, every.distance2, every.y, every.x)
-    return Found(*(column[order] for column in every))
+    return item_rows(found(placed, windows, seen, placement, near, beside), placed, seen.rank)
