@@ -17,25 +17,9 @@ from planes.arrays import Bools, Codes, Ints
 from planes.spans import Box
 
 __all__ = [
-    "PAD",
-    "WORD",
-    "Beside",
-    "Found",
-    "Placed",
-    "Seen",
-    "Windows",
-    "Words",
-    "found",
-    "nearest",
-    "beside_of",
-    "front_at",
-    "packed",
-    "row_order",
-    "rows_of",
-    "union",
-    "visible",
-    "windows_at",
-]
+    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "cut_off", "found", "front_at",
+    "nearest", "packed", "row_order", "rows_of", "union", "visible", "windows_at",
+]  # fmt: skip
 
 Words = npt.NDArray[np.uint64]
 Beside = npt.NDArray[np.uint8]
@@ -56,7 +40,7 @@ A pixel is within 63 columns, and (255 + a)**2 - (63 + a)**2 > 240**2.
 WORDS_AT_ONCE = 2**16
 """Words of pairs worked on at a time: 512 KB, half of a level-2 cache; with fewer the calls weigh more."""
 
-_ONE = np.uint64(1)
+_ONE, _FULL = np.uint64(1), np.uint64(2**64 - 1)
 _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _SUM = np.uint64(0x0001000100010001)
@@ -171,6 +155,21 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
             cover >>= np.maximum(-right[now], 0).astype(np.uint64)[:, None]
             seen[of[now]] &= ~cover
     return seen
+
+
+def cut_off(rows: Words, left: Ints, top: Ints, bounds: Box) -> None:
+    """Take away of pixels (n, height) what lies beyond the bounds; column 0 and row 0 lie at `left` and `top` (n,)."""
+    x, y, x_max, y_max = bounds
+    height = rows.shape[1]
+    over = (left < x) | (left > x_max - WORD + 1)
+    over |= (top < y) | (top > y_max - height + 1)
+    at = over.nonzero()[0]
+    if not len(at):
+        return
+    left, row = left[at], top[at][:, None] + np.arange(height)
+    first, last = (np.maximum(far, 0).view(np.uint64) for far in (x - left, left + (WORD - 1 - x_max)))
+    inside = (row >= y) & (row <= y_max)
+    rows[at] &= ((_FULL << first) & (_FULL >> last))[:, None] * inside
 
 
 def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints, beside: Beside) -> Found:

@@ -13,7 +13,7 @@ import numpy as np
 
 from planes import bitrows
 from planes.arrays import Bools, Ints
-from planes.bitrows import WORD, Found, Placed, Windows, Words
+from planes.bitrows import Found, Placed, Windows, Words
 from planes.cells import met_boxes
 from planes.itemrows import item_rows
 from planes.spans import Box, ragged
@@ -28,8 +28,6 @@ Of 128 KB on, each array would be new pages from the system.
 
 FRONTS_AT_ONCE = 2**14
 """Pairs of tiles near one placement that are compared one by one; in a larger crowd only those that meet are listed."""
-
-_FULL = np.uint64(2**64 - 1)
 
 
 class Pile(NamedTuple):
@@ -104,7 +102,7 @@ def front_to_back(
         if len(rows):
             _hide(rows, pile, some, pierce)
             if bounds is not None:
-                _cut_off(rows, some, bounds)
+                bitrows.cut_off(rows, some.left, some.top, bounds)
             parts.append(_counted(placed, pile, some, rows))
     if not parts:
         return Found(*[np.zeros(0, np.int64)] * 6)
@@ -232,21 +230,6 @@ def _fronts_of_many(pile: Pile, near: Near) -> tuple[Ints, Ints, Ints]:
     there = (pairs[pairs.searchsorted(asked, side="right") - 1] == asked).nonzero()[0]
     of, front = of[there], front[there]
     return of, front, pile.box_xyxy[front, 0] - near.left[of]
-
-
-def _cut_off(rows: Words, near: Near, bounds: Box) -> None:
-    """Take away of pixels (n, height) what lies beyond the bounds."""
-    x, y, x_max, y_max = bounds
-    height = rows.shape[1]
-    over = (near.left < x) | (near.left > x_max - WORD + 1)
-    over |= (near.top < y) | (near.top > y_max - height + 1)
-    at = over.nonzero()[0]
-    if not len(at):
-        return
-    left, row = near.left[at], near.top[at][:, None] + np.arange(height)
-    first, last = (np.maximum(far, 0).view(np.uint64) for far in (x - left, left + (WORD - 1 - x_max)))
-    inside = (row >= y) & (row <= y_max)
-    rows[at] &= ((_FULL << first) & (_FULL >> last))[:, None] * inside
 
 
 def _counted(placed: Placed, pile: Pile, near: Near, rows: Words) -> Found:

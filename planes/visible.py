@@ -15,7 +15,7 @@ import numpy as np
 
 from planes import bitrows, cells, cropping
 from planes.arrays import Bools, Ints
-from planes.bitrows import PAD, WORD, Beside, Seen, Words, beside_of
+from planes.bitrows import PAD, Beside, Seen, Words, beside_of
 from planes.cells import Cells
 from planes.items import Items, Stack
 from planes.spans import Box
@@ -168,22 +168,8 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
     rows = kernels_of(bitrows).visible(tiles.words, height, tiles.begin[which], of, tiles.begin[front] - down, right)
     if bounds is not None:
-        _cut_off(rows, boxes, bounds)
+        bitrows.cut_off(rows, boxes[:, 0], boxes[:, 1], bounds)
     return np.asarray(rows)
-
-
-def _cut_off(rows: Words, boxes_xyxy: Ints, bounds: Box) -> None:
-    """Take away what of tiles (V, height) in boxes lies beyond the bounds."""
-    x, y, x_max, y_max = bounds
-    over = np.flatnonzero((boxes_xyxy[:, :2] < (x, y)).any(axis=1) | (boxes_xyxy[:, 2:] > (x_max, y_max)).any(axis=1))
-    if not len(over):
-        return
-    left, top = boxes_xyxy[over, :2].T
-    full = np.uint64(2**64 - 1)
-    first, last = (np.clip(edge - left, 0, WORD).astype(np.uint64) for edge in (x, x_max + 1))
-    columns = (full << first) & ~(full << last)
-    row = top[:, None] + np.arange(rows.shape[1])
-    rows[over] &= np.where((row >= y) & (row <= y_max), columns[:, None], np.uint64(0))
 
 
 def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> Seen:
