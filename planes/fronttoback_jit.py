@@ -49,7 +49,6 @@ PAD = 64
 EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
 
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
-OUT_WORDS = types.uint64[::1]
 
 
 @compiled(types.Tuple((OUT, OUT, OUT))(BOXES))
@@ -169,7 +168,10 @@ def _take(tiles, tile, rest, word, step, shift, low, high):
 
 @njit
 def _struck(tiles, tile, rest, word, step, shift, low, high, own, level):
-    """What a tile shares with what is left of a pattern, told as by `shared`; that is taken away."""
+    """What a tile shares with what is left of a pattern, told as by `shared`; that is taken away.
+
+    In one pass: `shared` and then `_take` make discs among 100 items 2 to 5 % slower, among 1000 items some 10 %.
+    """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)
     ahead, behind, beyond = columns_about(own)
