@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
+from numba import njit, types
 
 from planes import lookup
 from planes.arrays import Ints
@@ -16,6 +16,13 @@ __all__ = ["looked_up"]
 
 PART_NS, PLACEMENT_NS, LISTED_NS = 8e5, 10.0, 40.0
 """What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
+
+
+@njit(inline="always")
+def _cell_at(x, y, cells_x, cells_y, bits, wide, high):
+    """The cell in which a pattern is placed; -1 beyond all."""
+    column, row = (x - cells_x) >> bits, (y - cells_y) >> bits
+    return row * wide + column if 0 <= column < wide and 0 <= row < high else -1
 
 
 @compiled(
@@ -33,11 +40,10 @@ def _looked_up(
     key, nearest_x = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
     hit, hit_samples = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
     while who < end:
-        column, row = (x[who] - cells_x) >> bits, (y[who] - cells_y) >> bits
-        if column < 0 or row < 0 or column >= wide or row >= high:
+        cell = _cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
+        if cell < 0:
             who += 1
             continue
-        cell = row * wide + column
         entry, last = begin[cell], begin[cell + 1]
         if entry == last:
             who += 1
