@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Codes, Ints
+from planes.arrays import Bools, Ints
 from planes.spans import Box
 
 __all__ = [
-    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "cut_off", "found", "front_at",
+    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "cut_off", "found",
     "nearest", "packed", "row_order", "rows_of", "union", "visible", "windows_at",
 ]  # fmt: skip
 
@@ -269,27 +269,6 @@ def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     rows &= windows_at(windows, seen.height, _which(placed, windows, placement), left, top)
     together = np.bitwise_or.reduceat(rows, first, axis=0)
     return np.asarray(np.bitwise_count(together).sum(axis=1, dtype=np.int64))
-
-
-def front_at(codes: Codes, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) -> tuple[Ints, Ints]:
-    """Objects that lie in front at pixels (n,), as (place, id).
-
-    Parameters
-    ----------
-    codes, plane_xyxy : a code plane (h, w), see `planes.compose`, and its box in the world
-    objects : by id, whether it can be hit
-    """
-    height, width = codes.shape
-    column, row = x - plane_xyxy[0], y - plane_xyxy[1]
-    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    place = inside.nonzero()[0]
-    if len(place) < len(column):
-        column, row = column[place], row[place]
-    code = codes.reshape(-1)[row * width + column]
-    some = code.nonzero()[0]
-    item = (code[some] >> 1).astype(np.int64) - 1
-    hit = objects[item]
-    return place[some[hit]], item[hit]
 
 
 def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:

@@ -11,16 +11,14 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from planes import bitrows
-from planes.arrays import Bools, Codes, Ints
+from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
 from planes.compiled import compiled
-from planes.spans import Box
 from planes.twins import in_parts
 
 __all__ = [
     "bits_of",
     "found",
-    "front_at",
     "is_far",
     "key_of",
     "put_rows",
@@ -331,28 +329,3 @@ def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
     order = np.empty(len(group), np.int64)
     _row_order(group, distance2, y, x, order)
     return order
-
-
-@compiled(
-    *(
-        types.int64(types.Array(kind, 2, "C", readonly=True), *[types.int64] * 2, INTS, INTS, FLAGS, OUT, OUT)
-        for kind in (types.uint16, types.uint32)
-    )
-)
-def _front_at(codes, left, top, x, y, objects, place, item):
-    count = 0
-    high, wide = np.uint64(codes.shape[0]), np.uint64(codes.shape[1])
-    for i in range(len(x)):  # every answer is written, and the next over it if it was none: no branch to be guessed
-        column, row = np.uint64(x[i] - left), np.uint64(y[i] - top)  # what lies before the plane wraps far beyond it
-        inside = (column < wide) & (row < high)
-        front = np.int64(codes[row, column] >> 1) if inside else 0
-        place[count], item[count] = i, front - 1
-        count += (front > 0) and objects[front - 1]
-    return count
-
-
-def front_at(codes: Codes, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) -> tuple[Ints, Ints]:
-    """See `bitrows.front_at`."""
-    place, item = np.empty((2, len(x)), np.int64)
-    count = _front_at(codes, plane_xyxy[0], plane_xyxy[1], x, y, objects, place, item)
-    return place[:count], item[:count]

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from planes import painting, steps
-from planes.arrays import Codes, InputError, Ints
+from planes import painting, pointquery, steps
+from planes.arrays import Bools, Codes, InputError, Ints
 from planes.constants import ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX
 from planes.items import NEVER, NO_BOXES, Change, Items, Stack, clipped
 from planes.spans import Box
@@ -61,12 +61,15 @@ class Drawing:
         self._corner = x, y
         self.codes: Codes = np.empty((y_max - y + 1, x_max - x + 1), _kind(items))
         self._near: Ints | None = None
+        self._cells: Bools | None = None
+        self._looks = 0
         self.draw(items.stack(), np.array([box_xyxy]))
 
     def draw(self, stack: Stack, dirty: Ints) -> None:
         """Draw boxes (n, 4) anew, from a stack that differs from the last one nowhere else."""
         self.forms, self._rank_of, self._masks = stack.forms, stack.rank_of, stack.masks
         self._places, self._near = painting.places_of(stack), None
+        self._cells, self._looks = None, 0
         kernels = kernels_of(painting, (len(dirty) + len(stack)) * PAINTED_NS)
         kernels.paint(self.codes, *self._corner, dirty, self._places, self._masks)
 
@@ -74,6 +77,8 @@ class Drawing:
         """Draw anew what the steps of items, the last first, change; tell how many pixels their boxes have."""
         if self._near is None:
             self._near = steps.near_of(self._places, *self._corner, *self.codes.shape)
+        if changes:
+            self._cells, self._looks = None, 0
         pixels = 0
         for _, ids, _, after in reversed(changes):
             if isinstance(after, tuple):
@@ -88,6 +93,18 @@ class Drawing:
                 follow = kernels_of(steps, len(some) * STEP_NS).follow_all
                 pixels += follow(self.codes, *self._corner, *many, self._places, self._near, self._masks)
         return pixels
+
+    def cells(self, looks: int) -> Bools | None:
+        """The coarse map, when as many pixels were looked up since the last change as would have paid for it.
+
+        None as long as they were not, and where more than half of its cells hold something.
+        """
+        before, self._looks = self._looks, self._looks + looks
+        pays = self.codes.size >> 2 * pointquery.CELL_BITS
+        if before < pays <= self._looks:
+            cells = pointquery.occupied(self.codes)
+            self._cells = cells if 2 * int(cells.sum()) <= cells.size else None
+        return self._cells
 
 
 class CodePlane:
@@ -150,6 +167,11 @@ class CodePlane:
             self._drawn = self._counted = items.version
             self._cost = 0
             return self._drawing.codes
+
+    def cells(self, looks: int) -> Bools | None:
+        """The coarse map of what was read, for as many looks, if there is one: see `Drawing.cells`."""
+        with self._lock:
+            return None if self._drawing is None else self._drawing.cells(looks)
 
 
 def _kind(items: Items) -> type[np.uint16 | np.uint32]:

@@ -24,10 +24,9 @@ def snapped(at: Floats) -> tuple[Ints, Ints] | None:
 
     None if one is no number within the limits.
     """
-    made = np.abs(at)
-    if not made.max(initial=0) <= LIMIT:  # of which one is not a number, the largest is not
+    if not (at.max(initial=0) <= LIMIT and at.min(initial=0) >= -LIMIT):  # if one is not a number, neither are these
         return None
-    np.multiply(at, SCALE, out=made)
+    made = at * SCALE
     made += ROUNDING
     whole = made.view(np.int64)
     whole -= ROUNDING_BITS

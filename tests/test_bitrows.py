@@ -207,24 +207,6 @@ def test_the_order_of_rows(name: str, seed: int, far: int) -> None:
     assert order.tolist() == sorted(range(count), key=lambda i: [key[i] for key in keys])
 
 
-@settings(deadline=None)
-@given(SEEDS, st.sampled_from([np.uint16, np.uint32]))
-@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
-def test_what_lies_in_front_at_a_pixel(name: str, seed: int, kind: type) -> None:
-    if name.endswith("jit"):
-        pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
-    codes, objects = rng.choice([0, 2, 3, 4, 5, 6, 7], (5, 7)).astype(kind), rng.random(3) < 0.6
-    x, y = rng.integers(-3, 10, (2, 40))
-    place, item = kernels.front_at(codes, (1, -1, 7, 3), x, y, objects)
-    told = []
-    for i, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
-        code = int(codes[py + 1, px - 1]) if 1 <= px <= 7 and -1 <= py <= 3 else 0
-        if code >= 2 and objects[code // 2 - 1]:
-            told.append((i, code // 2 - 1))
-    assert list(zip(place.tolist(), item.tolist(), strict=True)) == told
-
-
 def boxes(rng: np.random.Generator, count: int, far: int, side: int) -> np.ndarray:
     low = rng.integers(-far, far + 1, (count, 2))
     return np.concatenate([low, low + rng.integers(0, side, (count, 2))], axis=1)

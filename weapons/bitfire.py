@@ -162,7 +162,7 @@ def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
 
     def read(_: Shots, volley: Volley) -> Rows:
         _tell_patterns(volley, sight.plan)
-        rows = points(volley, codes, plane.box_xyxy, objects, kernels_of(bitrows))
+        rows = points(volley, codes, plane.cells(len(volley)), plane.box_xyxy, objects)
         sight.plan.run("read", "one code for each sample", rows.nbytes)
         return rows
 

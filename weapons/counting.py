@@ -9,9 +9,11 @@ from types import ModuleType
 
 import numpy as np
 
+from planes import pointquery
 from planes.arrays import Bools, Codes, Ints
 from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
 from planes.spans import Box, ragged
+from planes.twins import kernels_of
 from weapons.hits import Rows
 from weapons.volley import Volley
 
@@ -83,15 +85,17 @@ def counted(
     )  # fmt: skip
 
 
-def points(volley: Volley, codes: Codes, plane_xyxy: Box, objects: Bools, kernels: ModuleType) -> Rows:
+def points(volley: Volley, codes: Codes, cells: Bools | None, plane_xyxy: Box, objects: Bools) -> Rows:
     """Rows of placements of the pixel that they lie on: what the code plane tells of it.
 
     Parameters
     ----------
+    cells : coarse map of the plane, if there is one
     objects : by id, whether it can be hit
     """
-    place, item = kernels.front_at(codes, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
-    return Rows(*volley.turn_of(place), item, None, None, None, None, volley.xy[place], None)
+    front_at = kernels_of(pointquery).front_at
+    place, item = front_at(codes, cells, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
+    return Rows(*volley.turn_of(place), item, None, None, None, None, volley.xy.take(place, axis=0), None)
 
 
 def _sums(values: Ints, first: Ints) -> Ints:
