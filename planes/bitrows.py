@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
 from planes.spans import Box
+from planes.strips import meets_strip
 
 __all__ = [
     "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "cut_off", "found",
@@ -37,8 +38,14 @@ NOWHERE, NOWHERE_LOSES = 255, 240
 A pixel is within 63 columns, and (255 + a)**2 - (63 + a)**2 > 240**2.
 """
 
-WORDS_AT_ONCE = 2**16
-"""Words of pairs worked on at a time: 512 KB, half of a level-2 cache; with fewer the calls weigh more."""
+WORDS_AT_ONCE = 2**15
+"""Words of pairs worked on at a time: 256 KB, a quarter of a level-2 cache; with fewer the calls weigh more."""
+
+PAIRS_AT_ONCE = 15 * 2**10
+"""Pairs whose boxes are compared at a time: 120 KB for each column; of those that meet, so many as have enough words.
+
+Of 128 KB on, each column would be new pages from the system.
+"""
 
 _ONE, _FULL = np.uint64(1), np.uint64(2**64 - 1)
 _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
@@ -82,6 +89,7 @@ class Windows(NamedTuple):
     rows : (n,) words from one column of words to the next
     words : flat
     shifted : words from the window at one column to that at the next; 0 if not all 64 shifts of each word are made
+    strips : (n, 4) of the patterns, see `planes.strips`; (0, 4) where boxes tell as much
     """
 
     box_xyxy: Ints
@@ -89,6 +97,7 @@ class Windows(NamedTuple):
     rows: Ints
     words: Words
     shifted: int
+    strips: Ints
 
 
 class Placed(NamedTuple):
@@ -99,6 +108,15 @@ class Placed(NamedTuple):
     y: Ints
     origin_x: Ints
     origin_y: Ints
+
+
+class Meeting(NamedTuple):
+    """Pairs (n,) of a placement and a tile that may share pixels; `left`, `top` are its corner about the placement."""
+
+    placement: Ints
+    tile: Ints
+    left: Ints
+    top: Ints
 
 
 class Found(NamedTuple):
@@ -182,47 +200,71 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
         empty
     """
     height = _rows_counted(windows, seen)
-    low, step = height < seen.height, WORDS_AT_ONCE // height
-    x, y = placed.x - placed.origin_x, placed.y - placed.origin_y
+    step = WORDS_AT_ONCE // height
+    tiles, asked = seen.box_xyxy.T.copy(), _placed_boxes(placed, windows)
     parts = [Found(*[np.zeros(0, np.int64)] * 6)]
-    for first in range(0, len(near), step):
-        now = slice(first, first + step)
-        who, at, pattern, left, top = _meeting(placed, windows, seen, placement[now], near[now])
-        begin = seen.begin[at]
-        if low:
-            begin -= top
-            top = np.full_like(top, windows.box_xyxy[pattern, 1])
-            begin += top
-        rows = rows_of(seen.words, height, begin)
-        rows &= windows_at(windows, height, pattern, left, top)
-        samples = _sums(np.bitwise_count(rows))
-        hit = samples.nonzero()[0]
-        who, at = who[hit], at[hit]
-        left, top = left[hit] + x[who], top[hit] + y[who]
-        if low or not len(beside):
-            distance2, across, down = nearest(rows[hit], left, top)
-        else:
-            distance2, across, down = _nearest_seen(seen, beside, at, left, top)
-        across += placed.origin_x[who]
-        down += placed.origin_y[who]
-        parts.append(Found(who, at, samples[hit], distance2, across, down))
+    for first in range(0, len(near), PAIRS_AT_ONCE):
+        now = slice(first, first + PAIRS_AT_ONCE)
+        met = _meeting(placed, windows, tiles, asked, (placement[now], near[now]))
+        parts += [
+            _counted(placed, windows, seen, Meeting(*[column[i : i + step] for column in met]), height, beside)
+            for i in range(0, len(met.tile), step)
+        ]
     return Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _meeting(
-    placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: Ints
-) -> tuple[Ints, Ints, Ints | int, Ints, Ints]:
-    """Pairs whose boxes share a pixel: placement, tile, pattern, and the tile's corner about the placement."""
-    pattern = _which(placed, windows, placement)
-    x, y, tiles, boxes = placed.x[placement], placed.y[placement], seen.box_xyxy[near], windows.box_xyxy
-    left, top = tiles[:, 0] - x, tiles[:, 1] - y
-    met = left <= boxes[pattern, 2]
-    met &= top <= boxes[pattern, 3]
-    met &= tiles[:, 2] - x >= boxes[pattern, 0]
-    met &= tiles[:, 3] - y >= boxes[pattern, 1]
-    some = met.nonzero()[0]
-    placement = placement[some]
-    return placement, near[some], _which(placed, windows, placement), left[some], top[some]
+def _meeting(placed: Placed, windows: Windows, tiles: Ints, asked: Ints, pairs: tuple[Ints, Ints]) -> Meeting:
+    """Those of pairs whose boxes share a pixel, and that are not beyond the strips of their patterns.
+
+    Parameters
+    ----------
+    tiles, asked : (4, V) and (4, P) sides of the boxes of tiles and of placed patterns
+    """
+    placement, near = pairs
+    for low, high in ((0, 2), (1, 3)):
+        met = tiles[low].take(near) <= asked[high].take(placement)
+        met &= tiles[high].take(near) >= asked[low].take(placement)
+        some = met.nonzero()[0]
+        placement, near = placement.take(some), near.take(some)
+    left, top = tiles[0].take(near) - placed.x.take(placement), tiles[1].take(near) - placed.y.take(placement)
+    if len(windows.strips) and len(near):
+        wide, high = (int(np.maximum.reduce(tiles[side + 2] - tiles[side])) + 1 for side in (0, 1))
+        some = meets_strip(windows.strips, _which(placed, windows, placement), left, top, wide, high)
+        placement, near, left, top = placement.take(some), near.take(some), left.take(some), top.take(some)
+    return Meeting(placement, near, left, top)
+
+
+def _placed_boxes(placed: Placed, windows: Windows) -> Ints:
+    """Sides (4, P) of the boxes of placed patterns."""
+    box = windows.box_xyxy.T
+    asked = np.empty((4, len(placed.x)), np.int64)
+    for side, place in enumerate((placed.x, placed.y, placed.x, placed.y)):
+        np.add(place, box[side].take(placed.pattern) if len(windows.first) > 1 else box[side], out=asked[side])
+    return asked
+
+
+def _counted(placed: Placed, windows: Windows, seen: Seen, met: Meeting, height: int, beside: Beside) -> Found:
+    """What pairs share, compared in so many rows."""
+    who, at, left, top = met
+    pattern, begin, low = _which(placed, windows, who), seen.begin[at], height < seen.height
+    if low:
+        begin -= top
+        top = np.full_like(top, windows.box_xyxy[pattern, 1])
+        begin += top
+    rows = rows_of(seen.words, height, begin)
+    rows &= windows_at(windows, height, pattern, left, top)
+    samples = _sums(np.bitwise_count(rows))
+    hit = samples.nonzero()[0]
+    who, at = who[hit], at[hit]
+    left = left[hit] + placed.x[who] - placed.origin_x[who]
+    top = top[hit] + placed.y[who] - placed.origin_y[who]
+    if low or not len(beside):
+        distance2, across, down = nearest(rows[hit], left, top)
+    else:
+        distance2, across, down = _nearest_seen(seen, beside, at, left, top)
+    across += placed.origin_x[who]
+    down += placed.origin_y[who]
+    return Found(who, at, samples[hit], distance2, across, down)
 
 
 def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:

@@ -19,6 +19,7 @@ from planes.twins import in_parts
 __all__ = [
     "bits_of",
     "found",
+    "is_beyond",
     "is_far",
     "key_of",
     "put_rows",
@@ -93,6 +94,15 @@ def is_far(origin_x, origin_y, left, top, right, bottom):
     """Whether a box about an origin is too far from it for `key_of`."""
     across = max(abs(left - origin_x), abs(right - origin_x))
     return max(across, abs(top - origin_y), abs(bottom - origin_y)) >= SIDE
+
+
+@njit(inline="always")
+def is_beyond(strips, pattern, x, y, left, top, right, bottom):
+    """Whether a box lies beyond the strip of a pattern that is placed on a pixel."""
+    a, b = strips[pattern, 0], strips[pattern, 1]
+    low = min(a * (left - x), a * (right - x)) + min(b * (top - y), b * (bottom - y))
+    high = max(a * (left - x), a * (right - x)) + max(b * (top - y), b * (bottom - y))
+    return (low > strips[pattern, 3]) | (high < strips[pattern, 2])
 
 
 @njit

@@ -8,7 +8,7 @@ from numba import njit, types
 from planes import lookup
 from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
-from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_far, key_of, put_rows, rows_by, shared
+from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_beyond, is_far, key_of, put_rows, rows_by, shared
 from planes.cells import Cells
 from planes.compiled import compiled
 
@@ -28,12 +28,12 @@ def _cell_at(x, y, cells_x, cells_y, bits, wide, high):
 @compiled(
     types.UniTuple(types.int64, 2)(
             types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS,
+            *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS,
             *[types.int64] * 5, INTS, INTS,
     )
 )  # fmt: skip
 def _looked_up(
-    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
     rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
 ):  # fmt: skip
     room = out.shape[1]
@@ -60,6 +60,8 @@ def _looked_up(
             at = listed[place]
             low, lowest = max(box[at, 1], top), min(box[at, 3], bottom)
             if (box[at, 0] > right) | (box[at, 2] < left) | (low > lowest):
+                continue
+            if len(strips) and is_beyond(strips, kind, x[who], y[who], box[at, 0], box[at, 1], box[at, 2], box[at, 3]):
                 continue
             offset = box[at, 0] - left + 63
             word = first[kind] + (offset >> 6) * step - top
@@ -89,7 +91,7 @@ def _looked_up(
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
     """See `lookup.looked_up`; `beside` is not needed."""
     arrays = (
-        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words,
+        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips,
         seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells,
     )  # fmt: skip
 

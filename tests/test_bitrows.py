@@ -83,8 +83,10 @@ class Case:
         self.patterns = []
         for _ in range(rng.choice([1, 1, 3])):
             mask = mask_of(rng, rng.randint(1, most), rng.randint(1, rng.choice([6, most])))
+            if rng.random() < 0.3:  # a long one, of which the boxes of most tiles tell less than its strip
+                mask = np.eye(rng.randint(100, 300), dtype=np.bool_)[:: rng.choice([-1, 1])]
             self.patterns.append((Spans.from_mask(mask, (0, 0)), rng.randint(-20, 5), rng.randint(-20, 5), mask))
-        spans = [Spans.from_mask(mask, (left, top)) for _, left, top, mask in self.patterns]
+        spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for _, left, top, mask in self.patterns]
         self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
         count = rng.randint(1, 6)
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)])
@@ -151,7 +153,10 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
     side = range(-radius, radius + 1)
     mask = np.array([[x * x + y * y <= radius * radius for x in side] for y in side])
     spans = Spans.from_mask(mask, (-radius, -radius))
-    case.patterns, case.windows = [(spans, -radius, -radius, mask)], windows._made([spans], rng.random() < 0.5)
+    case.patterns, case.windows = (
+        [(spans, -radius, -radius, mask)],
+        windows._made([Pattern(spans, None)], rng.random() < 0.5),
+    )
     x, y = case.placed.x, case.placed.y
     case.placed = Placed(np.zeros_like(x), x, y, x, y)
     beside = bitrows.beside_of(case.seen)

@@ -17,6 +17,7 @@ from planes.spans import Spans
 from planes.tiles import TileAtlas
 from planes.twins import kernels_of
 from weapons import windows
+from weapons.pattern import Pattern
 
 Pixel = tuple[int, int]
 
@@ -73,7 +74,10 @@ class Case:
             (mask_of(rng, most), -rng.randint(0, most // 2), -rng.randint(0, most // 2))
             for _ in range(rng.randint(1, 3))
         ]
-        spans = [Spans.from_mask(mask, (left, top)) for mask, left, top in self.patterns]
+        if rng.random() < 0.2:  # a long one, of which the boxes of most tiles tell less than its strip
+            line = np.eye(rng.randint(100, 200), dtype=np.bool_)[:: rng.choice([-1, 1])]
+            self.patterns = [(line, -rng.randint(0, 100), -rng.randint(0, 100))]
+        spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for mask, left, top in self.patterns]
         self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
         count = 0 if rng.random() < 0.05 else rng.choice([1, 2, 5])
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)], np.int64)
@@ -157,7 +161,7 @@ def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
     """A tile of 64 x 64 px is hit at its corners wherever it lies among the cells, which begin with another tile."""
     tiles = TileAtlas().tiles(enumerate([np.ones((64, 64), np.bool_)] * 2), np.arange(2), 1)
     every, none = np.full(2, 1), np.zeros(0, np.bool_)
-    dot = windows._made([Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0))], False)
+    dot = windows._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)], False)
     for offset in range(64):
         corner = np.array([(-64, -128), (offset, offset)])
         boxes = np.concatenate([corner, corner + 63], axis=1)
@@ -181,7 +185,7 @@ def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: boo
         pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
         found = kernels_of(fronttoback).front_to_back(
             Placed(zero, zero, zero, zero, zero),
-            windows._made([spans], False),
+            windows._made([Pattern(spans, None)], False),
             pile,
             None,
             None,

@@ -13,14 +13,14 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "twins", "compiled", "schema", "exact", "sines", "sines_jit", "grid256",
-        "snapping", "snapping_jit", "spans", "stack", "bitrows", "bitrows_jit", "itemrows", "cells",
-        "cells_jit", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit", "tiles", "bigrows",
-        "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids", "quadtree",
-        "bvh", "broadphase", "triangles", "slabs", "image", "kept", "sprite", "hull", "cover",
-        "outline", "fit", "bounding", "placing", "placing_jit", "items", "cropping", "cropping_jit",
-        "visible", "index", "painting", "painting_jit", "steps", "steps_jit", "pointquery",
-        "pointquery_jit", "compose", "jumps", "jumps_jit", "clearance", "labels", "poses", "scenefile",
-        "scene", "loading", "history", "render", "sampling",
+        "snapping", "snapping_jit", "spans", "strips", "stack", "bitrows", "bitrows_jit", "itemrows",
+        "cells", "cells_jit", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit", "tiles",
+        "bigrows", "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids",
+        "quadtree", "bvh", "broadphase", "triangles", "slabs", "image", "kept", "sprite", "hull",
+        "cover", "outline", "fit", "bounding", "placing", "placing_jit", "items", "cropping",
+        "cropping_jit", "visible", "index", "painting", "painting_jit", "steps", "steps_jit",
+        "pointquery", "pointquery_jit", "compose", "jumps", "jumps_jit", "clearance", "labels", "poses",
+        "scenefile", "scene", "loading", "history", "render", "sampling",
     ),
     "weapons": (
         "draws", "draws_jit", "weapon", "columns", "pattern", "windows", "guns", "arsenal", "volley",

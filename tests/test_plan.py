@@ -333,8 +333,8 @@ def test_plans_are_added_up() -> None:
 MOST, SLACK = 16, 60_000
 """While a stage works it holds at most so many times the bytes that it hands on, and some beside."""
 
-AT_ONCE = 4 * 8 * WORDS_AT_ONCE
-"""Bytes that bit rows hold while some are counted: two sets of rows, windows and their counts."""
+AT_ONCE = 5 * 8 * WORDS_AT_ONCE
+"""Bytes that bit rows hold while some are counted: rows, windows, and three sets for the nearest."""
 
 SELECTING = {"pre-filter", "broad phase", "volumes", "filter", "occluders", "verdicts", "plan"}
 """Stages that hand on less than they look at."""
@@ -515,7 +515,7 @@ SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), 
 OF_SCENES = (
     "arrays bitrows cells compose constants cropping fronttoback grid256 image index itemrows items kept labels lookup"
     " painting placing pointquery poses rasterise sampling scene scenefile schema sines snapping spans sprite stack"
-    " steps tiles twins visible"
+    " steps strips tiles twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"

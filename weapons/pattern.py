@@ -15,6 +15,7 @@ from planes.bitrows import WORD
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
+from planes.strips import Strip, strip_of
 
 if TYPE_CHECKING:
     from planes.volumes import Volumes
@@ -49,6 +50,11 @@ class Pattern:
         """What its bit rows take in `weapons.windows`."""
         x, y, x_max, y_max = self.spans.box_xyxy or (0, 0, -1, -1)
         return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
+
+    @cached_property
+    def strip(self) -> Strip:
+        """The strip that its pixels lie in."""
+        return strip_of(self.spans)
 
     @cached_property
     def table(self) -> PatternTable:

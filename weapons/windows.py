@@ -9,6 +9,7 @@ import numpy as np
 from planes.bitrows import WORD, Windows, Words
 from planes.kept import Kept
 from planes.spans import Spans
+from planes.strips import strips_of
 from weapons.pattern import Pattern
 
 __all__ = ["fits", "windows_of"]
@@ -48,20 +49,21 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
         told = vars(patterns[0])
         told["placed"] = placed = told.get("placed", 0) + placements
         often = placed > OFTEN
-    return _kept.get((tuple(patterns), often), lambda: _made([pattern.spans for pattern in patterns], often))
+    return _kept.get((tuple(patterns), often), lambda: _made(patterns, often))
 
 
-def _made(patterns: Sequence[Spans], often: bool) -> Windows:
-    boxes = [spans.box_xyxy or (0, 0, -1, -1) for spans in patterns]
-    columns = [_columns(spans) for spans in patterns]
+def _made(patterns: Sequence[Pattern], often: bool) -> Windows:
+    boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
+    strips = strips_of([pattern.strip for pattern in patterns], boxes)
+    columns = [_columns(pattern.spans) for pattern in patterns]
     rows = np.array([words.shape[1] for words in columns])
     if often:
         words = columns[0]
         shifts = np.arange(WORD, dtype=np.uint64)[:, None]
         table = (words[:-1, None] >> shifts) | (words[1:, None] << (np.uint64(WORD) - shifts))
-        return Windows(np.array(boxes), np.array([WORD]), WORD * rows, table.reshape(-1), words.shape[1])
+        return Windows(boxes, np.array([WORD]), WORD * rows, table.reshape(-1), words.shape[1], strips)
     first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
-    return Windows(np.array(boxes), first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0)
+    return Windows(boxes, first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0, strips)
 
 
 def _columns(spans: Spans) -> Words:
