@@ -127,7 +127,7 @@ class Spans:
         """Pixels of each run."""
         return self.x_last - self.x_first + 1
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Pixels of the set."""
         return int(self.lengths.sum())

@@ -378,7 +378,7 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     told = {
         "shots": 2 * 2 * word,
         "stack": 8 * word + 1,
-        "patterns": (3 * 5 + 2 + 1 + 4) * word,
+        "patterns": (3 * 5 + 1 + 4) * word,
         "plan": 0,
         "weights": (9 + 1) * word + 3 * word,
         "verdicts": 2 * 5 * word,

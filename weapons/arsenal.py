@@ -157,7 +157,7 @@ class Polygon(Plain):
     points: Sequence[Sequence[float]]
     holes: Sequence[Sequence[Sequence[float]]] = ()
 
-    @property
+    @cached_property
     def reach_256(self) -> int:
         """Distance of the farthest point."""
         return _farthest(np.concatenate(self._rings()))
@@ -246,7 +246,7 @@ class Stencil(Plain):
     def _sprite(self) -> Sprite:
         return Sprite.from_mask(Mask().check("mask", self.mask), pivot_xy=self.pivot_xy)
 
-    @property
+    @cached_property
     def reach_256(self) -> int:
         """Distance of the farthest pixel, unturned."""
         return _farthest(SUB * self.spans(1 << 30, 0).pixels())

@@ -74,7 +74,7 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
         return "direct", "no bounds that fit one plane"
     patterns = max(len(table.count), 1)
     samples = placements * int(table.count.sum()) / patterns
-    spans = placements * len(table.y) / patterns
+    spans = placements * table.runs / patterns
     composed = COMPOSED_CALL_NS + placements * COMPOSED_PLACEMENT_NS + spans * COMPOSED_SPAN_NS
     composed += samples * COMPOSED_PIXEL_NS + plane.cost(scene.items) * REDRAW_PIXEL_NS
     x, y, x_max, y_max = plane.box_xyxy

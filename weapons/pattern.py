@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -121,58 +121,90 @@ def smoothed(linear: Ints, falloff: str) -> Ints:
     return linear
 
 
+class TableSpans(NamedTuple):
+    """Spans of several patterns, one after another, as columns.
+
+    Parameters
+    ----------
+    y, x_first, x_last : of each
+    ordinal : (n,) number of its first pixel in the prefix sums, less its `x_first`
+    row : (n,) a number that rises with pattern and row, by which the spans of a range of rows are found
+    top, rows : the least row, and how many there are
+    """
+
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+    ordinal: Ints
+    row: Ints
+    top: int
+    rows: int
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return 5 * self.y.nbytes
+
+
 class PatternTable:
-    """The distinct patterns of a call, one after another.
+    """The distinct patterns of a call; their spans, one after another, are put together when they are asked for.
 
     Parameters
     ----------
     patterns : they themselves
-    begin : (n + 1,) first span of each pattern
     count : (n,) pixels of each
     box_xyxy : (n, 4) inclusive; x_max < x_min for an empty pattern
     """
 
     def __init__(self, patterns: Sequence[Pattern]) -> None:
         self.patterns = patterns
-        spans = [p.spans for p in patterns]
-        self.y = np.concatenate([s.y for s in spans])
-        self.x_first = np.concatenate([s.x_first for s in spans])
-        self.x_last = np.concatenate([s.x_last for s in spans])
-        self.begin = np.cumsum([0, *(len(s) for s in spans)])
-        self.count = np.array([s.count for s in spans], np.int64)
-        self.box_xyxy = np.array([s.box_xyxy or (0, 0, -1, -1) for s in spans], np.int64)
-        self.prefix: Ints | None = None
-        lengths = self.x_last - self.x_first + 1
-        ordinal = np.cumsum(lengths) - lengths
-        if patterns[0].prefix is not None:
-            self.prefix = np.concatenate([p.prefix for p in patterns if p.prefix is not None])
-            ordinal = ordinal + np.repeat(np.arange(len(patterns)), np.diff(self.begin))  # each prefix begins with a 0
-        self.ordinal = ordinal - self.x_first
-        # One rising number for each row of each pattern finds the spans of a range of rows.
-        self._top = int(self.y.min(initial=0))
-        self._rows = int(self.y.max(initial=0)) - self._top + 1
-        self._row = np.repeat(np.arange(len(patterns)), np.diff(self.begin)) * (self._rows + 2) + self.y - self._top
+        self.count = np.array([p.spans.count for p in patterns], np.int64)
+        self.box_xyxy = np.array([p.spans.box_xyxy or (0, 0, -1, -1) for p in patterns], np.int64)
+
+    @property
+    def runs(self) -> int:
+        """Spans of all patterns."""
+        return sum(len(p.spans) for p in self.patterns)
 
     @cached_property
+    def prefix(self) -> Ints | None:
+        """Prefix sums of the weights of all patterns; None if all have full weight."""
+        prefixes = [p.prefix for p in self.patterns if p.prefix is not None]
+        return np.concatenate(prefixes) if prefixes else None
+
+    @cached_property
+    def spans(self) -> TableSpans:
+        """Spans of all patterns."""
+        spans = [p.spans for p in self.patterns]
+        y, x_first, x_last = (np.concatenate([getattr(s, side) for s in spans]) for side in ("y", "x_first", "x_last"))
+        pattern = np.repeat(np.arange(len(spans)), [len(s) for s in spans])
+        lengths = x_last - x_first + 1
+        ordinal = np.cumsum(lengths) - lengths - x_first
+        if self.prefix is not None:
+            ordinal += pattern  # each prefix begins with a 0
+        top = int(y.min(initial=0))
+        rows = int(y.max(initial=0)) - top + 1
+        return TableSpans(y, x_first, x_last, ordinal, pattern * (rows + 2) + y - top, top, rows)
+
+    @property
     def nbytes(self) -> int:
-        """Bytes of the spans and of what finds them, without those of the weights."""
-        columns = (self.begin, self.count, self.box_xyxy)
-        return 5 * self.y.nbytes + sum(column.nbytes for column in columns)
+        """Bytes of what there is for each pattern, without their spans and weights."""
+        return self.count.nbytes + self.box_xyxy.nbytes
 
     def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
         """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""
-        rows = self._rows
-        low, high = (np.clip(boxes_xyxy[:, side] - y - self._top, -1, rows) for side in (1, 3))
-        first = np.searchsorted(self._row, pattern * (rows + 2) + low)
-        last = np.searchsorted(self._row, pattern * (rows + 2) + high, side="right")
+        spans, rows = self.spans, self.spans.rows
+        low, high = (np.clip(boxes_xyxy[:, side] - y - spans.top, -1, rows) for side in (1, 3))
+        first = np.searchsorted(spans.row, pattern * (rows + 2) + low)
+        last = np.searchsorted(spans.row, pattern * (rows + 2) + high, side="right")
         owner, place = ragged(np.maximum(last - first, 0))
         span = first[owner] + place
         box = boxes_xyxy[owner]
-        x_first = np.maximum(self.x_first[span] + x[owner], box[:, 0])
-        x_last = np.minimum(self.x_last[span] + x[owner], box[:, 2])
+        x_first = np.maximum(spans.x_first[span] + x[owner], box[:, 0])
+        x_last = np.minimum(spans.x_last[span] + x[owner], box[:, 2])
         some = x_first <= x_last
-        row = self.y[span] + y[owner]
-        ordinal = self.ordinal[span] - x[owner]
+        row = spans.y[span] + y[owner]
+        ordinal = spans.ordinal[span] - x[owner]
         return Runs(owner[some], row[some], x_first[some], x_last[some], ordinal[some])
 
     def weight(self, ordinal: Ints, x_first: Ints, x_last: Ints) -> Ints:

@@ -73,7 +73,7 @@ def verdicts_of(weapon: Weapon, shots: Shots, sight: Sight) -> Ints:
 
 def _tell_patterns(plan: Plan, volley: Volley, made: int) -> None:
     """Record the patterns of a part of the shots, and their weights."""
-    plan.run("patterns", f"{len(volley.table.count)} distinct", made)
+    plan.run("patterns", f"{len(volley.table.count)} distinct", made + volley.table.spans.nbytes)
     if volley.table.prefix is not None:
         plan.run("weights", "falloff of the hit pixels, by prefix sums", volley.table.prefix.nbytes)
 
