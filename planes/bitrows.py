@@ -7,6 +7,7 @@ Every function is from arrays to arrays; `bitrows_jit` has the same ones, compil
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
@@ -133,9 +134,12 @@ class Found(NamedTuple):
     y: Ints
 
 
-def packed(mask: Bools) -> Words:
-    """Rows (h,) of a mask (h, w) of at most 64 columns."""
-    return np.asarray((mask * _PLACES[: mask.shape[1]]).sum(axis=1, dtype=np.uint64))
+def packed(masks: Sequence[Bools]) -> Words:
+    """Rows (n, 64) of masks (h, w), each of at most 64 x 64 pixels."""
+    bits = np.zeros((len(masks), WORD, WORD), np.bool_)
+    for own, mask in zip(bits, masks, strict=True):
+        own[: mask.shape[0], : mask.shape[1]] = mask
+    return np.packbits(bits, axis=2, bitorder="little").view("<u8")[..., 0].astype(np.uint64)
 
 
 def rows_of(words: npt.NDArray[Kind], height: int, begin: Ints) -> npt.NDArray[Kind]:

@@ -396,8 +396,8 @@ class Items:
 
         if not self._tiles:
             self._tiles.append(TileAtlas())
-        used = ((variant.uid, variant.mask) for variant in self.variants)
-        return self._tiles[0].tiles(used, self.mask[stack.ids], stack.forms)
+        variants, ids = self.variants, stack.ids
+        return self._tiles[0].tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, and the row of each item's, which has pixels: in px about its mask's pixel [0, 0]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,10 @@ STRIDE = 3 * WORD
 ATLAS_SLACK = 1024
 """Tiles no longer in use that an atlas keeps, beside as many as are."""
 
-NO_FLAGS = np.zeros(0, np.bool_)
+PACKED_AT_ONCE = 1024
+"""Tiles whose pixels, 4 KB each, are packed in one go."""
+
+NO_FLAGS, NO_NUMBERS = np.zeros(0, np.bool_), np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +82,17 @@ class Tiles:
 
 
 class TileAtlas:
-    """Tiles of masks, by the number of the mask; those no longer in use are dropped in time."""
+    """Tiles of masks, by the number of the mask; those no longer in use are dropped in time.
+
+    Each has a slot of STRIDE words, which is written once: tiles that were handed out stay.
+    """
 
     def __init__(self) -> None:
         self.words: Words = np.zeros(4 * STRIDE, np.uint64)
-        self._used = 0
-        self._first: dict[int, int] = {}
-        self._count: dict[int, int] = {}
         self._columns = np.zeros((4, 4), np.int64)  # left, top, width, height
+        self._used = self._enough = 0  # slots; with more than enough, tiles no longer in use are looked for
+        self._places: dict[int, tuple[int, int]] = {}  # of each mask: its first slot, and how many
+        self._number, self._slots = NO_NUMBERS, np.zeros((0, 2), np.int64)  # of the last stack: masks, their places
         self._last: tuple[int, Tiles] | None = None
         self._lock = threading.Lock()
 
@@ -95,56 +101,86 @@ class TileAtlas:
         last = self._last
         return last[1] if last is not None and last[0] == forms else None
 
-    def tiles(self, masks: Iterable[tuple[int, Bools]], number: Ints, forms: int) -> Tiles:
+    def tiles(self, mask_of: Callable[[int], Bools], number: Ints, forms: int) -> Tiles:
         """Tiles of the items of a stack.
 
         Parameters
         ----------
-        masks : number and mask (h, w) of all that are in use
-        number : (M,) of the mask of each item
+        mask_of : tells the mask (h, w) of the item of a rank
+        number : (M,) of the mask of each item; equal masks may have the same
         forms : of the stack: another of the same has the same tiles
         """
         with self._lock:
             if self._last is None or self._last[0] != forms:
-                self._last = forms, self._listed(masks, number)
+                self._last = forms, self._listed(*self._found(mask_of, number))
             return self._last[1]
 
-    def _listed(self, masks: Iterable[tuple[int, Bools]], number: Ints) -> Tiles:
-        distinct, which = np.unique(number, return_inverse=True)
-        kept = sum(self._count[uid] for uid in distinct.tolist() if uid in self._first)
-        if self._used > 2 * kept + ATLAS_SLACK:
-            self._first, self._used = {}, 0
-            self.words, self._columns = np.zeros(4 * STRIDE, np.uint64), np.zeros((4, 4), np.int64)
-        missing = set(distinct.tolist()) - self._first.keys()
-        for uid, mask in masks if missing else ():
-            if uid in missing and uid not in self._first:
-                self._append(uid, mask)
-        first = np.array([self._first[uid] for uid in distinct.tolist()], np.int64)[which]
-        count = np.array([self._count[uid] for uid in distinct.tolist()], np.int64)[which]
-        rank, place = ragged(count)
+    def _listed(self, first: Ints, count: Ints) -> Tiles:
+        """Tiles of masks, each of some slots from a first one on."""
+        whole = bool((count == 1).all())
+        rank, place = (np.arange(len(count)), 0) if whole else ragged(count)
         slot = first[rank] + place
-        left, top, width, height = self._columns[slot].T
-        size = np.stack([width, height], axis=1)
-        whole = len(rank) == len(number) and not left.any() and not top.any()
+        columns = self._columns.take(slot, axis=0)
+        whole &= not columns[:, :2].any()
+        left, top, size = columns[:, 0], columns[:, 1], columns[:, 2:]
         return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole)
 
-    def _append(self, uid: int, mask: Bools) -> None:
-        """Cut one mask into tiles, without those that have no pixel."""
-        self._first[uid] = self._used
-        for top in range(0, mask.shape[0], WORD):
-            for left in range(0, mask.shape[1], WORD):
-                part = mask[top : top + WORD, left : left + WORD]
-                if part.any():
-                    self._put(left, top, part)
-        self._count[uid] = self._used - self._first[uid]
+    def _found(self, mask_of: Callable[[int], Bools], number: Ints) -> Ints:
+        """First slot and count (2, M) of each mask of a stack; only what the last stack had not is looked for."""
+        if len(self._number) != len(number) or self._used > self._enough:
+            self._drop_unused(number)
+            self._number, self._slots = np.full(len(number), -1), np.zeros((len(number), 2), np.int64)
+        changed = np.flatnonzero(self._number != number)
+        distinct, at, which = np.unique(number[changed], return_index=True, return_inverse=True)
+        asked = list(zip(distinct.tolist(), changed[at].tolist(), strict=True))
+        self._add([(one, mask_of(rank)) for one, rank in asked if one not in self._places])
+        places = np.array([self._places[one] for one, _ in asked], np.int64).reshape(-1, 2)
+        self._number, self._slots[changed] = number, places[which]
+        return self._slots.T
 
-    def _put(self, left: int, top: int, part: Bools) -> None:
-        if (self._used + 1) * STRIDE > len(self.words):
-            grown = np.zeros(2 * len(self.words), np.uint64)
-            grown[: len(self.words)] = self.words
-            self.words = grown  # tiles that were handed out keep the old rows
-            self._columns = np.concatenate([self._columns, np.zeros_like(self._columns)])
-        begin = self._used * STRIDE + WORD
-        self.words[begin : begin + part.shape[0]] = packed(part)
-        self._columns[self._used] = left, top, part.shape[1], part.shape[0]
-        self._used += 1
+    def _drop_unused(self, number: Ints) -> None:
+        """Keep only the tiles of some masks, if that halves the atlas."""
+        used = {one: self._places[one] for one in sorted(set(number.tolist())) if one in self._places}
+        first, count = np.array(list(used.values()), np.int64).reshape(-1, 2).T
+        kept = int(count.sum())
+        self._enough = 2 * kept + ATLAS_SLACK
+        if self._used <= self._enough:
+            return
+        which, place = ragged(count)
+        slots, words, columns = first[which] + place, self.words.reshape(-1, STRIDE), self._columns
+        self._allot(max(2 * kept, 4))
+        self.words.reshape(-1, STRIDE)[:kept], self._columns[:kept] = words[slots], columns[slots]
+        begin = (np.cumsum(count) - count).tolist()
+        self._places = dict(zip(used, zip(begin, count.tolist(), strict=True), strict=True))
+        self._used = kept
+
+    def _allot(self, slots: int) -> None:
+        self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 4), np.int64)
+
+    def _add(self, masks: list[tuple[int, Bools]]) -> None:
+        """Cut masks into tiles, without those that have no pixel."""
+        parts: list[tuple[int, int, Bools]] = []
+        places = {}
+        for number, mask in masks:
+            begin = self._used + len(parts)
+            for top in range(0, mask.shape[0], WORD):
+                for left in range(0, mask.shape[1], WORD):
+                    part = mask[top : top + WORD, left : left + WORD]
+                    if part.any():
+                        parts.append((left, top, part))
+            places[number] = begin, self._used + len(parts) - begin
+        for first in range(0, len(parts), PACKED_AT_ONCE):
+            self._put(parts[first : first + PACKED_AT_ONCE])
+        self._places.update(places)
+
+    def _put(self, parts: list[tuple[int, int, Bools]]) -> None:
+        """Pack parts (h, w) of masks, each from some left and top on, into the next slots."""
+        end = self._used + len(parts)
+        if end > len(self._columns):
+            words, columns = self.words, self._columns
+            self._allot(max(end, 2 * len(columns)))
+            self.words[: len(words)], self._columns[: len(columns)] = words, columns
+        rows = packed([part for _, _, part in parts])
+        self.words.reshape(-1, STRIDE)[self._used : end, WORD : 2 * WORD] = rows
+        self._columns[self._used : end] = [(left, top, *part.shape[::-1]) for left, top, part in parts]
+        self._used = end

@@ -77,7 +77,7 @@ class Case:
         height = -(-max(m.shape[0] for m in masks) // 8) * 8
         packed = np.zeros((len(masks), height), np.uint64)
         for row, mask in zip(packed, masks, strict=True):
-            row[: len(mask)] = bitrows.packed(mask)
+            row[: len(mask)] = bitrows.packed([mask])[0, : len(mask)]
         self.seen: Seen = visible._laid_out(np.arange(len(masks)), boxes, packed)
         most = rng.choice([3, 12, 40, 150])
         self.patterns = []
@@ -181,7 +181,7 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
     words = np.zeros(STRIDE * len(masks) + WORD, np.uint64)
     begin = np.arange(len(masks)) * STRIDE + WORD
     for mask, first in zip(masks, begin.tolist(), strict=True):
-        words[first : first + len(mask)] = bitrows.packed(mask)
+        words[first : first + WORD] = bitrows.packed([mask])[0]
     pairs = sorted((rng.randrange(len(masks)), rng.randrange(len(masks))) for _ in range(rng.randint(0, 9)))
     shift = [(rng.randint(-63, 63), rng.randint(-63, 63)) for _ in pairs]
     of, other = np.array(pairs, np.int64).reshape(-1, 2).T
@@ -276,7 +276,7 @@ def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, few: int, a
 
 
 def tiled(masks: list[np.ndarray], atlas: TileAtlas, forms: int) -> Tiles:
-    return atlas.tiles(enumerate(masks), np.arange(len(masks)), forms)
+    return atlas.tiles(masks.__getitem__, np.arange(len(masks)), forms)
 
 
 def pixels_in(words: np.ndarray, begin: int, left: int, top: int, height: int) -> set[Pixel]:
@@ -361,22 +361,32 @@ def test_rows_are_cropped_to_their_pixels(name: str, seed: int) -> None:
 
 
 def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tiles that were handed out stay; memory follows what is in use."""
+    """All, some or none of the masks are new ones, in any order; tiles that were handed out stay; memory follows."""
     monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 4)
-    rng, atlas = random.Random(1), TileAtlas()
-    old, kept = atlas.tiles([], np.zeros(0, np.int64), -1), atlas.words
-    for forms in range(60):
-        masks = {10 * forms + k: mask_of(rng, rng.randint(1, 140), rng.randint(1, 70)) for k in range(3)}
-        tiles = atlas.tiles(masks.items(), np.array(list(masks)), forms)
+    monkeypatch.setattr("planes.tiles.PACKED_AT_ONCE", 3)
+    rng, atlas, made, number = random.Random(1), TileAtlas(), [], [0, 0, 0]
+    old, kept = atlas.tiles([].__getitem__, np.zeros(0, np.int64), -1), atlas.words
+    for forms in range(120):
+        made += [mask_of(rng, rng.randint(1, 140), rng.randint(1, 70)) for _ in "abc"]
+        fresh = range(len(made) - 3, len(made))
+        number = [rng.choice(fresh) if rng.random() < 0.4 else one for one in number]
+        if forms in (10, 20, 30):
+            number = rng.choices(fresh, k=rng.randint(0, 4))
+        rng.shuffle(number)
+        tiles = atlas.tiles([made[one] for one in number].__getitem__, np.array(number, np.int64), forms)
         words = tiles.words.copy()
-        assert atlas.tiles([], np.array(list(masks)), forms) is tiles
-        for rank, mask in enumerate(masks.values()):
+        assert atlas.tiles([].__getitem__, np.array(number), forms) is tiles
+        for rank, one in enumerate(number):
             own = [k for k in range(len(tiles)) if tiles.rank[k] == rank]
             told = [pixels_in(words, int(tiles.begin[k]), int(tiles.left[k]), int(tiles.top[k]), 64) for k in own]
-            assert set().union(*told) == pixels_of(mask, 0, 0)
+            assert set().union(*told) == pixels_of(made[one], 0, 0)
+            assert [set(tiles.size_wh[k].tolist()) for k in own] == [
+                {min(64, made[one].shape[1] - tiles.left[k]), min(64, made[one].shape[0] - tiles.top[k])} for k in own
+            ]
+        assert tiles.whole == (tiles.rank.tolist() == list(range(len(number))) and not (tiles.left | tiles.top).any())
         assert all(np.array_equal(old.words[b : b + 64], kept[b : b + 64]) for b in old.begin.tolist())
+        assert len(atlas.words) <= 128 * STRIDE and len(atlas._columns) * STRIDE == len(atlas.words)
         old, kept = tiles, words
-    assert len(atlas.words) <= 64 * STRIDE and len(atlas._columns) * STRIDE == len(atlas.words)
 
 
 def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:

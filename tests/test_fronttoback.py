@@ -48,7 +48,7 @@ class Case:
         if masks and rng.random() < 0.3:  # all alike, so that what is said of the largest tile holds of each
             masks = [np.ones_like(masks[0])] * len(masks)
         corners = [(far + rng.randint(-spread, spread), rng.randint(-spread, spread)) for _ in masks]
-        tiles = TileAtlas().tiles(enumerate(masks), np.arange(len(masks)), 1)
+        tiles = TileAtlas().tiles(masks.__getitem__, np.arange(len(masks)), 1)
         boxes = np.array(
             [(x, y, x + m.shape[1] - 1, y + m.shape[0] - 1) for m, (x, y) in zip(masks, corners, strict=True)], np.int64
         )
@@ -159,7 +159,7 @@ def test_each_pixel_ends_at_the_first_item_that_the_shot_accepts(jit: bool) -> N
 
 def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
     """A tile of 64 x 64 px is hit at its corners wherever it lies among the cells, which begin with another tile."""
-    tiles = TileAtlas().tiles(enumerate([np.ones((64, 64), np.bool_)] * 2), np.arange(2), 1)
+    tiles = TileAtlas().tiles(([np.ones((64, 64), np.bool_)] * 2).__getitem__, np.arange(2), 1)
     every, none = np.full(2, 1), np.zeros(0, np.bool_)
     dot = windows._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)], False)
     for offset in range(64):
@@ -180,7 +180,7 @@ def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: boo
     for seed in range(9):
         corners = random.Random(seed).sample(around, len(around))
         masks = [tall, *[np.ones((1, 1), np.bool_)] * len(corners)]
-        tiles = TileAtlas().tiles(enumerate(masks), np.arange(len(masks)), 1)
+        tiles = TileAtlas().tiles(masks.__getitem__, np.arange(len(masks)), 1)
         boxes = np.array([(9, 0, 9, 19), *[(x, y, x, y) for x, y in corners]])
         pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
         found = kernels_of(fronttoback).front_to_back(
