@@ -128,6 +128,8 @@ def bools(field: str, values: object, shape: Shape) -> Bools:
 
 def real(field: str, value: object, low: float, high: float) -> float:
     """Check one finite number in [low, high]."""
+    if type(value) is float and low <= value <= high:
+        return value
     given = float(value) if type(value) is int and value.bit_length() < FLOAT_BITS else value
     number = float(reals(field, given, ()))
     if not low <= number <= high:

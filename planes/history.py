@@ -11,7 +11,6 @@ import pickle
 import threading
 from bisect import bisect
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple, NoReturn, TypeVar
 from weakref import WeakValueDictionary
 
@@ -112,11 +111,11 @@ class PastItems(Items):
         self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
         for item, angle in angles.items():
             quarter, c, s = quarter_turns(angle)
-            form = replace(self.forms[item], quarter=quarter, c=c, s=s)
+            form = self.forms[item]._replace(quarter=quarter, c=c, s=s)
             with within(f"object {item} at {angle:.15g} degrees"):
                 variant = variant_of(self.sprites[item], form)
             self.angles[item], self.forms[item], self.variants[item] = angle, form, variant
-            self._use(item, variant)
+            self._use([item], [variant])
         for name in COLUMNS:
             _sealed(getattr(self, name))
 

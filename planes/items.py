@@ -191,7 +191,7 @@ class Items:
         for column, value in values.items():
             getattr(self, column)[item] = value
         self.alive[item] = 1
-        self._use(item, variant)
+        self._use([item], [variant])
         self.record(np.array([item]))
         return item
 
@@ -225,7 +225,7 @@ class Items:
         for item, form, variant in zip(ids, forms, variants, strict=True):
             self.atlas.drop(self.variants[item])
             self.forms[item], self.variants[item] = form, variant
-            self._use(item, variant)
+        self._use(ids, variants)
 
     def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
         """Note that items changed in some columns."""
@@ -423,11 +423,13 @@ class Items:
         volumes, row = self.bounding(Kind(name) if k is None else Kind(KINDS[2], k), ids)
         return shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
 
-    def _use(self, item: int, variant: Variant) -> None:
-        self.offset[item] = self.atlas.take(variant)
-        self.mask[item] = variant.uid
-        self.pivot_256[item] = variant.pivot_x, variant.pivot_y
-        self.size_wh[item] = variant.mask.shape[::-1]
+    def _use(self, ids: Sequence[int], variants: Sequence[Variant]) -> None:
+        """Let the columns of items tell of their masks."""
+        take = self.atlas.take
+        told = [(take(one), one.uid, one.pivot_x, one.pivot_y, *one.mask.shape[::-1]) for one in variants]
+        columns = np.array(told, np.int64).reshape(-1, 6)
+        self.offset[ids], self.mask[ids] = columns[:, 0], columns[:, 1]
+        self.pivot_256[ids], self.size_wh[ids] = columns[:, 2:4], columns[:, 4:]
 
     def _compact(self) -> None:
         """Lay the masks in use out anew, without the others."""

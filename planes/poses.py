@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals, within
+from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals
 from planes.constants import POSITION_MAX, SCALE_BITS, SUB
 from planes.items import Items
 from planes.sprite import Form, form_of
@@ -74,10 +74,12 @@ def changed_forms(
         flips = each("flip", flip, n).tolist()
         if len(flips) != n:
             raise InputError(f"flip: expected one for all or {n}, got {len(flips)}")
-    forms = []
-    for row, (item, number, side, pair, turn) in enumerate(zip(ids, frames, flips, scales, angles, strict=True)):
-        with within(f"row {row}"):
-            forms.append(form_of(items.sprites[item], number, side, (pair[0], pair[1]), turn))
+    forms: list[Form] = []
+    try:
+        for item, number, side, (sx, sy), turn in zip(ids, frames, flips, scales, angles, strict=True):
+            forms.append(form_of(items.sprites[item], number, side, (sx, sy), turn))
+    except InputError as error:
+        raise InputError(f"row {len(forms)}: {error}") from error
     return angles, forms
 
 

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -57,8 +57,7 @@ FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(NamedTuple):
     """All of a pose that changes a mask, as integers: frame, flip, scale in 1/65536, quarter turns and the rest."""
 
     frame: int = 0
@@ -229,8 +228,8 @@ def as_sprite(value: object) -> Sprite:
 def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Form:
     """Check a pose and reduce it to what changes the mask."""
     number = integer("frame", frame, 0, sprite.frame_count - 1)
-    scales = [real(f"scale[{i}]", v, SCALE_MIN, SCALE_MAX) for i, v in enumerate(scale_xy)]
-    sx, sy = (round(v * ONE) for v in scales)
+    sx = round(real("scale[0]", scale_xy[0], SCALE_MIN, SCALE_MAX) * ONE)
+    sy = round(real("scale[1]", scale_xy[1], SCALE_MIN, SCALE_MAX) * ONE)
     return Form(number, choice("flip", flip, FLIPS), sx, sy, *quarter_turns(angle))
 
 

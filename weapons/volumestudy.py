@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -103,7 +102,7 @@ def _reboxed(scene: Scene) -> list[Volumes]:
 def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
     """Mask of an object before its turn, its pivot in the mask, and where the mask goes then, px."""
     items = scene.items
-    variant = variant_of(items.sprites[item], replace(items.forms[item], quarter=0, c=1 << TRIG_BITS, s=0))
+    variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
     pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
     return variant.mask, pivot, items.position_256[item] / SUB - pivot
 
