@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,9 +17,21 @@ from planes.arrays import InputError, Ints
 from planes.constants import HALF, SUB, TRIG_BITS
 from planes.twins import kernels_of
 
-__all__ = ["isqrt", "pixel", "quarter_turns", "rounded_div", "scaled", "snap", "turned", "unit", "unit_toward"]
+__all__ = [
+    "isqrt",
+    "over_one",
+    "pixel",
+    "quarter_turns",
+    "rounded_div",
+    "scaled",
+    "snap",
+    "turned",
+    "unit",
+    "unit_toward",
+]
 
 ONE = 1 << TRIG_BITS
+Whole = TypeVar("Whole", int, Ints)
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
 
@@ -83,24 +96,27 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
     folded = math.fmod(degrees, 360.0)
     k = math.floor((folded + 45) / 90)
     k += (folded - 90 * k >= 45) - (folded - 90 * k < -45)
-    c, s = unit(folded - 90 * k)
-    return k % 4, int(c), int(s)
+    radians = math.radians(folded - 90 * k)
+    c, s = math.cos(radians) * ONE, math.sin(radians) * ONE
+    if max(abs(c - round(c)), abs(s - round(s))) > 0.5 - sines.DOUBT:
+        c, s = _exactly(folded - 90 * k)
+    return k % 4, round(c), round(s)
 
 
 def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
     """Turn points (N, 2) by a direction, or each by its own (N,), about the origin; rounded once, half to even."""
     x, y = points_256[..., 0], points_256[..., 1]
-    return np.stack([_over_one(x * c - y * s), _over_one(x * s + y * c)], axis=-1)
+    return np.stack([over_one(x * c - y * s), over_one(x * s + y * c)], axis=-1)
 
 
 def scaled(directions: Ints, length_256: int) -> Ints:
     """Directions, (cos, sin) times 2**30, at a length; rounded once, half to even."""
-    return _over_one(directions * length_256)
+    return over_one(directions * length_256)
 
 
-def _over_one(numerator: Ints) -> Ints:
+def over_one(numerator: Whole) -> Whole:
     """Divide by 2**30, rounding half to even: up from a half if what is below it is odd."""
-    return np.asarray((numerator + (ONE // 2 - 1) + ((numerator >> TRIG_BITS) & 1)) >> TRIG_BITS)
+    return (numerator + (ONE // 2 - 1) + ((numerator >> TRIG_BITS) & 1)) >> TRIG_BITS
 
 
 def _exactly(degrees: float) -> tuple[int, int]:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planes import turning
 from planes.arrays import (
     Bools,
     Image,
@@ -46,15 +47,22 @@ from planes.constants import (
     VARIANT_BYTES,
     VARIANT_CACHE_BYTES,
 )
-from planes.grid256 import quarter_turns, rounded_div, snap, turned
+from planes.grid256 import over_one, quarter_turns, rounded_div, snap, turned
 from planes.kept import Kept
 from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
+from planes.twins import kernels_of
 
 __all__ = ["Form", "Sprite", "Variant", "as_sprite", "form_of", "frame_pivot", "picture_of", "rows_of", "variant_of"]
 
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
+
+FINE_BITS = TRIG_BITS - SCALE_BITS
+"""By what a turned position is finer than one that is scaled."""
+
+MAPPED_NS = 20
+"""What it takes in numpy to turn a pixel of a mask."""
 
 
 class Form(NamedTuple):
@@ -249,8 +257,8 @@ def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple
         image = np.zeros((*variant.mask.shape, 4), np.uint8)
         image[variant.mask] = (*(sprite.color or color), 255)
         return image, variant.pivot_x, variant.pivot_y
-    source, pivot_x, pivot_y = _source_pixels(frame.mask, frame_pivot(sprite, frame), form)
-    image = frame.image.reshape(-1, 4)[np.maximum(source, 0)]
+    source, _, pivot_x, pivot_y = _mapped(frame.mask, frame_pivot(sprite, frame), form)
+    image = _flipped(frame.image, form.flip).reshape(-1, 4)[np.maximum(source, 0)]
     image[source < 0] = 0
     return image, pivot_x, pivot_y
 
@@ -266,14 +274,12 @@ def _make_variant(sprite: Sprite, form: Form) -> Variant:
         pivot_x, pivot_y = -SUB * x, -SUB * y
     else:
         frame = sprite.frames[form.frame]
-        source, pivot_x, pivot_y = _source_pixels(frame.mask, frame_pivot(sprite, frame), form)
-        mask = frame.mask.reshape(-1)[np.maximum(source, 0)] & (source >= 0) if frame.mask.size else frame.mask
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
+        _, mask, pivot_x, pivot_y = _mapped(frame.mask, frame_pivot(sprite, frame), form)
+    (x, y, x_max, y_max), area = kernels_of(turning).sides_of(mask)
+    if not area:
         return Variant((sprite.uid, form), np.zeros((0, 0), np.bool_), 0, 0, 0)
-    y, x = int(rows[0]), int(columns[0])
-    cropped = _frozen(mask[y : rows[-1] + 1, x : columns[-1] + 1])
-    return Variant((sprite.uid, form), cropped, pivot_x - SUB * x, pivot_y - SUB * y, int(cropped.sum()))
+    cropped = _frozen(mask[y : y_max + 1, x : x_max + 1])
+    return Variant((sprite.uid, form), cropped, pivot_x - SUB * x, pivot_y - SUB * y, area)
 
 
 def _shape_spans(outline: Outline, form: Form) -> Spans:
@@ -294,37 +300,49 @@ def _shape_spans(outline: Outline, form: Form) -> Spans:
     return polygon(rings)
 
 
-def _source_pixels(mask: Bools, pivot_256: tuple[int, int], form: Form) -> tuple[Ints, int, int]:
-    """For each pixel of the result the flat index of the frame's pixel it comes from (-1: none), and the pivot."""
+def _mapped(mask: Bools, pivot_256: tuple[int, int], form: Form) -> tuple[Ints, Bools, int, int]:
+    """Flip, scale and turn a frame.
+
+    Returns
+    -------
+    for each pixel of the result the flat index of the flipped frame's pixel that it comes from, -1 for none; whether
+    that one is set; and the pivot (x, y)
+    """
     h, w = mask.shape
-    source = np.arange(h * w).reshape(h, w)
     x, y = pivot_256
+    held = _flipped(mask, form.flip)
+    source = np.arange(h * w).reshape(h, w)
     if "x" in form.flip:
-        source, x = source[:, ::-1], SUB * (w - 1) - x
+        x = SUB * (w - 1) - x
     if form.flip in ("y", "xy"):
-        source, y = source[::-1], SUB * (h - 1) - y
+        y = SUB * (h - 1) - y
     if not form.plain and mask.size:
-        source, x, y = _inverse_mapped(source, mask.reshape(-1), x, y, form)
+        source, held, x, y = _inverse_mapped(held, x, y, form)
     for _ in range(form.quarter):
-        source, x, y = np.rot90(source, -1), SUB * (source.shape[0] - 1) - y, x
-    return source, x, y
+        source, held, x, y = source.T[:, ::-1], held.T[:, ::-1], SUB * (held.shape[0] - 1) - y, x
+    return source, held, x, y
 
 
-def _inverse_mapped(source: Ints, inside: Bools, x: int, y: int, form: Form) -> tuple[Ints, int, int]:
-    """Scale and turn by r: map each centre of the result back to the squares of the frame that hold it."""
-    h, w = source.shape
-    pivot, (width, height) = _result_grid((w, h), (x, y), form)
-    dx = SUB * np.arange(width) - pivot[0]
-    dy = (SUB * np.arange(height) - pivot[1])[:, None]
-    columns = _squares(dx * form.c + dy * form.s, x, form.scale_x)
-    rows = _squares(dy * form.c - dx * form.s, y, form.scale_y)
-    found = np.full((height, width), -1, np.int64)
-    held = np.zeros(found.shape, np.bool_)
-    for row, column in itertools.product(rows, columns):
-        valid = (row >= 0) & (row < h) & (column >= 0) & (column < w) & ~held
-        found[valid] = source[row[valid], column[valid]]
-        held[valid] = inside[found[valid]]
-    return found, pivot[0], pivot[1]
+def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
+    """An array (h, w, ...) flipped, in one piece."""
+    return np.ascontiguousarray(array[:: -1 if flip in ("y", "xy") else 1, :: -1 if "x" in flip else 1])
+
+
+def _inverse_mapped(inside: Bools, x: int, y: int, form: Form) -> tuple[Ints, Bools, int, int]:
+    """Scale and turn by r: map each centre of the result back to the squares of the frame that hold it.
+
+    A centre (dx, dy) from the pivot is (dx c + dy s, dy c - dx s) from it on the frame, in 2**-38 px of the result:
+    divided by the scale, and counted from the border of pixel [0, 0], it tells column and row.
+    """
+    h, w = inside.shape
+    (left, top), size_wh = _result_grid((w, h), (x, y), form)
+    c, s = form.c, form.s
+    column = (x + HALF) * (form.scale_x << FINE_BITS) - left * c - top * s
+    row = (y + HALF) * (form.scale_y << FINE_BITS) - top * c + left * s
+    unit = (SUB * form.scale_x << FINE_BITS, SUB * form.scale_y << FINE_BITS)
+    kernel = kernels_of(turning, size_wh[0] * size_wh[1] * MAPPED_NS).inverse_mapped
+    source, held = kernel(inside, size_wh, (column, row), (SUB * c, SUB * s), unit)
+    return source, held, left, top
 
 
 def _result_grid(
@@ -338,24 +356,19 @@ def _result_grid(
     edges, places = [], []
     for size, v, scale in zip(size_wh, pivot, (form.scale_x, form.scale_y), strict=True):
         edges.append([(e - v) * scale // ONE + up for e, up in ((-HALF, 0), (SUB * size - HALF, 1))])
-        halves = rounded_div(np.array((v + HALF) * scale - HALF * ONE), HALF * ONE)
-        places.append(v % SUB if scale == ONE else int(halves) * HALF % SUB)
-    corners = turned(np.array(list(itertools.product(*edges))), form.c, form.s)
-    low, high = (corners.min(axis=0) - 1).tolist(), (corners.max(axis=0) + 1).tolist()
+        if scale == ONE:
+            places.append(v % SUB)
+        else:
+            halves = rounded_div(np.array((v + HALF) * scale - HALF * ONE), HALF * ONE)
+            places.append(int(halves) * HALF % SUB)
+    c, s = form.c, form.s
+    across = [over_one(x * c - y * s) for x in edges[0] for y in edges[1]]
+    down = [over_one(x * s + y * c) for x in edges[0] for y in edges[1]]
+    low, high = (min(across) - 1, min(down) - 1), (max(across) + 1, max(down) + 1)
     x, y = (place - SUB * ((edge + place) // SUB) for place, edge in zip(places, low, strict=True))
     width, height = (high[0] + x) // SUB + 1, (high[1] + y) // SUB + 1
     _check_size("scale", width, height)
     return (x, y), (width, height)
-
-
-def _squares(mapped: Ints, pivot: int, scale: int) -> list[Ints]:
-    """Columns (or rows) of the closed squares that hold positions; two of them where a position is on a border.
-
-    `mapped` is in 2**-38 px of the result; column = floor(mapped / scale + pivot + 1/2).
-    """
-    column, rest = np.divmod(mapped + (pivot + HALF) * scale * (1 << 14), scale * (1 << 22))
-    border = rest == 0
-    return [column, column - border] if border.any() else [column]
 
 
 def frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:

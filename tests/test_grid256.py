@@ -384,7 +384,7 @@ def test_unit_toward_refuses_no_direction() -> None:
 
 
 @MANY
-@given(any_angle)
+@given(st.one_of(any_angle, near_halves))
 @example(45.0)
 @example(-45.0)
 @example(135.0)

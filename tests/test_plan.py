@@ -515,7 +515,7 @@ SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), 
 OF_SCENES = (
     "arrays bitrows cells compose constants cropping fronttoback grid256 image index itemrows items kept labels lookup"
     " painting placing pointquery poses rasterise sampling scene scenefile schema sines snapping spans sprite stack"
-    " steps strips tiles twins visible"
+    " steps strips tiles turning twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"

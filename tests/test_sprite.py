@@ -1,7 +1,9 @@
 """Images and shapes to placed masks, against a reference that asks one pixel at a time, and the laws of placement."""
 
+import importlib
 import itertools
 import math
+import random
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,17 +11,18 @@ import numpy as np
 import oracle_raster
 import oracle_sprite as oracle
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from planes import sprite as module
+from planes import turning
 from planes.arrays import InputError
 from planes.constants import VARIANT_BYTES
 from planes.kept import Kept
 from planes.scene import Scene
 from planes.sprite import Form, Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
 
-AGAINST = settings(max_examples=120, deadline=None)
+AGAINST = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 LAWS = settings(max_examples=80, deadline=None)
 
 FULL = 1 << 16
@@ -89,6 +92,7 @@ def sprite_of(mask: np.ndarray, pivot: tuple[int, int] | None = None) -> Sprite:
 @example(np.ones((1, 1), np.bool_), (2000, -700), "xy", (0.3, 0.3), 135.0, (1, 1))
 @example(np.ones((4, 3), np.bool_), (129, 127), "y", (1.5, 1.5), 90.0, (64, 192))
 def test_placed_mask_is_the_reference(
+    jit: bool,
     mask: np.ndarray,
     pivot: tuple[int, int] | None,
     flip: str,
@@ -98,6 +102,34 @@ def test_placed_mask_is_the_reference(
 ) -> None:
     expected = oracle.placed_mask(mask.tolist(), pivot, turn_of(flip, scale, angle), position)
     assert placed(sprite_of(mask, pivot), position, flip=flip, scale=scale, angle=angle) == expected
+
+
+@pytest.mark.parametrize("name", ["planes.turning", "planes.turning_jit"])
+@LAWS
+@given(masks(), st.integers(0, 2**32))
+def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(name: str, mask: np.ndarray, seed: int) -> None:
+    """Steps of a few parts, so that many places are on borders; both kernels choose the same of several squares."""
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+    rng = random.Random(seed)
+    (h, w), (width, height) = mask.shape, (rng.randint(1, 12), rng.randint(1, 12))
+    unit, step = (rng.randint(1, 6), rng.randint(1, 6)), (rng.randint(-9, 9), rng.randint(-9, 9))
+    first = rng.randint(-9, unit[0] * w + 9), rng.randint(-9, unit[1] * h + 9)
+    given = mask, (width, height), first, step, unit
+    found, held = importlib.import_module(name).inverse_mapped(*given)
+    for j, i in itertools.product(range(height), range(width)):
+        place = first[0] + i * step[0] + j * step[1], first[1] + j * step[0] - i * step[1]
+        x, y = ({p // u, -(-p // u) - 1} for p, u in zip(place, unit, strict=True))
+        squares = itertools.product(y, x)
+        inside = [square for square in squares if 0 <= square[0] < h and 0 <= square[1] < w]
+        assert held[j, i] == any(mask[square] for square in inside)
+        assert (divmod(int(found[j, i]), w) in inside) if inside else found[j, i] == -1
+        assert not inside or held[j, i] == mask.reshape(-1)[found[j, i]]
+    assert np.array_equal(found, turning.inverse_mapped(*given)[0])
+    box, area = importlib.import_module(name).sides_of(held)
+    places = np.argwhere(held)
+    assert area == len(places)
+    assert box == ((*places.min(axis=0)[::-1], *places.max(axis=0)[::-1]) if area else (0, 0, -1, -1))
 
 
 @pytest.mark.parametrize("flip", FLIPS)
