@@ -139,7 +139,7 @@ def packed(masks: Sequence[Bools]) -> Words:
     bits = np.zeros((len(masks), WORD, WORD), np.bool_)
     for own, mask in zip(bits, masks, strict=True):
         own[: mask.shape[0], : mask.shape[1]] = mask
-    return np.packbits(bits, axis=2, bitorder="little").view("<u8")[..., 0].astype(np.uint64)
+    return np.packbits(bits.reshape(-1), bitorder="little").view("<u8").astype(np.uint64).reshape(-1, WORD)
 
 
 def rows_of(words: npt.NDArray[Kind], height: int, begin: Ints) -> npt.NDArray[Kind]:

@@ -78,28 +78,27 @@ def boxes_in(field: str, name: object) -> int | None:
 
 @dataclass
 class MaskAtlas:
-    """All masks in use in one flat array; an equal mask is stored once."""
+    """All masks in use in one flat array; one that several items use is stored once."""
 
     flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
     used: int = 0
     live: int = 0
-    offsets: dict[tuple[int, Form], int] = field(default_factory=dict)
-    users: dict[tuple[int, Form], int] = field(default_factory=dict)
+    offsets: dict[int, int] = field(default_factory=dict)
+    users: dict[int, int] = field(default_factory=dict)
 
     def take(self, variant: Variant) -> int:
         """Offset of a mask that an item begins to use."""
-        self.users[variant.key] = self.users.get(variant.key, 0) + 1
-        if self.users[variant.key] == 1:
+        users = self.users[variant.uid] = self.users.get(variant.uid, 0) + 1
+        if users == 1:
             self.live += variant.mask.size
-        if variant.key not in self.offsets:
-            self._append(variant)
-        return self.offsets[variant.key]
+        offset = self.offsets.get(variant.uid)
+        return self._append(variant) if offset is None else offset
 
     def drop(self, variant: Variant) -> None:
         """Tell that an item no longer uses a mask."""
-        self.users[variant.key] -= 1
-        if not self.users[variant.key]:
-            del self.users[variant.key]
+        users = self.users[variant.uid] = self.users[variant.uid] - 1
+        if not users:
+            del self.users[variant.uid]
             self.live -= variant.mask.size
 
     @property
@@ -107,15 +106,15 @@ class MaskAtlas:
         """More than half of it, beyond some slack, is no longer in use."""
         return self.used > 2 * self.live + ATLAS_SLACK_BYTES
 
-    def _append(self, variant: Variant) -> None:
-        end = self.used + variant.mask.size
+    def _append(self, variant: Variant) -> int:
+        begin, end = self.used, self.used + variant.mask.size
         if end > len(self.flat):
             grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
-            grown[: self.used] = self.flat[: self.used]
+            grown[:begin] = self.flat[:begin]
             self.flat = grown  # a stack that was handed out keeps the old array
-        self.flat[self.used : end] = variant.mask.reshape(-1)
-        self.offsets[variant.key] = self.used
-        self.used = end
+        self.flat[begin:end] = variant.mask.reshape(-1)
+        self.offsets[variant.uid], self.used = begin, end
+        return begin
 
 
 COLUMNS: dict[str, tuple[int, ...]] = {

@@ -31,9 +31,10 @@ class Kept(Generic[Key, Value]):
     def get(self, key: Key, make: Callable[[], Value]) -> Value:
         """Find a value, or make it."""
         with self._lock:
-            if key in self.values:
+            found = self.values.get(key)
+            if found is not None:
                 self.values.move_to_end(key)
-                return self.values[key]
+                return found
             made = self.values[key] = make()
             self.bytes += self.size(made)
             while self.bytes > self.limit and len(self.values) > 1:

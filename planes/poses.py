@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
-from planes.arrays import Floats, InputError, Ints, array_of, each, integers, reals
-from planes.constants import POSITION_MAX, SCALE_BITS, SUB
+from planes.arrays import Floats, InputError, Ints, array_of, choice, each, integer, integers, reals, within
+from planes.constants import POSITION_MAX, SUB
+from planes.grid256 import quarter_turns
 from planes.items import Items
-from planes.sprite import Form, form_of
+from planes.sprite import FLIPS, Form, whole_scale
 
 __all__ = ["are_rows", "changed_forms", "one_place", "points", "scale_pair"]
 
-ONE = 1 << SCALE_BITS
 NUMBERS = frozenset((int, float, np.float64))
 FLOAT64 = np.dtype(np.float64)
 
@@ -57,36 +60,54 @@ def changed_forms(
 ) -> tuple[list[float], list[Form] | None]:
     """Angles and forms of objects after a change; no forms if nothing of them changes."""
     n, ids = len(rows), rows.tolist()
-    old = [items.forms[item] for item in ids]
     angles = [items.angles[item] for item in ids]
     if angle is None and scale is None and flip is None and frame is None:
         return angles, None
+    columns: Iterable[Any] = zip(*(items.forms[item] for item in ids), strict=True) if n else ((),) * len(Form())
+    frames, flips, x, y, *turns = columns
     if angle is not None:
         angles = reals("angle", each("angle", angle, n), (n,)).tolist()
-    scales = [[form.scale_x / ONE, form.scale_y / ONE] for form in old]
+        turns = list(zip(*map(quarter_turns, angles), strict=True))
     if scale is not None:
-        scales = _scale_rows(scale, n).tolist()
-    frames = [form.frame for form in old]
+        x, y = _scale_rows(scale, n)
     if frame is not None:
-        frames = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
-    flips = [form.flip for form in old]
+        frames = _frame_rows(frame, [items.sprites[item].frame_count for item in ids])
     if flip is not None:
-        flips = each("flip", flip, n).tolist()
-        if len(flips) != n:
-            raise InputError(f"flip: expected one for all or {n}, got {len(flips)}")
-    forms: list[Form] = []
-    try:
-        for item, number, side, (sx, sy), turn in zip(ids, frames, flips, scales, angles, strict=True):
-            forms.append(form_of(items.sprites[item], number, side, (sx, sy), turn))
-    except InputError as error:
-        raise InputError(f"row {len(forms)}: {error}") from error
-    return angles, forms
+        flips = _flip_rows(flip, n)
+    return angles, list(map(Form, frames, flips, x, y, *turns))
 
 
-def _scale_rows(scale: object, n: int) -> Floats:
-    """One number, one for each (n,), or pairs (n, 2) or (1, 2)."""
+def _frame_rows(frame: object, counts: list[int]) -> list[int]:
+    """One number, or one for each (n,) of objects whose sprites have so many frames."""
+    n = len(counts)
+    numbers: list[int] = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
+    for row, (number, count) in enumerate(zip(numbers, counts, strict=True)):
+        if number >= count:
+            with within(f"row {row}"):
+                integer("frame", number, 0, count - 1)
+    return numbers
+
+
+def _flip_rows(flip: object, n: int) -> list[str]:
+    """One word, or one for each (n,)."""
+    words: list[str] = each("flip", flip, n).tolist()
+    if len(words) != n:
+        raise InputError(f"flip: expected one for all or {n}, got {len(words)}")
+    for row, word in enumerate(words):
+        with within(f"row {row}"):
+            choice("flip", word, FLIPS)
+    return words
+
+
+def _scale_rows(scale: object, n: int) -> tuple[list[int], list[int]]:
+    """Scales in x and y, in 1/65536, of one number, one for each (n,), or pairs (n, 2) or (1, 2)."""
     values = array_of("scale", scale)
     if values.ndim < 2:
         values = each("scale", values, n)[:, None]
     fits = values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2)
-    return reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
+    pairs = reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
+    whole = []
+    for row, (x, y) in enumerate(pairs.tolist()):
+        with within(f"row {row}"):
+            whole.append(whole_scale(x, y))
+    return [x for x, _ in whole], [y for _, y in whole]

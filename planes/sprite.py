@@ -53,7 +53,18 @@ from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
 from planes.twins import kernels_of
 
-__all__ = ["Form", "Sprite", "Variant", "as_sprite", "form_of", "frame_pivot", "picture_of", "rows_of", "variant_of"]
+__all__ = [
+    "Form",
+    "Sprite",
+    "Variant",
+    "as_sprite",
+    "form_of",
+    "frame_pivot",
+    "picture_of",
+    "rows_of",
+    "variant_of",
+    "whole_scale",
+]
 
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
@@ -236,9 +247,14 @@ def as_sprite(value: object) -> Sprite:
 def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Form:
     """Check a pose and reduce it to what changes the mask."""
     number = integer("frame", frame, 0, sprite.frame_count - 1)
-    sx = round(real("scale[0]", scale_xy[0], SCALE_MIN, SCALE_MAX) * ONE)
-    sy = round(real("scale[1]", scale_xy[1], SCALE_MIN, SCALE_MAX) * ONE)
-    return Form(number, choice("flip", flip, FLIPS), sx, sy, *quarter_turns(angle))
+    x, y = whole_scale(*scale_xy)
+    return Form(number, choice("flip", flip, FLIPS), x, y, *quarter_turns(angle))
+
+
+def whole_scale(x: float, y: float) -> tuple[int, int]:
+    """Check a scale and round it to 1/65536."""
+    x, y = real("scale[0]", x, SCALE_MIN, SCALE_MAX), real("scale[1]", y, SCALE_MIN, SCALE_MAX)
+    return round(x * ONE), round(y * ONE)
 
 
 _kept: Kept[tuple[int, Form], Variant] = Kept(VARIANT_CACHE_BYTES, lambda variant: variant.mask.nbytes + VARIANT_BYTES)

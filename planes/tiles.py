@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -157,30 +157,31 @@ class TileAtlas:
     def _allot(self, slots: int) -> None:
         self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 4), np.int64)
 
-    def _add(self, masks: list[tuple[int, Bools]]) -> None:
+    def _add(self, masks: Sequence[tuple[int, Bools]]) -> None:
         """Cut masks into tiles, without those that have no pixel."""
-        parts: list[tuple[int, int, Bools]] = []
-        places = {}
-        for number, mask in masks:
-            begin = self._used + len(parts)
-            for top in range(0, mask.shape[0], WORD):
-                for left in range(0, mask.shape[1], WORD):
-                    part = mask[top : top + WORD, left : left + WORD]
-                    if part.any():
-                        parts.append((left, top, part))
-            places[number] = begin, self._used + len(parts) - begin
+        parts = [
+            (which, left, top, mask[top : top + WORD, left : left + WORD])
+            for which, (_, mask) in enumerate(masks)
+            for top in range(0, mask.shape[0], WORD)
+            for left in range(0, mask.shape[1], WORD)
+        ]
+        begin, count = self._used, np.zeros(len(masks), np.int64)
         for first in range(0, len(parts), PACKED_AT_ONCE):
-            self._put(parts[first : first + PACKED_AT_ONCE])
-        self._places.update(places)
+            count += np.bincount(self._put(parts[first : first + PACKED_AT_ONCE]), minlength=len(masks))
+        places = zip((begin + np.cumsum(count) - count).tolist(), count.tolist(), strict=True)
+        self._places.update(zip((number for number, _ in masks), places, strict=True))
 
-    def _put(self, parts: list[tuple[int, int, Bools]]) -> None:
-        """Pack parts (h, w) of masks, each from some left and top on, into the next slots."""
-        end = self._used + len(parts)
+    def _put(self, parts: Sequence[tuple[int, int, int, Bools]]) -> Ints:
+        """Pack parts (h, w) of masks, each from some left and top on, into the next slots; tell whose each is."""
+        rows = packed([part for *_, part in parts])
+        columns = np.array([(which, left, top, *part.shape[::-1]) for which, left, top, part in parts])
+        full = np.flatnonzero(rows.any(axis=1))
+        end = self._used + len(full)
         if end > len(self._columns):
-            words, columns = self.words, self._columns
-            self._allot(max(end, 2 * len(columns)))
-            self.words[: len(words)], self._columns[: len(columns)] = words, columns
-        rows = packed([part for _, _, part in parts])
-        self.words.reshape(-1, STRIDE)[self._used : end, WORD : 2 * WORD] = rows
-        self._columns[self._used : end] = [(left, top, *part.shape[::-1]) for left, top, part in parts]
+            old = self.words, self._columns
+            self._allot(max(end, 2 * len(old[1])))
+            self.words[: len(old[0])], self._columns[: len(old[1])] = old
+        self.words.reshape(-1, STRIDE)[self._used : end, WORD : 2 * WORD] = rows[full]
+        self._columns[self._used : end] = columns[full, 1:]
         self._used = end
+        return np.asarray(columns[full, 0])

@@ -10,6 +10,7 @@ from test_compose import MASKS, add_one, change, front_to_back, random_scene
 
 from planes import History, InputError, Scene, Sprite
 from planes.items import Role, Stack
+from planes.tiles import Tiles
 
 BLINKING = Sprite.from_image(np.array([[[0] * 4] * 3 + [[255] * 4] * 3] * 4, np.uint8), grid_wh=(3, 4))
 """Two frames: nothing, and a block."""
@@ -60,11 +61,15 @@ def moved(scene: Scene, rng: np.random.Generator) -> None:
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(0, 12))
-def test_the_stack_after_any_change_is_the_one_made_anew(jit: bool, seed: int, count: int) -> None:
+def test_the_stack_after_any_change_is_the_one_made_anew(
+    monkeypatch: pytest.MonkeyPatch, jit: bool, seed: int, count: int
+) -> None:
+    monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 2)
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, count)
     if rng.random() < 0.5:
         scene.add(np.zeros((3, 2), np.bool_))  # never in the stack
+    scene.add(MASKS[14], (3, 3), scale=10.5)  # of several tiles
     blinking = scene.add(BLINKING, (3, 3), layer=int(rng.integers(-1, 2)))
     old: list[tuple[Stack, list[Any]]] = []
     for _ in range(12):
@@ -80,11 +85,26 @@ def test_the_stack_after_any_change_is_the_one_made_anew(jit: bool, seed: int, c
         stack = scene.items.stack()
         assert told(stack) == said_of(scene)
         assert worked_out(stack) == worked_out(scene.items.stack_of(Role.HITTABLE, Role.OCCLUDER))
+        assert masks_of(scene.items.tiles(), stack) == [stack.mask(rank).tolist() for rank in range(len(stack))]
         old.append((stack, told(stack)))
     for stack, before in old:
         assert told(stack) == before, "a stack that was handed out changed"
     alike = {told_forms(stack) for stack, _ in old}
     assert len(alike) == len({number for number, _ in alike})
+
+
+def masks_of(tiles: Tiles, stack: Stack) -> list[Any]:
+    """The masks of a stack, put together of tiles, each of which has a pixel."""
+    masks = [np.zeros_like(stack.mask(rank)) for rank in range(len(stack))]
+    for rank, left, top, (width, height), begin in zip(
+        *(column.tolist() for column in (tiles.rank, tiles.left, tiles.top, tiles.size_wh, tiles.begin)), strict=True
+    ):
+        words = tiles.words[begin - 64 : begin + 128].tolist()
+        assert not any(words[:64]) and not any(words[64 + height :]) and any(words)
+        for y, x in np.ndindex(height, width):
+            masks[rank][top + y, left + x] = words[64 + y] >> x & 1
+        assert not any(word >> width for word in words)
+    return [mask.tolist() for mask in masks]
 
 
 def told_forms(stack: Stack) -> tuple[int, str]:
