@@ -131,11 +131,11 @@ class TileAtlas:
             self._drop_unused(number)
             self._number, self._slots = np.full(len(number), -1), np.zeros((len(number), 2), np.int64)
         changed = np.flatnonzero(self._number != number)
-        distinct, at, which = np.unique(number[changed], return_index=True, return_inverse=True)
-        asked = list(zip(distinct.tolist(), changed[at].tolist(), strict=True))
-        self._add([(one, mask_of(rank)) for one, rank in asked if one not in self._places])
-        places = np.array([self._places[one] for one, _ in asked], np.int64).reshape(-1, 2)
-        self._number, self._slots[changed] = number, places[which]
+        numbers = number[changed].tolist()
+        missing = {one: rank for one, rank in zip(numbers, changed.tolist(), strict=True) if one not in self._places}
+        self._add([(one, mask_of(rank)) for one, rank in missing.items()])
+        self._slots[changed] = np.array([self._places[one] for one in numbers], np.int64).reshape(-1, 2)
+        self._number = number
         return self._slots.T
 
     def _drop_unused(self, number: Ints) -> None:
