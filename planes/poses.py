@@ -9,9 +9,9 @@ import numpy as np
 
 from planes.arrays import Floats, InputError, Ints, array_of, choice, each, integer, integers, reals, within
 from planes.constants import POSITION_MAX, SUB
+from planes.forms import FLIPS, Form, whole_scale
 from planes.grid256 import quarter_turns
 from planes.items import Items
-from planes.sprite import FLIPS, Form, whole_scale
 
 __all__ = ["are_rows", "changed_forms", "one_place", "points", "scale_pair"]
 

@@ -24,6 +24,7 @@ from planes.constants import (
     SCALE_MIN,
     SUB,
 )
+from planes.forms import FLIPS
 from planes.image import read_png, read_text, write_png, write_text
 from planes.items import Role
 from planes.schema import (
@@ -47,7 +48,7 @@ from planes.schema import (
     json_of,
     typed,
 )
-from planes.sprite import FLIPS, Sprite, rows_of
+from planes.sprite import Sprite, rows_of
 
 __all__ = [
     "DEVICE",

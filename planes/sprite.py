@@ -1,10 +1,4 @@
-"""Images and shapes to masks: frames, and the one rule by which they are flipped, scaled, turned and placed.
-
-A turn is 90 k + r degrees: k by exact turns of the array, r by inverse mapping in integers. A pixel of the result is
-set when its centre, mapped back, lies in a closed pixel square that is set; so a mirrored sprite turns into the mirror
-image (but at odd multiples of 45 degrees where width and height are odd and even: there the quarter turn settles how
-the pixels lie). Picture and mask go through the same map: what is drawn is what is tested.
-"""
+"""Images and shapes to masks: frames, and the masks that they have in each form; see `forms`."""
 
 from __future__ import annotations
 
@@ -12,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,17 +31,14 @@ from planes.constants import (
     ALPHA_THRESHOLD,
     FRAMES_MAX,
     HALF,
-    MASK_AREA_MAX,
     MASK_SIDE_MAX,
-    SCALE_BITS,
-    SCALE_MAX,
-    SCALE_MIN,
     SUB,
     TRIG_BITS,
     VARIANT_BYTES,
     VARIANT_CACHE_BYTES,
 )
-from planes.grid256 import over_one, quarter_turns, rounded_div, snap, turned
+from planes.forms import FLIPS, ONE, Form, check_size, flipped, mapped, whole_scale
+from planes.grid256 import quarter_turns, rounded_div, snap, turned
 from planes.kept import Kept
 from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
@@ -65,32 +56,6 @@ __all__ = [
     "variant_of",
     "whole_scale",
 ]
-
-FLIPS = ("none", "x", "y", "xy")
-ONE = 1 << SCALE_BITS
-
-FINE_BITS = TRIG_BITS - SCALE_BITS
-"""By what a turned position is finer than one that is scaled."""
-
-MAPPED_NS = 20
-"""What it takes in numpy to turn a pixel of a mask."""
-
-
-class Form(NamedTuple):
-    """All of a pose that changes a mask, as integers: frame, flip, scale in 1/65536, quarter turns and the rest."""
-
-    frame: int = 0
-    flip: str = "none"
-    scale_x: int = ONE
-    scale_y: int = ONE
-    quarter: int = 0
-    c: int = 1 << TRIG_BITS
-    s: int = 0
-
-    @property
-    def plain(self) -> bool:
-        """No inverse mapping is needed: nothing but flips and quarter turns."""
-        return self.scale_x == self.scale_y == ONE and self.s == 0
 
 
 @dataclass(frozen=True)
@@ -190,7 +155,7 @@ class Sprite:
         """Take a boolean array (h, w) as the mask of one frame."""
         given = array_of("mask", mask)
         if given.ndim == 2:
-            _check_size("mask", given.shape[1], given.shape[0])
+            check_size("mask", given.shape[1], given.shape[0])
         checked = bools("mask", given, (None, None))
         return cls((Frame(_frozen(checked)),), _pivot(pivot_xy), color=_color(color), source=source)
 
@@ -251,12 +216,6 @@ def form_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, 
     return Form(number, choice("flip", flip, FLIPS), x, y, *quarter_turns(angle))
 
 
-def whole_scale(x: float, y: float) -> tuple[int, int]:
-    """Check a scale and round it to 1/65536."""
-    x, y = real("scale[0]", x, SCALE_MIN, SCALE_MAX), real("scale[1]", y, SCALE_MIN, SCALE_MAX)
-    return round(x * ONE), round(y * ONE)
-
-
 _kept: Kept[tuple[int, Form], Variant] = Kept(VARIANT_CACHE_BYTES, lambda variant: variant.mask.nbytes + VARIANT_BYTES)
 
 
@@ -273,8 +232,8 @@ def picture_of(sprite: Sprite, form: Form, color: tuple[int, int, int]) -> tuple
         image = np.zeros((*variant.mask.shape, 4), np.uint8)
         image[variant.mask] = (*(sprite.color or color), 255)
         return image, variant.pivot_x, variant.pivot_y
-    source, _, pivot_x, pivot_y = _mapped(frame.mask, frame_pivot(sprite, frame), form)
-    image = _flipped(frame.image, form.flip).reshape(-1, 4)[np.maximum(source, 0)]
+    source, _, pivot_x, pivot_y = mapped(frame.mask, frame_pivot(sprite, frame), form)
+    image = flipped(frame.image, form.flip).reshape(-1, 4)[np.maximum(source, 0)]
     image[source < 0] = 0
     return image, pivot_x, pivot_y
 
@@ -290,7 +249,7 @@ def _make_variant(sprite: Sprite, form: Form) -> Variant:
         pivot_x, pivot_y = -SUB * x, -SUB * y
     else:
         frame = sprite.frames[form.frame]
-        _, mask, pivot_x, pivot_y = _mapped(frame.mask, frame_pivot(sprite, frame), form)
+        _, mask, pivot_x, pivot_y = mapped(frame.mask, frame_pivot(sprite, frame), form)
     (x, y, x_max, y_max), area = kernels_of(turning).sides_of(mask)
     if not area:
         return Variant((sprite.uid, form), np.zeros((0, 0), np.bool_), 0, 0, 0)
@@ -306,85 +265,14 @@ def _shape_spans(outline: Outline, form: Form) -> Spans:
     if outline.radius is not None:
         a, b = (int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y))
         half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
-        _check_size("scale", *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
+        check_size("scale", *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
         return ellipse(a, b, c, s)
     sign = np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
     scale = np.array([form.scale_x, form.scale_y])
     rings = [turned(rounded_div(r * sign * scale, ONE), c, s) for r in outline.rings]
     every = np.concatenate(rings)
-    _check_size("scale", *(int(v) // SUB + 1 for v in every.max(axis=0) - every.min(axis=0)))
+    check_size("scale", *(int(v) // SUB + 1 for v in every.max(axis=0) - every.min(axis=0)))
     return polygon(rings)
-
-
-def _mapped(mask: Bools, pivot_256: tuple[int, int], form: Form) -> tuple[Ints, Bools, int, int]:
-    """Flip, scale and turn a frame.
-
-    Returns
-    -------
-    for each pixel of the result the flat index of the flipped frame's pixel that it comes from, -1 for none; whether
-    that one is set; and the pivot (x, y)
-    """
-    h, w = mask.shape
-    x, y = pivot_256
-    held = _flipped(mask, form.flip)
-    source = np.arange(h * w).reshape(h, w)
-    if "x" in form.flip:
-        x = SUB * (w - 1) - x
-    if form.flip in ("y", "xy"):
-        y = SUB * (h - 1) - y
-    if not form.plain and mask.size:
-        source, held, x, y = _inverse_mapped(held, x, y, form)
-    for _ in range(form.quarter):
-        source, held, x, y = source.T[:, ::-1], held.T[:, ::-1], SUB * (held.shape[0] - 1) - y, x
-    return source, held, x, y
-
-
-def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
-    """An array (h, w, ...) flipped, in one piece."""
-    return np.ascontiguousarray(array[:: -1 if flip in ("y", "xy") else 1, :: -1 if "x" in flip else 1])
-
-
-def _inverse_mapped(inside: Bools, x: int, y: int, form: Form) -> tuple[Ints, Bools, int, int]:
-    """Scale and turn by r: map each centre of the result back to the squares of the frame that hold it.
-
-    A centre (dx, dy) from the pivot is (dx c + dy s, dy c - dx s) from it on the frame, in 2**-38 px of the result:
-    divided by the scale, and counted from the border of pixel [0, 0], it tells column and row.
-    """
-    h, w = inside.shape
-    (left, top), size_wh = _result_grid((w, h), (x, y), form)
-    c, s = form.c, form.s
-    column = (x + HALF) * (form.scale_x << FINE_BITS) - left * c - top * s
-    row = (y + HALF) * (form.scale_y << FINE_BITS) - top * c + left * s
-    unit = (SUB * form.scale_x << FINE_BITS, SUB * form.scale_y << FINE_BITS)
-    kernel = kernels_of(turning, size_wh[0] * size_wh[1] * MAPPED_NS).inverse_mapped
-    source, held = kernel(inside, size_wh, (column, row), (SUB * c, SUB * s), unit)
-    return source, held, left, top
-
-
-def _result_grid(
-    size_wh: tuple[int, int], pivot: tuple[int, int], form: Form
-) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Pivot and size of a grid that holds the scaled and turned frame.
-
-    The pivot keeps its place between the pixels. A scaled one goes where the edges of the frame put it, to half a
-    pixel: whole scales repeat pixels exactly, and a mirrored frame lies on the mirrored grid.
-    """
-    edges, places = [], []
-    for size, v, scale in zip(size_wh, pivot, (form.scale_x, form.scale_y), strict=True):
-        edges.append([(e - v) * scale // ONE + up for e, up in ((-HALF, 0), (SUB * size - HALF, 1))])
-        if scale == ONE:
-            places.append(v % SUB)
-        else:
-            halves = rounded_div(np.array((v + HALF) * scale - HALF * ONE), HALF * ONE)
-            places.append(int(halves) * HALF % SUB)
-    c, s = form.c, form.s
-    across = [over_one(x * c - y * s) for x in edges[0] for y in edges[1]]
-    down = [over_one(x * s + y * c) for x in edges[0] for y in edges[1]]
-    low, high = (min(across) - 1, min(down) - 1), (max(across) + 1, max(down) + 1)
-    x, y = (place - SUB * ((edge + place) // SUB) for place, edge in zip(places, low, strict=True))
-    width, height = (high[0] + x) // SUB + 1, (high[1] + y) // SUB + 1
-    _check_size("scale", width, height)
-    return (x, y), (width, height)
 
 
 def frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:
@@ -411,7 +299,7 @@ def _as_rgba(image: object) -> Image:
     array = array_of("image", image)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] not in (3, 4):
         raise InputError(f"image: expected bytes of shape (h, w, 3 or 4), got {array.dtype} {array.shape}")
-    _check_size("image", array.shape[1], array.shape[0])
+    check_size("image", array.shape[1], array.shape[0])
     if array.shape[2] == 4:
         return array.copy()
     return np.dstack([array, np.full(array.shape[:2], 255, np.uint8)])
@@ -439,12 +327,6 @@ def _frame_rects(
     if (width // w) * (height // h) > FRAMES_MAX:
         raise InputError(f"grid_wh: expected at most {FRAMES_MAX} frames, got {[w, h]} in {width} x {height}")
     return [[x, y, w, h] for y in range(0, height, h) for x in range(0, width, w)]
-
-
-def _check_size(name: str, width: int, height: int) -> None:
-    if min(width, height) < 1 or max(width, height) > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
-        limit = f"a mask of sides up to {MASK_SIDE_MAX} px and {MASK_AREA_MAX} px in all, not empty"
-        raise InputError(f"{name}: expected {limit}, got {width} x {height}")
 
 
 def _frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -17,7 +17,7 @@ ORDER = {
         "cells", "cells_jit", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit", "tiles",
         "bigrows", "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids",
         "quadtree", "bvh", "broadphase", "triangles", "slabs", "image", "kept", "turning",
-        "turning_jit", "sprite", "hull", "cover", "outline", "fit", "bounding", "placing",
+        "turning_jit", "forms", "sprite", "hull", "cover", "outline", "fit", "bounding", "placing",
         "placing_jit", "items", "cropping", "cropping_jit", "visible", "index", "painting",
         "painting_jit", "steps", "steps_jit", "pointquery", "pointquery_jit", "compose", "jumps",
         "jumps_jit", "clearance", "labels", "poses", "scenefile", "scene", "loading", "history",

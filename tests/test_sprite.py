@@ -517,7 +517,7 @@ def test_a_pose_that_makes_a_mask_too_large_is_refused() -> None:
 @pytest.mark.parametrize("sprite", [Sprite.box(60, 1), Sprite.circle(30)], ids=["box", "ellipse"])
 def test_a_thin_shape_that_turns_into_a_large_mask_is_refused(sprite: Sprite, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lying flat it is 60 x 1; turned by 45 degrees its mask is 43 x 43."""
-    monkeypatch.setattr(module, "MASK_AREA_MAX", 600)
+    monkeypatch.setattr("planes.forms.MASK_AREA_MAX", 600)
     flat = (1.0, 1 / 64)
     assert variant_of(sprite, posed(sprite, scale=flat)).area > 0
     with pytest.raises(InputError, match="scale: expected a mask"):
