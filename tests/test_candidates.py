@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from planes.broadphase import Grid
 from planes.constants import INDEX_SLACK
 from planes.index import STRUCTURES, Index
 from planes.spans import meets
-from weapons import Beam, Box, Cone, Disc, Point, Ring, Rounds, Spread, Stencil, Weapon, costs, fire
+from weapons import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Spread, Stencil, Weapon, costs, fire
 from weapons.arsenal import Plain, pattern_of
 from weapons.candidates import Candidates, prefilter_of
 from weapons.plan import Stage
@@ -69,16 +70,28 @@ def pairs_tested(scene: Scene, weapon: Weapon, at: Any, **how: Any) -> tuple[int
     return stage.pairs
 
 
+def three_crowds() -> list[Scene]:
+    return [crowd(seed, world=seed != 1) for seed in range(3)]
+
+
+@cache
+def trials() -> list[tuple[int, Weapon, Any, Any, Hits]]:
+    """Which crowd, a weapon, places, directions, and what is hit without a pre-filter."""
+    rng, scenes = np.random.default_rng(1), three_crowds()
+    out = []
+    for which, weapon in itertools.product(range(3), WEAPONS):
+        at, aim = rng.uniform(-5, 125, (60, 2)), rng.uniform(-180, 180, 60)
+        truth = fire(scenes[which], weapon, at, aim=aim, prefilter="none", strategy="direct")
+        out.append((which, weapon, at, aim, truth))
+    return out
+
+
 @pytest.mark.parametrize("broadphase", BROADPHASES)
 @pytest.mark.parametrize("prefilter", VOLUMES)
 def test_no_hit_is_lost(prefilter: str, broadphase: str) -> None:
-    rng = np.random.default_rng(1)
-    found = 0
-    for seed, weapon in itertools.product(range(3), WEAPONS):
-        scene = crowd(seed, world=seed != 1)
-        at, aim = rng.uniform(-5, 125, (60, 2)), rng.uniform(-180, 180, 60)
-        truth = fire(scene, weapon, at, aim=aim, prefilter="none", strategy="direct")
-        hits = fire(scene, weapon, at, aim=aim, prefilter=prefilter, broadphase=broadphase, strategy="direct")
+    found, scenes = 0, three_crowds()
+    for which, weapon, at, aim, truth in trials():
+        hits = fire(scenes[which], weapon, at, aim=aim, prefilter=prefilter, broadphase=broadphase, strategy="direct")
         assert hits == truth
         found += len(hits)
     assert found > 700
