@@ -123,8 +123,12 @@ RUN = [sys.executable, "-W", "error", "-m", "weapons"]
 
 
 @pytest.mark.parametrize("word", ["report", "fire", "new", "compare", "replay", "demo"])
-def test_help_shows_examples(word: str) -> None:
-    shown = subprocess.run([*RUN, word, "--help"], capture_output=True, text=True, check=True).stdout
+def test_help_shows_examples(word: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as ended:
+        main([word, "--help"])
+    shown, code = capsys.readouterr().out, ended.value.code
+    assert code == 0
     examples = shown.split("examples:\n")[1].splitlines()
     assert any(line.startswith(f"  hitplanes {word} ") for line in examples)
     assert all(len(line) <= 120 for line in shown.splitlines())

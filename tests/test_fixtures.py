@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import runpy
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,10 +87,13 @@ def test_saved_and_loaded_it_is_the_same(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_script_draws_what_is_in_the_folder(name: str, tmp_path: Path) -> None:
+def test_script_draws_what_is_in_the_folder(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = FIXTURES / name
-    words = [sys.executable, "-W", "error", str(folder / "draw.py"), str(tmp_path)]
-    subprocess.run(words, check=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(folder / "draw.py"), str(tmp_path)])
+    monkeypatch.setattr(sys, "path", [str(folder), *sys.path])
+    monkeypatch.delitem(sys.modules, "drawing", raising=False)  # each script finds it by itself
+    runpy.run_path(sys.argv[0], run_name="__main__")
     assert files_of(tmp_path) == files_of(folder)
     assert (tmp_path / "scene.json").read_bytes() == (folder / "scene.json").read_bytes()
     for file in sorted(file for file in files_of(folder) if file.endswith(".png")):

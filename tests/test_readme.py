@@ -72,20 +72,23 @@ def test_log_example_answers_what_is_shown(tmp_path: Path) -> None:
     assert (tmp_path / "h.jsonl").read_text().splitlines(keepends=True)[1] == answer
 
 
-def test_golden_example_is_written_accepted_and_says_what_changed(tmp_path: Path) -> None:
+def test_golden_example_is_written_accepted_and_says_what_changed(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A user's golden test, in a folder of its own."""
+    tmp_path = pytester.path
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("COLUMNS", "200")
     (code,) = (block for block in blocks("python") if "hits_golden" in block)
     (told,) = re.findall(r"```text\n(.*?)```", section("A golden test of your own game"), flags=re.DOTALL)
     (tmp_path / "test_blast.py").write_text(code)
     shutil.copytree(ROOT / "fixtures" / "gallery", tmp_path / "level1")
 
     def pytest_run(*words: str) -> tuple[int, str]:
-        run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words]
-        env = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-        done = subprocess.run(run, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
-        return done.returncode, done.stdout
+        done = pytester.runpytest_inprocess("-q", "-p", "no:cacheprovider", *words)
+        return int(done.ret), done.stdout.str()
 
-    assert pytest_run()[0] == 1 and not (tmp_path / "goldens").exists()
+    assert pytester.runpytest_subprocess("-q").ret == 1 and not (tmp_path / "goldens").exists()
     assert (tmp_path / "hits-failures" / "index.html").is_file()
     assert pytest_run("--hits-update")[0] == 0 and pytest_run()[0] == 0
     scene = tmp_path / "level1" / "scene.json"
