@@ -687,9 +687,9 @@ def long_record(path: Path, lines: int) -> Scene:
 
 
 def test_a_record_is_read_in_a_stream(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record, "AT_ONCE", 20)
+    monkeypatch.setattr(record, "AT_ONCE", 10)
     peaks = []
-    for lines in (200, 1000):
+    for lines in (100, 500):
         path.unlink(missing_ok=True)
         world = long_record(path, lines)
         tracemalloc.start()

@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 TIMES = ("us_per_shot", "runs", "setup_ms", "kept_bytes", "run_bytes")
 
 
-FEWER = Effort(shots=150, runs=1, seconds=0, objects=40)
+FEWER = Effort(shots=100, runs=1, seconds=0, objects=40)
 FEWEST = Effort(shots=20, runs=1, seconds=0, objects=2)
 
 
