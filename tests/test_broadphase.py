@@ -115,7 +115,7 @@ def test_equals_brute_force_while_boxes_come_move_and_go(make: Maker, d: int, wo
     rng = np.random.default_rng(d + 10)
     rows = world(rng, 200, d)
     plain, other = BruteForce(rows), make(rows)
-    for step in range(8):
+    for step in range(6):
         new = (uniform, world)[step % 2](rng, 60, d)
         assert np.array_equal(plain.insert(new), other.insert(new))
         gone = rng.permutation(plain.ids)[:50]
@@ -734,7 +734,7 @@ def few_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("few_are_many")
 @pytest.mark.parametrize("machine", [Changing, ChangingIn3D])
 def test_any_sequence_of_changes(machine: type[Changing]) -> None:
-    run_state_machine_as_test(machine, settings=settings(max_examples=25, stateful_step_count=15, deadline=None))
+    run_state_machine_as_test(machine, settings=settings(max_examples=10, stateful_step_count=15, deadline=None))
 
 
 @pytest.mark.long

@@ -86,7 +86,7 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
 # The code plane
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 12))
 def test_the_code_plane_follows_every_change(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -254,7 +254,7 @@ def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
 # The label plane, and limits
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=14, deadline=None)
 @given(st.integers(0, 2**32), st.tuples(*2 * [st.integers(-9, 9)]), st.tuples(*2 * [st.integers(1, 20)]))
 def test_the_label_plane_of_any_box(seed: int, corner: tuple[int, int], size: tuple[int, int]) -> None:
     scene = random_scene(np.random.default_rng(seed), 8)

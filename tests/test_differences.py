@@ -126,7 +126,7 @@ def test_a_change_of_any_kind_of_leaf_is_told(number: int) -> None:
 
 
 @given(st.data(), OTHER)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_any_change_of_any_leaf_is_told(data: st.DataObject, other: Json) -> None:
     number, steps = data.draw(st.sampled_from(paths()))
     report = reports()[number]

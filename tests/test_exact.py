@@ -147,7 +147,7 @@ def test_signs_are_exact_within_three_ulp(predicate: Callable[..., Any], length:
     scale, offset = LENGTHS[length]
     if scale * ratio > 1e304:
         pytest.skip("not finite")
-    assert wrong(predicate, family(predicate, 200, 1, scale, offset, ratio)) == []
+    assert wrong(predicate, family(predicate, 80, 1, scale, offset, ratio)) == []
 
 
 @pytest.mark.long

@@ -244,7 +244,7 @@ QUIET: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck
 def test_a_changing_scene() -> None:
     """Fails at once, with the steps as they came; the long run takes minutes to make them few."""
     phases = [Phase.explicit, Phase.reuse, Phase.generate]
-    few = settings(max_examples=50, stateful_step_count=25, phases=phases, **QUIET)
+    few = settings(max_examples=20, stateful_step_count=25, phases=phases, **QUIET)
     run_state_machine_as_test(ChangingScene, settings=few)
 
 
@@ -360,7 +360,7 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.fixture(scope="module")
 def in_whole_parts() -> list[tuple[Volley, Scene, str, Hits]]:
     """Volleys, what they are fired at, how, and what they hit."""
-    battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 3))]
+    battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 4))]
     ways = [(v, s, how) for v, s in battles for how in (("direct", "composed") if s.bounds else ("direct",))]
     return [(volley, scene, how, volley.fired(scene, strategy=how)) for volley, scene, how in ways]
 

@@ -828,7 +828,7 @@ class RecordedScene(ChangingScene):
 
 def test_the_past_of_a_scene_that_changes() -> None:
     phases = [Phase.explicit, Phase.reuse, Phase.generate]
-    few = settings(max_examples=50, stateful_step_count=30, phases=phases, **QUIET)
+    few = settings(max_examples=20, stateful_step_count=30, phases=phases, **QUIET)
     run_state_machine_as_test(RecordedScene, settings=few)
 
 

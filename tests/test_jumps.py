@@ -43,7 +43,7 @@ def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
 # Kernels
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=34, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: random.Random) -> None:
     plane = some_plane(rng)
@@ -72,7 +72,7 @@ def some_ray(rng: random.Random, h: int, w: int) -> tuple[tuple[int, int], tuple
     return (x, y), step.get(kind, (dx, dy))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=134, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: ModuleType, rng: random.Random) -> None:
     plane = some_plane(rng)
@@ -145,7 +145,7 @@ def answer(battle: Battle, strategy: str) -> Hits | str:
         return str(error)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds, count=st.integers(1, 12))
 def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
     battle = single(rng, count)
@@ -156,7 +156,7 @@ def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: ra
         assert walked.verdicts.tolist() == jumped.verdicts.tolist()  # type: ignore[union-attr]
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_rays_that_jump_hit_what_the_oracle_hits(kernels: ModuleType, rng: random.Random) -> None:
     battle = single(rng, 3)

@@ -59,7 +59,7 @@ def moved(scene: Scene, rng: np.random.Generator) -> None:
     scene.move(chosen, xy if n > 1 else xy.reshape(2))
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=27, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(0, 12))
 def test_the_stack_after_any_change_is_the_one_made_anew(
     monkeypatch: pytest.MonkeyPatch, jit: bool, seed: int, count: int

@@ -18,7 +18,7 @@ ALL_PAIRS = [*((*pair, 2) for pair in PAIRS), *((*pair, 3) for pair in SPACE_PAI
 SMALL_PAIRS = [("point", kind, 2) for kind in KINDS] + [("segment", "segment", 2), ("segment", "capsule", 2)]
 EXTREME = ("subnormal", "huge", "greatest", "mixed")
 ORDINARY = tuple(name for name in adversarial.FAMILIES if name not in EXTREME)
-COUNT = 96  # of each pair, in each law: eight of each family
+COUNT = 72  # of each pair, in each law: six of each family
 
 every_pair = pytest.mark.parametrize(("kind_a", "kind_b", "dim"), ALL_PAIRS + SMALL_PAIRS)
 planar_pair = pytest.mark.parametrize(("kind_a", "kind_b"), [*PAIRS, *(pair[:2] for pair in SMALL_PAIRS)])
@@ -252,7 +252,7 @@ def minkowski(kind_a: str, a: Shape, kind_b: str, b: Shape) -> bool:
     return nearest <= (radius_a + radius_b) ** 2
 
 
-@pytest.mark.parametrize("count", [48, pytest.param(600, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [36, pytest.param(600, marks=pytest.mark.long)])
 @planar_pair
 def test_against_the_minkowski_difference(kind_a: str, kind_b: str, count: int) -> None:
     for name, a, b in adversarial.cases(kind_a, kind_b, count, 4):
@@ -461,7 +461,7 @@ def test_convex_rings() -> None:
 
 @every_pair
 def test_families_are_well_formed_and_half_meet(kind_a: str, kind_b: str, dim: int) -> None:
-    made = list(adversarial.cases(kind_a, kind_b, 360, 16, dim))
+    made = list(adversarial.cases(kind_a, kind_b, 240, 16, dim))
     assert {name for name, _, _ in made} == set(adversarial.FAMILIES)
     for name, a, b in made:
         for kind, shape in ((kind_a, a), (kind_b, b)):

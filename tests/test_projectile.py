@@ -151,17 +151,17 @@ def compare(seed: int, moving: bool, scenes: int, steps: Sequence[int | None]) -
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_swept_projectile_agrees_with_the_reference(moving: bool) -> None:
-    told = compare(1, moving, 140, [None])
-    assert told["hit"] > 600
-    assert told["close"] <= (40 if moving else 0)
+    told = compare(1, moving, 60, [None])
+    assert told["hit"] > 250
+    assert told["close"] <= (18 if moving else 0)
 
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_projectile_in_steps_agrees_with_the_reference(moving: bool) -> None:
-    told = compare(2, moving, 140, [1, 2, 7, 64])
-    assert told["hit"] > 300
+    told = compare(2, moving, 60, [1, 2, 7, 64])
+    assert told["hit"] > 120
     assert told["close"] == 0
-    assert told["doubtful"] < 25
+    assert told["doubtful"] < 12
 
 
 @pytest.mark.long
@@ -333,7 +333,7 @@ def test_more_steps_come_nearer_to_the_swept_flight(moving: bool) -> None:
     """k / n are among k / 2n: a target that is met with n steps is met with 2n, and not later."""
     counts = 1, 2, 4, 8, 16, 32, 64, 128, 256
     seen, there = np.zeros(len(counts)), 0
-    for number in range(12):
+    for number in range(8):
         rng = np.random.default_rng((7, number))
         scene, radius = convex_targets(rng, moving)
         at = rng.uniform(-70, 70, (200, 2))
@@ -352,7 +352,7 @@ def test_more_steps_come_nearer_to_the_swept_flight(moving: bool) -> None:
             assert (stop.fraction <= before + 1e-9).all()
             before = stop.fraction
         there += met.sum()
-    assert there > 500
+    assert there > 330
     assert (np.diff(seen) >= 0).all()
     assert seen[0] < 0.2 * there
     assert seen[-1] > 0.97 * there
@@ -361,7 +361,7 @@ def test_more_steps_come_nearer_to_the_swept_flight(moving: bool) -> None:
 @pytest.mark.parametrize("moving", [False, True])
 def test_whatever_steps_meet_a_swept_flight_meets_not_later(moving: bool) -> None:
     met = 0
-    for number in range(60):
+    for number in range(40):
         rng = np.random.default_rng((8, number))
         things = things_of(rng, 5, moving)
         scene, speed, radius = scene_of(things), SPEEDS[1 + number % 6], RADII[number % 6]
@@ -372,7 +372,7 @@ def test_whatever_steps_meet_a_swept_flight_meets_not_later(moving: bool) -> Non
         assert not (stops & (swept.reason == Reason.RANGE)).any()
         slack = 2.0**-17 if number % 6 == 0 else 2.0**-50  # half a px a frame: times are whole numbers over 128^2
         assert (stepped.fraction >= swept.fraction - slack).all()
-    assert met > 150
+    assert met > 100
 
 
 def columns(hits: RayHits) -> list[np.ndarray]:
@@ -383,7 +383,7 @@ def columns(hits: RayHits) -> list[np.ndarray]:
 @pytest.mark.parametrize("steps", [None, 5], ids=str)
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_batch_is_its_shots_and_whole_shifts_change_nothing(moving: bool, steps: int | None) -> None:
-    for number in range(14):
+    for number in range(10):
         rng = np.random.default_rng((9, number))
         things = things_of(rng, 5, moving)
         weapon = Projectile(SPEEDS[number % 7], RADII[number % 6], steps=steps)

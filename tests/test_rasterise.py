@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from planes import rasterise
 from planes.spans import Spans
 
-AGAINST = settings(max_examples=80, deadline=None)
-LAWS = settings(max_examples=60, deadline=None)
+AGAINST = settings(max_examples=54, deadline=None)
+LAWS = settings(max_examples=40, deadline=None)
 
 ONE = 2**30
 REACH = 14  # px: shapes are drawn this near, so that a reference can look at every pixel
@@ -135,7 +135,7 @@ def test_ellipse(radius_x: int, radius_y: int, axis: Point) -> None:
     check(rasterise.ellipse(radius_x, radius_y, *axis), lambda x, y: oracle.in_ellipse(x, y, radius_x, radius_y, *axis))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=67, deadline=None)
 @given(polygons)
 @example([[(0, 0)]])
 @example([[(1, 0)]])
@@ -149,7 +149,7 @@ def test_polygon(rings: list[list[Point]]) -> None:
     check(polygon(*rings), lambda x, y: oracle.in_polygon(x, y, rings))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(points, points, small_lengths)
 @example((0, 0), (0, 0), 0)
 @example((0, 0), (0, 0), 256)
@@ -162,7 +162,7 @@ def test_beam(a: Point, b: Point, radius: int) -> None:
     check(beam(a, b, radius), lambda x, y: oracle.in_beam(x, y, a, b, radius), REACH + 4)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=67, deadline=None)
 @given(lengths, directions, half_angles)
 @example(0, (ONE, 0), 30.0)
 @example(1, (ONE, 0), 180.0)
@@ -178,7 +178,7 @@ def test_cone(reach: int, axis: Point, half_degrees: float) -> None:
     check(cone(reach, axis, half_degrees), lambda x, y: oracle.in_cone(x, y, reach, *axis, *half))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(points, points)
 @example((0, 0), (0, 0))
 @example((128, 128), (128, 128))
@@ -616,7 +616,7 @@ def near(a: Point, b: Point, count: int, reach_px: int, rng: random.Random) -> l
     return found
 
 
-FAR_OFF = settings(max_examples=12, deadline=None)
+FAR_OFF = settings(max_examples=8, deadline=None)
 
 
 @FAR_OFF
@@ -719,7 +719,7 @@ long_ways = st.tuples(
     st.one_of(st.integers(2, 2**12), st.integers(2**27, 2**28), st.integers(2**27, 2**28)),
 ).filter(lambda d: math.gcd(*d) == 1 and math.hypot(*d) < 2**29 - 2**12)
 any_maps = st.sampled_from([lambda v: v, *MAPS.values()])
-HAIR = settings(max_examples=16, deadline=None)
+HAIR = settings(max_examples=11, deadline=None)
 
 
 @HAIR

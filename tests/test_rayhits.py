@@ -61,7 +61,7 @@ def many(rng: random.Random, count: int = 9) -> Battle:
 # Parts of a batch
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=27, deadline=None)
 @given(worlds, st.sampled_from([1, 3, 10, 40]))
 def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> None:
     battle = many(rng)
@@ -116,7 +116,7 @@ def test_a_composed_ray_is_refused_by_name() -> None:
 # What is told
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(worlds)
 def test_rows_are_added_up_by_body(rng: random.Random) -> None:
     battle = many(rng, 4)
@@ -132,7 +132,7 @@ def test_rows_are_added_up_by_body(rng: random.Random) -> None:
         assert one.objects == tuple(dict.fromkeys(row.object for row in rows))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(worlds)
 def test_the_answer_as_json_is_the_answer(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -184,7 +184,7 @@ def test_no_column_can_be_written() -> None:
 # Cells
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(worlds)
 def test_verdicts_add_up_to_all_cells(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -231,7 +231,7 @@ def test_the_cells_of_a_thin_ray_are_columns_and_rows_and_corners() -> None:
     assert passed > 100
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(worlds)
 def test_pixels_are_those_of_the_rows_and_the_passes(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -291,7 +291,7 @@ def beyond(pixels: Collection[tuple[int, int]], bounds: tuple[int, int, int, int
     return max(xs) < bounds[0] or min(xs) > bounds[2] or max(ys) < bounds[1] or min(ys) > bounds[3]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(worlds)
 def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
     battle = many(rng, 2)

@@ -476,7 +476,7 @@ def brute_planes(scene: Scene) -> Planes:
     return Planes((x, y), **out)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32), st.booleans())
 def test_planes_are_the_front_most_items(seed: int, bounded: bool) -> None:
     rng = np.random.default_rng(seed)

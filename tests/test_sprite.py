@@ -22,8 +22,8 @@ from planes.kept import Kept
 from planes.scene import Scene
 from planes.sprite import Form, Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
 
-AGAINST = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-LAWS = settings(max_examples=80, deadline=None)
+AGAINST = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+LAWS = settings(max_examples=54, deadline=None)
 
 FULL = 1 << 16
 FLIPS = ("none", "x", "y", "xy")
