@@ -315,7 +315,7 @@ def test_the_oriented_box_has_right_angles() -> None:
 
 
 def test_one_box_more_never_covers_more() -> None:
-    for mask in [*random_masks(30, 20, 29), *NAMED.values()]:
+    for mask in [*random_masks(20, 20, 29), *NAMED.values()]:
         found = [fit.boxes(mask, k) for k in range(1, BOXES_MAX + 1)]
         for k, one in enumerate(found, 1):
             check_boxes(one, mask, k)

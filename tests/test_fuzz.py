@@ -270,7 +270,7 @@ def run_apart(fuzz: Callable[[int, int, str], None], seed: int, count: int, fold
     assert (run.returncode, run.stdout, run.stderr) == (0, "", ""), f"{run.stderr}\nthe last case lies in {folder}"
 
 
-@pytest.mark.parametrize(("fuzz", "count"), [(fuzz_scenes, 250), (fuzz_images, 600)], ids=["scenes", "images"])
+@pytest.mark.parametrize(("fuzz", "count"), [(fuzz_scenes, 100), (fuzz_images, 240)], ids=["scenes", "images"])
 def test_spoilt_files_load_or_are_refused(fuzz: Callable[[int, int, str], None], count: int, tmp_path: Path) -> None:
     run_apart(fuzz, 1, count, tmp_path)
 

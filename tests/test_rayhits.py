@@ -213,7 +213,7 @@ def test_the_cells_of_a_thin_ray_are_columns_and_rows_and_corners() -> None:
     """A ray that goes on to a next column or row meets one more cell, and at a corner both and one more."""
     rng = random.Random(8)
     passed = 0
-    for _ in range(400):
+    for _ in range(268):
         on_pixels = rng.random() < 0.5
         ends: list[int] = []
         for _ in range(4):
@@ -228,7 +228,7 @@ def test_the_cells_of_a_thin_ray_are_columns_and_rows_and_corners() -> None:
         hits = fired(Battle(Gun(), [shot], [bar(-3, 2), bar(4, 5, 3, 9, occluder=True)], (-7, -7, 7, 7)))
         assert sum(hits.verdict_counts().values()) == columns + rows - 1 + corners, (a, b)
         passed += corners
-    assert passed > 100
+    assert passed > 67
 
 
 @settings(max_examples=40, deadline=None)
@@ -477,7 +477,7 @@ def test_rays_of_every_weapon_through_nothing() -> None:
 @pytest.mark.parametrize("at", [(FAR, -FAR), (-FAR, FAR), (2**40, -(2**40))])
 def test_a_battle_far_away(at: Pixel) -> None:
     """All that is derived, too, is what it is at home; points to what a float64 holds there."""
-    for seed in range(30):
+    for seed in range(20):
         battle = many(random.Random(seed), 3)
         x, y = (v - 40 * (v > 0) + 40 * (v < 0) for v in at)
         here, there = fired(battle), fired(battle.moved(x, y))
