@@ -25,10 +25,15 @@ def _stamp() -> str:
 
 
 def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a kernel for its signatures, or without any for those of its calls; it lets other threads run."""
+    """Compile a kernel for its signatures, or without any for those of its calls; it lets other threads run.
+
+    Parameters
+    ----------
+    options : of numba, where they are others
+    """
 
     def made(kernel: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True, **options)(kernel)
+        dispatcher = njit(**{"nogil": True, **options})(kernel)
         dispatcher.enable_caching()
         dispatcher._cache._cache_file._source_stamp = _stamp()
         for signature in signatures:

@@ -32,7 +32,7 @@ from planes.compiled import compiled
 from planes.fronttoback import Pile
 from planes.spans import Box
 
-__all__ = ["front_to_back"]
+__all__ = ["PAD", "cut_off", "front_to_back", "laid", "near_of", "struck", "take"]
 
 PART_NS, PLACEMENT_NS, TILE_NS = 8e5, 150.0, 0.7
 """What a thread must have to do to be worth it; about what a placement takes, and more for each tile there is."""
@@ -80,7 +80,7 @@ def _binned(box):
 
 
 @njit
-def _near(box, begin, listed, cells, left, top, right, bottom, near):
+def near_of(box, begin, listed, cells, left, top, right, bottom, near):
     """Tiles whose boxes meet one, front to back; how many."""
     count = 0
     if not len(cells):
@@ -122,7 +122,7 @@ def _sort(numbers, count):
 
 
 @njit
-def _laid(windows, first, columns, step, rows, rest):
+def laid(windows, first, columns, step, rows, rest):
     """Copy the rows of a pattern between the empty ones, and tell how many pixels it has."""
     pixels = 0
     for column in range(columns):
@@ -135,7 +135,7 @@ def _laid(windows, first, columns, step, rows, rest):
 
 
 @njit
-def _cut_off(rest, columns, step, left, top, rows, x, y, x_max, y_max):
+def cut_off(rest, columns, step, left, top, rows, x, y, x_max, y_max):
     """Take away what of a pattern lies beyond the bounds, and tell how many pixels it has left."""
     pixels = 0
     for column in range(columns):
@@ -152,7 +152,7 @@ def _cut_off(rest, columns, step, left, top, rows, x, y, x_max, y_max):
 
 
 @njit
-def _take(tiles, tile, rest, word, step, shift, low, high):
+def take(tiles, tile, rest, word, step, shift, low, high):
     """Take the pixels of a tile away from what is left, in rows from `low` to `high`; how many there were."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     left, right = np.uint64(shift), np.uint64(63 - shift)
@@ -167,10 +167,10 @@ def _take(tiles, tile, rest, word, step, shift, low, high):
 
 
 @njit
-def _struck(tiles, tile, rest, word, step, shift, low, high, own, level):
+def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
     """What a tile shares with what is left of a pattern, told as by `shared`; that is taken away.
 
-    In one pass: `shared` and then `_take` make discs among 100 items 2 to 5 % slower, among 1000 items some 10 %.
+    In one pass: `shared` and then `take` make discs among 100 items 2 to 5 % slower, among 1000 items some 10 %.
     """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)
@@ -241,7 +241,7 @@ def _front_to_back(
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
             return -1, 0
-        close = _near(box, begin, listed, cells, left, top, right, bottom, near)
+        close = near_of(box, begin, listed, cells, left, top, right, bottom, near)
         close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
         if close == 0:
             who += 1
@@ -252,9 +252,9 @@ def _front_to_back(
             rest[:], last_kind = 0, kind
         step, rows = following[kind], bottom - top + 1
         columns = (62 + right - left + 1) // 64 + 2
-        pixels = _laid(windows, first[kind], columns, step, rows, rest)
+        pixels = laid(windows, first[kind], columns, step, rows, rest)
         if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
-            pixels = _cut_off(rest, columns, step, left, top, rows, bounds[0], bounds[1], bounds[2], bounds[3])
+            pixels = cut_off(rest, columns, step, left, top, rows, bounds[0], bounds[1], bounds[2], bounds[3])
         n, item = 0, -1
         for i in range(close):
             if pixels == 0:
@@ -264,13 +264,13 @@ def _front_to_back(
             offset = box[at, 0] - left + 63
             tile, word, shift = tile_begin[at] - box[at, 1], PAD + (offset >> 6) * step - top, offset & 63
             if len(occluder) and occluder[at]:
-                pixels -= _take(tiles, tile, rest, word, step, shift, low, high)
+                pixels -= take(tiles, tile, rest, word, step, shift, low, high)
                 continue
             own, level = origin_x[who] - box[at, 0], origin_y[who]
             if pierce:
                 samples, distance2, across, down = shared(tiles, tile, rest, word, step, shift, low, high, own, level)
             else:
-                samples, distance2, across, down = _struck(tiles, tile, rest, word, step, shift, low, high, own, level)
+                samples, distance2, across, down = struck(tiles, tile, rest, word, step, shift, low, high, own, level)
                 pixels -= samples
             if samples == 0:
                 continue

@@ -12,7 +12,7 @@ from planes.spans import Spans
 from planes.strips import strips_of
 from weapons.pattern import Pattern
 
-__all__ = ["fits", "windows_of"]
+__all__ = ["columns_of", "fits", "windows_of"]
 
 TABLE_BYTES_MOST = 2**22
 """All shifts of a pattern are not made beyond it: in a larger table each window is a miss of the cache."""
@@ -55,7 +55,7 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
 def _made(patterns: Sequence[Pattern], often: bool) -> Windows:
     boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
     strips = strips_of([pattern.strip for pattern in patterns], boxes)
-    columns = [_columns(pattern.spans) for pattern in patterns]
+    columns = [columns_of(pattern.spans) for pattern in patterns]
     rows = np.array([words.shape[1] for words in columns])
     if often:
         words = columns[0]
@@ -66,7 +66,7 @@ def _made(patterns: Sequence[Pattern], often: bool) -> Windows:
     return Windows(boxes, first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0, strips)
 
 
-def _columns(spans: Spans) -> Words:
+def columns_of(spans: Spans) -> Words:
     """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows around it."""
     mask, _ = spans.to_mask()
     height, width = mask.shape
