@@ -31,8 +31,9 @@ from planes.bigrows import pixels_of, rows_of_spans
 from planes.grid256 import pixel, snap
 from planes.spans import Spans
 from weapons import Beam, Box, Disc, Hits, Laser, Pistol, Point, Rounds, Spread, Stencil, Weapon, fire, prepare
+from weapons.costs import COMPILED
 from weapons.oneshot import OneShot
-from weapons.ready import ODD, PIXEL
+from weapons.squares import ODD, PIXEL
 
 ROOT = Path(__file__).parents[1]
 WORLD = (220, 160)
@@ -80,7 +81,8 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
         with ExitStack() as patches:
             patches.enter_context(mock.patch.object(weapons.pieces, "OFTEN", 2))
             if compiled and seed % 2:
-                patches.enter_context(mock.patch.multiple(squares, ROWS=1, LISTED_NS=0, CELLS_NS=seed % 32))
+                costs = squares.COMPILED._replace(compose=seed % 1000, item=0)
+                patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=costs))
             check_random_scene(seed)
 
     use_jit(compiled)
@@ -154,9 +156,10 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 }
 
 
-def small_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let compiled kernels begin with a small buffer, and list all tiles by cells soon."""
-    for name, value in {"ROWS": 1, "LISTED_NS": 0, "CELLS_NS": 60}.items():
+def small_and_composed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let compiled kernels begin with a small buffer, and compose soon what can be seen."""
+    costs = COMPILED._replace(compose=400, item=0)
+    for name, value in {"ROWS": 1, "COMPILED": costs}.items():
         monkeypatch.setattr(f"weapons.squares_jit.{name}", value)
 
 
@@ -164,7 +167,7 @@ def small_and_listed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
     if jit:
-        small_and_listed(monkeypatch)
+        small_and_composed(monkeypatch)
     for bounded in (True, False):
         check_weapon(name, bounded, monkeypatch)
 
@@ -497,20 +500,6 @@ def test_kernels_may_be_changed_between_two_versions() -> None:
             for how in ({}, {"aim": 30.0}, {"aim": 30.0}, {}):
                 same(ready.fire((50.0, 50.0), **how), fire(scene, weapon, (50.0, 50.0), **how))
             assert type(ready._squares).__module__.endswith("_jit") == compiled
-    finally:
-        use_jit(None)
-
-
-def test_squares_that_are_forgotten_are_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba")
-    monkeypatch.setattr("weapons.squares_jit.SQUARES_MOST", 3)
-    scene = crowd(9)
-    ready: Any = prepare(scene, Disc(9))
-    try:
-        use_jit(True)
-        for x in range(-64, 250, 16):
-            same(ready.fire((x, 90)), fire(scene, Disc(9), (x, 90)))
-            assert sum(map(len, ready._squares.made.values())) <= 3
     finally:
         use_jit(None)
 

@@ -5,7 +5,6 @@ scene, weapon -> rounds and squares -> one look-up a shot -> hits
 
 from __future__ import annotations
 
-import math
 import threading
 from math import floor
 from types import ModuleType
@@ -23,23 +22,14 @@ from weapons.firing import category_bits, fire
 from weapons.hits import Hits
 from weapons.oneshot import Answer, Filter, Present, Told, answer_of
 from weapons.pieces import Frame, frame_of, rounds_of
-from weapons.squares import CELL_SHIFT, EDGE, SIDE, Look
+from weapons.squares import FARTHEST, ODD, PIXEL, Look
 from weapons.volley import checked_shots
 from weapons.weapon import Weapon
 
 __all__ = ["Ready", "prepare"]
 
-PIXEL = 257 / 512
-"""The floor of a position moved by it is its whole pixel, (rint(256 v) + 128) // 256: a tie on the edge is even."""
-
-ODD = math.nextafter(1 - PIXEL, 0)
-"""The only position within the limits at which that sum is rounded up to a whole number."""
-
 AIMS_BYTES = 32 * 2**20
 """Patterns of other aims and numbers that are kept as integer rows, bytes."""
-
-FARTHEST = SIDE * EDGE // 2
-"""Positions beyond it, px, go the way of `fire`."""
 
 AIM_BYTES = 200
 """What an aim or a number costs beside what is looked up with it, bytes."""
@@ -81,8 +71,10 @@ class Ready:
     What makes a shot cheap is found out when the first shot needs it, and once:
 
     - the pattern of each aim, and of each number of a `Spread`, with a bit for a pixel;
-    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit. With
-      compiled kernels a square only tells if any is near, and one call of a kernel walks the items there.
+    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit.
+
+    With compiled kernels there are no squares. One call of a kernel walks the items, until shots have spent on that as
+    much as it takes to compose what can be seen of all objects; or looks at those, if that is done, by any caller.
 
     Every shot compares the version of the scene, which counts its changes, with that of what was found out. If the
     scene has changed, the squares near the old and the new places of what changed are forgotten first (all of them, if
@@ -114,7 +106,7 @@ class _ReadyPattern(Ready):
         super().__init__(scene, weapon, kept)
         _, spread, plain = parts_of(weapon)
         self._frame, self._directed, self._drawn = frame, plain.directed, spread is not None
-        self._pierce, self._answer = plain.pierce, answer_of(weapon)
+        self._pierce, self._answer = plain.pierce, answer_of(weapon)[0]
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
         self._kernels: ModuleType | None = None
@@ -123,32 +115,27 @@ class _ReadyPattern(Ready):
         self._aims: dict[object, Looks] = {}
         self._told: dict[tuple[object, object], Looks] = {}
         self._aims_bytes = 0
-        self._quick: dict[int, dict[int, Any]] = {}
-        self._straight: Look
+        self._straight: Look = _not_known
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         if self._items.version != self._version:
             self._follow()
-        try:
+        if type(at) is tuple and len(at) == 2:
             x, y = at
-            if type(at) is tuple:
-                if type(x) is not int or type(y) is not int:
-                    if type(x) is float and type(y) is float and x != ODD and y != ODD:
-                        x, y = floor(x + PIXEL), floor(y + PIXEL)
-                    else:
-                        return self._looked_up(at, aim, toward, shot)
-                if aim is None and toward is None and shot is None:
-                    near = self._quick[x >> CELL_SHIFT][y >> CELL_SHIFT]
-                    hits = self._answer()
-                    hits._present, hits._at = self._present, at
-                    if near:
+            kind = type(x)
+            if kind is type(y) and (kind is float or kind is int):
+                try:
+                    if aim is None and toward is None and shot is None:
+                        hits = self._answer()
+                        hits._present, hits._at = self._present, at
                         self._straight(x, y, hits)
-                    return hits
-                if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST:
-                    return self._told_of(at, (aim, None, shot), x, y, self._known(aim, toward, shot))
-        except (KeyError, TypeError, ValueError, OverflowError):
-            pass
+                        return hits
+                    looks = self._known(aim, toward, shot)
+                    if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
+                        return self._told_of(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
+                except (KeyError, ValueError, OverflowError):  # it is not known yet, or too far
+                    pass
         return self._looked_up(at, aim, toward, shot)
 
     def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
@@ -212,8 +199,8 @@ class _ReadyPattern(Ready):
         self._grow(AIM_BYTES)
         self._aims[key] = looks
         straight = (0, None, None) if self._directed else 0
-        if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0) and self._squares.whole:
-            self._straight, self._quick = looks[0][2], self._squares.made
+        if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0):
+            self._straight = self._squares.straight(looks[0][2])
         return looks
 
     def _grow(self, size: int) -> None:
@@ -233,11 +220,16 @@ class _ReadyPattern(Ready):
             if kernels is not self._kernels:
                 self._kernels = kernels
                 self._squares = kernels.Squares(self.scene, self.weapon, self._pierce, self._filter, self._frame)
-                self._aims, self._told, self._quick = {}, {}, {}
+                self._aims, self._told, self._straight = {}, {}, _not_known
             stack = self._items.stack()
             self._squares.follow(stack)
             self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
             self._version = version
+
+
+def _not_known(x: float, y: float, hits: Answer) -> None:
+    """Instead of a look that is not made yet."""
+    raise KeyError
 
 
 def plain_pair(value: object) -> tuple[float, float] | None:

@@ -7,9 +7,11 @@ mask without what lies before it, as integer rows. After a change of the scene t
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
-from typing import Generic, NamedTuple, TypeVar
+from math import floor
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,11 +23,25 @@ from planes.scene import Scene
 from planes.spans import Box, meets
 from weapons.candidates import refused
 from weapons.hits import HitRow
-from weapons.oneshot import Answer, Filter
+from weapons.oneshot import Answer, Filter, answer_of
 from weapons.pieces import Frame, Round, pieces_of
 from weapons.weapon import Weapon
 
-__all__ = ["CELL_SHIFT", "EDGE", "SIDE", "Cell", "Look", "Made", "Seen", "Shared", "Squares", "new"]
+__all__ = [
+    "CELL_SHIFT",
+    "EDGE",
+    "FARTHEST",
+    "ODD",
+    "PIXEL",
+    "SIDE",
+    "Cell",
+    "Look",
+    "Made",
+    "Seen",
+    "Shared",
+    "Squares",
+    "new",
+]
 
 Kind = TypeVar("Kind")
 
@@ -45,6 +61,15 @@ KEPT_BYTES = 64 * 2**20
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
 """Squares beyond it are not made: a shot that finds one needs no check of its range."""
 
+FARTHEST = SIDE * EDGE // 2
+"""Positions beyond it, px, go the way of `fire`."""
+
+PIXEL = 257 / 512
+"""The floor of a position moved by it is its whole pixel, (rint(256 v) + 128) // 256: a tie on the edge is even."""
+
+ODD = math.nextafter(1 - PIXEL, 0)
+"""The only position within the limits at which that sum is rounded up to a whole number."""
+
 CELL_BYTES, SEEN_BYTES = 400, 400
 """What a square costs, and what is seen of an object beside its pixels, bytes."""
 
@@ -62,8 +87,9 @@ Shared = tuple[int, int, int, int, int, int]
 """What a round shares with an object: of the nearest pixel the squared distance, y and x, from the round's pixel; a
 number that rises front to back; id of the object; and how many pixels."""
 
-Look = Callable[[int, int, Answer], None]
-"""Of a round whose pixel is x and y, tell an answer what it hits, in order."""
+Look = Callable[[Any, Any, Answer], None]
+"""Of a round whose pixel is x and y, tell an answer what it hits, in order; a straight one takes any position, and
+raises an error of a key or a value if it is none that it knows the pixel of."""
 
 new = tuple.__new__
 """It makes a row in half the time that `HitRow` takes."""
@@ -119,13 +145,13 @@ class Squares:
 
     Parameters
     ----------
-    made : tiles near each square, where a whole round is looked up
-    whole : whether rounds are
+    made : tiles near each square
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
         self.made: Made[Cell] = Made(self._square)
         self.stride = self._tile = 0
+        self._tell = answer_of(weapon)[1]
         self._scene, self._shots, self._pierce = scene, kept.shots(weapon, (0, 0), (None, None, None)), pierce
         self._frame, self._corner, self._side = frame, frame.corner, frame.side
         self._stack: Stack | None = None
@@ -139,7 +165,7 @@ class Squares:
 
     def look(self, one: Round) -> tuple[Look, int]:
         """A function that looks up what a round hits; and how many bytes are kept for it."""
-        made, stride, number = self.made, self.stride, one.number
+        made, stride, number, tell = self.made, self.stride, one.number, self._tell
         pieces = pieces_of(one.spans, self._frame, stride)
 
         def look(x: int, y: int, hits: Answer) -> None:
@@ -157,9 +183,22 @@ class Squares:
                     shared = _gathered(shared)
                 shared.sort()
             for distance2, dy, dx, _, item, n in shared:
-                hits.append(new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
+                tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
 
         return look, sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _ in pieces)
+
+    def straight(self, look: Look) -> Look:
+        """The look of a round, for positions instead of pixels; in a square that nothing is near it is quick."""
+        made, whole = self.made, self.whole
+
+        def straight(x: float, y: float, hits: Answer) -> None:
+            if x == ODD or y == ODD:
+                raise KeyError
+            column, row = floor(x + PIXEL), floor(y + PIXEL)
+            if not whole or made[column >> CELL_SHIFT][row >> CELL_SHIFT]:
+                look(column, row, hits)
+
+        return straight
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""

@@ -1,73 +1,79 @@
-"""The squares of `squares`, compiled: each shot walks the stack from the front, and a square tells if that is needed.
+"""What `squares` tells, compiled: one call of a kernel answers a shot.
 
-One call answers a shot. A call of a compiled function takes 100 ns more for each array that it is given, so this one
-is given addresses: of the scene, of the pixels of a round, and of a buffer for what they share.
+At first each shot walks the stack from the front. When shots have spent as much on that as it takes to compose what can
+be seen of the objects, that is done, and listed by cells of shot positions.
+
+A call of a compiled function takes 100 ns more for each array that it is given, so this one is given the address of a
+buffer, in which there are those of the scene and of the pixels of a round. It does not let other threads run: that
+would take as long as many a shot.
 """
 
 from __future__ import annotations
 
 import struct
 import threading
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import carray, njit, types
 from numba.extending import intrinsic
 
-from planes import cells_jit
-from planes.arrays import Ints
+from planes.arrays import Bools, Ints
 from planes.bitrows import WORD, Words
-from planes.bitrows_jit import shared
+from planes.bitrows_jit import key_of, put_rows, shared
 from planes.cells import Cells
 from planes.compiled import compiled
 from planes.constants import WEIGHT_FULL
+from planes.fronttoback_jit import PAD, cut_off, laid, near_of, struck, take
 from planes.items import Stack
 from planes.scene import Scene
 from planes.spans import Spans
-from planes.visible import View
+from planes.visible import Composition, View
+from weapons.costs import COMPILED
 from weapons.hits import HitRow
-from weapons.oneshot import Answer, Filter
+from weapons.oneshot import Answer, Filter, answer_of
 from weapons.pieces import Frame, Round
-from weapons.squares import CELL_SHIFT, SIDE, Look, Made, new
+from weapons.squares import FARTHEST, ODD, PIXEL, Look, new
 from weapons.weapon import Weapon
+from weapons.windows import columns_of
 
 __all__ = ["Squares"]
-
-SQUARES_MOST = 2**18
-"""Squares of which it is kept whether anything is near: some 25 MB."""
-
-LISTED_NS, CELLS_NS = 100, 10**5
-"""What it takes to list a tile by cells, and all of them beside that; to look at one takes a ns. When as much was spent
-on looking at all of them, they are listed: so the cost is never more than twice that of the better choice."""
 
 ROWS = 256
 """Rows that a buffer has room for at first."""
 
-read = struct.Struct("=6q").unpack_from
-"""What a round shares with an object, 48 bytes: see `squares.Shared`."""
+TILE_NS, MET_NS = 1, 50
+"""What a shot spends on each tile when it walks the stack, and more on each that it meets."""
 
 PIECE_BYTES = 400
-"""What a piece costs beside its pixels, bytes."""
+"""What a round costs beside its pixels, bytes."""
 
 FAR = 2**42
 """Beyond all positions."""
 
-X, Y, BITS, WIDE, HIGH, BEGIN, LISTED, BOX, TILE, TILES, WORDS, LEFT, TOP, RIGHT, LOW, PIERCE, LOOKED, WORTH = range(18)
-"""Of a scene: its cells; addresses of their lists, and of the columns and words of its tiles; how many tiles; its
-bounds; whether shots go through objects; tiles looked at since it changed, and at how many it is worth listing them."""
+COMPOSE, UNKNOWN = -1, -2
+"""Instead of a number of rows: it is worth composing; the position is none that is looked up."""
 
-ROUND_LEFT, ROUND_TOP, ROUND_RIGHT, ROUND_LOW, PIXELS = range(5)
-"""Of a round: its box about its pixel, and from where on its words lie: columns of 64 px, with an empty one before and
-after, and PAD empty rows below."""
+LEFT, TOP, RIGHT, LOW, PIERCE, SPENT, WORTH, COMPOSED = range(8)
+X, Y, BITS, WIDE, HIGH, BEGIN, LISTED, TILES, BOX, RANK, ITEM, BLOCKS, WORD_OF, WORDS, SCRATCH = range(8, 23)
+"""Of a scene: its bounds; whether shots go through objects; what shots have spent on walking, and what is worth
+composing; whether that is done. Its cells, and how many tiles; then addresses: of lists, of columns of tiles, of words,
+and of 5 numbers a tile to work with."""
 
-PAD = 8
-"""Rows are counted so many at a time."""
+ROUND_LEFT, ROUND_TOP, ROUND_RIGHT, ROUND_LOW, STEP, COLUMNS, PIXELS = range(7)
+"""Of a round: its box about its pixel; words from one column of 64 px to the next, how many, and from where on they
+lie."""
 
-ROOM, FOUND = range(2)
-"""Of a buffer: how many rows it has room for; from where on they lie, and after them room for what is left of a round
-when something was hit."""
+SCENE, ROUND, ROOM, FOUND = range(4)
+"""Of a buffer: addresses of the scene and the round, for how many rows it has room, and from where on they lie; after
+them there is room for what is left of the round."""
+
+ROW = 6
+"""Numbers of a row: 0, item, samples, squared distance, x, y."""
+
+FIRST, ROW_BYTES = 8 * FOUND, 8 * ROW
+read = struct.Struct("8x5q").unpack_from
 
 
 @intrinsic
@@ -93,137 +99,110 @@ def _words(address):
 
 
 @njit
-def _cut(pixels, rest, left, top, wide, step, scene):
-    """Copy the words of a round, without what lies out of the bounds."""
-    full = np.uint64(2**64 - 1)
-    for column in range(wide):
-        x = left + 64 * (column - 1)
-        before, after = scene[LEFT] - x, x + 63 - scene[RIGHT]
-        inside = np.uint64(0)
-        if before < 64 and after < 64:
-            inside = (full << np.uint64(max(before, 0))) & (full >> np.uint64(max(after, 0)))
-        for row in range(step):
-            kept = inside if scene[TOP] <= top + row <= scene[LOW] else np.uint64(0)
-            rest[column * step + row] = pixels[column * step + row] & kept
-
-
-@njit
-def _erased(tiles, tile, rest, word, step, shift, low, high):
-    """Take the pixels of a tile out of what is left of a round, in rows from `low` to `high` of the world."""
-    for row in range(low, high + 1):
-        rest[word + row] &= ~(tiles[tile + row] << np.uint64(shift))
-        if shift:
-            rest[word + step + row] &= ~(tiles[tile + row] >> np.uint64(64 - shift))
-
-
-@njit(inline="always")
-def _sooner(found, a, b):
-    for k in range(3):
-        if found[a + k] != found[b + k]:
-            return found[a + k] < found[b + k]
-    return found[a + 3] < found[b + 3]
-
-
-@njit
-def _in_order(found, count):
-    """Sort rows by (distance2, y, x, place in the stack)."""
-    step = 1
-    while step < count // 3:
-        step = 3 * step + 1
-    while step:  # Shell (1959): a few rows are what there mostly is
-        for row in range(step, count):
-            at, other = 6 * row, 6 * (row - step)
-            while other >= 0 and _sooner(found, at, other):
-                for k in range(6):
-                    moved = found[at + k]
-                    found[at + k] = found[other + k]
-                    found[other + k] = moved
-                at, other = other, other - 6 * step
-        step //= 3
-
-
-@njit
-def _noted(found, at, new, distance2, y, x, samples):
-    """Begin a row, or add another tile of the same object to it."""
-    found[at + 5] = samples + (0 if new else found[at + 5])
-    nearer = new or distance2 < found[at]
-    if not nearer and distance2 == found[at]:
-        nearer = y < found[at + 1] or (y == found[at + 1] and x < found[at + 2])
-    if nearer:
-        found[at], found[at + 1], found[at + 2] = distance2, y, x
-
-
-@compiled(types.int64(*[types.int64] * 5))
-def _shot(scene_at, round_at, x, y, buffer_at):
-    """Rows of a round placed on a pixel, which may be more than the buffer has room for; -1 if cells are worth it."""
-    scene, shape, buffer = _ints(scene_at), _ints(round_at), _ints(buffer_at)
-    column, line = (x - scene[X]) >> scene[BITS], (y - scene[Y]) >> scene[BITS]
-    if column < 0 or line < 0 or column >= scene[WIDE] or line >= scene[HIGH]:
+def _listed(scene, box, x, y, left, top, right, bottom, near):
+    """Tiles in the cell of a pixel whose boxes meet one, front to back; how many."""
+    column, row = (x - scene[X]) >> scene[BITS], (y - scene[Y]) >> scene[BITS]
+    if column < 0 or row < 0 or column >= scene[WIDE] or row >= scene[HIGH]:
         return 0
-    begin, lists = _ints(scene[BEGIN]), _ints(scene[LISTED])
-    cell = line * scene[WIDE] + column
-    scene[LOOKED] += begin[cell + 1] - begin[cell]
-    if scene[LOOKED] > scene[WORTH]:
-        return -1
-    boxes, columns, tiles = _ints(scene[BOX]), _ints(scene[TILE]), _words(scene[WORDS])
-    left, top, right, bottom = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], x + shape[ROUND_RIGHT], y + shape[ROUND_LOW]
-    step, wide = bottom - top + 1 + PAD, ((right - left) >> 6) + 3
-    found = _ints(buffer_at + 8 * FOUND)
-    pixels, left_over = _words(round_at + 8 * PIXELS), _words(buffer_at + 8 * (FOUND + 6 * buffer[ROOM]))
-    rest, whole = pixels, True
-    if left < scene[LEFT] or top < scene[TOP] or right > scene[RIGHT] or bottom > scene[LOW]:
-        _cut(pixels, left_over, left, top, wide, step, scene)
-        rest, whole = left_over, False
-    count, last = 0, -1
+    begin, listed, cell, count = _ints(scene[BEGIN]), _ints(scene[LISTED]), row * scene[WIDE] + column, 0
     for entry in range(begin[cell], begin[cell + 1]):
-        at = lists[entry]
-        tile_left, tile_top = boxes[4 * at], boxes[4 * at + 1]
-        if tile_left > right or tile_top > bottom or boxes[4 * at + 2] < left or boxes[4 * at + 3] < top:
-            continue
-        low, deep = max(tile_top, top), min(boxes[4 * at + 3], bottom)
-        across = tile_left - left + 64
-        word, shift, tile = (across >> 6) * step - top, across & 63, columns[4 * at] - tile_top
-        if not columns[4 * at + 3]:
-            own = x - tile_left
-            samples, distance2, dx, dy = shared(tiles, tile, rest, word, step, shift, low, deep, own, y)
-            if samples == 0:
-                continue
-            rank = columns[4 * at + 1]
-            new = rank != last
-            count, last = count + new, rank
-            if count <= buffer[ROOM]:
-                _noted(found, 6 * (count - 1), new, distance2, dy, dx, samples)
-                found[6 * count - 3], found[6 * count - 2] = rank, columns[4 * at + 2]
-            if scene[PIERCE]:
-                continue
-        if whole:
-            for place in range(wide * step):
-                left_over[place] = pixels[place]
-            rest, whole = left_over, False
-        _erased(tiles, tile, rest, word, step, shift, low, deep)
-    if count <= buffer[ROOM]:
-        _in_order(found, count)
+        tile = listed[entry]
+        across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
+        near[count] = tile
+        count += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
     return count
 
 
-@compiled(types.boolean(*[types.int64] * 5))
-def _any_near(scene_at, left, top, right, bottom):
-    """Whether any tile of an object meets a box."""
-    scene = _ints(scene_at)
-    boxes, columns = _ints(scene[BOX]), _ints(scene[TILE])
-    for at in range(0, 4 * scene[TILES], 4):
-        met = (boxes[at] <= right) & (boxes[at + 1] <= bottom) & (boxes[at + 2] >= left) & (boxes[at + 3] >= top)
-        if met and not columns[at + 3]:
-            return True
-    return False
+NONE = np.zeros(0, np.int64)
 
 
-def _bare(compiled: Any) -> Any:
-    """A compiled function without the choice among its types, which takes twice as long as the call."""
-    return compiled.overloads[compiled.signatures[0]].entry_point
+@njit
+def _walked(scene, box, left, top, right, bottom, near):
+    """Tiles whose boxes meet one, front to back: all are looked at, and that is counted."""
+    count = near_of(box, NONE, NONE, NONE, left, top, right, bottom, near)
+    scene[SPENT] += TILE_NS * len(box) + MET_NS * count
+    return count
 
 
-shot, any_near = _bare(_shot), _bare(_any_near)
+@njit
+def _left_of(shape, pixels, scene, left, top, rest):
+    """Copy the pixels of a round that lie within the bounds."""
+    rows, bottom, right = shape[ROUND_LOW] - shape[ROUND_TOP] + 1, shape[ROUND_LOW], shape[ROUND_RIGHT]
+    laid(pixels, PAD, shape[COLUMNS], shape[STEP], rows, rest)
+    right, bottom = left + right - shape[ROUND_LEFT], top + bottom - shape[ROUND_TOP]
+    if left < scene[LEFT] or top < scene[TOP] or right > scene[RIGHT] or bottom > scene[LOW]:
+        bounds = scene[LEFT], scene[TOP], scene[RIGHT], scene[LOW]
+        cut_off(rest, shape[COLUMNS], shape[STEP], left, top, rows, *bounds)
+
+
+@njit
+def _met(scene, shape, box, near, close, rest, x, y):
+    """What a round shares with tiles, front to back, as columns: keys, columns of the nearest pixel, items, samples."""
+    rank, items, blocks, first = _ints(scene[RANK]), _ints(scene[ITEM]), _ints(scene[BLOCKS]), _ints(scene[WORD_OF])
+    tiles, step, room = _words(scene[WORDS]), shape[STEP], scene[TILES]
+    key, across = near[room:], near[2 * room :]
+    item, samples = near[3 * room :], near[4 * room :]
+    left, top, bottom, count, last = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], y + shape[ROUND_LOW], 0, -1
+    for i in range(close):
+        at = near[i]
+        low, high = max(box[at, 1], top), min(box[at, 3], bottom)
+        offset = box[at, 0] - left + WORD - 1
+        tile, word, shift = first[at] - box[at, 1], PAD + (offset >> 6) * step - top, offset & 63
+        if blocks[at]:
+            take(tiles, tile, rest, word, step, shift, low, high)
+            continue
+        if scene[PIERCE]:
+            n, distance2, dx, dy = shared(tiles, tile, rest, word, step, shift, low, high, x - box[at, 0], y)
+        else:
+            n, distance2, dx, dy = struck(tiles, tile, rest, word, step, shift, low, high, x - box[at, 0], y)
+        if n == 0:
+            continue
+        nearest = key_of(distance2, dx, dy)
+        if rank[at] != last:
+            key[count], across[count], item[count], samples[count], last = nearest, dx, items[at], n, rank[at]
+            count += 1
+            continue
+        samples[count - 1] += n
+        if nearest < key[count - 1]:
+            key[count - 1], across[count - 1] = nearest, dx
+    return count
+
+
+@compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
+def _shot(at_x, at_y, buffer_at):
+    """Rows of a round at a position, in order; they may be more than the buffer has room for."""
+    if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
+        return UNKNOWN
+    x, y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
+    buffer = _ints(buffer_at)
+    scene, shape = _ints(buffer[SCENE]), _ints(buffer[ROUND])
+    box, near = carray(_pointer(scene[BOX]), (scene[TILES], 4), np.int64), _ints(scene[SCRATCH])
+    left, top, right, bottom = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], x + shape[ROUND_RIGHT], y + shape[ROUND_LOW]
+    if scene[COMPOSED]:
+        close = _listed(scene, box, x, y, left, top, right, bottom, near)
+    else:
+        close = _walked(scene, box, left, top, right, bottom, near)
+        if scene[SPENT] > scene[WORTH]:
+            return COMPOSE
+    if close == 0:
+        return 0
+    room, rest = buffer[ROOM], _words(buffer[ROUND] + 8 * PIXELS)
+    if not scene[COMPOSED]:
+        pixels, rest = rest, _words(buffer_at + 8 * (FOUND + ROW * room))
+        _left_of(shape, pixels, scene, left, top, rest)
+    count = _met(scene, shape, box, near, close, rest, x, y)
+    if count <= room:
+        every = scene[TILES]
+        found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
+        put_rows(
+            0, count, near[every:], near[2 * every :], near[3 * every :], near[4 * every :], (0, x, y),
+            found[:, 0], found[:, 1], found[:, 2], found[:, 3], found[:, 4], found[:, 5],
+        )  # fmt: skip
+    return count
+
+
+shot = _shot.overloads[_shot.signatures[0]].entry_point
+"""It, without the choice among its types, which takes twice as long as the call."""
 
 
 def _address(array: Any) -> int:
@@ -232,130 +211,122 @@ def _address(array: Any) -> int:
     return int(array.__array_interface__["data"][0])
 
 
-@dataclass(frozen=True, eq=False)
-class Here:
-    """A scene at one version, as `_shot` reads it, and what must be kept for that."""
+class Pile(NamedTuple):
+    """Tiles, front to back: place in the stack, item, whether it only blocks, and first row in `words`."""
+
+    rank: Ints
+    item: Ints
+    blocks: Ints
+    begin: Ints
+    words: Words
+
+
+class Buffer(NamedTuple):
+    """Where a shot tells its rows: an address, for how many there is room, the bytes, and what must be kept."""
 
     address: int
+    room: int
+    view: memoryview
     numbers: Ints
-    boxes: Ints
-    kept: tuple[Any, ...]
-
-
-Buffer = tuple[int, int, memoryview, Ints]
-"""Its address, for how many rows it has room, and its bytes."""
 
 
 class Squares:
-    """See `squares.Squares`; `made` tells of each square whether any object is near, so that a shot must be walked."""
+    """See `squares.Squares`; there are no squares here: a shot is looked up in what is kept of the scene."""
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
-        self.made: Made[bool] = Made(self._near)
-        self.whole = True
-        self._scene, self._reach = scene, frame.reach
-        self._words = (2 * frame.reach + 1 + PAD) * (2 * frame.reach // WORD + 3)
-        self._view = View(pierce, kept.accept, tuple(set(kept.exclude[0].tolist()) - {-1}))
-        self._here: Here
+        self._scene, self._tell = scene, answer_of(weapon)[1]
+        self._reach = np.array([-frame.reach, -frame.reach, frame.reach, frame.reach])
+        self._view = View(pierce, kept.accept, tuple(sorted(set(kept.exclude[0].tolist()) - {-1})))
         self._forms = -1
-        self._tiles: tuple[Ints | None, Ints, Words]
-        self._count = 0
-        self._buffers: list[Buffer] = []
+        self._tiles: tuple[Bools, Pile]
+        self._here = np.zeros(SCRATCH + 1, np.int64)  # it is changed in place: buffers have its address
+        self._kept: tuple[Any, ...] = ()
         self._lock = threading.Lock()
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now."""
         with self._lock:
+            composed = self._scene.compositions().kept(self._view, self._scene.version)
+            if composed is not None:
+                self._compose(composed)
+                return
             tiles = self._scene.items.tiles()
-            boxes = tiles.boxes(stack.box_xyxy)
             if stack.forms != self._forms:
-                there = np.flatnonzero(self._view.accepts(stack)[tiles.rank])
+                there = self._view.accepts(stack)[tiles.rank]
                 rank = tiles.rank[there]
-                columns = np.stack([tiles.begin[there], rank, stack.ids[rank], stack.occluder[rank]], axis=1)
-                which = None if len(there) == len(tiles) else there
-                self._forms, self._tiles = stack.forms, (which, columns, tiles.words)
-            which = self._tiles[0]
-            boxes = np.ascontiguousarray(boxes if which is None else boxes[which])
-            begin, listed = np.array([0, len(boxes)]), np.arange(len(boxes))
-            everywhere = Cells(-FAR, -FAR, FAR.bit_length(), 1, 1, begin, listed)
-            self._here = self._placed(boxes, everywhere, CELLS_NS + LISTED_NS * len(boxes))
-            self.made.clear()
-            self._count = 0
+                pile = Pile(
+                    rank, stack.ids[rank], stack.occluder[rank].astype(np.int64), tiles.begin[there], tiles.words
+                )
+                self._forms, self._tiles = stack.forms, (there, pile)
+            there, pile = self._tiles
+            cells = Cells(0, 0, 0, 0, 0, NONE, NONE)
+            bounds = self._scene.bounds or (-FAR, -FAR, FAR, FAR)
+            worth = int(COMPILED.compose + COMPILED.item * len(stack))
+            self._place(pile, tiles.boxes(stack.box_xyxy)[there], cells, (*bounds, self._view.pierce, 0, worth, False))
 
-    def _placed(self, boxes: Ints, cells: Cells, worth: int) -> Here:
-        _, columns, words = self._tiles
-        kept = (cells.begin, cells.listed, boxes, columns)
-        bounds = self._scene.bounds or (-FAR, -FAR, FAR, FAR)
-        numbers = np.array(
-            [*cells[:5], *map(_address, kept), len(boxes), _address(words), *bounds, self._view.pierce, 0, worth],
-            np.int64,
-        )
-        return Here(_address(numbers), numbers, boxes, (*kept, words))
+    def _compose(self, composed: Composition) -> None:
+        """Look up what can be seen: nothing in it covers another, and it lies within the bounds."""
+        seen = composed.seen
+        pile = Pile(seen.rank, composed.ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
+        self._place(pile, seen.box_xyxy, composed.cells(self._reach), (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
 
-    def _list(self) -> None:
-        """List the tiles by cells, as many shots were fired at one version."""
-        with self._lock:
-            if self._here.numbers[WORTH] < FAR:
-                boxes, reach = self._here.boxes, self._reach
-                cells = cells_jit.cells_of(boxes, np.array([-reach, -reach, reach, reach]), CELL_SHIFT)
-                self._here = self._placed(boxes, cells, 2**62)
-
-    def _near(self, i: int, j: int) -> bool:
-        """Whether an object is near the square (i, j)."""
-        side = SIDE + 2 * self._reach
-        left, top = i * SIDE - self._reach, j * SIDE - self._reach
-        here = self._here
-        near = bool(any_near(here.address, left, top, left + side - 1, top + side - 1))
-        with self._lock:
-            self._count += 1
-            if self._count > SQUARES_MOST:
-                self.made.clear()
-                self._count = 1
-            self.made[i][j] = near
-        return near
+    def _place(self, pile: Pile, boxes_xyxy: Ints, cells: Cells, told: tuple[int, ...]) -> None:
+        """Tell the kernel where all lies."""
+        columns = tuple(map(np.ascontiguousarray, (cells.begin, cells.listed, boxes_xyxy, *pile)))
+        scratch = np.empty(5 * len(boxes_xyxy), np.int64)
+        begin, listed, *rest = map(_address, columns)
+        here = [*told, *cells[:5], begin, listed, len(boxes_xyxy), *rest, _address(scratch)]
+        self._here[:] = np.array(here, np.int64)
+        self._kept = columns, scratch  # after that: until then another thread may read what was there before
 
     def look(self, one: Round) -> tuple[Look, int]:
         """See `squares.Squares.look`."""
-        numbers, number, buffers = _numbers(one.spans), one.number, self._buffers
-        assert len(numbers) - PIXELS <= self._words  # what buffers have room for
-        shape = _address(numbers), numbers
+        numbers, number, tell = _numbers(one.spans), one.number, self._tell
+        buffers: list[Buffer] = []
 
-        def look(x: int, y: int, hits: Answer) -> None:
+        def look(x: float, y: float, hits: Answer) -> None:
             try:
                 buffer = buffers.pop()  # another thread has another one
             except IndexError:
-                buffer = self._buffer(ROWS)
-            here = self._here
-            count = shot(here.address, shape[0], x, y, buffer[0])
+                buffer = self._buffer(numbers, ROWS)
+            count = shot(x, y, buffer[0])
             if count:
                 _, room, view, _ = buffer
-                if not 0 <= count <= room:
-                    self._make_room(count)
+                if not 0 < count <= room:
+                    buffers.append(self._room_for(count, buffer, numbers))
+                    if count == UNKNOWN:
+                        raise KeyError
                     return look(x, y, hits)
-                for at in range(8 * FOUND, 8 * FOUND + 48 * count, 48):
-                    distance2, dy, dx, _, item, n = read(view, at)
-                    hits.append(new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
+                at, end = FIRST, FIRST + ROW_BYTES * count
+                while at < end:  # to make a range takes longer than to read a row
+                    item, n, distance2, column, row = read(view, at)
+                    tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (column, row), distance2)))
+                    at += ROW_BYTES
             buffers.append(buffer)
 
         return look, PIECE_BYTES + numbers.nbytes
 
-    def _make_room(self, count: int) -> None:
-        """Make a buffer for so many rows; if that is less than none, list the tiles by cells."""
-        if count < 0:
-            self._list()
-        else:
-            self._buffers.append(self._buffer(2 * count))
+    def straight(self, look: Look) -> Look:
+        """See `squares.Squares.straight`."""
+        return look
 
-    def _buffer(self, rows: int) -> Buffer:
-        numbers = np.zeros(FOUND + 6 * rows + self._words, np.int64)
-        numbers[ROOM] = rows
-        return _address(numbers), rows, memoryview(numbers).cast("B"), numbers
+    def _room_for(self, count: int, buffer: Buffer, numbers: Ints) -> Buffer:
+        """A buffer for so many rows; if shots have spent as much as that takes, compose what can be seen."""
+        if count > 0:
+            return self._buffer(numbers, 2 * count)
+        with self._lock:
+            if count == COMPOSE and not self._here[COMPOSED]:
+                scene = self._scene
+                self._compose(scene.compositions().read(self._view, scene.items, scene.bounds))
+        return buffer
+
+    def _buffer(self, pixels: Ints, rows: int) -> Buffer:
+        numbers = np.zeros(FOUND + ROW * rows + len(pixels), np.int64)
+        numbers[:FOUND] = _address(self._here), _address(pixels), rows
+        return Buffer(_address(numbers), rows, memoryview(numbers).cast("B"), numbers)
 
 
 def _numbers(spans: Spans) -> Ints:
     """A round's box and words, as `_shot` reads them."""
-    mask, (left, top) = spans.to_mask()
-    high, width = mask.shape
-    padded = np.zeros((high + PAD, ((width - 1) // WORD + 3) * WORD), np.bool_)
-    padded[:high, WORD : WORD + width] = mask
-    words = np.packbits(padded, axis=1, bitorder="little").view("<i8").T
-    return np.concatenate([[left, top, left + width - 1, top + high - 1], words.reshape(-1)])
+    words = columns_of(spans)
+    return np.concatenate([spans.box_xyxy, words.shape[::-1], words.reshape(-1).view(np.int64)])
