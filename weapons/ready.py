@@ -22,7 +22,7 @@ from weapons.firing import category_bits, fire
 from weapons.hits import Hits
 from weapons.oneshot import Answer, Filter, Present, Told, answer_of
 from weapons.pieces import Frame, frame_of, rounds_of
-from weapons.squares import FARTHEST, ODD, PIXEL, Look
+from weapons.squares import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
 from weapons.volley import checked_shots
 from weapons.weapon import Weapon
 
@@ -115,27 +115,35 @@ class _ReadyPattern(Ready):
         self._aims: dict[object, Looks] = {}
         self._told: dict[tuple[object, object], Looks] = {}
         self._aims_bytes = 0
-        self._straight: Look = _not_known
+        self._straight: Look
+        self._quick: Any = {}
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         if self._items.version != self._version:
             self._follow()
-        if type(at) is tuple and len(at) == 2:
-            x, y = at
-            kind = type(x)
-            if kind is type(y) and (kind is float or kind is int):
-                try:
+        try:
+            if type(at) is tuple:
+                x, y = at
+                kind = type(x)
+                if kind is type(y) and (kind is float or kind is int):
                     if aim is None and toward is None and shot is None:
-                        hits = self._answer()
+                        hits, quick = self._answer(), self._quick
                         hits._present, hits._at = self._present, at
-                        self._straight(x, y, hits)
+                        if quick is None:
+                            self._straight(x, y, hits)
+                            return hits
+                        column, row = floor(x + PIXEL), floor(y + PIXEL)
+                        if quick[column >> CELL_SHIFT][row >> CELL_SHIFT]:
+                            if x == ODD or y == ODD:  # that is off by a pixel, though in the same square
+                                return self._looked_up(at, aim, toward, shot)
+                            self._straight(column, row, hits)
                         return hits
                     looks = self._known(aim, toward, shot)
                     if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
                         return self._told_of(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
-                except (KeyError, ValueError, OverflowError):  # it is not known yet, or too far
-                    pass
+        except (KeyError, ValueError, OverflowError):  # it is not known yet, too far, or no pair
+            pass
         return self._looked_up(at, aim, toward, shot)
 
     def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
@@ -200,7 +208,7 @@ class _ReadyPattern(Ready):
         self._aims[key] = looks
         straight = (0, None, None) if self._directed else 0
         if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0):
-            self._straight = self._squares.straight(looks[0][2])
+            self._straight, self._quick = looks[0][2], self._squares.quick
         return looks
 
     def _grow(self, size: int) -> None:
@@ -220,16 +228,11 @@ class _ReadyPattern(Ready):
             if kernels is not self._kernels:
                 self._kernels = kernels
                 self._squares = kernels.Squares(self.scene, self.weapon, self._pierce, self._filter, self._frame)
-                self._aims, self._told, self._straight = {}, {}, _not_known
+                self._aims, self._told, self._quick = {}, {}, {}
             stack = self._items.stack()
             self._squares.follow(stack)
             self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
             self._version = version
-
-
-def _not_known(x: float, y: float, hits: Answer) -> None:
-    """Instead of a look that is not made yet."""
-    raise KeyError
 
 
 def plain_pair(value: object) -> tuple[float, float] | None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from math import floor
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -28,20 +27,9 @@ from weapons.pieces import Frame, Round, pieces_of
 from weapons.weapon import Weapon
 
 __all__ = [
-    "CELL_SHIFT",
-    "EDGE",
-    "FARTHEST",
-    "ODD",
-    "PIXEL",
-    "SIDE",
-    "Cell",
-    "Look",
-    "Made",
-    "Seen",
-    "Shared",
-    "Squares",
+    "CELL_SHIFT", "EDGE", "FARTHEST", "ODD", "PIXEL", "SIDE", "Cell", "Look", "Made", "Seen", "Shared", "Squares",
     "new",
-]
+]  # fmt: skip
 
 Kind = TypeVar("Kind")
 
@@ -88,8 +76,10 @@ Shared = tuple[int, int, int, int, int, int]
 number that rises front to back; id of the object; and how many pixels."""
 
 Look = Callable[[Any, Any, Answer], None]
-"""Of a round whose pixel is x and y, tell an answer what it hits, in order; a straight one takes any position, and
-raises an error of a key or a value if it is none that it knows the pixel of."""
+"""Of a round whose pixel is x and y, tell an answer what it hits, in order.
+
+One of compiled kernels takes any position, and raises an error of a key or a value if it is none whose pixel it knows.
+"""
 
 new = tuple.__new__
 """It makes a row in half the time that `HitRow` takes."""
@@ -146,6 +136,7 @@ class Squares:
     Parameters
     ----------
     made : tiles near each square
+    quick : the same, where a whole round is looked up: no look is needed where nothing is near; else empty
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
@@ -158,7 +149,7 @@ class Squares:
         self._seen = -1
         self._blocks: dict[tuple[int, int], list[Near]] = {}
         self._tiles: dict[int, dict[tuple[int, int], Seen]] = {}
-        self.whole = not frame.tiled
+        self.quick: Any = {} if frame.tiled else self.made
         self._cut = frame.tiled  # whether an object, or a round, may be met in several parts
         self.nbytes = 0
         self._lock = threading.Lock()
@@ -186,19 +177,6 @@ class Squares:
                 tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
 
         return look, sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _ in pieces)
-
-    def straight(self, look: Look) -> Look:
-        """The look of a round, for positions instead of pixels; in a square that nothing is near it is quick."""
-        made, whole = self.made, self.whole
-
-        def straight(x: float, y: float, hits: Answer) -> None:
-            if x == ODD or y == ODD:
-                raise KeyError
-            column, row = floor(x + PIXEL), floor(y + PIXEL)
-            if not whole or made[column >> CELL_SHIFT][row >> CELL_SHIFT]:
-                look(column, row, hits)
-
-        return straight
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""
@@ -302,15 +280,19 @@ class Squares:
             left, top, right, low = self._scene.bounds
             mask[: max(top - y, 0)] = mask[max(low - y + 1, 0) :] = False
             mask[:, : max(left - x, 0)] = mask[:, max(right - x + 1, 0) :] = False
-        seen = self._placed(packed(mask, self.stride), x - self._corner, y - self._corner, x_max - x, one.item)
+        seen = self._placed(mask, x - self._corner, y - self._corner, one.item)
         self.nbytes += _bytes(seen)
         return seen
 
-    def _placed(self, bits: int, x: int, y: int, across: int, item: int) -> Seen:
-        """What is seen of a tile, without its empty rows; a part looked up at (x, y) begins at its first pixel."""
-        first, last = ((bits & -bits).bit_length() - 1) // self.stride, (bits.bit_length() - 1) // self.stride
-        box = x - self._side + 1, x + across, y + first - self._side + 1, y + last
-        return (*box, bits >> max(first, 0) * self.stride, (y + first) * self.stride + x, item)
+    def _placed(self, mask: Bools, x: int, y: int, item: int) -> Seen:
+        """What is seen of a tile, in the box of what is; a part looked up at (x, y) begins at its first pixel."""
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return 0, -1, 0, -1, 0, 0, item
+        (top, low), (left, right) = rows[[0, -1]].tolist(), columns[[0, -1]].tolist()
+        box = x + left - self._side + 1, x + right, y + top - self._side + 1, y + low
+        bits = packed(mask[top : low + 1, left : right + 1], self.stride)
+        return (*box, bits, (y + top) * self.stride + x + left, item)
 
     def _part(self, one: Near, box: Box) -> Bools:
         """Mask of an item in a box inside of its own."""

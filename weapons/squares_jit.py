@@ -234,6 +234,7 @@ class Squares:
     """See `squares.Squares`; there are no squares here: a shot is looked up in what is kept of the scene."""
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
+        self.quick = None  # each shot is looked up
         self._scene, self._tell = scene, answer_of(weapon)[1]
         self._reach = np.array([-frame.reach, -frame.reach, frame.reach, frame.reach])
         self._view = View(pierce, kept.accept, tuple(sorted(set(kept.exclude[0].tolist()) - {-1})))
@@ -305,10 +306,6 @@ class Squares:
             buffers.append(buffer)
 
         return look, PIECE_BYTES + numbers.nbytes
-
-    def straight(self, look: Look) -> Look:
-        """See `squares.Squares.straight`."""
-        return look
 
     def _room_for(self, count: int, buffer: Buffer, numbers: Ints) -> Buffer:
         """A buffer for so many rows; if shots have spent as much as that takes, compose what can be seen."""
