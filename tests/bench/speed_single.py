@@ -159,15 +159,16 @@ def pymunk_ray(space: Space) -> Call:
 def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
     """Time every call; blocks of the sides take turns; a round is told by its median. All rows are compared.
 
-    Who begins changes from block to block: what ran before leaves its caches.
+    The order is drawn anew for each block: who always came after the same one would always find its caches, full of
+    what is of use to both, or emptied.
     """
     spent: dict[str, list[int]] = {name: [] for name in calls}
-    nothing = _empty_ns()
+    nothing, rng = _empty_ns(), np.random.default_rng(0)
     for number, work in enumerate(works):
         answers: dict[str, list[Any]] = {name: [] for name in calls}
         for begin in range(0, len(work), BLOCK):
-            turn = begin // BLOCK % len(calls)
-            for name, (call, ready) in [*calls.items()][turn:] + [*calls.items()][:turn]:
+            for name in rng.permutation(list(calls)).tolist():
+                call, ready = calls[name]
                 if ready:
                     ready()
                 taken, got = _block(call, work[begin : begin + BLOCK])
