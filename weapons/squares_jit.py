@@ -137,7 +137,10 @@ def _left_of(shape, pixels, scene, left, top, rest):
 
 @njit
 def _met(scene, shape, box, near, close, rest, x, y):
-    """What a round shares with tiles, front to back, as columns: keys, columns of the nearest pixel, items, samples."""
+    """How many items a round shares pixels with, in tiles that are near it, front to back.
+
+    After the list of those come columns: keys, columns of the nearest pixel, items, samples.
+    """
     rank, items, blocks, first = _ints(scene[RANK]), _ints(scene[ITEM]), _ints(scene[BLOCKS]), _ints(scene[WORD_OF])
     tiles, step, room = _words(scene[WORDS]), shape[STEP], scene[TILES]
     key, across = near[room:], near[2 * room :]
@@ -168,9 +171,19 @@ def _met(scene, shape, box, near, close, rest, x, y):
     return count
 
 
+@njit
+def _tell(met, every, count, x, y, buffer_at, room):
+    """Write what `_met` told to a buffer, in order."""
+    found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
+    put_rows(
+        0, count, met[every:], met[2 * every :], met[3 * every :], met[4 * every :], (0, x, y),
+        found[:, 0], found[:, 1], found[:, 2], found[:, 3], found[:, 4], found[:, 5],
+    )  # fmt: skip
+
+
 @compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
 def _shot(at_x, at_y, buffer_at):
-    """Rows of a round at a position, in order; they may be more than the buffer has room for."""
+    """How many rows a round has at a position; they are told, unless the buffer has no room for so many."""
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
     x, y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
@@ -192,12 +205,7 @@ def _shot(at_x, at_y, buffer_at):
         _left_of(shape, pixels, scene, left, top, rest)
     count = _met(scene, shape, box, near, close, rest, x, y)
     if count <= room:
-        every = scene[TILES]
-        found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
-        put_rows(
-            0, count, near[every:], near[2 * every :], near[3 * every :], near[4 * every :], (0, x, y),
-            found[:, 0], found[:, 1], found[:, 2], found[:, 3], found[:, 4], found[:, 5],
-        )  # fmt: skip
+        _tell(near, scene[TILES], count, x, y, buffer_at, room)
     return count
 
 
