@@ -345,7 +345,7 @@ def test_the_pixel_of_a_position(v: float) -> None:
 
 
 @pytest.mark.parametrize("x", [ODD, 0.498046875, math.nextafter(ODD, 0), -0.501953125, 2.498046875])
-def test_positions_on_the_edge_of_a_pixel(x: float) -> None:
+def test_positions_on_the_edge_of_a_pixel(x: float, jit: bool) -> None:
     scene = Scene()
     for k in range(-3, 4, 2):
         scene.add([[True]], (k, 0))
@@ -461,6 +461,14 @@ def test_far_away(jit: bool) -> None:
                 same(ready.fire(at), fire(scene, Disc(3), at))
         with pytest.raises(InputError, match="within"):
             ready.fire((math.nextafter(2.0**40, math.inf), 0.0))
+
+
+@pytest.mark.parametrize("at", [(3, 30), (56, 30), (30, 3), (30, 56)])
+def test_a_shot_a_few_pixels_over_the_edge(at: tuple[int, int], jit: bool) -> None:
+    scene = Scene((60, 60))
+    scene.add(np.ones((80, 80), bool), (30, 30))
+    ready = prepare(scene, Disc(5))
+    same(ready.fire(at), fire(scene, Disc(5), at))
 
 
 def test_a_scene_that_is_filled_after_the_first_shot(jit: bool) -> None:
