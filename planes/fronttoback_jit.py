@@ -20,6 +20,7 @@ from planes.bitrows_jit import (
     WORDS,
     bits_of,
     columns_about,
+    is_beyond,
     is_far,
     key_of,
     pixel_of,
@@ -103,6 +104,17 @@ def near_of(box, begin, listed, cells, left, top, right, bottom, near):
                 count += 1
     _sort(near, count)
     return count
+
+
+@njit
+def _crossing(strips, pattern, x, y, box, near, count):
+    """Keep tiles that are not beyond the strip of a pattern; how many."""
+    kept = 0
+    for i in range(count):
+        tile = near[i]
+        near[kept] = tile
+        kept += not is_beyond(strips, pattern, x, y, box[tile, 0], box[tile, 1], box[tile, 2], box[tile, 3])
+    return kept
 
 
 @njit
@@ -218,12 +230,12 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
 @compiled(
     types.UniTuple(types.int64, 2)(
             types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, WORDS, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
+            *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
             INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4)
     )
 )  # fmt: skip
 def _front_to_back(
-    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows,
+    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
     rank, box, tile_begin, tiles, occluder, categories, owner, accept, exclude, pierce, bounds,
 ):  # fmt: skip
     room, most = out.shape[1], 0
@@ -242,6 +254,8 @@ def _front_to_back(
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
             return -1, 0
         close = near_of(box, begin, listed, cells, left, top, right, bottom, near)
+        if len(strips):
+            close = _crossing(strips, kind, x[who], y[who], box, near, close)
         close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
         if close == 0:
             who += 1
@@ -307,7 +321,7 @@ def front_to_back(
     """See `fronttoback.front_to_back`."""
     accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
     arrays = (
-        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, *pile,
+        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips, *pile,
         accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
     )  # fmt: skip
 
