@@ -403,6 +403,22 @@ def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:
     assert windows.fits([pattern, other]) and windows.fits([])
 
 
+@settings(deadline=None)
+@given(SEEDS)
+def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mask = rng.random(rng.integers(0, [20, 150])) < rng.choice([0, 0.02, 0.5, 1])
+    spans = Spans.from_mask(mask, tuple(rng.integers(-200, 200, 2).tolist()))
+    words, (left, top, *_) = windows.columns_of(spans), spans.box_xyxy or (0, 0)
+    told = {
+        (left - WORD + 1 + WORD * column + bit, top - WORD + row)
+        for column, row in zip(*(each.tolist() for each in words.nonzero()), strict=True)
+        for bit in range(WORD)
+        if int(words[column, row]) >> bit & 1
+    }
+    assert told == {(x, y) for x, y in spans.pixels().tolist()}
+
+
 # Which kernels
 
 

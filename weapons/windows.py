@@ -24,11 +24,15 @@ OFTEN = 64
 """Placements of a pattern, in all calls, that are worth all of its shifts."""
 
 WINDOW_CACHE_BYTES = 2**26
-"""Windows kept for the next call, bytes."""
+"""Windows kept for the next call, and columns of words kept for windows with other patterns, bytes."""
 
 _kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
     WINDOW_CACHE_BYTES, lambda windows: windows.words.nbytes + windows.box_xyxy.nbytes
 )
+
+_kept_columns: Kept[Pattern, Words] = Kept(WINDOW_CACHE_BYTES, lambda words: words.nbytes)
+
+_FULL = np.uint64(2**64 - 1)
 
 
 def fits(patterns: Sequence[Pattern]) -> bool:
@@ -55,7 +59,7 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
 def _made(patterns: Sequence[Pattern], often: bool) -> Windows:
     boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
     strips = strips_of([pattern.strip for pattern in patterns], boxes)
-    columns = [columns_of(pattern.spans) for pattern in patterns]
+    columns = [_columns(pattern) for pattern in patterns]
     rows = np.array([words.shape[1] for words in columns])
     if often:
         words = columns[0]
@@ -66,13 +70,20 @@ def _made(patterns: Sequence[Pattern], often: bool) -> Windows:
     return Windows(boxes, first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0, strips)
 
 
+def _columns(pattern: Pattern) -> Words:
+    """Those of `columns_of`, of a pattern: other calls have it among others."""
+    return _kept_columns.get(pattern, lambda: columns_of(pattern.spans))
+
+
 def columns_of(spans: Spans) -> Words:
     """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows around it."""
-    mask, _ = spans.to_mask()
-    height, width = mask.shape
-    words = (WORD - 2 + width) // WORD + 2
-    padded = np.zeros((height, words * WORD), np.bool_)
-    padded[:, WORD - 1 : WORD - 1 + width] = mask
-    made = np.zeros((words, height + 2 * WORD), np.uint64)
-    made[:, WORD : WORD + height] = np.packbits(padded, axis=1, bitorder="little").view("<u8").T
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
+    columns = (WORD - 2 + x_max - x + 1) // WORD + 2
+    made = np.zeros((columns, y_max - y + 1 + 2 * WORD), np.uint64)
+    column = x - (WORD - 1) + WORD * np.arange(columns)
+    first, last = (np.clip(end[:, None] - column, 0, WORD).view(np.uint64) for end in (spans.x_first, spans.x_last + 1))
+    row = np.flatnonzero(np.diff(spans.y, prepend=y - 1))
+    if len(row):
+        runs = (_FULL << first) & ~(_FULL << last)  # by 64 all is shifted out
+        made[:, spans.y[row] - y + WORD] = np.bitwise_or.reduceat(runs, row, axis=0).T
     return made
