@@ -176,7 +176,7 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
         seen, plan = composition.seen, sight.plan
         windows = _windows(volley, plan)
         listed = composition.cells(_reach(windows.box_xyxy))
-        plan.run("pre-filter", f"cells of {1 << listed.bits} px")
+        plan.run("pre-filter", f"cells of {1 << listed.bits} px{', strips' * bool(len(windows.strips))}")
         if volley.scattered:
             placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
             plan.run("pre-filter", "", placement.nbytes + near.nbytes)
@@ -208,7 +208,8 @@ def _by_pile(items: Items, sight: Sight) -> Reader:
             placed_of(volley), windows, pile, accept, exclude, sight.pierce, sight.bounds
         )
         rows = rows_of(volley, found, tiles.each(stack.ids))
-        sight.plan.run("samples", "counted by bit rows, front to back: boxes, filters and occluders, too", rows.nbytes)
+        tests = f"boxes, {'strips, ' * bool(len(windows.strips))}filters and occluders"
+        sight.plan.run("samples", f"counted by bit rows, front to back: {tests}, too", rows.nbytes)
         return rows
 
     return read

@@ -51,7 +51,7 @@ class Costs(NamedTuple):
     pixel: float
 
 
-IN_NUMPY = Costs(50_000, 1400, 5.0, 1_000_000, 10_000, 13_000, REDRAW_PIXEL_NS)
+IN_NUMPY = Costs(50_000, 500, 4.0, 2_000_000, 2500, 13_000, REDRAW_PIXEL_NS)
 COMPILED = Costs(5000, 120, 0.3, 100_000, 1500, 400, 0.05)
 """Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
