@@ -62,15 +62,20 @@ def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, p
 
 def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
     """Offsets (n, 2) within a disc: draw after draw of each state until one is."""
-    bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
+    bits, high = np.uint64((1 << (2 * reach).bit_length()) - 1), np.uint64(32)
     offsets = np.empty((len(state), 2), np.int64)
     pending = np.arange(len(state))
     while len(pending):
         state += GOLDEN
         drawn = mix64(state)
-        x = (drawn & bits).astype(np.int64) - reach
-        y = ((drawn >> np.uint64(32)) & bits).astype(np.int64) - reach
-        good = (x <= reach) & (y <= reach) & (SUB * SUB * (x * x + y * y) <= radius2)
-        offsets[pending[good], 0], offsets[pending[good], 1] = x[good], y[good]
-        pending, state = pending[~good], state[~good]
+        x, y = (drawn & bits).view(np.int64), ((drawn >> high) & bits).view(np.int64)
+        x -= reach
+        y -= reach
+        distance2 = x * x
+        distance2 += y * y
+        within = distance2 <= radius2 // SUB**2
+        good, rest = within.nonzero()[0], np.logical_not(within).nonzero()[0]
+        row = pending.take(good)
+        offsets[row, 0], offsets[row, 1] = x.take(good), y.take(good)
+        pending, state = pending.take(rest), state.take(rest)
     return offsets

@@ -36,7 +36,7 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
             drawn = _mixed(state)
             x = np.int64(drawn & bits) - reach
             y = np.int64((drawn >> np.uint64(32)) & bits) - reach
-            if x <= reach and y <= reach and SUB * SUB * (x * x + y * y) <= radius2:
+            if SUB * SUB * (x * x + y * y) <= radius2:
                 offsets[row, 0], offsets[row, 1] = x, y
                 break
 
