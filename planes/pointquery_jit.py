@@ -6,23 +6,21 @@ import numpy as np
 from numba import types
 
 from planes.arrays import Bools, Codes, Ints
+from planes.bitrows_jit import FLAGS, INTS, OUT
 from planes.compiled import compiled
 from planes.pointquery import CELL_BITS, occupied
 from planes.spans import Box
 
 __all__ = ["CELL_BITS", "front_at", "occupied"]
 
-INTS = types.Array(types.int64, 1, "A", readonly=True)
-FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
 CELLS = types.Array(types.boolean, 2, "C", readonly=True)
-BITS, ONE = np.uint64(CELL_BITS), np.uint64(1)
+BITS = np.uint64(CELL_BITS)
 
 
 @compiled(
     *(
         types.int64(
-            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, INTS, INTS, FLAGS,
-            types.int64[::1], types.int64[::1],
+            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, INTS, INTS, FLAGS, OUT, OUT
         )
         for kind in (types.uint16, types.uint32)
     )
@@ -30,13 +28,13 @@ BITS, ONE = np.uint64(CELL_BITS), np.uint64(1)
 def _front_at(codes, cells, left, top, x, y, objects, place, item):
     count = 0
     high, wide, coarse = np.uint64(codes.shape[0]), np.uint64(codes.shape[1]), cells.size > 0
-    for i in range(len(x)):  # every answer is written, and the next over it if it was none: no branch to be guessed
+    for i in range(len(x)):
         column, row = np.uint64(x[i] - left), np.uint64(y[i] - top)  # what lies before the plane wraps far beyond it
         if (column >= wide) | (row >= high):
             continue
         if coarse and not cells[row >> BITS, column >> BITS]:
             continue
-        front = np.int64(codes[row, column] >> 1)
+        front = np.int64(codes[row, column] >> 1)  # it is written, and the next over it if it is none: without a branch
         place[count], item[count] = i, front - 1
         count += (front > 0) & objects[max(front - 1, 0)]
     return count
