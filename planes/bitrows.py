@@ -19,8 +19,8 @@ from planes.spans import Box
 from planes.strips import meets_strip
 
 __all__ = [
-    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "cut_off", "found",
-    "nearest", "packed", "row_order", "rows_of", "union", "visible", "windows_at",
+    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "crossing", "cut_off",
+    "found", "nearest", "packed", "placed_boxes", "row_order", "rows_of", "union", "visible", "windows_at",
 ]  # fmt: skip
 
 Words = npt.NDArray[np.uint64]
@@ -205,7 +205,7 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     """
     height = _rows_counted(windows, seen)
     step = WORDS_AT_ONCE // height
-    tiles, asked = seen.box_xyxy.T.copy(), _placed_boxes(placed, windows)
+    tiles, asked = seen.box_xyxy.T.copy(), placed_boxes(placed, windows)
     parts = [Found(*[np.zeros(0, np.int64)] * 6)]
     for first in range(0, len(near), PAIRS_AT_ONCE):
         now = slice(first, first + PAIRS_AT_ONCE)
@@ -230,15 +230,27 @@ def _meeting(placed: Placed, windows: Windows, tiles: Ints, asked: Ints, pairs: 
         met &= tiles[high].take(near) >= asked[low].take(placement)
         some = met.nonzero()[0]
         placement, near = placement.take(some), near.take(some)
+    placement, near = crossing(placed, windows, tiles, placement, near)
     left, top = tiles[0].take(near) - placed.x.take(placement), tiles[1].take(near) - placed.y.take(placement)
-    if len(windows.strips) and len(near):
-        wide, high = (int(np.maximum.reduce(tiles[side + 2] - tiles[side])) + 1 for side in (0, 1))
-        some = meets_strip(windows.strips, _which(placed, windows, placement), left, top, wide, high)
-        placement, near, left, top = placement.take(some), near.take(some), left.take(some), top.take(some)
     return Meeting(placement, near, left, top)
 
 
-def _placed_boxes(placed: Placed, windows: Windows) -> Ints:
+def crossing(placed: Placed, windows: Windows, tiles: Ints, placement: Ints, near: Ints) -> tuple[Ints, Ints]:
+    """Those of pairs (n,) of placements and tiles that are not beyond the strips of their patterns.
+
+    Parameters
+    ----------
+    tiles : (4, V) sides of the boxes of tiles
+    """
+    if not len(windows.strips) or not len(near):
+        return placement, near
+    wide, high = (int(np.maximum.reduce(tiles[side + 2] - tiles[side])) + 1 for side in (0, 1))
+    left, top = tiles[0].take(near) - placed.x.take(placement), tiles[1].take(near) - placed.y.take(placement)
+    some = meets_strip(windows.strips, _which(placed, windows, placement), left, top, wide, high)
+    return placement.take(some), near.take(some)
+
+
+def placed_boxes(placed: Placed, windows: Windows) -> Ints:
     """Sides (4, P) of the boxes of placed patterns."""
     box = windows.box_xyxy.T
     asked = np.empty((4, len(placed.x)), np.int64)

@@ -17,7 +17,6 @@ from planes.bitrows import Found, Placed, Windows, Words
 from planes.cells import met_boxes
 from planes.itemrows import item_rows
 from planes.spans import Box, ragged
-from planes.strips import meets_strip
 
 __all__ = ["Pile", "front_to_back"]
 
@@ -115,20 +114,13 @@ def _near(
     placed: Placed, windows: Windows, pile: Pile, accept: Ints | int | None, exclude: Ints | None
 ) -> tuple[Near, int]:
     """Pairs whose boxes and strips meet, of tiles that are there for the placement; and how many rows are looked at."""
-    box = windows.box_xyxy if len(windows.box_xyxy) == 1 else windows.box_xyxy[placed.pattern]
-    asked = np.empty((len(placed.x), 4), np.int64)
-    asked[:, 0::2], asked[:, 1::2] = placed.x[:, None], placed.y[:, None]
-    asked += box
-    placement, tile = met_boxes(asked, pile.box_xyxy)
+    asked = bitrows.placed_boxes(placed, windows)
+    placement, tile = met_boxes(asked.T, pile.box_xyxy)
+    placement, tile = bitrows.crossing(placed, windows, pile.box_xyxy.T, placement, tile)
     left, top = pile.box_xyxy[:, 0], pile.box_xyxy[:, 1]
     high = int(np.maximum.reduce(pile.box_xyxy[:, 3] - top, initial=0)) + 1
-    low = int(np.maximum.reduce(box[:, 3] - box[:, 1], initial=0)) + 1
-    if len(windows.strips):
-        wide = int(np.maximum.reduce(pile.box_xyxy[:, 2] - left, initial=0)) + 1
-        across, down = left[tile] - placed.x[placement], top[tile] - placed.y[placement]
-        some = meets_strip(windows.strips, placed.pattern[placement], across, down, wide, high)
-        placement, tile = placement[some], tile[some]
-    near = Near(placement, tile, left[tile], top[tile] if low >= high else asked[placement, 1])
+    low = int(np.maximum.reduce(asked[3] - asked[1], initial=0)) + 1
+    near = Near(placement, tile, left[tile], top[tile] if low >= high else asked[1][placement])
     if accept is None:
         return near, min(high, low)
     return near.at(_accepted(pile, accept, exclude, placement, tile).nonzero()[0]), min(high, low)
