@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
+from numba import njit, types
 
 from planes.arrays import Ints
 from planes.cells import Cells, coarse_enough
 from planes.compiled import compiled
 
-__all__ = ["cells_of", "listed_at", "met_boxes"]
+__all__ = ["cell_at", "cells_of", "listed_at", "met_boxes"]
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
 BOXES = types.Array(types.int64, 2, "C", readonly=True)
@@ -54,14 +54,20 @@ def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:
     return Cells(x, y, bits, wide, high, begin, _listed(spans, wide, wide * high, begin))
 
 
+@njit(inline="always")
+def cell_at(at_x, at_y, x, y, bits, wide, high):
+    """The cell that a pixel is in; -1 beyond all."""
+    column, row = (at_x - x) >> bits, (at_y - y) >> bits
+    return row * wide + column if 0 <= column < wide and 0 <= row < high else -1
+
+
 @compiled(types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT))
 def _at(x, y, bits, wide, high, begin, listed, at_x, at_y, place, box):
     count, room = 0, len(place)
     for i in range(len(at_x)):
-        column, row = (at_x[i] - x) >> bits, (at_y[i] - y) >> bits
-        if column < 0 or row < 0 or column >= wide or row >= high:
+        cell = cell_at(at_x[i], at_y[i], x, y, bits, wide, high)
+        if cell < 0:
             continue
-        cell = row * wide + column
         for entry in range(begin[cell], begin[cell + 1]):
             if count < room:
                 place[count], box[count] = i, listed[entry]

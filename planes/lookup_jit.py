@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from planes import lookup
 from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
 from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_beyond, is_far, key_of, put_rows, rows_by, shared
 from planes.cells import Cells
+from planes.cells_jit import cell_at
 from planes.compiled import compiled
 
 __all__ = ["looked_up"]
 
 PART_NS, PLACEMENT_NS, LISTED_NS = 8e5, 10.0, 40.0
 """What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
-
-
-@njit(inline="always")
-def _cell_at(x, y, cells_x, cells_y, bits, wide, high):
-    """The cell in which a pattern is placed; -1 beyond all."""
-    column, row = (x - cells_x) >> bits, (y - cells_y) >> bits
-    return row * wide + column if 0 <= column < wide and 0 <= row < high else -1
 
 
 @compiled(
@@ -40,7 +34,7 @@ def _looked_up(
     key, nearest_x = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
     hit, hit_samples = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
     while who < end:
-        cell = _cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
+        cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
         if cell < 0:
             who += 1
             continue

@@ -23,6 +23,7 @@ from planes.arrays import Bools, Ints
 from planes.bitrows import WORD, Words
 from planes.bitrows_jit import key_of, put_rows, shared
 from planes.cells import Cells
+from planes.cells_jit import cell_at
 from planes.compiled import compiled
 from planes.constants import WEIGHT_FULL
 from planes.fronttoback_jit import PAD, cut_off, laid, near_of, struck, take
@@ -101,10 +102,10 @@ def _words(address):
 @njit
 def _listed(scene, box, x, y, left, top, right, bottom, near):
     """Tiles in the cell of a pixel whose boxes meet one, front to back; how many."""
-    column, row = (x - scene[X]) >> scene[BITS], (y - scene[Y]) >> scene[BITS]
-    if column < 0 or row < 0 or column >= scene[WIDE] or row >= scene[HIGH]:
+    cell, count = cell_at(x, y, scene[X], scene[Y], scene[BITS], scene[WIDE], scene[HIGH]), 0
+    if cell < 0:
         return 0
-    begin, listed, cell, count = _ints(scene[BEGIN]), _ints(scene[LISTED]), row * scene[WIDE] + column, 0
+    begin, listed = _ints(scene[BEGIN]), _ints(scene[LISTED])
     for entry in range(begin[cell], begin[cell + 1]):
         tile = listed[entry]
         across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
