@@ -29,10 +29,11 @@ from planes.constants import (
     TRIG_BITS,
     TRIG_ERROR,
 )
+from planes.forms import Form
 from planes.kept import Kept
 from planes.parts import Parts, joined
 from planes.rings import neighbours
-from planes.sprite import Form, Sprite, Variant, frame_pivot
+from planes.sprite import Sprite, Variant, frame_pivot
 from planes.volumes import Circles, Core, Polygons, Volumes
 
 __all__ = ["KINDS", "Bounds", "Kind", "bounding", "fitted", "moved", "shifted"]

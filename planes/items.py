@@ -18,10 +18,11 @@ import numpy.typing as npt
 from planes import placing
 from planes.arrays import Bools, Floats, InputError, Ints, choice
 from planes.constants import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURNAL_ROWS, SUB
+from planes.forms import Form
 from planes.grid256 import pixel
 from planes.placing import boxes_at
 from planes.spans import Box
-from planes.sprite import Form, Sprite, Variant, variant_of
+from planes.sprite import Sprite, Variant, variant_of
 from planes.stack import Stack, clipped
 from planes.twins import kernels_of
 

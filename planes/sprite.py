@@ -44,18 +44,7 @@ from planes.rasterise import ellipse, polygon
 from planes.spans import Spans
 from planes.twins import kernels_of
 
-__all__ = [
-    "Form",
-    "Sprite",
-    "Variant",
-    "as_sprite",
-    "form_of",
-    "frame_pivot",
-    "picture_of",
-    "rows_of",
-    "variant_of",
-    "whole_scale",
-]
+__all__ = ["Sprite", "Variant", "as_sprite", "form_of", "frame_pivot", "picture_of", "rows_of", "variant_of"]
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from planes import sprite as module
 from planes import turning
 from planes.arrays import InputError
 from planes.constants import VARIANT_BYTES
+from planes.forms import Form
 from planes.kept import Kept
 from planes.scene import Scene
-from planes.sprite import Form, Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
+from planes.sprite import Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
 
 AGAINST = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 LAWS = settings(max_examples=54, deadline=None)

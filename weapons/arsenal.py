@@ -13,13 +13,14 @@ import numpy as np
 
 from planes.arrays import InputError, Ints, choice, integer, shown, within
 from planes.constants import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
+from planes.forms import Form
 from planes.grid256 import ONE, pixel, snap, turned, unit
 from planes.kept import Kept
 from planes.rasterise import beam, cone, disc, polygon, ring
 from planes.scene import Scene
 from planes.schema import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word
 from planes.spans import Spans
-from planes.sprite import Form, Sprite, rows_of, variant_of
+from planes.sprite import Sprite, rows_of, variant_of
 from weapons.guns import Laser, Pistol, Projectile, Rifle, Sweep, Traced
 from weapons.pattern import FALLOFFS, Pattern, Swept, make_pattern
 from weapons.weapon import LENGTH, Part, Weapon

@@ -20,6 +20,7 @@ from planes.constants import POSITION_MAX, WEIGHT_FULL
 from planes.items import Stack
 from planes.scene import Scene
 from planes.spans import Box, meets
+from planes.turning import sides_of
 from weapons.candidates import refused
 from weapons.hits import HitRow
 from weapons.oneshot import Answer, Filter, answer_of
@@ -286,10 +287,9 @@ class Squares:
 
     def _placed(self, mask: Bools, x: int, y: int, item: int) -> Seen:
         """What is seen of a tile, in the box of what is; a part looked up at (x, y) begins at its first pixel."""
-        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-        if not len(rows):
+        (left, top, right, low), pixels = sides_of(mask)
+        if not pixels:
             return 0, -1, 0, -1, 0, 0, item
-        (top, low), (left, right) = rows[[0, -1]].tolist(), columns[[0, -1]].tolist()
         box = x + left - self._side + 1, x + right, y + top - self._side + 1, y + low
         bits = packed(mask[top : low + 1, left : right + 1], self.stride)
         return (*box, bits, (y + top) * self.stride + x + left, item)
