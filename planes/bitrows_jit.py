@@ -128,29 +128,32 @@ def put_rows(count, n, key, across, seen, samples, placed, placement_out, seen_o
     return count + n
 
 
-Kernel = Callable[[int, int, int, Ints], tuple[int, int]]
-"""Goes on with a placement, before a last one, after so many rows; tells where it stopped, -1 if it cannot decide."""
+Kernel = Callable[..., tuple[int, int]]
+"""Goes on with a placement, before a last one, after so many rows that it has written, by what it is given beside;
+tells where it stopped, -1 if it cannot decide."""
 
 
-def rows_by(kernel: Kernel, count: int, least: float) -> Found | None:
+def rows_by(kernel: Kernel, count: int, least: float, *given: Any) -> Found | None:
     """Rows of all placements, in threads if there are enough of them; None if the kernel cannot decide them.
 
     Parameters
     ----------
     least : placements that are worth a thread
+    given : to the kernel
     """
-    parts = in_parts(count, least, lambda first, last: _filled(kernel, first, last))
+    if count < 2 * least:
+        rows = _filled(kernel, 0, count, given)
+        return None if rows is None else Found(*rows)
+    parts = in_parts(count, least, lambda first, last: _filled(kernel, first, last, given))
     known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
-        return None
-    return Found(*(known[0] if len(known) == 1 else np.concatenate(known, axis=1)))
+    return Found(*np.concatenate(known, axis=1)) if len(known) == len(parts) else None
 
 
-def _filled(kernel: Kernel, who: int, last: int) -> Ints | None:
+def _filled(kernel: Kernel, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
     """Columns (6, n) of the rows of some placements; room that is not written to costs nothing."""
     count, out = 0, np.empty((6, ROOM * (last - who) + ROOM_LEAST), np.int64)
     while True:
-        who, count = kernel(who, last, count, out)
+        who, count = kernel(who, last, count, out, *given)
         if who == last or who < 0:
             return out[:, :count] if who >= 0 else None
         more = np.empty((6, 2 * out.shape[1]), np.int64)

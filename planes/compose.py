@@ -130,6 +130,8 @@ class CodePlane:
 
     def cost(self, items: Items) -> int:
         """Pixels that must be drawn anew before the plane can be read; each change is looked at once."""
+        if self._drawing is not None and self._drawn == items.version:
+            return 0
         with self._lock:
             return self._owed(items)
 
@@ -153,6 +155,9 @@ class CodePlane:
     def read(self, items: Items) -> Codes:
         """Codes (h, w) of the present version; `redrawn` tells how many pixels, of old and new boxes, that concerns."""
         with self._lock:
+            if self._drawing is not None and self._drawn == items.version:
+                self.redrawn = 0
+                return self._drawing.codes
             changes = self._changes(items, self._drawn)
             if changes is not None and not _are_few(changes) and self._owed(items) == self.size:
                 changes = None

@@ -320,16 +320,14 @@ def front_to_back(
 ) -> Found:
     """See `fronttoback.front_to_back`."""
     accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
-    arrays = (
-        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips, *pile,
-        accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
-    )  # fmt: skip
-
-    def kernel(who: int, end: int, count: int, out: Ints) -> tuple[int, int]:
-        return _front_to_back(who, end, count, out, *arrays)
-
-    each = PLACEMENT_NS + TILE_NS * len(pile.rank)
-    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART_NS / each)
+    found = None
+    if not windows.shifted:
+        each = PLACEMENT_NS + TILE_NS * len(pile.rank)
+        found = rows_by(
+            _front_to_back, len(placed.x), PART_NS / each,
+            *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips, *pile,
+            accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
+        )  # fmt: skip
     if found is None:
         return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)
     return found

@@ -332,6 +332,9 @@ class Items:
 
     def stack(self) -> Stack:
         """Items that decide, front to back: greater layer; occluders before objects; then the later added."""
+        known = self._stack
+        if known is not None and known[0] == self.version:
+            return known[1]
         with self._lock:
             if self._stack is None or self._stack[0] != self.version:
                 if self.atlas.wasteful:
@@ -377,13 +380,13 @@ class Items:
 
     def imagery(self) -> list[Role]:
         """Roles of what is in the scene and decides no hit."""
-        forms, known = self.stack().forms, self._imagery
-        if known is None or known[0] != forms:
+        known = self._imagery
+        if known is None or known[0] != self.arrangement:
             count = np.bincount(self.role[: self.count], self.alive[: self.count], len(ROLES)).tolist()
             drawn = [
                 role for role in ROLES if count[ROLES.index(role)] and ROLES.index(role) not in (HITTABLE, OCCLUDER)
             ]
-            known = self._imagery = forms, drawn
+            known = self._imagery = self.arrangement, drawn
         return known[1]
 
     def tiles(self) -> Tiles:

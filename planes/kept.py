@@ -1,13 +1,13 @@
-"""What was made and may be asked for again: the last ones used are kept, within a number of bytes."""
+"""What was made and may be asked for again: of many the last ones used, within a number of bytes; of one thing all."""
 
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-__all__ = ["Kept"]
+__all__ = ["Kept", "once"]
 
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
@@ -40,3 +40,23 @@ class Kept(Generic[Key, Value]):
             while self.bytes > self.limit and len(self.values) > 1:
                 self.bytes -= self.size(self.values.popitem(last=False)[1])
             return made
+
+
+class once(Generic[Value]):  # noqa: N801 - it is used as a decorator
+    """A property that is worked out when it is first read, and kept with its owner.
+
+    It is `functools.cached_property` as that is from Python 3.12 on: the lock that it has before takes longer than what
+    most of these work out.
+    """
+
+    def __init__(self, make: Callable[[Any], Value]) -> None:
+        self.make, self.__doc__ = make, make.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, one: Any, owner: type) -> Value:
+        if one is None:
+            return self  # type: ignore[return-value] # of the class it is this
+        value = vars(one)[self.name] = self.make(one)
+        return value

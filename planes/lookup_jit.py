@@ -6,7 +6,6 @@ import numpy as np
 from numba import types
 
 from planes import lookup
-from planes.arrays import Ints
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
 from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_beyond, is_far, key_of, put_rows, rows_by, shared
 from planes.cells import Cells
@@ -84,14 +83,12 @@ def _looked_up(
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
     """See `lookup.looked_up`; `beside` is not needed."""
-    arrays = (
-        *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips,
-        seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells,
-    )  # fmt: skip
-
-    def kernel(who: int, end: int, count: int, out: Ints) -> tuple[int, int]:
-        return _looked_up(who, end, count, out, *arrays)
-
     each = PLACEMENT_NS + LISTED_NS * len(cells.listed) / max(len(cells.begin) - 1, 1)
-    found = None if windows.shifted else rows_by(kernel, len(placed.x), PART_NS / each)
+    found = None
+    if not windows.shifted:
+        found = rows_by(
+            _looked_up, len(placed.x), PART_NS / each,
+            *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips,
+            seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells,
+        )  # fmt: skip
     return lookup.looked_up(placed, windows, seen, cells, beside) if found is None else found

@@ -5,12 +5,15 @@ Functions from arrays to arrays; `pointquery_jit` has the same ones, compiled.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
+from planes.grid256 import pixel
 from planes.spans import Box
 
-__all__ = ["CELL_BITS", "front_at", "occupied"]
+__all__ = ["CELL_BITS", "Front", "front_at", "occupied"]
 
 CELL_BITS = 3
 """Cells of the coarse map have sides of 8 px: the map of a plane of 1920 x 1080 fits the level-1 cache."""
@@ -30,8 +33,16 @@ def occupied(codes: Codes) -> Bools:
     return np.not_equal(cells, 0)
 
 
-def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) -> tuple[Ints, Ints]:
-    """Objects that lie in front at pixels (n,), as (place, id).
+class Front(NamedTuple):
+    """What lies in front at some of many positions: which of them (n,), the id of the object, and the pixel (n, 2)."""
+
+    place: Ints
+    object: Ints
+    xy: Ints
+
+
+def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
+    """Objects that lie in front at positions (N, 2) in 1/256 px.
 
     Parameters
     ----------
@@ -39,7 +50,8 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, x: Ints, y: Int
     cells : its coarse map, or None to read the plane alone
     objects : by id, whether it can be hit
     """
-    column, row = x - plane_xyxy[0], y - plane_xyxy[1]
+    xy = pixel(at_256)
+    column, row = xy[:, 0] - plane_xyxy[0], xy[:, 1] - plane_xyxy[1]
     some = _inside(column, row, codes.shape)
     if cells is not None:
         some = _narrowed(some, _read(cells, column, row, some, CELL_BITS).nonzero()[0])
@@ -48,7 +60,8 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, x: Ints, y: Int
     item = (code.take(front) >> 1).astype(np.int64)
     item -= 1
     hit = objects.take(item).nonzero()[0]
-    return _narrowed(some, front.take(hit)), item.take(hit)
+    place = _narrowed(some, front.take(hit))
+    return Front(place, item.take(hit), xy.take(place, axis=0))
 
 
 def _inside(column: Ints, row: Ints, shape: tuple[int, ...]) -> Ints | None:

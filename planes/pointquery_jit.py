@@ -6,9 +6,10 @@ import numpy as np
 from numba import types
 
 from planes.arrays import Bools, Codes, Ints
-from planes.bitrows_jit import FLAGS, INTS, OUT
+from planes.bitrows_jit import BOXES, FLAGS, OUT, ROWS_OUT
 from planes.compiled import compiled
-from planes.pointquery import CELL_BITS, occupied
+from planes.constants import HALF
+from planes.pointquery import CELL_BITS, Front, occupied
 from planes.spans import Box
 
 __all__ = ["CELL_BITS", "front_at", "occupied"]
@@ -20,22 +21,23 @@ BITS = np.uint64(CELL_BITS)
 @compiled(
     *(
         types.int64(
-            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, INTS, INTS, FLAGS, OUT, OUT
+            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
         )
         for kind in (types.uint16, types.uint32)
     )
 )  # fmt: skip
-def _front_at(codes, cells, left, top, x, y, objects, place, item):
+def _front_at(codes, cells, left, top, at_256, objects, place, item, xy):
     count = 0
     high, wide, coarse = np.uint64(codes.shape[0]), np.uint64(codes.shape[1]), cells.size > 0
-    for i in range(len(x)):
-        column, row = np.uint64(x[i] - left), np.uint64(y[i] - top)  # what lies before the plane wraps far beyond it
+    for i in range(len(at_256)):
+        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
+        column, row = np.uint64(x - left), np.uint64(y - top)  # what lies before the plane wraps far beyond it
         if (column >= wide) | (row >= high):
             continue
         if coarse and not cells[row >> BITS, column >> BITS]:
             continue
         front = np.int64(codes[row, column] >> 1)  # it is written, and the next over it if it is none: without a branch
-        place[count], item[count] = i, front - 1
+        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
         count += (front > 0) & objects[max(front - 1, 0)]
     return count
 
@@ -43,9 +45,9 @@ def _front_at(codes, cells, left, top, x, y, objects, place, item):
 NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
 
 
-def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, x: Ints, y: Ints, objects: Bools) -> tuple[Ints, Ints]:
+def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
     """See `pointquery.front_at`."""
-    place, item = np.empty((2, len(x)), np.int64)
-    coarse = NO_CELLS if cells is None else cells
-    count = _front_at(codes, coarse, plane_xyxy[0], plane_xyxy[1], x, y, objects, place, item)
-    return place[:count], item[:count]
+    place, item = np.empty((2, len(at_256)), np.int64)
+    xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
+    count = _front_at(codes, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
+    return Front(place[:count], item[:count], xy[:count])

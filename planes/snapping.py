@@ -6,7 +6,6 @@ import numpy as np
 
 from planes.arrays import Floats, Ints
 from planes.constants import POSITION_MAX, SUB
-from planes.grid256 import pixel
 
 __all__ = ["snapped"]
 
@@ -19,15 +18,12 @@ ROUNDING_BITS = ROUNDING.view(np.int64)
 """Of the sum, beyond these, the bits are that whole number: so none is converted, which takes twice as long."""
 
 
-def snapped(at: Floats) -> tuple[Ints, Ints] | None:
-    """Positions (N, 2), px, in 1/256 px, as `grid256.snap` rounds them, and the whole pixels that hold them.
-
-    None if one is no number within the limits.
-    """
+def snapped(at: Floats) -> Ints | None:
+    """Positions (N, 2), px, in 1/256 px, as `grid256.snap` rounds them; None if one is no number within the limits."""
     if not (at.max(initial=0) <= LIMIT and at.min(initial=0) >= -LIMIT):  # if one is not a number, neither are these
         return None
     made = at * SCALE
     made += ROUNDING
-    whole = made.view(np.int64)
+    whole: Ints = made.view(np.int64)
     whole -= ROUNDING_BITS
-    return whole, pixel(whole)
+    return whole

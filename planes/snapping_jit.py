@@ -7,24 +7,23 @@ from numba import types
 
 from planes.arrays import Floats, Ints
 from planes.compiled import compiled
-from planes.constants import HALF, POSITION_MAX, SUB
+from planes.constants import POSITION_MAX, SUB
 
 __all__ = ["snapped"]
 
 FLOATS = types.Array(types.float64, 1, "C", readonly=True)
 
 
-@compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1]))
-def _snapped(at, whole, pixel):
+@compiled(types.boolean(FLOATS, types.int64[::1]))
+def _snapped(at, whole):
     good = True
     for i in range(len(at)):
         good &= abs(at[i]) <= POSITION_MAX  # of what is not a number it is not
         whole[i] = np.int64(np.rint(at[i] * SUB))
-        pixel[i] = (whole[i] + HALF) >> 8
     return good
 
 
-def snapped(at: Floats) -> tuple[Ints, Ints] | None:
+def snapped(at: Floats) -> Ints | None:
     """See `snapping.snapped`."""
-    whole, pixel = np.empty(at.shape, np.int64), np.empty(at.shape, np.int64)
-    return (whole, pixel) if _snapped(at.ravel(), whole.ravel(), pixel.ravel()) else None
+    whole = np.empty(at.shape, np.int64)
+    return whole if _snapped(at.ravel(), whole.ravel()) else None

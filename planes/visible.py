@@ -104,9 +104,7 @@ class Compositions:
 
     def kept(self, view: View, version: int) -> Composition | None:
         """The composition of a version, if it is there."""
-        with self._lock:
-            self._forget(version)
-            return self._kept.get(view)
+        return self._kept.get(view) if self._version == version else None
 
     def pays(self, view: View, version: int, lost: float, cost: float) -> bool:
         """Whether a view has lost as much as a composition costs, with what it would lose now.
@@ -125,12 +123,13 @@ class Compositions:
         if found is None:
             found = Composition(items.stack(), items.tiles(), bounds, view)
             with self._lock:
+                self._forget(items.version)
                 self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
         return found
 
     def _forget(self, version: int) -> None:
         if self._version != version:
-            self._version, self._kept, self._missed = version, {}, {}
+            self._kept, self._missed, self._version = {}, {}, version  # in this order: `kept` holds no lock
 
 
 def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:

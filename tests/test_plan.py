@@ -376,9 +376,9 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     scene.add(np.ones((5, 5), np.bool_), (20, 20))
     word, runs, hits = 8, 3 * 5 * 8, 3 * 5 * 8
     told = {
-        "shots": 2 * 2 * word,
+        "shots": 2 * word,
         "stack": 8 * word + 1,
-        "patterns": (3 * 5 + 1 + 4) * word,
+        "patterns": (2 + 3 * 5 + 1 + 4) * word,
         "plan": 0,
         "weights": (9 + 1) * word + 3 * word,
         "verdicts": 2 * 5 * word,
@@ -440,6 +440,17 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
     unmet = yard()
     unmet.set(3, categories=0)
     assert "filter" not in names(fire(unmet, Disc(9), SHOTS))[1]
+
+
+def test_what_was_left_out_is_told_of_the_scene_as_it_was() -> None:
+    """Also where the plan is first read when all of it has changed."""
+    for weapon in (Disc(9), Disc(9, falloff="linear"), Laser(60)):
+        scene = yard(full=True)
+        hits, told = (fire(scene, weapon, SHOTS, aim=30, strategy="direct") for _ in range(2))
+        before = told.plan.left_out
+        scene.remove(scene.ids())
+        scene.add(Sprite.box(9, 9), (40, 40))
+        assert hits.plan.left_out == before and set(IMAGERY) <= names(hits)[1]
 
 
 def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,13 +42,15 @@ def test_what_lies_in_front_at_a_pixel(kernels: ModuleType, seed: int, kind: typ
     x = left + rng.integers(-beyond, width + beyond, count)
     y = top + rng.integers(-beyond, height + beyond, count)
     cells = kernels.occupied(codes) if coarse else None
-    place, item = kernels.front_at(codes, cells, (left, top, left + width - 1, top + height - 1), x, y, objects)
+    at_256 = np.stack([x, y], axis=1) * 256 + rng.integers(-128, 128, (count, 2))
+    place, item, xy = kernels.front_at(codes, cells, (left, top, left + width - 1, top + height - 1), at_256, objects)
     told = []
     for i, (column, row) in enumerate(zip((x - left).tolist(), (y - top).tolist(), strict=True)):
         code = int(codes[row, column]) if 0 <= column < width and 0 <= row < height else 0
         if code >= 2 and objects[code // 2 - 1]:
             told.append((i, code // 2 - 1))
     assert list(zip(place.tolist(), item.tolist(), strict=True)) == told
+    assert xy.tolist() == np.stack([x, y], axis=1)[place].tolist()
 
 
 @pytest.mark.parametrize("coarse", [False, True])
@@ -58,7 +60,7 @@ def test_one_pixel_beyond_the_edges_there_is_nothing(kernels: ModuleType, coarse
     for x, y in ((-1, 3), (16, 3), (3, -1), (3, 9), (-1, -1), (16, 9)):
         for also in ([], [5]):
             at = np.array([[x, y], *([k, k] for k in also)])
-            place, _ = kernels.front_at(codes, cells, (0, 0, 15, 8), at[:, 0], at[:, 1], objects)
+            place, *_ = kernels.front_at(codes, cells, (0, 0, 15, 8), 256 * at, objects)
             assert place.tolist() == [1] * len(also)
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from planes import bitrows, cells, fronttoback, lookup
+from planes import bitrows, cells, fronttoback, lookup, pointquery
 from planes.arrays import Ints
 from planes.bitrows import WORD, Seen, Windows
 from planes.compose import CodePlane
@@ -24,10 +25,10 @@ from planes.scene import Scene
 from planes.tiles import Tiles
 from planes.twins import expect, kernels_of
 from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
-from weapons.arsenal import Plain, parts_of, pattern_of
+from weapons.arsenal import parts_of, pattern_of
 from weapons.candidates import Candidates, may_refuse, refused
 from weapons.costs import chosen_candidates, chosen_form
-from weapons.counting import NOT_BESIDE, counted, placed_of, points, rows_of
+from weapons.counting import NOT_BESIDE, counted, placed_of, rows_of
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
@@ -36,7 +37,7 @@ from weapons.volley import Shots, Volley, placements_of, volley_of
 from weapons.weapon import Weapon
 from weapons.windows import fits, windows_of
 
-__all__ = ["counts", "fired_by_bits", "view_of"]
+__all__ = ["fired_by_bits", "kind_of", "view_of"]
 
 SHOT_NS, ITEM_NS = 300.0, 3.0
 """What a placement of a disc of 40 px takes in numpy, and more for each item: by `tests/bench/speed.py`."""
@@ -60,12 +61,36 @@ REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
 
 
-def counts(weapon: Weapon) -> bool:
-    """Whether bit rows serve a weapon: one without weights, whose patterns are not too large."""
-    plain = parts_of(weapon)[2]
-    if plain.falloff is not None:
-        return False
-    return plain.reach_256 <= SUB * REACH_COUNTED or (not plain.directed and fits([pattern_of(plain, ONE, 0)]))
+class Kind(NamedTuple):
+    """What holds for all shots of a weapon.
+
+    Parameters
+    ----------
+    counted : whether bit rows serve it: it has no weights, and its patterns are not too large
+    placements : of each shot
+    scattered : whether it has pellets
+    pierces : whether its samples go on through objects
+    is_point : whether its shot is one pixel
+    """
+
+    counted: bool
+    placements: int
+    scattered: bool
+    pierces: bool
+    is_point: bool
+
+
+def kind_of(weapon: Weapon) -> Kind:
+    """Kind of a weapon of patterns, kept with it, as it does not change."""
+    kept: Kind | None = getattr(weapon, "_kind", None)
+    if kept is None:
+        burst, spread, plain = parts_of(weapon)
+        near, full = plain.reach_256 <= SUB * REACH_COUNTED, plain.falloff is None
+        alone = full and not plain.directed and (near or fits([pattern_of(plain, ONE, 0)]))
+        point = alone and not burst and not spread and pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
+        kept = Kind(full and (near or alone), placements_of(weapon), spread is not None, plain.pierce, point)
+        weapon._keep("_kind", kept)
+    return kept
 
 
 def fired_by_bits(
@@ -73,21 +98,23 @@ def fired_by_bits(
 ) -> Hits:
     """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
-    burst, spread, plain = parts_of(weapon)
-    each = placements_of(weapon)
-    view, placements = view_of(plain.pierce, shots), each * len(shots)
-    point = not burst and not spread and is_point(plain, view, stack)
-    alone = spread is None and (prefilter, broadphase) == ("auto", "auto")
+    kind, each = kind_of(weapon), kind_of(weapon).placements
+    view, placements = view_of(kind.pierces, shots), each * len(shots)
+    point = kind.is_point and view == OF_ALL[False] and not stack.has_unmet
+    alone = not kind.scattered and prefilter == broadphase == "auto"
     expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
     asked = 0 if alone or name == "composed" else placements
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
-    sight = Sight(stack, scene.bounds, plain.pierce, candidates, plan)
+    sight = Sight(stack, scene.bounds, kind.pierces, candidates, plan)
     plan.run("plan", f"{name}: {why}")
-    read, first, most = _reader(scene, name, view, point, alone, sight)
-    parts: list[Rows] = []
-    for begin, part, volley in _parts(weapon, shots, first // each, most // each, candidates):
-        parts.append(read(part, volley).later(begin))
+    plane = scene.code_plane() if point and name == "composed" else None
+    if plane is not None:
+        parts = _read(plane, shots, sight)
+    else:
+        read, first, most = _reader(scene, name, view, alone, sight)
+        part_of = _parts(weapon, shots, first // each, most // each, candidates)
+        parts = [read(part, volley).later(begin) for begin, part, volley in part_of]
     rows = Rows.joined(parts)
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
@@ -99,18 +126,13 @@ def fired_by_bits(
 Reader = Callable[[Shots, Volley], Rows]
 
 
-def _reader(
-    scene: Scene, name: str, view: View | None, point: bool, alone: bool, sight: Sight
-) -> tuple[Reader, int, int]:
+def _reader(scene: Scene, name: str, view: View | None, alone: bool, sight: Sight) -> tuple[Reader, int, int]:
     """How rows of placements are found, and of how many at first and at most at a time.
 
     Parameters
     ----------
     alone : whether each placement has rows of its own, and no pre-filter but boxes was asked for
     """
-    plane = scene.code_plane() if point and name == "composed" else None
-    if plane is not None:
-        return _by_plane(plane, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if name == "composed" and view is not None:
         known = scene.compositions()
         kept = known.kept(view, scene.version)
@@ -146,27 +168,22 @@ def _windows(volley: Volley, plan: Plan) -> Windows:
     """Windows of the patterns of placements."""
     compiled = kernels_of(bitrows) is not bitrows
     windows = windows_of(volley.table.patterns, 0 if compiled else len(volley))
-    _tell_patterns(volley, plan)
+    plan.run("patterns", f"{len(volley.table.patterns)} distinct", volley.nbytes)
     return windows
 
 
-def _tell_patterns(volley: Volley, plan: Plan) -> None:
-    plan.run("patterns", f"{len(volley.table.patterns)} distinct", volley.nbytes)
-
-
-def _by_plane(plane: CodePlane, sight: Sight) -> Reader:
-    """Read what lies in front at each placement of one pixel."""
-    codes = plane.read(sight.candidates.items)
+def _read(plane: CodePlane, shots: Shots, sight: Sight) -> list[Rows]:
+    """Read what lies in front at each shot of one pixel."""
+    codes, objects, parts = plane.read(sight.candidates.items), sight.stack.is_object, []
     sight.plan.run("code plane", f"{plane.redrawn} px drawn anew", plane.redrawn * codes.itemsize)
-    objects = sight.stack.is_object
-
-    def read(_: Shots, volley: Volley) -> Rows:
-        _tell_patterns(volley, sight.plan)
-        rows = points(volley, codes, plane.cells(len(volley)), plane.box_xyxy, objects)
+    for begin in range(0, len(shots), PLACEMENTS_AT_ONCE):
+        at_256 = shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
+        front = kernels_of(pointquery).front_at(codes, plane.cells(len(at_256)), plane.box_xyxy, at_256, objects)
+        rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
         sight.plan.run("read", "one code for each sample", rows.nbytes)
-        return rows
-
-    return read
+        parts.append(rows.later(begin))
+    sight.plan.leave_out("patterns", "each shot is one pixel")
+    return parts
 
 
 def _by_composition(composition: Composition, sight: Sight) -> Reader:
@@ -289,13 +306,6 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
     if (accept != accept[0]).any() or (exclude != exclude[0]).any():
         return None
     return View(pierce, int(accept[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
-
-
-def is_point(plain: Plain, view: View | None, stack: Stack) -> bool:
-    """Whether what is placed is one pixel, and ends at the first item there."""
-    if plain.directed or view != OF_ALL[False] or stack.has_unmet:
-        return False
-    return pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
 
 
 def _is_disc(volley: Volley) -> bool:

@@ -9,15 +9,13 @@ from types import ModuleType
 
 import numpy as np
 
-from planes import pointquery
-from planes.arrays import Bools, Codes, Ints
+from planes.arrays import Ints
 from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
-from planes.spans import Box, ragged
-from planes.twins import kernels_of
+from planes.spans import ragged
 from weapons.hits import Rows
 from weapons.volley import Volley
 
-__all__ = ["NOT_BESIDE", "counted", "placed_of", "points", "rows_of"]
+__all__ = ["NOT_BESIDE", "counted", "placed_of", "rows_of"]
 
 NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
 """No distances along rows: the nearest pixel is looked for in what is hit."""
@@ -42,7 +40,11 @@ def rows_of(volley: Volley, found: Found, ids: Ints) -> Rows:
     shot, round_ = volley.turn_of(found.placement)
     first_xy = np.empty((len(found.x), 2), np.int64)
     first_xy[:, 0], first_xy[:, 1] = found.x, found.y
-    return Rows(shot, round_, ids[found.seen], found.samples, None, None, None, first_xy, found.distance2)
+    rows = {
+        "shot": shot, "object": ids[found.seen], "samples": found.samples, "first_xy": first_xy,
+        "distance2": found.distance2,
+    }  # fmt: skip
+    return Rows.of(rows if round_ is None else {**rows, "round": round_})
 
 
 def counted(
@@ -83,19 +85,6 @@ def counted(
         *volley.turn_of(placement), ids[rank[order]], samples, pixels[order] if volley.scattered else None, None,
         pellets[order], np.stack([found.x[order], found.y[order]], axis=1), found.distance2[order],
     )  # fmt: skip
-
-
-def points(volley: Volley, codes: Codes, cells: Bools | None, plane_xyxy: Box, objects: Bools) -> Rows:
-    """Rows of placements of the pixel that they lie on: what the code plane tells of it.
-
-    Parameters
-    ----------
-    cells : coarse map of the plane, if there is one
-    objects : by id, whether it can be hit
-    """
-    front_at = kernels_of(pointquery).front_at
-    place, item = front_at(codes, cells, plane_xyxy, volley.xy[:, 0], volley.xy[:, 1], objects)
-    return Rows(*volley.turn_of(place), item, None, None, None, None, volley.xy.take(place, axis=0), None)
 
 
 def _sums(values: Ints, first: Ints) -> Ints:

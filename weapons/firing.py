@@ -15,7 +15,7 @@ from planes.arrays import InputError, Ints, each, reals, shown
 from planes.constants import ALL
 from planes.scene import Scene
 from weapons.arsenal import ray_parts_of
-from weapons.bitfire import counts, fired_by_bits
+from weapons.bitfire import fired_by_bits, kind_of
 from weapons.hits import Hits
 from weapons.plan import Plan, read_stack
 from weapons.runfire import fired_by_runs
@@ -75,7 +75,8 @@ def fire(
     """
     plan = Plan()
     present = scene if isinstance(scene, Scene) else _history(scene).scene
-    shots = checked_shots(weapon, at, aim, toward, category_bits(present, accept), exclude, seed, shot)
+    bits = accept if type(accept) is int else category_bits(present, accept)
+    shots = checked_shots(weapon, at, aim, toward, bits, exclude, seed, shot)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if not isinstance(scene, Scene):
         return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
@@ -137,7 +138,7 @@ def fired(
 
         return fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
     stack = read_stack(scene, plan)
-    fired_by = fired_by_bits if counts(weapon) else fired_by_runs
+    fired_by = fired_by_bits if kind_of(weapon).counted else fired_by_runs
     return fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planes.arrays import InputError, Ints, integer
 from planes.constants import WEIGHT_FULL
+from planes.kept import once
 from planes.sampling import Verdict
 from planes.scene import Scene
 from planes.spans import Spans, merged_runs
@@ -56,9 +56,6 @@ class HitRow(NamedTuple):
     pellets: int
     first_xy: tuple[int, int]
     distance2: int
-
-
-COLUMNS = frozenset(HitRow._fields)
 
 
 class OwnerRow(NamedTuple):
@@ -108,6 +105,13 @@ class Rows(Columns):
             if column is not None:
                 columns[name] = column
 
+    @classmethod
+    def of(cls, columns: dict[str, Ints]) -> Rows:
+        """Rows of these columns, some of which may be missing."""
+        rows = object.__new__(cls)
+        vars(rows).update(columns)
+        return rows
+
     def __getattr__(self, name: str) -> Any:
         """Make a column that was not given."""
         if name not in DEFAULTS:
@@ -122,11 +126,11 @@ class Rows(Columns):
 
     def take(self, rows: Ints | slice) -> Rows:
         """Some of the rows."""
-        return Rows._of({name: column[rows] for name, column in vars(self).items()})
+        return Rows.of({name: column[rows] for name, column in vars(self).items()})
 
     def later(self, shots: int) -> Rows:
         """The same rows of shots that come so many later."""
-        return Rows._of({**vars(self), "shot": self.shot + shots}) if shots else self
+        return Rows.of({**vars(self), "shot": self.shot + shots}) if shots else self
 
     @classmethod
     def joined(cls, parts: Sequence[Rows]) -> Rows:
@@ -135,19 +139,13 @@ class Rows(Columns):
             return parts[0]
         given = [name for name in HitRow._fields if any(name in vars(part) for part in parts)]
         columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in given}
-        return cls._of(columns) if parts else cls.none()
+        return cls.of(columns) if parts else cls.none()
 
     @classmethod
     def none(cls) -> Rows:
         """No rows."""
         none = np.zeros(0, np.int64)
-        return cls._of({"shot": none, "object": none, "first_xy": np.zeros((0, 2), np.int64)})
-
-    @classmethod
-    def _of(cls, columns: dict[str, Ints]) -> Rows:
-        rows = object.__new__(cls)
-        vars(rows).update(columns)
-        return rows
+        return cls.of({"shot": none, "object": none, "first_xy": np.zeros((0, 2), np.int64)})
 
 
 DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
@@ -159,6 +157,19 @@ DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
     "distance2": lambda rows: ZEROS[: len(rows)],
 }
 """What columns of rows hold where they are not given."""
+
+
+def _column(name: str) -> once[Ints]:
+    """A column of hits, read-only."""
+
+    def made(hits: Hits) -> Ints:
+        rows = hits._rows
+        given: Ints | None = vars(rows).get(name)
+        column = DEFAULTS[name](rows) if given is None else given
+        column.flags.writeable = False
+        return column
+
+    return once(made)
 
 
 class Hits:
@@ -178,15 +189,9 @@ class Hits:
     weapon, shots : what was fired
     """
 
-    shot: Ints
-    round: Ints
-    object: Ints
-    samples: Ints
-    pixels: Ints
-    weight: Ints
-    pellets: Ints
-    first_xy: Ints
-    distance2: Ints
+    shot, round, object = _column("shot"), _column("round"), _column("object")
+    samples, pixels, weight = _column("samples"), _column("pixels"), _column("weight")
+    pellets, first_xy, distance2 = _column("pellets"), _column("first_xy"), _column("distance2")
     _scenes: list[Scene] | None = None
     _walked: tuple[int, Any] | None = None
 
@@ -198,30 +203,21 @@ class Hits:
 
     def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self._rows, self.weapon, self.shots, self.plan = rows, weapon, shots, plan
-        self.scene, self.version = scene, scene.version
-
-    def __getattr__(self, name: str) -> Any:
-        """Hand out a column, read-only, when it is first asked for."""
-        if name not in COLUMNS:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        column = getattr(self._rows, name)
-        column.flags.writeable = False
-        setattr(self, name, column)
-        return column
+        self.scene, self.version = scene, scene.items.version
 
     @property
     def nbytes(self) -> int:
         """Bytes of the columns."""
         return self._rows.nbytes
 
-    @cached_property
+    @once
     def starts(self) -> Ints:
         """The rows of shot i are starts[i] .. starts[i + 1] - 1."""
         starts = np.concatenate([[0], np.cumsum(np.bincount(self.shot, minlength=len(self.shots)))])
         starts.flags.writeable = False
         return starts
 
-    @cached_property
+    @once
     def verdicts(self) -> Ints:
         """Samples of each shot by verdict, counted when they are first asked for."""
         verdicts = self._counted()

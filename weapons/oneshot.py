@@ -10,6 +10,7 @@ import numpy as np
 
 from planes.arrays import Ints, integer
 from planes.items import Stack
+from planes.kept import once
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from planes.spans import Box
@@ -64,6 +65,12 @@ class Answer(Hits):
     _at: tuple[float, float]
     _told: Told = (None, None, None)
 
+    scene: once[Scene] = once(lambda one: one._present.scene)
+    version: once[int] = once(lambda one: one._present.version)
+    weapon: once[Weapon] = once(lambda one: one._present.weapon)
+    shots: once[Shots] = once(lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told))
+    _rows: once[Rows] = once(lambda one: one._columns())
+
     def _columns(self) -> Rows:
         raise NotImplementedError
 
@@ -75,14 +82,8 @@ class Answer(Hits):
     def _checked(self, shot: int) -> int:
         return integer("shot", shot, 0, 0)
 
-    def __getattr__(self, name: str) -> Any:
-        """Make what is not there yet."""
-        if name not in MADE:
-            return super().__getattr__(name)
-        setattr(self, name, MADE[name](self))
-        return getattr(self, name)
-
-    def _walk(self) -> tuple[Volley, Met]:
+    @once
+    def _met(self) -> tuple[Volley, Met]:
         """Walk the samples of the shot through the stack as it was."""
         present = self._present
         volley = volley_of(present.weapon, self.shots)
@@ -93,7 +94,9 @@ class Answer(Hits):
     def _counted(self) -> Ints:
         return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))
 
-    def _planned(self) -> Plan:
+    @once
+    def plan(self) -> Plan:
+        """What was done for the shot."""
         plan = Plan()
         plan.run("prepared", "looked up; the stages after it ran when they were asked for")
         return plan
@@ -153,15 +156,3 @@ def answer_of(weapon: Weapon) -> tuple[Callable[[], Answer], Callable[[Any, HitR
     """
     _, spread, plain = parts_of(weapon)
     return (OneShot, OneShot.append) if spread is None and plain.falloff is None else (Uneven, Uneven.append)
-
-
-MADE: dict[str, Callable[[Answer], Any]] = {
-    "scene": lambda one: one._present.scene,
-    "version": lambda one: one._present.version,
-    "weapon": lambda one: one._present.weapon,
-    "shots": lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told),
-    "plan": Answer._planned,
-    "_met": Answer._walk,
-    "_rows": lambda one: one._columns(),
-}
-"""What an answer has beside its rows, and how it is made when it is first asked for."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from time import perf_counter_ns
 from typing import Any
 
-from planes.items import Stack
+from planes.items import Role, Stack
 from planes.scene import Scene
 from weapons.candidates import BOX, Candidates
 from weapons.pattern import PatternTable
@@ -82,9 +81,12 @@ class Plan:
         """Record that a stage was not needed; nothing of one that ran, or of which that is known."""
         self._notes.append((name, why))
 
-    def leave_out_all(self, told: Iterable[tuple[str, str]]) -> None:
-        """Record names of stages that were not needed, each with why."""
-        self._notes.extend(told)
+    def leave_out_all(self, told: Callable[..., Iterable[tuple[str, str]]], *of: object) -> None:
+        """Record stages that were not needed: a function tells their names, each with why, when they are asked for.
+
+        What it tells them of must not change until then.
+        """
+        self._notes.append((told, of))
 
     @property
     def ran(self) -> list[Stage]:
@@ -106,9 +108,14 @@ class Plan:
                     bytes_made, pairs, now = numbers
                     self._add(Stage(name, why, bytes_made, pairs, now - self._mark))
                     self._mark = now
-                elif name not in self._stage_of and name not in (stage.name for stage in self._left_out):
-                    self._left_out.append(Stage(name, why))
+                    continue
+                for left_out in name(*why) if callable(name) else ((name, why),):
+                    self._leave_out(*left_out)
             self._notes.clear()
+
+    def _leave_out(self, name: str, why: str) -> None:
+        if name not in self._stage_of and name not in (stage.name for stage in self._left_out):
+            self._left_out.append(Stage(name, why))
 
     def _add(self, stage: Stage) -> None:
         """Count a stage, or what it did once more."""
@@ -253,25 +260,30 @@ def leave_out_unused(
 
 def leave_out_uncounted(plan: Plan, scene: Scene, candidates: Candidates, choosy: bool, name: str, why: str) -> None:
     """Complete a plan of a call that was counted by bit rows with what it did not need."""
-    composed = name == "composed"
-    plan.leave_out("broad phase", "composed: cells" if composed else candidates.why_unindexed)
-    plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
-    leave_out_absent(plan, scene, candidates.stack, weighted=False, choosy=choosy)
-    plan.leave_out("verdicts", "counted when asked for")
+    bounded = scene.bounds is not None
+    plan.leave_out_all(_uncounted, candidates, bounded, choosy, name == "composed", why, scene.items.imagery())
+
+
+def _uncounted(
+    candidates: Candidates, bounded: bool, choosy: bool, composed: bool, why: str, imagery: Sequence[Role]
+) -> Iterator[tuple[str, str]]:
+    yield "broad phase", "composed: cells" if composed else candidates.why_unindexed
+    yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
+    yield from _absent(candidates.stack, False, bounded, choosy)
+    yield "verdicts", "counted when asked for"
     if not composed:
-        plan.leave_out("composition", f"direct: {why}")
-    leave_out_imagery(plan, scene)
+        yield "composition", f"direct: {why}"
+    yield from _undrawn(imagery)
 
 
 def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, choosy: bool) -> None:
     """Record what neither the shots nor the scene have."""
-    plan.leave_out_all(_absent(weighted, scene.bounds is not None, stack.has_occluders, stack.layered, choosy))
+    plan.leave_out_all(_absent, stack, weighted, scene.bounds is not None, choosy)
 
 
-@cache
-def _absent(*there: bool) -> list[tuple[str, str]]:
-    """What is told of what is not there, of those in ABSENT."""
-    return [told for told, present in zip(ABSENT, there, strict=True) if not present]
+def _absent(stack: Stack, weighted: bool, bounded: bool, choosy: bool) -> Iterator[tuple[str, str]]:
+    there = weighted, bounded, stack.has_occluders, stack.layered, choosy
+    return (told for told, present in zip(ABSENT, there, strict=True) if not present)
 
 
 ABSENT = (
@@ -285,5 +297,8 @@ ABSENT = (
 
 def leave_out_imagery(plan: Plan, scene: Scene) -> None:
     """Record the roles that decide nothing."""
-    for role in scene.items.imagery():
-        plan.leave_out(role.value, "drawn only for a picture")
+    plan.leave_out_all(_undrawn, scene.items.imagery())
+
+
+def _undrawn(imagery: Sequence[Role]) -> Iterator[tuple[str, str]]:
+    return ((role.value, "drawn only for a picture") for role in imagery)

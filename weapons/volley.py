@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from planes import snapping
 from planes.arrays import InputError, Ints, array_of, each, integer, integers, reals
 from planes.constants import ALL, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from planes.grid256 import ONE, pixel, snap, turned, unit, unit_toward
+from planes.kept import once
 from planes.poses import one_place, points
 from planes.twins import kernels_of
 from weapons import draws
@@ -38,7 +38,6 @@ class Shots:
     number : (N,) shot numbers, for the draws, or that of the first, from which they count up
     seed : (N,) uint64, of the draws, or that of all
     row : (N,) their places in the call, for errors, or that of the first
-    xy : (N, 2) whole pixels that they are on, where they are known
     """
 
     def __init__(
@@ -51,18 +50,15 @@ class Shots:
         number: Ints | int,
         seed: draws.Words | int,
         row: Ints | int,
-        xy: Ints | None = None,
     ) -> None:
         self.at_256, self.toward_256 = at_256, toward_256
         self._direction, self._accept, self._exclude = direction, accept, exclude
         self._number, self._seed, self._row = number, seed, row
-        if xy is not None:
-            self.xy = xy
 
     def __len__(self) -> int:
         return len(self.at_256)
 
-    @cached_property
+    @once
     def xy(self) -> Ints:
         """Whole pixels (N, 2) that they are on."""
         return pixel(self.at_256)
@@ -72,34 +68,34 @@ class Shots:
         """That of all, where one was given for all."""
         return self._direction if isinstance(self._direction, tuple) else None
 
-    @cached_property
+    @once
     def direction(self) -> Ints:
         """Cosine and sine (N, 2) of the aims, times 2**30."""
         if self._direction is None and self.toward_256 is not None:
             return np.stack(unit_toward(self.toward_256[:, 0], self.toward_256[:, 1]), axis=1)
         return _spread(self._direction, len(self))
 
-    @cached_property
+    @once
     def accept(self) -> Ints:
         """Category bits (N,)."""
         return _spread(self._accept, len(self))
 
-    @cached_property
+    @once
     def exclude(self) -> Ints:
         """Owners (N, K) that are passed over, -1 for none."""
         return _spread(self._exclude, len(self))
 
-    @cached_property
+    @once
     def number(self) -> Ints:
         """Shot numbers (N,), for the draws."""
         return self._number + np.arange(len(self)) if isinstance(self._number, int) else self._number
 
-    @cached_property
+    @once
     def seed(self) -> draws.Words:
         """Seeds (N,) of the draws."""
         return np.broadcast_to(np.uint64(self._seed), len(self)) if isinstance(self._seed, int) else self._seed
 
-    @cached_property
+    @once
     def row(self) -> Ints:
         """Places (N,) in the call."""
         return self._row + np.arange(len(self)) if isinstance(self._row, int) else self._row
@@ -107,7 +103,7 @@ class Shots:
     @property
     def nbytes(self) -> int:
         """Bytes of what is not the same for all."""
-        made = 2 * self.at_256.nbytes
+        made = self.at_256.nbytes
         for column in (
             self._direction,
             self.toward_256,
@@ -121,7 +117,7 @@ class Shots:
                 made += column.nbytes
         return made
 
-    @cached_property
+    @once
     def choosy(self) -> bool:
         """Whether any shot may refuse an item."""
         if isinstance(self._accept, int) and isinstance(self._exclude, tuple):
@@ -149,7 +145,7 @@ class Shots:
 
         return Shots(
             self.at_256[rows], some(self._direction), some(self.toward_256), some(self._accept), some(self._exclude),
-            counted(self._number), some(self._seed), counted(self._row), self.xy[rows],
+            counted(self._number), some(self._seed), counted(self._row),
         )  # fmt: skip
 
 
@@ -181,22 +177,22 @@ class Volley:
     def __len__(self) -> int:
         return len(self.xy)
 
-    @cached_property
+    @once
     def pattern(self) -> Ints:
         """Which of the patterns (P,) each has."""
         return ZEROS[: len(self.xy)] if self._pattern is None else self._pattern
 
-    @cached_property
+    @once
     def shot(self) -> Ints:
         """Shot (P,) of each, counted from 0 within the batch."""
         return np.arange(len(self.xy)) if self._whose is None else self._whose[0]
 
-    @cached_property
+    @once
     def round(self) -> Ints:
         """Round (P,) of each."""
         return ZEROS[: len(self.xy)] if self._whose is None else self._whose[1]
 
-    @cached_property
+    @once
     def pellet(self) -> Ints:
         """Pellet (P,) of each."""
         return ZEROS[: len(self.xy)] if self._whose is None else self._whose[2]
@@ -217,9 +213,9 @@ class Volley:
     @property
     def nbytes(self) -> int:
         """Bytes of the table and of the columns, without those of the shots."""
-        words = 0 if self._pattern is None else self._pattern.size
+        words = self.xy.size if self._pattern is None else self.xy.size + self._pattern.size
         if self._whose is not None:
-            words += 3 * len(self) + self.origin_xy.size + (self.xy.size if self.scattered else 0)
+            words += 3 * len(self) + (self.origin_xy.size if self.scattered else 0)
         return self.table.nbytes + 8 * words
 
     @property
@@ -244,7 +240,7 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    at_256, xy, single = _places(at)
+    at_256, single = _places(at)
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -257,23 +253,20 @@ def checked_shots(
         0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
         0,
-        xy,
     )
 
 
-def _places(at: object) -> tuple[Ints, Ints, bool]:
-    """Positions (N, 2) in 1/256 px, their whole pixels, and whether it was one shot's alone (2,)."""
+def _places(at: object) -> tuple[Ints, bool]:
+    """Positions (N, 2) in 1/256 px, and whether it was one shot's alone (2,)."""
     if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
-        many: tuple[Ints, Ints] | None = kernels_of(snapping).snapped(at)
+        many: Ints | None = kernels_of(snapping).snapped(at)
         if many is not None:
-            return *many, False
+            return many, False
     one = one_place(at)
     if one is not None:
-        at_256 = np.array((one,), np.int64)
-        return at_256, pixel(at_256), True
+        return np.array((one,), np.int64), True
     single = array_of("at", at).shape == (2,)
-    at_256 = snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2)
-    return at_256, pixel(at_256), single
+    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 
 
 def _accepted(accept: object, n: int) -> Ints | int:
@@ -301,6 +294,8 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
     if not burst and not spread:
+        if not plain.directed:
+            return Volley(pattern_of(plain, *STRAIGHT).table, None, shots.xy, shots.xy)
         return Volley(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
