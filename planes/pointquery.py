@@ -10,10 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
+from planes.constants import HALF, SUB
 from planes.grid256 import pixel
 from planes.spans import Box
 
 __all__ = ["CELL_BITS", "Front", "front_at", "occupied"]
+
+SUB_BITS = SUB.bit_length() - 1
 
 CELL_BITS = 3
 """Cells of the coarse map have sides of 8 px: the map of a plane of 1920 x 1080 fits the level-1 cache."""
@@ -50,24 +53,23 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, o
     cells : its coarse map, or None to read the plane alone
     objects : by id, whether it can be hit
     """
-    xy = pixel(at_256)
-    column, row = xy[:, 0] - plane_xyxy[0], xy[:, 1] - plane_xyxy[1]
-    some = _inside(column, row, codes.shape)
+    x, y = (at_256[:, axis] + (HALF - SUB * plane_xyxy[axis]) for axis in (0, 1))  # from the corner of its first pixel
+    some = _inside(x, y, codes.shape)
     if cells is not None:
-        some = _narrowed(some, _read(cells, column, row, some, CELL_BITS).nonzero()[0])
-    code = _read(codes, column, row, some, 0)
+        some = _narrowed(some, _read(cells, x, y, some, SUB_BITS + CELL_BITS).nonzero()[0])
+    code = _read(codes, x, y, some, SUB_BITS)
     front = code.nonzero()[0]
     item = (code.take(front) >> 1).astype(np.int64)
     item -= 1
     hit = objects.take(item).nonzero()[0]
     place = _narrowed(some, front.take(hit))
-    return Front(place, item.take(hit), xy.take(place, axis=0))
+    return Front(place, item.take(hit), pixel(at_256.take(place, axis=0)))
 
 
-def _inside(column: Ints, row: Ints, shape: tuple[int, ...]) -> Ints | None:
-    """Which pixels (n,) a plane has; None if it has all."""
-    height, width = shape
-    far = column.view(np.uint64), row.view(np.uint64)  # what lies before the plane is far beyond it
+def _inside(x: Ints, y: Ints, shape: tuple[int, ...]) -> Ints | None:
+    """Which positions (n,), in 1/256 px, lie on a plane; None if all do."""
+    height, width = (side << SUB_BITS for side in shape)
+    far = x.view(np.uint64), y.view(np.uint64)  # what lies before the plane is far beyond it
     if int(far[0].max(initial=0)) < width and int(far[1].max(initial=0)) < height:
         return None
     return ((far[0] < width) & (far[1] < height)).nonzero()[0]
@@ -78,11 +80,11 @@ def _narrowed(some: Ints | None, rows: Ints) -> Ints:
     return rows if some is None else some.take(rows)
 
 
-def _read(plane: Codes | Bools, column: Ints, row: Ints, some: Ints | None, bits: int) -> Codes | Bools:
-    """What a plane (h, w) of cells of 2**bits px has at some pixels (n,)."""
+def _read(plane: Codes | Bools, x: Ints, y: Ints, some: Ints | None, bits: int) -> Codes | Bools:
+    """What a plane (h, w) of cells of 2**bits / 256 px has at some positions (n,), in 1/256 px."""
     if some is not None:
-        column, row = column.take(some), row.take(some)
-    place = row >> bits
+        x, y = x.take(some), y.take(some)
+    place = y >> bits
     place *= plane.shape[1]
-    place += column >> bits if bits else column
+    place += x >> bits
     return plane.reshape(-1).take(place)

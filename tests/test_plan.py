@@ -101,7 +101,7 @@ OF_BITS = [
     (BITFIRE, "windows_of", "patterns", 400),
     (BITFIRE, "chosen_form", "plan", 10**3),
     (BITFIRE, "chosen_candidates", "plan", 2 * 10**3),
-    (BITFIRE, "leave_out_uncounted", "plan", 4 * 10**3),
+    (BITFIRE, "leave_out_uncounted", "rows", 4 * 10**3),
 ]
 OF_TILES = [
     *OF_BITS,

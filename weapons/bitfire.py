@@ -117,9 +117,8 @@ def fired_by_bits(
         parts = [read(part, volley).later(begin) for begin, part, volley in part_of]
     rows = Rows.joined(parts)
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
-    plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     leave_out_uncounted(plan, scene, candidates, may_refuse(stack, shots), name, why)
-    plan.run("plan", "")
+    plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits
 
 

@@ -103,19 +103,8 @@ class Shots:
     @property
     def nbytes(self) -> int:
         """Bytes of what is not the same for all."""
-        made = self.at_256.nbytes
-        for column in (
-            self._direction,
-            self.toward_256,
-            self._accept,
-            self._exclude,
-            self._number,
-            self._seed,
-            self._row,
-        ):
-            if isinstance(column, np.ndarray):
-                made += column.nbytes
-        return made
+        columns = self.toward_256, self._direction, self._accept, self._exclude, self._number, self._seed, self._row
+        return self.at_256.nbytes + sum([column.nbytes for column in columns if isinstance(column, np.ndarray)])
 
     @once
     def choosy(self) -> bool:
