@@ -205,11 +205,11 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     """
     height = _rows_counted(windows, seen)
     step = WORDS_AT_ONCE // height
-    tiles, asked = seen.box_xyxy.T.copy(), placed_boxes(placed, windows)
+    tiles = seen.box_xyxy.T.copy()
     parts = [Found(*[np.zeros(0, np.int64)] * 6)]
     for first in range(0, len(near), PAIRS_AT_ONCE):
         now = slice(first, first + PAIRS_AT_ONCE)
-        met = _meeting(placed, windows, tiles, asked, (placement[now], near[now]))
+        met = _meeting(placed, windows, tiles, placement[now], near[now])
         parts += [
             _counted(placed, windows, seen, Meeting(*[column[i : i + step] for column in met]), height, beside)
             for i in range(0, len(met.tile), step)
@@ -217,19 +217,27 @@ def found(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     return Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _meeting(placed: Placed, windows: Windows, tiles: Ints, asked: Ints, pairs: tuple[Ints, Ints]) -> Meeting:
-    """Those of pairs whose boxes share a pixel, and that are not beyond the strips of their patterns.
+def _meeting(placed: Placed, windows: Windows, tiles: Ints, placement: Ints, near: Ints) -> Meeting:
+    """Those of pairs (n,) whose boxes share a pixel, and that are not beyond the strips of their patterns.
 
     Parameters
     ----------
-    tiles, asked : (4, V) and (4, P) sides of the boxes of tiles and of placed patterns
+    tiles : (4, V) sides of the boxes of tiles
     """
-    placement, near = pairs
-    for low, high in ((0, 2), (1, 3)):
-        met = tiles[low].take(near) <= asked[high].take(placement)
-        met &= tiles[high].take(near) >= asked[low].take(placement)
+    box = windows.box_xyxy.T
+    corner: list[Ints] = []
+    for axis, place in ((0, placed.x), (1, placed.y)):
+        own, pattern = place.take(placement), _which(placed, windows, placement)
+        low, high = tiles[axis].take(near), tiles[axis + 2].take(near)
+        low -= own
+        high -= own
+        met = low <= box[axis + 2].take(pattern)
+        met &= high >= box[axis].take(pattern)
         some = met.nonzero()[0]
         placement, near = placement.take(some), near.take(some)
+        corner = [side.take(some) for side in (*corner, low)]
+    if not len(windows.strips):
+        return Meeting(placement, near, *corner)
     placement, near = crossing(placed, windows, tiles, placement, near)
     left, top = tiles[0].take(near) - placed.x.take(placement), tiles[1].take(near) - placed.y.take(placement)
     return Meeting(placement, near, left, top)

@@ -95,21 +95,23 @@ def coarse_enough(low: Ints, high: Ints, bits: int) -> int:
 
 def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
     """Boxes that patterns placed at pixels (n,) may meet, as (place, box), sorted."""
-    column, row = (x - cells.x) >> cells.bits, (y - cells.y) >> cells.bits
-    inside = (column >= 0) & (column < cells.wide) & (row >= 0) & (row < cells.high)
-    cell = row * cells.wide + column
-    every = inside.all()
-    if not every:
-        near = inside.nonzero()[0]
-        cell = cell[near]
-    begin = cells.begin[cell]
-    length = cells.begin[cell + 1] - begin
+    column, row = x - cells.x, y - cells.y
+    column >>= cells.bits
+    row >>= cells.bits
+    far = column.view(np.uint64), row.view(np.uint64)  # what lies before the first cell is far beyond the last
+    inside = None
+    if int(far[0].max(initial=0)) >= cells.wide or int(far[1].max(initial=0)) >= cells.high:
+        inside = ((far[0] < cells.wide) & (far[1] < cells.high)).nonzero()[0]
+        column, row = column.take(inside), row.take(inside)
+    row *= cells.wide
+    row += column
+    length = (cells.begin[1:] - cells.begin[:-1]).take(row)
     busy = length.nonzero()[0]
-    length = length[busy]
-    place = np.repeat(busy, length)
-    offset = begin[busy] - np.cumsum(length) + length
-    box = cells.listed[np.arange(len(place)) + np.repeat(offset, length)]
-    return place if every else near[place], box
+    length, begin = length.take(busy), cells.begin.take(row.take(busy))
+    begin -= length.cumsum() - length
+    entry = begin.repeat(length)
+    entry += np.arange(len(entry))
+    return (busy if inside is None else inside.take(busy)).repeat(length), cells.listed.take(entry)
 
 
 def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
