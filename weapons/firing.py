@@ -13,6 +13,7 @@ import numpy as np
 
 from planes.arrays import InputError, Ints, each, reals, shown
 from planes.constants import ALL
+from planes.heap import keep_freed
 from planes.scene import Scene
 from weapons.arsenal import ray_parts_of
 from weapons.bitfire import fired_by_bits, kind_of
@@ -132,6 +133,8 @@ def fired(
 ) -> Hits:
     """Decide what checked shots hit; the other arguments are those of `fire`, and a plan that has begun."""
     plan = plan or Plan()
+    if len(shots) > 1:
+        keep_freed()
     parts = ray_parts_of(weapon)
     if parts is not None:
         from weapons.rayfire import fired_rays

@@ -1,0 +1,36 @@
+"""Large blocks that were freed are kept for the next step of a batch, where the C library lets them be."""
+
+import subprocess
+import sys
+
+import pytest
+
+BLOCKS = """
+import ctypes
+import numpy as np
+from planes import Scene
+from weapons import Disc, fire
+
+class Told(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_size_t) for name in "arena ordblks smblks blocks mapped a b c d e".split()]
+
+told = getattr(ctypes.CDLL(None), "mallinfo2", None)
+if told is None:
+    raise SystemExit("no glibc")
+told.restype = Told
+
+scene = Scene()
+scene.add(np.ones((9, 9), np.bool_), (20, 20))
+fire(scene, Disc(3), {at})
+before = told().blocks
+block = np.empty(2**23, np.uint8)
+print(told().blocks > before)
+"""
+
+
+@pytest.mark.parametrize(("at", "from_the_system"), [("(0, 0)", True), ("np.zeros((2, 2))", False)])
+def test_a_batch_lets_large_blocks_be_kept(at: str, from_the_system: bool) -> None:
+    run = subprocess.run([sys.executable, "-c", BLOCKS.format(at=at)], capture_output=True, text=True, check=False)
+    if "no glibc" in run.stderr:
+        pytest.skip("another C library")
+    assert run.stdout.strip() == str(from_the_system), run.stderr
