@@ -19,8 +19,8 @@ from planes.spans import Box
 from planes.strips import meets_strip
 
 __all__ = [
-    "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "crossing", "cut_off",
-    "found", "nearest", "packed", "placed_boxes", "row_order", "rows_of", "union", "visible", "windows_at",
+    "BESIDE_REACH", "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "crossing",
+    "cut_off", "found", "nearest", "packed", "placed_boxes", "row_order", "rows_of", "union", "visible", "windows_at",
 ]  # fmt: skip
 
 Words = npt.NDArray[np.uint64]
@@ -33,20 +33,20 @@ WORD = 64
 PAD = 16
 """Empty rows between seen tiles: patterns of so few rows are counted by their own."""
 
-NOWHERE, NOWHERE_LOSES = 255, 240
-"""Instead of the distance along a row that has no pixel; and how near the origin lies if that loses to any pixel, px.
+NOWHERE = 255
+"""Instead of the distance along a row that has no pixel."""
 
-A pixel is within 63 columns, and (255 + a)**2 - (63 + a)**2 > 240**2.
+BESIDE_REACH = 180
+"""Radius of the largest disc whose nearest pixel is told by distances along rows, px.
+
+A distance beyond it counts as one more: it loses all the same, and the squares of two such add up within uint16.
 """
 
-WORDS_AT_ONCE = 2**15
-"""Words of pairs worked on at a time: 256 KB, a quarter of a level-2 cache; with fewer the calls weigh more."""
+WORDS_AT_ONCE = 2**17
+"""Words of pairs worked on at a time: a megabyte; with fewer the calls weigh more, with more the caches overflow."""
 
-PAIRS_AT_ONCE = 15 * 2**10
-"""Pairs whose boxes are compared at a time: 120 KB for each column; of those that meet, so many as have enough words.
-
-Of 128 KB on, each column would be new pages from the system.
-"""
+PAIRS_AT_ONCE = 2**16
+"""Pairs whose boxes are compared at a time: 512 KB a column; of those that meet, so many as have enough words."""
 
 _ONE, _FULL = np.uint64(1), np.uint64(2**64 - 1)
 _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
@@ -392,20 +392,17 @@ def beside_of(seen: Seen) -> Beside:
 
 
 def _nearest_seen(seen: Seen, beside: Beside, near: Ints, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
-    """Like `nearest`, of all visible pixels of tiles: a disc that hits any of them hits the nearest."""
+    """Like `nearest`, of all visible pixels of tiles: a disc up to BESIDE_REACH that hits any hits the nearest."""
     column = np.minimum(np.maximum(-left, 0), WORD - 1)
     away = left + column
-    across = beside.reshape(-1, seen.height)[near * WORD + column]
+    across = beside.reshape(-1, seen.height).take(near * WORD + column, axis=0)
     up = -min(int(np.minimum.reduce(top, initial=0)), 0)
-    squares = np.arange(-up, max(int(np.maximum.reduce(top, initial=0)), 0) + seen.height) ** 2
-    most = max(int(squares[0]), int(squares[-1]), int(np.maximum.reduce(np.square(away), initial=0)))
-    kind = np.int32 if most <= NOWHERE_LOSES**2 else np.int64
-    distance2: npt.NDArray[Any] = np.abs(away).astype(kind)[:, None]
-    distance2 = across + distance2
+    down = np.abs(np.arange(-up, max(int(np.maximum.reduce(top, initial=0)), 0) + seen.height))
+    squares = (np.minimum(down, BESIDE_REACH + 1) ** 2).astype(np.uint16)
+    distance2 = across + np.abs(away).astype(np.uint16)[:, None]
+    np.minimum(distance2, BESIDE_REACH + 1, out=distance2)
     distance2 *= distance2
-    distance2 += rows_of(squares.astype(kind), seen.height, top + up)
-    if most > NOWHERE_LOSES**2:
-        distance2[across == NOWHERE] = _MOST[kind]
+    distance2 += rows_of(squares, seen.height, top + up)
     row = distance2.argmin(axis=1)
     every = np.arange(len(near))
     step = across[every, row].astype(np.int64)

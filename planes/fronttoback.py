@@ -20,11 +20,8 @@ from planes.spans import Box, ragged
 
 __all__ = ["Pile", "front_to_back"]
 
-WORDS_AT_ONCE = 15 * 2**10
-"""Words of pairs worked on at a time: 120 KB, which stay in the level-2 cache with all that is made of them.
-
-Of 128 KB on, each array would be new pages from the system.
-"""
+WORDS_AT_ONCE = 2**16
+"""Words of pairs worked on at a time: 512 KB; with fewer the calls weigh more."""
 
 FRONTS_AT_ONCE = 2**14
 """Pairs of tiles near one placement that are compared one by one; in a larger crowd only those that meet are listed."""

@@ -16,6 +16,7 @@ import planes.tiles
 import planes.visible
 import weapons.bitfire
 import weapons.firing
+import weapons.pattern
 import weapons.windows
 from planes import History, Scene, Sprite
 from planes.arrays import Bools
@@ -288,3 +289,18 @@ def test_points_hit_no_occluder(jit: bool) -> None:
     scene.remove(1)
     scene.add(Sprite.box(9, 9), (15, 9))
     assert hit() == [0, 4]
+
+
+@pytest.mark.parametrize("radius", [130, weapons.pattern.BESIDE_REACH, weapons.pattern.BESIDE_REACH + 1])
+def test_large_discs_hit_the_nearest_pixel_of_what_is_far(radius: int) -> None:
+    """Masks of a few pixels each, most of them near the edge of most discs."""
+    rng = np.random.default_rng(radius)
+    scene = Scene()
+    for _ in range(20):
+        mask = np.zeros((64, 64), np.bool_)
+        mask[tuple(rng.integers(0, 64, (2, 4)))] = True
+        scene.add(mask, rng.integers(0, 200, 2))
+    turn, far = rng.uniform(0, 2 * np.pi, 300), rng.uniform(radius - 40, radius + 4, 300)
+    at = rng.integers(0, 200, (300, 2)) + np.stack([np.cos(turn), np.sin(turn)], axis=1) * far[:, None]
+    hits = fire(scene, Disc(radius), at, strategy="composed")
+    assert len(hits) > 1000 and hits == by_runs(scene, Disc(radius), at)

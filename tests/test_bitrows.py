@@ -145,7 +145,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
 
 
 @settings(max_examples=80, deadline=None)
-@given(SEEDS, st.integers(0, 40))
+@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([130, bitrows.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
     case = Case(seed)

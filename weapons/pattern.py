@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.bitrows import WORD
+from planes.bitrows import BESIDE_REACH, WORD
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
@@ -24,9 +24,6 @@ __all__ = ["FALLOFFS", "Pattern", "PatternTable", "Swept", "falloff_weights", "m
 
 Swept = tuple[Ints, Ints, int]
 """Ends (2,) of a segment and a radius, in 1/256 px."""
-
-DISC_MOST = 2**10
-"""Radius of the largest pattern that is looked at for being a disc, px."""
 
 FALLOFFS = ("linear", "smooth")
 _DOUBT = 2.0**-30  # the float below is right to 2**-34; nearer to a whole number than this, integers decide
@@ -69,8 +66,8 @@ class Pattern:
 
     @cached_property
     def is_disc(self) -> bool:
-        """Whether it holds all pixels that are nearer to the origin than one of its own, or as near."""
-        if not self.spans.count or max(map(abs, self.spans.box_xyxy or ())) > DISC_MOST:
+        """Whether it holds all pixels that are nearer to the origin than one of its own, or as near; of small ones."""
+        if not self.spans.count or max(map(abs, self.spans.box_xyxy or ())) > BESIDE_REACH:
             return False
         farthest = int((self.spans.pixels() ** 2).sum(axis=1).max())
         x = np.array([math.isqrt(farthest - y * y) for y in range(math.isqrt(farthest) + 1)])
