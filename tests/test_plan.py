@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import planes.bitrows
 import planes.clearance
 import planes.compose
+import planes.fronttoback
 import planes.index
 import planes.items
 import planes.render
@@ -36,7 +38,6 @@ import weapons.resolve
 import weapons.runfire
 import weapons.tracing
 from planes import History, Scene, Sprite
-from planes.bitrows import WORDS_AT_ONCE
 from weapons import Box, Disc, Laser, Pistol, Point, Rifle, Weapon, fire, report_of
 from weapons.candidates import Candidates
 from weapons.hits import Hits
@@ -333,6 +334,9 @@ def test_plans_are_added_up() -> None:
 MOST, SLACK = 16, 60_000
 """While a stage works it holds at most so many times the bytes that it hands on, and some beside."""
 
+WORDS_AT_ONCE, PAIRS_AT_ONCE = 2**15, 15 * 2**10
+"""Of parts so small that what is held for one is less than what is made of all."""
+
 AT_ONCE = 5 * 8 * WORDS_AT_ONCE
 """Bytes that bit rows hold while some are counted: rows, windows, and three sets for the nearest."""
 
@@ -359,6 +363,9 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
         before[0], whole[0] = now, max(whole[0], most)
 
     monkeypatch.setattr(Plan, "run", measured)
+    monkeypatch.setattr(planes.bitrows, "WORDS_AT_ONCE", WORDS_AT_ONCE)
+    monkeypatch.setattr(planes.bitrows, "PAIRS_AT_ONCE", PAIRS_AT_ONCE)
+    monkeypatch.setattr(planes.fronttoback, "WORDS_AT_ONCE", WORDS_AT_ONCE // 2)
     tracemalloc.start()
     try:
         hits = fire(scene, weapon, at, accept=["default"], exclude=[5] * len(at), **how)

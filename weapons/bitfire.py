@@ -42,8 +42,8 @@ __all__ = ["fired_by_bits", "kind_of", "view_of"]
 SHOT_NS, ITEM_NS = 300.0, 3.0
 """What a placement of a disc of 40 px takes in numpy, and more for each item: by `tests/bench/speed.py`."""
 
-PLACEMENTS_AT_ONCE = 2**14
-"""Placements of a part of a batch at most: 128 KB for each of their columns."""
+PLACEMENTS_AT_ONCE = 2**15
+"""Placements of a part of a batch at most: 256 KB for each of their columns."""
 
 NEAR_AT_ONCE = 2**12
 """Placements at most whose objects are looked up at a time: in a crowd each meets a hundred."""
