@@ -37,6 +37,7 @@ OUT = types.int64[::1]
 ROWS_OUT = types.int64[:, ::1]
 ALL = np.uint64(2**64 - 1)
 FAR = np.int64(2**62)
+EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
 ONE = np.uint64(1)
 ROW_BITS, ROWS = 7, 127
 ROOM, ROOM_LEAST = 8, 64

@@ -11,6 +11,7 @@ from planes.bitrows import Found, Placed, Windows
 from planes.bitrows_jit import (
     ALL,
     BOXES,
+    EVERYWHERE,
     FAR,
     FLAGS,
     INTS,
@@ -46,8 +47,6 @@ CELL_BITS = 6
 
 PAD = 64
 """Empty rows before and after those of a pattern."""
-
-EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
 
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
 

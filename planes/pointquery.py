@@ -1,4 +1,6 @@
-"""What lies in front at single pixels: reads of a code plane, most of which its coarse map spares.
+"""What lies in front at single pixels.
+
+In a code plane: reads of it, most of which its coarse map spares. In a stack: items one by one, front to back.
 
 Functions from arrays to arrays; `pointquery_jit` has the same ones, compiled.
 """
@@ -10,11 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
+from planes.cells import met_boxes
 from planes.constants import HALF, SUB
 from planes.grid256 import pixel
 from planes.spans import Box
+from planes.stack import Stack
 
-__all__ = ["CELL_BITS", "Front", "front_at", "occupied"]
+__all__ = ["CELL_BITS", "Front", "front_at", "front_of", "occupied"]
 
 SUB_BITS = SUB.bit_length() - 1
 
@@ -64,6 +68,25 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, o
     hit = objects.take(item).nonzero()[0]
     place = _narrowed(some, front.take(hit))
     return Front(place, item.take(hit), pixel(at_256.take(place, axis=0)))
+
+
+def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
+    """Objects that lie in front at positions (N, 2) in 1/256 px, of all items of a stack, within bounds."""
+    xy = pixel(at_256)
+    place, rank = met_boxes(np.concatenate([xy, xy], axis=1), stack.box_xyxy)
+    down = xy.take(place, axis=0) - stack.box_xyxy[:, :2].take(rank, axis=0)
+    texel = stack.offset.take(rank) + down[:, 1] * stack.width.take(rank) + down[:, 0]
+    on = stack.masks.take(texel).nonzero()[0]
+    place, rank = place.take(on), rank.take(on)
+    front = np.ones(len(place), np.bool_)
+    np.not_equal(place[1:], place[:-1], out=front[1:])
+    front &= ~stack.occluder.take(rank)
+    if bounds is not None:
+        x, y = xy[:, 0].take(place), xy[:, 1].take(place)
+        front &= (x >= bounds[0]) & (x <= bounds[2]) & (y >= bounds[1]) & (y <= bounds[3])
+    some = front.nonzero()[0]
+    place = place.take(some)
+    return Front(place, stack.ids.take(rank.take(some)), xy.take(place, axis=0))
 
 
 def _inside(x: Ints, y: Ints, shape: tuple[int, ...]) -> Ints | None:

@@ -1,4 +1,4 @@
-"""The kernel of `pointquery`, compiled: one pass."""
+"""The kernels of `pointquery`, compiled: one pass, and one walk for each pixel."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import numpy as np
 from numba import types
 
 from planes.arrays import Bools, Codes, Ints
-from planes.bitrows_jit import BOXES, FLAGS, OUT, ROWS_OUT
+from planes.bitrows_jit import BOXES, EVERYWHERE, FLAGS, INTS, OUT, ROWS_OUT
 from planes.compiled import compiled
 from planes.constants import HALF
 from planes.pointquery import CELL_BITS, Front, occupied
 from planes.spans import Box
+from planes.stack import Stack
 
-__all__ = ["CELL_BITS", "front_at", "occupied"]
+__all__ = ["CELL_BITS", "front_at", "front_of", "occupied"]
 
 CELLS = types.Array(types.boolean, 2, "C", readonly=True)
 BITS = np.uint64(CELL_BITS)
@@ -51,3 +52,30 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, o
     xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
     count = _front_at(codes, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
     return Front(place[:count], item[:count], xy[:count])
+
+
+@compiled(types.int64(*[BOXES] * 2, INTS, INTS, FLAGS, FLAGS, types.UniTuple(types.int64, 4), OUT, OUT, ROWS_OUT))
+def _front_of(at_256, box, offset, width, masks, occluder, bounds, place, rank, xy):
+    count = 0
+    for i in range(len(at_256)):
+        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
+        if x < bounds[0] or y < bounds[1] or x > bounds[2] or y > bounds[3]:
+            continue
+        for item in range(len(box)):
+            across = (box[item, 0] <= x) & (box[item, 2] >= x)
+            if not (across & (box[item, 1] <= y) & (box[item, 3] >= y)):
+                continue
+            if masks[offset[item] + (y - box[item, 1]) * width[item] + x - box[item, 0]]:
+                place[count], rank[count], xy[count, 0], xy[count, 1] = i, item, x, y
+                count += not occluder[item]
+                break
+    return count
+
+
+def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
+    """See `pointquery.front_of`."""
+    place, rank = np.empty((2, len(at_256)), np.int64)
+    xy = np.empty(at_256.shape, np.int64)
+    what = stack.box_xyxy, stack.offset, stack.width, stack.masks, stack.occluder
+    count = _front_of(at_256, *what, EVERYWHERE if bounds is None else bounds, place, rank, xy)
+    return Front(place[:count], stack.ids.take(rank[:count]), xy[:count])

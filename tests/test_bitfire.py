@@ -36,7 +36,14 @@ WEAPONS: list[Weapon] = [
 ]  # fmt: skip
 PARTS: dict[str, dict[str, int]] = {
     "whole": {},
-    "parts": {"PLACEMENTS_AT_ONCE": 7, "WORDS_AT_ONCE": 640, "PAIRS_AT_ONCE": 50, "BRUTE_PAIRS": 0, "OFTEN": 0},
+    "parts": {
+        "WALKED_MOST": 0,
+        "PLACEMENTS_AT_ONCE": 7,
+        "WORDS_AT_ONCE": 640,
+        "PAIRS_AT_ONCE": 50,
+        "BRUTE_PAIRS": 0,
+        "OFTEN": 0,
+    },
     "single": {"CHUNK_PAIRS": 1, "WORDS_AT_ONCE": WORD, "PAIRS_AT_ONCE": 1, "PATTERNS_BYTES_MOST": 1, "OFTEN": 10**9},
     "few cells": {"CELLS_MOST": 4, "BRUTE_PAIRS": 9, "TABLE_BYTES_MOST": 0, "ENTRIES_A_BOX": 2},
 }

@@ -45,6 +45,9 @@ SHOT_NS, ITEM_NS = 300.0, 3.0
 PLACEMENTS_AT_ONCE = 2**15
 """Placements of a part of a batch at most: 256 KB for each of their columns."""
 
+WALKED_MOST = 2**14
+"""Pairs of shots of one pixel and items up to which each shot looks at all items."""
+
 NEAR_AT_ONCE = 2**12
 """Placements at most whose objects are looked up at a time: in a crowd each meets a hundred."""
 
@@ -111,6 +114,8 @@ def fired_by_bits(
     plane = scene.code_plane() if point and name == "composed" else None
     if plane is not None:
         parts = _read(plane, shots, sight)
+    elif point and alone and name == "direct" and placements * len(stack) <= WALKED_MOST:
+        parts = [_walked(shots, sight)]
     else:
         read, first, most = _reader(scene, name, view, alone, sight)
         part_of = _parts(weapon, shots, first // each, most // each, candidates)
@@ -123,6 +128,15 @@ def fired_by_bits(
 
 
 Reader = Callable[[Shots, Volley], Rows]
+
+
+def _walked(shots: Shots, sight: Sight) -> Rows:
+    """Look for each shot of one pixel in all items, front to back."""
+    front = kernels_of(pointquery).front_of(sight.stack, sight.bounds, shots.at_256)
+    rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
+    sight.plan.run("samples", "each pixel is looked for in the items, front to back: boxes, too", rows.nbytes)
+    sight.plan.leave_out("patterns", "each shot is one pixel")
+    return rows
 
 
 def _reader(scene: Scene, name: str, view: View | None, alone: bool, sight: Sight) -> tuple[Reader, int, int]:

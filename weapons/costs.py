@@ -38,11 +38,13 @@ class Costs(NamedTuple):
     Parameters
     ----------
     call, placement, pair : more of a call, of each placement, and of each with each item, without a composition
+    read : more of a call of single pixels without a code plane
     compose, item : of a composition, and of each item
     draw, pixel : of a code plane: of each item that is drawn, and of each pixel
     """
 
     call: float
+    read: float
     placement: float
     pair: float
     compose: float
@@ -51,8 +53,8 @@ class Costs(NamedTuple):
     pixel: float
 
 
-IN_NUMPY = Costs(50_000, 500, 4.0, 2_000_000, 2500, 13_000, REDRAW_PIXEL_NS)
-COMPILED = Costs(5000, 120, 0.3, 100_000, 1500, 400, 0.05)
+IN_NUMPY = Costs(50_000, 50_000, 500, 4.0, 2_000_000, 2500, 7500, REDRAW_PIXEL_NS)
+COMPILED = Costs(5000, 25_000, 120, 0.3, 100_000, 1500, 400, 0.05)
 """Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 
@@ -109,7 +111,8 @@ def chosen_form(
     if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
         return "composed", "it is there"
     costs = IN_NUMPY if kernels_of(bitrows) is bitrows else COMPILED
-    lost = costs.call + placements * (costs.placement + len(stack) * costs.pair)
+    lost = placements * (costs.placement + len(stack) * costs.pair)
+    lost += costs.call if plane is None else costs.read
     cost = costs.compose + len(stack) * costs.item
     if plane is not None:
         drawn = len(stack) * costs.draw if plane.codes is None else 0
