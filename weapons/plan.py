@@ -154,9 +154,8 @@ class Plan:
         return sum(stage.ns for stage in self.ran)
 
     def has_run(self, name: str) -> bool:
-        """Whether a stage ran."""
-        self._read()
-        return name in self._stage_of
+        """Whether a stage ran; no stages are made for that."""
+        return any(note[0] == name and len(note) > 2 for note in self._notes) or name in self._stage_of
 
     def has_left_out(self, name: str) -> bool:
         """Whether a stage was left out."""

@@ -93,9 +93,10 @@ class Ready:
     def fire(self, at: object, aim: object = None, toward: object = None, shot: object = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         kept = self._filter
+        exclude = kept.exclude if kept.exclude.size else None
         return fire(
-            self.scene, self.weapon, at, aim=aim, toward=toward, accept=kept.accept, exclude=kept.exclude,
-            seed=kept.seed, shot=shot,
+            self.scene, self.weapon, at, aim=aim, toward=toward, accept=kept.accept, exclude=exclude, seed=kept.seed,
+            shot=shot,
         )  # fmt: skip
 
 
