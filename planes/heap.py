@@ -18,7 +18,7 @@ def keep_freed() -> None:
 
     glibc gives a large block back to the system when it is freed, and takes the next one from there page by page, until
     it has seen one as large freed: from then on it keeps such blocks (`mallopt(3)`, M_MMAP_THRESHOLD). A picture that
-    was freed does that, too. A batch works in arrays of some 256 KB; with new pages for each, discs took twice as long.
-    Other C libraries are not changed by this.
+    was freed does that, too. A batch works in arrays of up to a megabyte; with new pages for each, discs took twice as
+    long. Other C libraries are not changed by this.
     """
     np.empty(LARGEST, np.uint8)

@@ -72,7 +72,7 @@ def cut(patch: pytest.MonkeyPatch, limits: dict[str, int]) -> None:
 def by_runs(scene: Scene | History, weapon: Weapon, at: object, **how: Any) -> Hits:
     """The same shots, counted run by run."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(weapons.firing, "kind_of", lambda own: weapons.bitfire.kind_of(own)._replace(counted=False))
+        patch.setattr(weapons.firing, "traits_of", lambda own: weapons.bitfire.traits_of(own)._replace(counted=False))
         hits = fire(scene, weapon, at, strategy="direct", prefilter="none", **how)
         assert hits.plan.has_run("verdicts")
         return hits

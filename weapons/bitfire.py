@@ -3,7 +3,8 @@
 scene -> stack -> weapon -> patterns -> windows -> what they share with tiles of items -> rows
 
 Composed: with what can be seen of all, by cells of shot positions. Direct: with tiles where they lie, front to back; of
-pellets that scatter, and where a pre-filter is asked for, with what can be seen of the items that they come near.
+pellets that scatter, and where a pre-filter is asked for, with what can be seen of the items that they come near. Shots
+of one pixel need no rows: they read the code plane, or, a few of them, the masks of the items themselves.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from weapons.volley import Shots, Volley, placements_of, volley_of
 from weapons.weapon import Weapon
 from weapons.windows import fits, windows_of
 
-__all__ = ["fired_by_bits", "kind_of", "view_of"]
+__all__ = ["fired_by_bits", "traits_of", "view_of"]
 
 SHOT_NS, ITEM_NS = 300.0, 3.0
 """What a placement of a disc of 40 px takes in numpy, and more for each item: by `tests/bench/speed.py`."""
@@ -64,7 +65,7 @@ REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
 
 
-class Kind(NamedTuple):
+class Traits(NamedTuple):
     """What holds for all shots of a weapon.
 
     Parameters
@@ -83,16 +84,16 @@ class Kind(NamedTuple):
     is_point: bool
 
 
-def kind_of(weapon: Weapon) -> Kind:
-    """Kind of a weapon of patterns, kept with it, as it does not change."""
-    kept: Kind | None = getattr(weapon, "_kind", None)
+def traits_of(weapon: Weapon) -> Traits:
+    """Traits of a weapon of patterns, kept with it, as it does not change."""
+    kept: Traits | None = getattr(weapon, "_traits", None)
     if kept is None:
         burst, spread, plain = parts_of(weapon)
         near, full = plain.reach_256 <= SUB * REACH_COUNTED, plain.falloff is None
         alone = full and not plain.directed and (near or fits([pattern_of(plain, ONE, 0)]))
         point = alone and not burst and not spread and pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
-        kept = Kind(full and (near or alone), placements_of(weapon), spread is not None, plain.pierce, point)
-        weapon._keep("_kind", kept)
+        kept = Traits(full and (near or alone), placements_of(weapon), spread is not None, plain.pierce, point)
+        weapon._keep("_traits", kept)
     return kept
 
 
@@ -101,19 +102,20 @@ def fired_by_bits(
 ) -> Hits:
     """Decide what shots hit; `how` are the pre-filter, broad phase and strategy."""
     prefilter, broadphase, strategy = how
-    kind, each = kind_of(weapon), kind_of(weapon).placements
-    view, placements = view_of(kind.pierces, shots), each * len(shots)
-    point = kind.is_point and view == OF_ALL[False] and not stack.has_unmet
-    alone = not kind.scattered and prefilter == broadphase == "auto"
+    traits = traits_of(weapon)
+    each, view = traits.placements, view_of(traits.pierces, shots)
+    placements = each * len(shots)
+    point = traits.is_point and view == OF_ALL[False] and not stack.has_unmet
+    alone = not traits.scattered and prefilter == broadphase == "auto"
     expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
     name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
     asked = 0 if alone or name == "composed" else placements
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
-    sight = Sight(stack, scene.bounds, kind.pierces, candidates, plan)
+    sight = Sight(stack, scene.bounds, traits.pierces, candidates, plan)
     plan.run("plan", f"{name}: {why}")
     plane = scene.code_plane() if point and name == "composed" else None
     if plane is not None:
-        parts = _read(plane, shots, sight)
+        parts = _read_plane(plane, shots, sight)
     elif point and alone and name == "direct" and placements * len(stack) <= WALKED_MOST:
         parts = [_walked(shots, sight)]
     else:
@@ -185,7 +187,7 @@ def _windows(volley: Volley, plan: Plan) -> Windows:
     return windows
 
 
-def _read(plane: CodePlane, shots: Shots, sight: Sight) -> list[Rows]:
+def _read_plane(plane: CodePlane, shots: Shots, sight: Sight) -> list[Rows]:
     """Read what lies in front at each shot of one pixel."""
     codes, objects, parts = plane.read(sight.candidates.items), sight.stack.is_object, []
     sight.plan.run("code plane", f"{plane.redrawn} px drawn anew", plane.redrawn * codes.itemsize)

@@ -16,7 +16,7 @@ from planes.constants import ALL
 from planes.heap import keep_freed
 from planes.scene import Scene
 from weapons.arsenal import ray_parts_of
-from weapons.bitfire import fired_by_bits, kind_of
+from weapons.bitfire import fired_by_bits, traits_of
 from weapons.hits import Hits
 from weapons.plan import Plan, read_stack
 from weapons.runfire import fired_by_runs
@@ -141,7 +141,7 @@ def fired(
 
         return fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
     stack = read_stack(scene, plan)
-    fired_by = fired_by_bits if kind_of(weapon).counted else fired_by_runs
+    fired_by = fired_by_bits if traits_of(weapon).counted else fired_by_runs
     return fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
 
 
