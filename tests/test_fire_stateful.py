@@ -250,7 +250,7 @@ def test_a_changing_scene() -> None:
 
 @pytest.mark.long
 def test_a_scene_that_changes_for_long() -> None:
-    run_state_machine_as_test(ChangingScene, settings=settings(max_examples=400, stateful_step_count=60, **QUIET))
+    run_state_machine_as_test(ChangingScene, settings=settings(max_examples=320, stateful_step_count=60, **QUIET))
 
 
 def crowd(count: int = 12) -> tuple[Scene, random.Random]:

@@ -834,4 +834,4 @@ def test_the_past_of_a_scene_that_changes() -> None:
 
 @pytest.mark.long
 def test_the_past_of_a_scene_that_changes_for_long() -> None:
-    run_state_machine_as_test(RecordedScene, settings=settings(max_examples=400, stateful_step_count=60, **QUIET))
+    run_state_machine_as_test(RecordedScene, settings=settings(max_examples=320, stateful_step_count=60, **QUIET))
