@@ -142,12 +142,11 @@ def rows_by(kernel: Kernel, count: int, least: float, *given: Any) -> Found | No
     least : placements that are worth a thread
     given : to the kernel
     """
-    if count < 2 * least:
-        rows = _filled(kernel, 0, count, given)
-        return None if rows is None else Found(*rows)
     parts = in_parts(count, least, lambda first, last: _filled(kernel, first, last, given))
     known = [part for part in parts if part is not None]
-    return Found(*np.concatenate(known, axis=1)) if len(known) == len(parts) else None
+    if len(known) < len(parts):
+        return None
+    return Found(*(known[0] if len(known) == 1 else np.concatenate(known, axis=1)))
 
 
 def _filled(kernel: Kernel, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:

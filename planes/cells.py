@@ -13,7 +13,7 @@ import numpy.typing as npt
 from planes.arrays import Ints
 from planes.spans import meets, ragged
 
-__all__ = ["Cells", "cells_of", "coarse_enough", "listed_at", "met_boxes"]
+__all__ = ["Cells", "cells_of", "coarse_enough", "listed_at", "met_boxes", "within"]
 
 CELLS_MOST = 2**20
 """Cells of one list: 8 MB of where each begins."""
@@ -98,10 +98,8 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
     column, row = x - cells.x, y - cells.y
     column >>= cells.bits
     row >>= cells.bits
-    far = column.view(np.uint64), row.view(np.uint64)  # what lies before the first cell is far beyond the last
-    inside = None
-    if int(far[0].max(initial=0)) >= cells.wide or int(far[1].max(initial=0)) >= cells.high:
-        inside = ((far[0] < cells.wide) & (far[1] < cells.high)).nonzero()[0]
+    inside = within(column, row, cells.wide, cells.high)
+    if inside is not None:
         column, row = column.take(inside), row.take(inside)
     row *= cells.wide
     row += column
@@ -112,6 +110,14 @@ def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
     entry = begin.repeat(length)
     entry += np.arange(len(entry))
     return (busy if inside is None else inside.take(busy)).repeat(length), cells.listed.take(entry)
+
+
+def within(x: Ints, y: Ints, wide: int, high: int) -> Ints | None:
+    """Which of (n,) places have an x from 0 on below `wide` and a y below `high`; None if all have."""
+    far = x.view(np.uint64), y.view(np.uint64)  # what lies before 0 is far beyond
+    if int(far[0].max(initial=0)) < wide and int(far[1].max(initial=0)) < high:
+        return None
+    return ((far[0] < wide) & (far[1] < high)).nonzero()[0]
 
 
 def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:

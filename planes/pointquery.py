@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planes.arrays import Bools, Codes, Ints
-from planes.cells import met_boxes
+from planes.cells import met_boxes, within
 from planes.constants import HALF, SUB
 from planes.grid256 import pixel
 from planes.spans import Box
@@ -58,7 +58,8 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, o
     objects : by id, whether it can be hit
     """
     x, y = (at_256[:, axis] + (HALF - SUB * plane_xyxy[axis]) for axis in (0, 1))  # from the corner of its first pixel
-    some = _inside(x, y, codes.shape)
+    high, wide = codes.shape
+    some = within(x, y, wide << SUB_BITS, high << SUB_BITS)
     if cells is not None:
         some = _narrowed(some, _read(cells, x, y, some, SUB_BITS + CELL_BITS).nonzero()[0])
     code = _read(codes, x, y, some, SUB_BITS)
@@ -80,22 +81,14 @@ def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
     place, rank = place.take(on), rank.take(on)
     front = np.ones(len(place), np.bool_)
     np.not_equal(place[1:], place[:-1], out=front[1:])
-    front &= ~stack.occluder.take(rank)
+    if stack.has_occluders:
+        front &= ~stack.occluder.take(rank)
     if bounds is not None:
         x, y = xy[:, 0].take(place), xy[:, 1].take(place)
         front &= (x >= bounds[0]) & (x <= bounds[2]) & (y >= bounds[1]) & (y <= bounds[3])
     some = front.nonzero()[0]
     place = place.take(some)
     return Front(place, stack.ids.take(rank.take(some)), xy.take(place, axis=0))
-
-
-def _inside(x: Ints, y: Ints, shape: tuple[int, ...]) -> Ints | None:
-    """Which positions (n,), in 1/256 px, lie on a plane; None if all do."""
-    height, width = (side << SUB_BITS for side in shape)
-    far = x.view(np.uint64), y.view(np.uint64)  # what lies before the plane is far beyond it
-    if int(far[0].max(initial=0)) < width and int(far[1].max(initial=0)) < height:
-        return None
-    return ((far[0] < width) & (far[1] < height)).nonzero()[0]
 
 
 def _narrowed(some: Ints | None, rows: Ints) -> Ints:

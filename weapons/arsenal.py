@@ -359,7 +359,7 @@ def _apart(weapon: Weapon) -> Parts:
 
 def has_no_range(weapon: Weapon) -> bool:
     """Whether a weapon is a ray that ends where it is aimed, and so must be aimed at a point."""
-    parts = _parts_of(weapon)[1]
+    parts = ray_parts_of(weapon)
     return parts is not None and parts[2].length_256 is None
 
 

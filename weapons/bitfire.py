@@ -4,7 +4,7 @@ scene -> stack -> weapon -> patterns -> windows -> what they share with tiles of
 
 Composed: with what can be seen of all, by cells of shot positions. Direct: with tiles where they lie, front to back; of
 pellets that scatter, and where a pre-filter is asked for, with what can be seen of the items that they come near. Shots
-of one pixel need no rows: they read the code plane, or, a few of them, the masks of the items themselves.
+of one pixel need no bit rows: they read the code plane, or, a few of them, the masks of the items themselves.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
 from planes.items import Items, Stack
+from planes.pointquery import Front
 from planes.scene import Scene
 from planes.tiles import Tiles
 from planes.twins import expect, kernels_of
@@ -60,6 +61,9 @@ PAIRS_AT_ONCE = 2**16
 
 OF_ALL = View(False, ALL, ()), View(True, ALL, ())
 """What shots see that refuse nothing: the front, and all that they pierce."""
+
+NO_PATTERNS = "patterns", "each shot is one pixel"
+"""What is told of the patterns of such shots: they were left out, and why."""
 
 REACH_COUNTED = 2**11
 """Reach of the weapons whose patterns fit bit rows whatever way they are turned, px."""
@@ -132,15 +136,6 @@ def fired_by_bits(
 Reader = Callable[[Shots, Volley], Rows]
 
 
-def _walked(shots: Shots, sight: Sight) -> Rows:
-    """Look for each shot of one pixel in all items, front to back."""
-    front = kernels_of(pointquery).front_of(sight.stack, sight.bounds, shots.at_256)
-    rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
-    sight.plan.run("samples", "each pixel is looked for in the items, front to back: boxes, too", rows.nbytes)
-    sight.plan.leave_out("patterns", "each shot is one pixel")
-    return rows
-
-
 def _reader(scene: Scene, name: str, view: View | None, alone: bool, sight: Sight) -> tuple[Reader, int, int]:
     """How rows of placements are found, and of how many at first and at most at a time.
 
@@ -194,11 +189,24 @@ def _read_plane(plane: CodePlane, shots: Shots, sight: Sight) -> list[Rows]:
     for begin in range(0, len(shots), PLACEMENTS_AT_ONCE):
         at_256 = shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
         front = kernels_of(pointquery).front_at(codes, plane.cells(len(at_256)), plane.box_xyxy, at_256, objects)
-        rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
+        rows = _rows_in_front(front)
         sight.plan.run("read", "one code for each sample", rows.nbytes)
         parts.append(rows.later(begin))
-    sight.plan.leave_out("patterns", "each shot is one pixel")
+    sight.plan.leave_out(*NO_PATTERNS)
     return parts
+
+
+def _walked(shots: Shots, sight: Sight) -> Rows:
+    """Look for each shot of one pixel in all items, front to back."""
+    rows = _rows_in_front(kernels_of(pointquery).front_of(sight.stack, sight.bounds, shots.at_256))
+    sight.plan.run("samples", "each pixel is looked for in the items, front to back: boxes, too", rows.nbytes)
+    sight.plan.leave_out(*NO_PATTERNS)
+    return rows
+
+
+def _rows_in_front(front: Front) -> Rows:
+    """Rows of what lies in front at shots of one pixel."""
+    return Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
 
 
 def _by_composition(composition: Composition, sight: Sight) -> Reader:

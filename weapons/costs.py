@@ -98,8 +98,7 @@ def chosen_form(
     view : what all shots accept; None if they differ in it
     point : whether one read of the code plane tells what a placement hits
     """
-    if strategy != "auto":
-        choice("strategy", strategy, STRATEGIES)
+    choice("strategy", strategy, STRATEGIES)
     if view is None:
         return "direct", "shots accept different items"
     if strategy != "auto":
@@ -136,8 +135,6 @@ def chosen_candidates(
     InputError
         If one is not known, or boxes are asked for in a broad phase and not as a pre-filter.
     """
-    if prefilter == broadphase == "auto" and not swept and not asked:
-        return Candidates(scene.items, stack, BOX, None, "box", "boxes are compared as samples are counted")
     wanted = prefilter_of(prefilter)
     structure = choice("broadphase", broadphase, BROADPHASES)
     if wanted.name == "none":
@@ -151,7 +148,8 @@ def chosen_candidates(
         return Candidates(scene.items, stack, wanted, None, told)
     if structure == "auto":
         if not asked or not _bvh_pays(scene, len(stack), asked):
-            return Candidates(scene.items, stack, wanted, None, told, "few pairs: every box is compared")
+            why = "few pairs: every box is compared" if asked else "boxes are compared as samples are counted"
+            return Candidates(scene.items, stack, wanted, None, told, why)
         structure = "bvh"
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{told}, by {structure}")
 

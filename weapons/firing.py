@@ -76,8 +76,7 @@ def fire(
     """
     plan = Plan()
     present = scene if isinstance(scene, Scene) else _history(scene).scene
-    bits = accept if type(accept) is int else category_bits(present, accept)
-    shots = checked_shots(weapon, at, aim, toward, bits, exclude, seed, shot)
+    shots = checked_shots(weapon, at, aim, toward, category_bits(present, accept), exclude, seed, shot)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if not isinstance(scene, Scene):
         return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)

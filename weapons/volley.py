@@ -201,8 +201,8 @@ class Volley:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the table and of the columns, without those of the shots."""
-        words = self.xy.size if self._pattern is None else self.xy.size + self._pattern.size
+        """Bytes of the table and of the columns."""
+        words = self.xy.size + (0 if self._pattern is None else self._pattern.size)
         if self._whose is not None:
             words += 3 * len(self) + (self.origin_xy.size if self.scattered else 0)
         return self.table.nbytes + 8 * words
@@ -283,8 +283,6 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
     if not burst and not spread:
-        if not plain.directed:
-            return Volley(pattern_of(plain, *STRAIGHT).table, None, shots.xy, shots.xy)
         return Volley(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot = np.repeat(np.arange(len(shots)), rounds * pellets)
