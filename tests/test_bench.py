@@ -98,9 +98,9 @@ def test_a_missing_row_ends_the_run() -> None:
         Side("A pygame", lambda work, units: [(0, 1, 5)], list, whole=True),
     ]
     with pytest.raises(DisagreementError, match=r"only numpy: \[\(1, 2, 7\)\]"):
-        race(Cell("static", "point", 6), sides, [None, None], 2, 0.001)
+        race(Cell("static", "point", 6), sides, [[None], [None]], 2, 0.001)
     easier = [sides[0], Side("pymunk", lambda work, units: 3, easier="hulls", whole=True)]
-    assert not race(Cell("static", "point", 6), easier, [None, None], 2, 0.001).sides["pymunk"].compared
+    assert not race(Cell("static", "point", 6), easier, [[None], [None]], 2, 0.001).sides["pymunk"].compared
 
 
 def test_targets_are_judged_by_the_worst_cell() -> None:

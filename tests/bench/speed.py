@@ -56,6 +56,7 @@ class Settings:
     objects, moving, single, planner : numbers of objects
     redrawn, huge : number of objects of these
     shots, rewound, batches : shots of a batch; of a rewind; of the planner's
+    row : batches that are fired one after the other, if there is time for them
     frames, steps, calls, starts : frames of a round, short steps of a round, single calls of a round, processes
     rounds, seconds : rounds of each cell; how long a peer may take of each
     jit : also measure the compiled twins
@@ -68,6 +69,7 @@ class Settings:
     redrawn: int = 1000
     huge: int = 100_000
     shots: int = 10_000
+    row: int = 32
     rewound: int = 1000
     batches: tuple[int, ...] = (1, 100, 2000)
     frames: int = 12
@@ -80,8 +82,8 @@ class Settings:
 
 
 QUICK = Settings(
-    objects=(10, 100, 1000), moving=(100, 1000), shots=2000, frames=4, calls=100, starts=5, rounds=3, seconds=0.05,
-    huge=10_000, rewound=200, planner=(100, 1000),
+    objects=(10, 100, 1000), moving=(100, 1000), shots=2000, row=4, frames=4, calls=100, starts=5, rounds=3,
+    seconds=0.05, huge=10_000, rewound=200, planner=(100, 1000),
 )  # fmt: skip
 
 

@@ -59,9 +59,10 @@ class Side:
 
 @dataclass
 class Times:
-    """What a side took for a unit of work, ns: in each round."""
+    """What a side took for a unit of work, ns: in each round, and for the first work of each alone."""
 
     rounds: list[float] = field(default_factory=list)
+    firsts: list[float] = field(default_factory=list)
     easier: str = ""
     units: int = 0
     compared: bool = False
@@ -74,10 +75,16 @@ class Times:
     def median(self) -> float:
         return statistics.median(self.rounds)
 
+    @property
+    def first(self) -> float:
+        """The median of the first works: what other sides left in the caches is of no use to them."""
+        return statistics.median(self.firsts or self.rounds)
+
     def to_dict(self) -> dict[str, Any]:
         return {
             "min_ns": self.least,
             "median_ns": self.median,
+            "first_ns": self.first,
             "rounds_ns": self.rounds,
             "units": self.units,
             "easier": self.easier,
@@ -117,49 +124,61 @@ class Cell:
 
 
 def race(
-    cell: Cell, sides: Sequence[Side], works: Iterable[Any], units: int, seconds: float, compare: bool = True
+    cell: Cell, sides: Sequence[Side], runs: Iterable[Sequence[Any]], units: int, seconds: float, compare: bool = True
 ) -> Cell:
-    """Let sides answer the works, one for each round, and compare the rows of all who tell rows.
+    """Let sides answer the runs, one for each round, and compare the rows of all who tell rows.
 
-    The first side is the one that the others are compared with. A side that is not `whole` answers as many units as
-    it can in the given seconds; the first of the works is for probing and warming up.
+    A run is works that are answered one after the other, without anything between them. All sides have the same time
+    for it: a `whole` one answers as many works as it can in the given seconds, and one at least; another as many units
+    of the first work. The first side is the one that the others are compared with; the first of the runs is for
+    probing and warming up.
     """
-    works = iter(works)
-    warm_up = next(works)
-    share = {side.name: _units(side, warm_up, units, seconds) for side in sides}
+    runs = iter(runs)
+    warm_up = next(runs)
+    shares = {side.name: _share(side, warm_up, units, seconds) for side in sides}
     cell.asked = units
-    for number, work in enumerate(works):
-        answers: dict[str, Any] = {}
+    for number, run in enumerate(runs):
+        answers: dict[str, list[Any]] = {}
         for side in itertools.islice(itertools.cycle(sides), number % len(sides), number % len(sides) + len(sides)):
-            times = cell.sides.setdefault(side.name, Times(easier=side.easier, units=share[side.name]))
-            ns, answers[side.name] = _timed(side, work, share[side.name])
-            times.rounds.append(ns / share[side.name])
+            works, share = shares[side.name]
+            times = cell.sides.setdefault(side.name, Times(easier=side.easier, units=works * share))
+            first, ns, answers[side.name] = _timed(side, run[:works], share)
+            times.firsts.append(first / share)
+            times.rounds.append(ns / (works * share))
         if compare:
-            _compare(cell, sides, answers, share)
+            _compare(cell, sides, answers)
     cell.sides = {side.name: cell.sides[side.name] for side in sides}
+    if longer := {name: cell.sides[name].first for name, (works, _) in shares.items() if works > 1}:
+        cell.values["first of a run, median"] = longer
     return cell
 
 
-def _units(side: Side, work: Any, units: int, seconds: float) -> int:
-    """How many units a side answers in a round; a whole one warms up by all of them."""
+def _share(side: Side, run: Sequence[Any], units: int, seconds: float) -> tuple[int, int]:
+    """How many works a side answers in a round, and how many units of each; a whole one warms up by one of them."""
     if side.whole:
-        _timed(side, work, units)
-        return units
+        _timed(side, run[:1], units)
+        _, ns, _ = _timed(side, run[:1], units)
+        return max(1, min(len(run), int(seconds * 1e9 / ns))), units
     probe = min(PROBE, units)
     while True:
-        ns, _ = _timed(side, work, probe)
+        _, ns, _ = _timed(side, run[:1], probe)
         if probe == units or ns > seconds * 1e9 / 4:
-            return max(1, min(units, int(seconds * 1e9 / max(ns / probe, 1))))
+            return 1, max(1, min(units, int(seconds * 1e9 / max(ns / probe, 1))))
         probe = min(4 * probe, units)
 
 
-def _timed(side: Side, work: Any, units: int) -> tuple[float, Any]:
+def _timed(side: Side, works: Sequence[Any], units: int) -> tuple[float, float, list[Any]]:
+    """What the first work takes, what all take, and their answers."""
     if side.ready:
         side.ready()
+    answers: list[Any] = []
     with no_collection():
         begin = time.perf_counter_ns()
-        answer = side.answer(work, units)
-        return time.perf_counter_ns() - begin, answer
+        answers.append(side.answer(works[0], units))
+        first = time.perf_counter_ns()
+        for work in works[1:]:
+            answers.append(side.answer(work, units))
+        return first - begin, time.perf_counter_ns() - begin, answers
 
 
 @contextmanager
@@ -173,23 +192,23 @@ def no_collection() -> Iterator[None]:
         gc.enable()
 
 
-def _compare(cell: Cell, sides: Sequence[Side], answers: dict[str, Any], share: dict[str, int]) -> None:
-    """Compare all rows of the shots that both the first side and another answered."""
+def _compare(cell: Cell, sides: Sequence[Side], answers: dict[str, list[Any]]) -> None:
+    """Compare all rows of the works, or of the part of the first work, that the first side and another answered."""
     first = next((side for side in sides if side.rows), None)
     if first is None or first.rows is None:
         return
-    expected = sorted_rows(first.rows(answers[first.name]))
-    cell.rows = len(expected) / share[first.name]
+    expected = [sorted_rows(first.rows(answer)) for answer in answers[first.name]]
+    cell.rows = sum(map(len, expected)) / cell.sides[first.name].units
     for side in sides:
         if side is first or side.rows is None:
             continue
-        both = min(share[side.name], share[first.name])
-        got = sorted_rows(side.rows(answers[side.name]))
-        ours = expected[expected[:, 0] < both]
-        got = got[got[:, 0] < both]
+        part = min((cell.sides[one.name].units for one in (first, side) if not one.whole), default=None)
         cell.sides[side.name].compared = cell.sides[first.name].compared = True
-        if not np.array_equal(ours, got):
-            raise DisagreementError(_difference(cell, first.name, side.name, ours, got))
+        for wanted, answer in zip(expected, answers[side.name], strict=False):
+            told = sorted_rows(side.rows(answer))
+            ours, got = (rows if part is None else rows[rows[:, 0] < part] for rows in (wanted, told))
+            if not np.array_equal(ours, got):
+                raise DisagreementError(_difference(cell, first.name, side.name, ours, got))
 
 
 def _difference(cell: Cell, name: str, other: str, ours: Ints, got: Ints) -> str:

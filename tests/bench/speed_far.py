@@ -45,7 +45,7 @@ def rewind(settings: Settings) -> Iterator[Cell]:
             recording.append(time.perf_counter_ns() - begin)
             boxes = scene.items.boxes(ids[::-1])
             past.append([pygame.Rect(x, y, x1 - x + 1, y1 - y + 1) for x, y, x1, y1 in boxes.tolist()])
-        works = list(islice(_at_ticks(settings.rewound, objects), settings.rounds + 1))
+        works = [[work] for work in islice(_at_ticks(settings.rewound, objects), settings.rounds + 1)]
         sides = [
             Side(mode, lambda w, n, h=history: _past(h, w, n), hit_rows, ready=ready, whole=True)
             for mode, ready in modes(settings).items()
@@ -100,7 +100,7 @@ def huge(settings: Settings) -> Iterator[Cell]:
     middles = scene.items.position_256[scene.ids("hittable")] / 256
     for name in ("point", "disc r=40", "ray 1000"):
         weapon: Any = PATTERNS[name]
-        works = list(islice(_half_near(name, settings.shots, middles), settings.rounds + 1))
+        works = [[work] for work in islice(_half_near(name, settings.shots, middles), settings.rounds + 1)]
         sides = ours(settings, scene, weapon)
         if name == "ray 1000":
             sides.append(Side("pymunk", space.rays, easier=EASIER))

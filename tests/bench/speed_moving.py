@@ -182,7 +182,7 @@ def moving(settings: Settings) -> Iterator[Cell]:
                     sides.append(space_side(shadow))
                 what = f"{shots} shots" + (", 5 % turn" if turning else "")
                 rounds = frames_of(shadow, frames, shots, turning, shots)
-                works = (next(rounds) for _ in range(settings.rounds + 1))
+                works = ([next(rounds)] for _ in range(settings.rounds + 1))
                 cell = Cell("moving", what, objects, unit="ns a frame")
                 yield race(cell, sides, works, frames, settings.seconds)
 
@@ -199,7 +199,7 @@ def redrawn(settings: Settings) -> Iterator[Cell]:
             mine = scene_of(objects)
             sides.append(Side(mode, _redraw(mine), ready=ready, whole=True))
             sides.append(Side(f"{mode}, move alone", _move(scene_of(objects)), ready=ready, whole=True))
-        steps = [_steps(scene_of(objects), moved, settings.steps, rng) for _ in range(settings.rounds + 1)]
+        steps = [[_steps(scene_of(objects), moved, settings.steps, rng)] for _ in range(settings.rounds + 1)]
         cell = Cell("redrawn", f"{moved} moved", objects, unit="ns a frame")
         race(cell, sides, steps, settings.steps, settings.seconds)
         for mode in modes(settings):

@@ -11,7 +11,7 @@ import numpy as np
 from speed_clock import Cell, Side, race
 from speed_engines import EASIER, Space, Tree
 from speed_peers import Baked, Masks, Plane, first, rendered
-from speed_world import MARGIN, PATTERNS, SEED, WORLD, Volleys, items_of, pattern_mask, scene_of, volleys
+from speed_world import MARGIN, PATTERNS, SEED, WORLD, Volleys, items_of, pattern_mask, runs, scene_of, volleys
 
 from planes import Scene, use_jit
 from weapons import Disc, Hits, Laser, Weapon, fire
@@ -163,7 +163,7 @@ def static(settings: Settings) -> Iterator[Cell]:
             sides = ours(settings, scene, weapon) + peers.sides(name)
             if name == "ray 1000" and objects <= 1000:
                 sides.append(unfiltered(settings, scene, weapon))
-            works = islice(volleys(name, settings.shots, objects), settings.rounds + 1)
+            works = islice(runs(name, settings.shots, objects, settings.row), settings.rounds + 1)
             yield race(Cell("static", name, objects), sides, works, settings.shots, settings.seconds)
         yield aimed_at_objects(settings, scene, objects, peers)
 
@@ -174,7 +174,11 @@ def aimed_at_objects(settings: Settings, scene: Scene, objects: int, peers: Peer
     middles = scene.items.boxes(ids).reshape(-1, 2, 2).mean(axis=1)
     rng = np.random.default_rng(7)
     works = [
-        Volleys(np.floor(middles[rng.integers(len(ids), size=settings.shots)])) for _ in range(settings.rounds + 1)
+        [
+            Volleys(np.floor(middles[rng.integers(len(ids), size=settings.shots)]), peers=not number)
+            for number in range(settings.row)
+        ]
+        for _ in range(settings.rounds + 1)
     ]
     own = ours(settings, scene, Disc(40))
     cell = race(
@@ -212,10 +216,10 @@ def choosy(settings: Settings, objects: int) -> Iterator[Cell]:
         return masks.filtered(*first(work, units), disc, 3, work.lists["passed"])
 
     sides = [*ours(settings, scene, Disc(40), accept=3), Side("A pygame", filtered, list)]
-    works = islice(with_owners(), settings.rounds + 1)
+    works = islice(([work] for work in with_owners()), settings.rounds + 1)
     yield race(Cell("special", "r=40, accept, exclude", objects), sides, works, settings.shots, settings.seconds)
     through = Side("A pygame", lambda w, n: masks.areas(*first(w, n), repeat(disc), True), list)
-    works = islice(volleys("disc r=40", settings.shots, objects), settings.rounds + 1)
+    works = islice(runs("disc r=40", settings.shots, objects, settings.row), settings.rounds + 1)
     sides = [*ours(settings, scene, Disc(40, pierce=True)), through]
     yield race(Cell("special", "r=40, pierce", objects), sides, works, settings.shots, settings.seconds)
 
@@ -226,7 +230,7 @@ def piercing_rays(settings: Settings, objects: int) -> Cell:
     space = Space(items_of(scene))
     sides = [*ours(settings, scene, Laser(1000)), Side("pymunk", space.piercing_rays, easier=EASIER)]
     sides.append(unfiltered(settings, scene, Laser(1000)))
-    works = islice(volleys("ray 1000", settings.shots, objects), settings.rounds + 1)
+    works = islice(runs("ray 1000", settings.shots, objects, settings.row), settings.rounds + 1)
     return race(Cell("special", "ray 1000, pierce", objects), sides, works, settings.shots, settings.seconds)
 
 
@@ -237,7 +241,7 @@ def wide(settings: Settings, objects: int) -> Iterator[Cell]:
     area = (-200, -200, WORLD[0] + 200, WORLD[1] + 200)
     assert max(map(abs, area[:2])) + 100 < MARGIN
     for name in ("point", "spread 8 x r=2", "disc r=40"):
-        works = islice(volleys(name, settings.shots, objects, area=area), settings.rounds + 1)
+        works = islice(runs(name, settings.shots, objects, settings.row, area=area), settings.rounds + 1)
         sides = ours(settings, scene, PATTERNS[name]) + peers.sides(name)[:3]
         cell = Cell("special", f"{name}, 200 px, off bounds", objects)
         yield race(cell, sides, works, settings.shots, settings.seconds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from functools import cache
 from typing import Any
 
@@ -18,7 +18,7 @@ from weapons.draws import disc_offsets
 
 __all__ = [
     "MARGIN", "PATTERNS", "SEED", "WORLD", "Aimed", "Item", "Volleys", "items_of", "pattern_mask", "scene_of",
-    "shotgun", "sprite_masks", "volleys",
+    "runs", "shotgun", "sprite_masks", "volleys",
 ]  # fmt: skip
 
 WORLD = (1920, 1080)
@@ -149,7 +149,12 @@ def pattern_mask(weapon: Plain, degrees: float = 0.0) -> tuple[Bools, int, int]:
 
 @dataclass
 class Volleys:
-    """A round's shots, as each side likes them; all of it is made before the clock starts."""
+    """A batch of shots, as each side likes them; all of it is made before the clock starts.
+
+    Parameters
+    ----------
+    peers : make the lists of the peers, too
+    """
 
     at: Floats
     aim: Floats | None = None
@@ -157,9 +162,12 @@ class Volleys:
     exclude: Ints | None = None
     pellets: Ints | None = None
     lists: dict[str, Any] = field(default_factory=dict)
+    peers: InitVar[bool] = True
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, peers: bool) -> None:
         """Make the lists of the peers."""
+        if not peers:
+            return
         xy = pixel(snap(self.at))
         self.lists["x"], self.lists["y"] = xy[:, 0].tolist(), xy[:, 1].tolist()
         self.lists["xy"] = xy
@@ -180,11 +188,22 @@ def volleys(
     name: str, count: int, seed: int, *, area: tuple[float, float, float, float] = (0, 0, *WORLD)
 ) -> Iterator[Volleys]:
     """Fresh shots for each round, uniform over an area (x_min, y_min, x_max, y_max)."""
+    return (run[0] for run in runs(name, count, seed, 1, area=area))
+
+
+def runs(
+    name: str, count: int, seed: int, row: int, *, area: tuple[float, float, float, float] = (0, 0, *WORLD)
+) -> Iterator[list[Volleys]]:
+    """Runs of so many batches for each round; peers, who answer a part of a batch, have their lists of the first."""
     rng = np.random.default_rng(seed)
     while True:
-        at = np.floor(rng.uniform(area[:2], area[2:], (count, 2)))
-        aim = rng.integers(0, 360, count).astype(float) if name in Aimed else None
-        yield Volleys(at, aim, pellets=placed_pellets(PATTERNS[name], at))
+        run = []
+        for number in range(row):
+            at = np.floor(rng.uniform(area[:2], area[2:], (count, 2)))
+            aim = rng.integers(0, 360, count).astype(float) if name in Aimed else None
+            pellets = None if number else placed_pellets(PATTERNS[name], at)
+            run.append(Volleys(at, aim, pellets=pellets, peers=not number))
+        yield run
 
 
 def placed_pellets(weapon: Weapon, at: Floats) -> Ints | None:

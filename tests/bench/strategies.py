@@ -12,7 +12,7 @@ from typing import Any
 from speed_clock import Cell, Side, race, told
 from speed_moving import Own, frames_of, own_rows
 from speed_static import Settings, modes, ours
-from speed_world import PATTERNS, scene_of, volleys
+from speed_world import PATTERNS, runs, scene_of
 
 STRATEGIES = ("direct", "composed", "auto")
 
@@ -34,7 +34,7 @@ def _still(settings: Settings, name: str, weapon: Any, objects: int, shots: int)
         for side in ours(settings, scene_of(objects), weapon, strategy=strategy):
             side.name = f"{side.name}, {strategy}"
             sides.append(side)
-    works = islice(volleys(name, shots, shots), max(settings.rounds, 5 if shots < 1000 else 0) + 1)
+    works = islice(runs(name, shots, shots, 1), max(settings.rounds, 5 if shots < 1000 else 0) + 1)
     cell = race(Cell("planner", f"{name}, {shots} shots", objects), sides, works, shots, settings.seconds)
     return _with_losses(settings, cell)
 
@@ -46,7 +46,7 @@ def _in_motion(settings: Settings, objects: int, shots: int) -> Cell:
             own = Own(scene_of(objects), strategy=strategy)
             sides.append(Side(f"{mode}, {strategy}", own.answer, own_rows, ready=ready, whole=True))
     rounds = frames_of(scene_of(objects), settings.frames, shots, 0.0, shots)
-    works = (next(rounds) for _ in range(settings.rounds + 1))
+    works = ([next(rounds)] for _ in range(settings.rounds + 1))
     cell = Cell("planner", f"all move, {shots} shots", objects, unit="ns a frame")
     return _with_losses(settings, race(cell, sides, works, settings.frames, settings.seconds))
 
