@@ -19,10 +19,10 @@ from planes.twins import in_parts
 __all__ = [
     "bits_of",
     "found",
+    "in_order",
     "is_beyond",
     "is_far",
     "key_of",
-    "put_rows",
     "row_order",
     "shared",
     "union",
@@ -106,27 +106,26 @@ def is_beyond(strips, pattern, x, y, left, top, right, bottom):
     return (low > strips[pattern, 3]) | (high < strips[pattern, 2])
 
 
-@njit
-def put_rows(count, n, key, across, seen, samples, placed, placement_out, seen_out, samples_out, distance2, x, y):
-    """Write n rows of a placement, sorted by their keys, and tell how many there are now.
+@njit(inline="always")
+def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
+    """Sort rows `first` .. `last` - 1 of a placement, in columns, by their keys, and tell pixels instead of these.
 
     Parameters
     ----------
-    placed : which it is, and the pixel from which distances are counted
+    origin_x, origin_y : the pixel from which distances are counted
+    distance2, x : keys, and the columns of the nearest pixels about the origin; the first are then squared distances
+    y : nothing yet
     """
-    who, origin_x, origin_y = placed
-    for i in range(n):
-        j = count + i
-        while j > count and distance2[j - 1] > key[i]:
-            distance2[j], y[j] = distance2[j - 1], y[j - 1]
+    for i in range(first + 1, last):
+        item, count, key, across, j = seen[i], samples[i], distance2[i], x[i], i
+        while j > first and distance2[j - 1] > key:
+            seen[j], samples[j], distance2[j], x[j] = seen[j - 1], samples[j - 1], distance2[j - 1], x[j - 1]
             j -= 1
-        distance2[j], y[j] = key[i], i
-    for j in range(count, count + n):
-        i = y[j]
-        placement_out[j], seen_out[j], samples_out[j], x[j] = who, seen[i], samples[i], origin_x + across[i]
-        y[j] = origin_y + ((distance2[j] >> 1) & (2 * SIDE - 1)) - SIDE
-        distance2[j] >>= SIDE_BITS
-    return count + n
+        seen[j], samples[j], distance2[j], x[j] = item, count, key, across
+    for i in range(first, last):
+        x[i] += origin_x
+        y[i] = origin_y + ((distance2[i] >> 1) & (2 * SIDE - 1)) - SIDE
+        distance2[i] >>= SIDE_BITS
 
 
 Kernel = Callable[..., tuple[int, int]]

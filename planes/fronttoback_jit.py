@@ -21,11 +21,11 @@ from planes.bitrows_jit import (
     WORDS,
     bits_of,
     columns_about,
+    in_order,
     is_beyond,
     is_far,
     key_of,
     pixel_of,
-    put_rows,
     row_key,
     rows_by,
     shared,
@@ -244,8 +244,7 @@ def _front_to_back(
     if end - who > FEW and len(box):
         begin, listed, cells = _binned(box)
     near, rest, last_kind = np.empty(len(box), np.int64), np.empty(most, np.uint64), -1
-    key, nearest_x = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
-    hit, hit_samples = np.empty(len(box), np.int64), np.empty(len(box), np.int64)
+    whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
     while who < end:
         kind = pattern[who]
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
@@ -268,7 +267,7 @@ def _front_to_back(
         pixels = laid(windows, first[kind], columns, step, rows, rest)
         if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
             pixels = cut_off(rest, columns, step, left, top, rows, bounds[0], bounds[1], bounds[2], bounds[3])
-        n, item = 0, -1
+        item, row = -1, count - 1
         for i in range(close):
             if pixels == 0:
                 break
@@ -289,17 +288,15 @@ def _front_to_back(
                 continue
             new = key_of(distance2, across, down)
             if rank[at] == item:
-                hit_samples[n - 1] += samples
-                if new < key[n - 1]:
-                    key[n - 1], nearest_x[n - 1] = new, across
+                hit_samples[row] += samples
+                if new < key[row]:
+                    key[row], nearest_x[row] = new, across
             else:
-                key[n], nearest_x[n], hit[n], hit_samples[n] = new, across, at, samples
+                row += 1
                 item = rank[at]
-                n += 1
-        count = put_rows(
-            count, n, key, nearest_x, hit, hit_samples, (who, origin_x[who], origin_y[who]),
-            out[0], out[1], out[2], out[3], out[4], out[5],
-        )  # fmt: skip
+                whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
+        in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
+        count = row + 1
         who += 1
     return who, count
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import types
 
 from planes import lookup
 from planes.bitrows import Beside, Found, Placed, Seen, Windows
-from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, is_beyond, is_far, key_of, put_rows, rows_by, shared
+from planes.bitrows_jit import BOXES, INTS, ROWS_OUT, WORDS, in_order, is_beyond, is_far, key_of, rows_by, shared
 from planes.cells import Cells
 from planes.cells_jit import cell_at
 from planes.compiled import compiled
@@ -30,8 +29,7 @@ def _looked_up(
     rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
 ):  # fmt: skip
     room = out.shape[1]
-    key, nearest_x = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
-    hit, hit_samples = np.empty(len(rank), np.int64), np.empty(len(rank), np.int64)
+    whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
     while who < end:
         cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
         if cell < 0:
@@ -43,7 +41,7 @@ def _looked_up(
             continue
         if count + last - entry > room:
             break
-        kind, n, item = pattern[who], 0, -1
+        kind, item, row = pattern[who], -1, count - 1
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
@@ -62,21 +60,19 @@ def _looked_up(
             samples, distance2, across, down = shared(
                 tiles, tile_begin[at] - box[at, 1], windows, word, step, offset & 63, low, lowest, own, level
             )
-            if samples:
-                if rank[at] == item:
-                    hit_samples[n - 1] += samples
-                    new = key_of(distance2, across, down)
-                    if new < key[n - 1]:
-                        key[n - 1], nearest_x[n - 1] = new, across
-                else:
-                    key[n], nearest_x[n] = key_of(distance2, across, down), across
-                    hit[n], hit_samples[n] = at, samples
-                    n += 1
-                    item = rank[at]
-        count = put_rows(
-            count, n, key, nearest_x, hit, hit_samples, (who, origin_x[who], origin_y[who]),
-            out[0], out[1], out[2], out[3], out[4], out[5],
-        )  # fmt: skip
+            if samples == 0:
+                continue
+            new = key_of(distance2, across, down)
+            if rank[at] == item:
+                hit_samples[row] += samples
+                if new < key[row]:
+                    key[row], nearest_x[row] = new, across
+            else:
+                row += 1
+                item = rank[at]
+                whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
+        in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
+        count = row + 1
         who += 1
     return who, count
 

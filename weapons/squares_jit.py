@@ -21,7 +21,7 @@ from numba.extending import intrinsic
 
 from planes.arrays import Bools, Ints
 from planes.bitrows import WORD, Words
-from planes.bitrows_jit import key_of, put_rows, shared
+from planes.bitrows_jit import in_order, key_of, shared
 from planes.cells import Cells
 from planes.cells_jit import cell_at
 from planes.compiled import compiled
@@ -70,11 +70,11 @@ SCENE, ROUND, ROOM, FOUND = range(4)
 """Of a buffer: addresses of the scene and the round, for how many rows it has room, and from where on they lie; after
 them there is room for what is left of the round."""
 
-ROW = 6
-"""Numbers of a row: 0, item, samples, squared distance, x, y."""
+ROW = 5
+"""Numbers of a row: item, samples, squared distance, x, y."""
 
 FIRST, ROW_BYTES = 8 * FOUND, 8 * ROW
-read = struct.Struct("8x5q").unpack_from
+read = struct.Struct("5q").unpack_from
 
 
 @intrinsic
@@ -175,11 +175,18 @@ def _met(scene, shape, box, near, close, rest, x, y):
 @njit
 def _tell(met, every, count, x, y, buffer_at, room):
     """Write what `_met` told to a buffer, in order."""
+    key, across, item, samples, down = (
+        met[every:],
+        met[2 * every :],
+        met[3 * every :],
+        met[4 * every :],
+        met[5 * every :],
+    )
+    in_order(0, count, x, y, item, samples, key, across, down)
     found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
-    put_rows(
-        0, count, met[every:], met[2 * every :], met[3 * every :], met[4 * every :], (0, x, y),
-        found[:, 0], found[:, 1], found[:, 2], found[:, 3], found[:, 4], found[:, 5],
-    )  # fmt: skip
+    for row in range(count):
+        found[row, 0], found[row, 1], found[row, 2] = item[row], samples[row], key[row]
+        found[row, 3], found[row, 4] = across[row], down[row]
 
 
 @compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
@@ -283,7 +290,7 @@ class Squares:
     def _place(self, pile: Pile, boxes_xyxy: Ints, cells: Cells, told: tuple[int, ...]) -> None:
         """Tell the kernel where all lies."""
         columns = tuple(map(np.ascontiguousarray, (cells.begin, cells.listed, boxes_xyxy, *pile)))
-        scratch = np.empty(5 * len(boxes_xyxy), np.int64)
+        scratch = np.empty(6 * len(boxes_xyxy), np.int64)
         begin, listed, *rest = map(_address, columns)
         here = [*told, *cells[:5], begin, listed, len(boxes_xyxy), *rest, _address(scratch)]
         self._here[:] = np.array(here, np.int64)
