@@ -52,10 +52,8 @@ _ONE, _FULL = np.uint64(1), np.uint64(2**64 - 1)
 _PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _SUM = np.uint64(0x0001000100010001)
-_FAR_SMALL = 2**14
-"""So far from the origin squares fit int32, with a sum of two, px."""
-
-_MOST = {kind: np.iinfo(kind).max for kind in (np.int32, np.int64)}
+_ROW_BITS = 6
+"""Of the row of a tile, in a number that sorts as (squared distance, row)."""
 
 
 class Seen(NamedTuple):
@@ -424,39 +422,43 @@ def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     column = np.minimum(np.maximum(-left, 0), WORD - 1)  # the nearest to the origin
     away = left + column
     across = np.abs(away)
-    far = max(int(np.maximum.reduce(side, initial=0)) for side in (across, top, -top))
-    kind = np.int32 if far + WORD < _FAR_SMALL else np.int64
-    step = np.minimum(_after(met, column), _before(met, column))
-    distance: npt.NDArray[Any] = step + across.astype(kind)[:, None]
-    distance *= distance
-    down: npt.NDArray[Any] = np.arange(met.shape[1], dtype=kind)
-    down = top.astype(kind)[:, None] + down
+    place = (met != 0).reshape(-1).nonzero()[0]  # of some 40 rows few have a pixel
+    pair = place // met.shape[1]
+    row = place - pair * met.shape[1]
+    key = _steps(met.reshape(-1).take(place), column.take(pair))
+    key += across.take(pair)
+    key *= key
+    down = top.take(pair)
+    down += row
     down *= down
-    distance += down
-    distance[step == WORD] = _MOST[kind]
-    row = distance.argmin(axis=1)
-    every = np.arange(len(met))
-    step = step[every, row].astype(np.int64)
-    before = (met[every, row] >> (column - step).view(np.uint64)) & _ONE
-    return distance[every, row].astype(np.int64), away + np.where(before, -step, step), row + top
+    key += down
+    key <<= _ROW_BITS
+    key |= row
+    begins = np.ones(len(pair), np.bool_)
+    np.not_equal(pair[1:], pair[:-1], out=begins[1:])
+    key = np.minimum.reduceat(key, begins.nonzero()[0])
+    row, distance2 = key & (WORD - 1), key >> _ROW_BITS
+    down = row + top
+    step = np.sqrt((distance2 - down * down).astype(np.float64)).astype(np.int64)  # of a square that a float holds
+    step -= across
+    before = (met[np.arange(len(met)), row] >> (column - step).view(np.uint64)) & _ONE
+    return distance2, away + np.where(before, -step, step), down
 
 
-def _after(words: Words, column: Ints) -> npt.NDArray[np.uint8]:
-    """Distance (n, height) from a column (n,) of words to the nearest pixel at or after it; 64 if none is."""
-    right = words >> column.view(np.uint64)[:, None]
-    below = right - _ONE
-    np.invert(right, out=right)
-    below &= right
-    return np.asarray(np.bitwise_count(below))
-
-
-def _before(words: Words, column: Ints) -> npt.NDArray[np.uint16]:
-    """Distance from a column of words to the nearest pixel at or before it; more than 64 if none is."""
-    left = words << (WORD - 1 - column).view(np.uint64)[:, None]
-    below = left >> _ONE
+def _steps(words: Words, column: Ints) -> Ints:
+    """Distances (n,) from columns of words, none 0, to their nearest pixels."""
+    own = column.view(np.uint64)
+    after = words >> own
+    below = after - _ONE
+    np.invert(after, out=after)
+    after &= below
+    before = words << (np.uint64(WORD - 1) - own)
+    np.right_shift(before, _ONE, out=below)
     np.invert(below, out=below)
-    left &= below
+    before &= below
     # The exponent of a float is the place of the highest bit, once no bit below it can round it up.
-    exponent = left.astype(np.float64).view(np.int64)
+    exponent = before.astype(np.float64).view(np.int64)
     exponent >>= 52
-    return np.asarray(np.uint16(1023 + WORD - 1) - exponent.astype(np.uint16))
+    np.subtract(1023 + WORD - 1, exponent, out=exponent)
+    np.minimum(exponent, np.bitwise_count(after), out=exponent)
+    return exponent

@@ -57,8 +57,9 @@ def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:
 @njit(inline="always")
 def cell_at(at_x, at_y, x, y, bits, wide, high):
     """The cell that a pixel is in; -1 beyond all."""
-    column, row = (at_x - x) >> bits, (at_y - y) >> bits
-    return row * wide + column if 0 <= column < wide and 0 <= row < high else -1
+    column, row = np.uint64((at_x - x) >> bits), np.uint64((at_y - y) >> bits)  # what lies before 0 is far beyond
+    inside = (column < np.uint64(wide)) & (row < np.uint64(high))
+    return np.int64(row * np.uint64(wide) + column) if inside else -1
 
 
 @compiled(types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT))

@@ -1,4 +1,4 @@
-"""Checked positions on the 1/256-px grid, many at once; `snapping_jit` has the compiled twin."""
+"""Checked positions on the 1/256-px grid, and their pixels, many at once; `snapping_jit` has the compiled twins."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 
 from planes.arrays import Floats, Ints
 from planes.constants import POSITION_MAX, SUB
+from planes.grid256 import pixel
 
-__all__ = ["snapped"]
+__all__ = ["pixels", "snapped"]
 
 LIMIT, SCALE = np.array(float(POSITION_MAX)), np.array(float(SUB))
 
@@ -27,3 +28,8 @@ def snapped(at: Floats) -> Ints | None:
     whole: Ints = made.view(np.int64)
     whole -= ROUNDING_BITS
     return whole
+
+
+def pixels(at_256: Ints) -> Ints:
+    """Whole pixels (N, 2) of positions in 1/256 px, as `grid256.pixel` tells them."""
+    return pixel(at_256)

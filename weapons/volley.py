@@ -61,7 +61,8 @@ class Shots:
     @once
     def xy(self) -> Ints:
         """Whole pixels (N, 2) that they are on."""
-        return pixel(self.at_256)
+        xy: Ints = kernels_of(snapping).pixels(self.at_256)
+        return xy
 
     @property
     def one_direction(self) -> tuple[int, int] | None:
