@@ -33,14 +33,14 @@ WORD = 64
 PAD = 16
 """Empty rows between seen tiles: patterns of so few rows are counted by their own."""
 
-NOWHERE = 255
-"""Instead of the distance along a row that has no pixel."""
-
-BESIDE_REACH = 180
+BESIDE_REACH = 113
 """Radius of the largest disc whose nearest pixel is told by distances along rows, px.
 
-A distance beyond it counts as one more: it loses all the same, and the squares of two such add up within uint16.
+The squares of what lies beyond it, twice as far to the side, add up within uint16.
 """
+
+NOWHERE = BESIDE_REACH + 1
+"""Instead of the distance along a row that has no pixel, and of one up or down that is farther: it loses."""
 
 WORDS_AT_ONCE = 2**17
 """Words of pairs worked on at a time: a megabyte; with fewer the calls weigh more, with more the caches overflow."""
@@ -363,11 +363,15 @@ def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
 def _sums(counts: npt.NDArray[np.uint8]) -> Ints:
     """Sums (n,) of rows (n, m), m a multiple of 8 up to 64, of numbers up to 64: eight of them at a time."""
     eights = counts.view(np.uint64)
-    pairs = eights & _BYTES
-    pairs += (eights >> np.uint64(8)) & _BYTES
-    total = pairs[:, 0].copy()
-    for column in range(1, pairs.shape[1]):
-        total += pairs[:, column]
+    total = np.zeros(len(counts), np.uint64)
+    for first in range(0, eights.shape[1], 3):  # three of them fit a byte
+        some = eights[:, first].copy()
+        for column in range(first + 1, min(first + 3, eights.shape[1])):
+            some += eights[:, column]
+        total += some & _BYTES
+        some >>= np.uint64(8)
+        some &= _BYTES
+        total += some
     total *= _SUM
     total >>= np.uint64(48)
     return total.astype(np.int64)
@@ -396,9 +400,8 @@ def _nearest_seen(seen: Seen, beside: Beside, near: Ints, left: Ints, top: Ints)
     across = beside.reshape(-1, seen.height).take(near * WORD + column, axis=0)
     up = -min(int(np.minimum.reduce(top, initial=0)), 0)
     down = np.abs(np.arange(-up, max(int(np.maximum.reduce(top, initial=0)), 0) + seen.height))
-    squares = (np.minimum(down, BESIDE_REACH + 1) ** 2).astype(np.uint16)
+    squares = (np.minimum(down, NOWHERE) ** 2).astype(np.uint16)
     distance2 = across + np.abs(away).astype(np.uint16)[:, None]
-    np.minimum(distance2, BESIDE_REACH + 1, out=distance2)
     distance2 *= distance2
     distance2 += rows_of(squares, seen.height, top + up)
     row = distance2.argmin(axis=1)
