@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import random
 from typing import Any
 
@@ -145,7 +146,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
 
 
 @settings(max_examples=80, deadline=None)
-@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([130, bitrows.BESIDE_REACH])))
+@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, bitrows.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
     case = Case(seed)
@@ -166,8 +167,28 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
         left, top = case.seen.box_xyxy[tile, :2].tolist()
         for row in range(case.seen.height):
             columns = [px - left for px, py in pixels if py == top + row]
-            told = [min((abs(column - c) for c in columns), default=255) for column in range(WORD)]
+            told = [min((abs(column - c) for c in columns), default=bitrows.NOWHERE) for column in range(WORD)]
             assert beside[tile, :, row].tolist() == told
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: bool) -> None:
+    """Tiles of one column of 64 rows, of which the first or the last has a pixel, on either side of the disc."""
+    reach = bitrows.BESIDE_REACH
+    side = np.arange(-reach, reach + 1)
+    spans = Spans.from_mask(side[:, None] ** 2 + side**2 <= reach * reach, (-reach, -reach))
+    rim = [(dx, math.isqrt(reach * reach - dx * dx)) for dx in range(reach + 1)]
+    rim = [(x * right, y * low) for x, y in rim for right in (-1, 1) for low in (-1, 1)]
+    boxes = np.array([(x, y - (WORD - 1) * last, x, y + (WORD - 1) * (not last)) for x, y in rim])
+    packed = np.zeros((len(rim), WORD), np.uint64)
+    packed[:, -last] = 1
+    seen = visible._laid_out(np.arange(len(rim)), boxes, packed)
+    every, zero = np.arange(len(rim)), np.zeros(1, np.int64)
+    made = windows._made([Pattern(spans, None)], False)
+    placed, beside = Placed(*[zero] * 5), bitrows.beside_of(seen)
+    found = bitrows.found(placed, made, seen, np.zeros_like(every), every, beside)
+    told = list(zip(found.x.tolist(), found.y.tolist(), found.distance2.tolist(), strict=True))
+    assert told == [(x, y, x * x + y * y) for x, y in rim]
 
 
 @settings(max_examples=100, deadline=None)
