@@ -340,7 +340,7 @@ def _counted(volley: Volley, windows: Windows, placement: Ints, near: Ints, seen
     """Count pairs, so many at a time as fit the cache, all of a shot together."""
     edges = [0, len(placement)]
     if len(placement) > PAIRS_AT_ONCE:
-        shot = volley.shot[placement]
+        shot, _ = volley.turn_of(placement)
         wanted = shot[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
         edges = [0, *np.unique(np.searchsorted(shot, wanted)).tolist(), len(placement)]
     parts = [

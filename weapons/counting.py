@@ -67,7 +67,7 @@ def counted(
     placed = placed_of(volley)
     found: Found = kernels.found(placed, windows, seen, placement, near, NOT_BESIDE)
     rank, samples = seen.rank[found.seen], found.samples
-    turn = volley.shot[found.placement] * volley.rounds + volley.round[found.placement]
+    turn = found.placement // volley.pellets
     pixels, pellets = samples, np.ones_like(samples)
     if volley.scattered or not _rising(seen.rank):
         order = kernels.row_order(turn, rank, found.seen, found.placement)

@@ -43,20 +43,22 @@ def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, p
     ----------
     radius_256 : radius in 1/256 px
     seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
-    shot, round_, pellet : (n,) int64; a row depends on its seed and its own three numbers only
+    shot, round_, pellet : (n,) int64; a row depends on its seed and its own three numbers only. Or columns (n, 1), of
+        the seeds, too, and pellets (k,) that all of them have: offsets are (n, k, 2) then, of the same numbers
     """
-    rows = np.broadcast_arrays(shot, round_, pellet)
-    seeds = np.broadcast_to(np.asarray(seed, np.uint64), rows[0].shape)
-    reach = radius_256 // SUB
-    offsets = np.empty((len(seeds), 2), np.int64)
-    for first in range(0, len(seeds), ROWS_AT_ONCE):
-        now = slice(first, first + ROWS_AT_ONCE)
-        key = mix64(seeds[now])
-        for word in rows:
-            key ^= word[now].astype(np.uint64)
+    words = np.asarray(seed, np.uint64), *(np.asarray(word).astype(np.uint64) for word in (shot, round_, pellet))
+    shape = np.broadcast_shapes(*(word.shape for word in words))
+    offsets = np.empty((*shape, 2), np.int64)
+    at_once = max(ROWS_AT_ONCE // max(shape[-1], 1), 1) if len(shape) > 1 else ROWS_AT_ONCE
+    for first in range(0, shape[0], at_once):
+        now = slice(first, first + at_once)
+        key, *rest = (word[now] if word.shape[:1] == shape[:1] and word.ndim == len(shape) else word for word in words)
+        key = mix64(key)
+        for word in rest:
+            key = key ^ word  # of more rows, if these are pellets
             key += GOLDEN
             _mix(key)
-        offsets[now] = _in_disc(key, reach, radius_256**2)
+        offsets[now] = _in_disc(key.reshape(-1), reach=radius_256 // SUB, radius2=radius_256**2).reshape(*key.shape, 2)
     return offsets
 
 

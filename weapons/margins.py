@@ -77,7 +77,7 @@ SHIFTS = _shifts()
 
 def _flips(volley: Volley, shot: Shots, sight: Sight) -> tuple[Bools, Ints]:
     """Whether a shot hits each item of the stack, and the number of the first shift that turns it over, -1 for none."""
-    n, placements = len(sight.stack), len(volley.shot)
+    n, placements = len(sight.stack), len(volley)
     still, flips = np.zeros(n, np.bool_), np.full(n, -1)
     step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
     edges = [0, 1, *range(1 + step, len(SHIFTS), step), len(SHIFTS)]
@@ -95,6 +95,6 @@ def _flips(volley: Volley, shot: Shots, sight: Sight) -> tuple[Bools, Ints]:
 def _shifted(volley: Volley, shift: Ints) -> Volley:
     """Place a volley once for each shift, with all placements as those of the first shot."""
     n = len(shift)
-    whose = np.tile(volley.shot, n), np.tile(volley.round, n), np.tile(volley.pellet, n)
-    xy = np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley.shot), axis=0)
-    return Volley(volley.table, np.tile(volley.pattern, n), xy, np.tile(volley.origin_xy, (n, 1)), whose, volley.rounds)
+    xy = np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley), axis=0)
+    turn_xy = np.tile(volley.turn_xy, (n, 1))
+    return Volley(volley.table, np.tile(volley.pattern, n), xy, turn_xy, volley.rounds, volley.pellets, shot=0)

@@ -147,9 +147,9 @@ class Volley:
     table : the distinct patterns
     pattern : (P,) which of them; None: all have the first
     xy : (P, 2) whole pixel it is placed on
-    origin_xy : (P, 2) whole pixel of its round, from which distances are counted
-    shot, round, pellet : (P,) whose it is; `shot` counts from 0 within the batch. Without them each is a shot
-    rounds : of a shot
+    turn_xy : (T, 2) whole pixel of each round of each shot, from which distances are counted
+    rounds, pellets : of a shot, and of a round
+    shot : of all, if they are placements of one shot, again and again
     """
 
     def __init__(
@@ -157,12 +157,13 @@ class Volley:
         table: PatternTable,
         pattern: Ints | None,
         xy: Ints,
-        origin_xy: Ints,
-        whose: tuple[Ints, Ints, Ints] | None = None,
+        turn_xy: Ints,
         rounds: int = 1,
+        pellets: int = 1,
+        shot: int | None = None,
     ) -> None:
-        self.table, self.xy, self.origin_xy, self.rounds = table, xy, origin_xy, rounds
-        self._pattern, self._whose = pattern, whose
+        self.table, self.xy, self.turn_xy, self.rounds, self.pellets = table, xy, turn_xy, rounds, pellets
+        self._pattern, self._shot = pattern, shot
 
     def __len__(self) -> int:
         return len(self.xy)
@@ -175,23 +176,31 @@ class Volley:
     @once
     def shot(self) -> Ints:
         """Shot (P,) of each, counted from 0 within the batch."""
-        return np.arange(len(self.xy)) if self._whose is None else self._whose[0]
+        return self.turn_of(np.arange(len(self.xy)))[0]
 
     @once
     def round(self) -> Ints:
         """Round (P,) of each."""
-        return ZEROS[: len(self.xy)] if self._whose is None else self._whose[1]
+        round_ = self.turn_of(np.arange(len(self.xy)))[1]
+        return ZEROS[: len(self.xy)] if round_ is None else round_
 
     @once
     def pellet(self) -> Ints:
         """Pellet (P,) of each."""
-        return ZEROS[: len(self.xy)] if self._whose is None else self._whose[2]
+        return ZEROS[: len(self.xy)] if self.pellets == 1 else np.arange(len(self.xy)) % self.pellets
+
+    @once
+    def origin_xy(self) -> Ints:
+        """Whole pixel (P, 2) of the round of each."""
+        return self.turn_xy if self.pellets == 1 else self.turn_xy.repeat(self.pellets, axis=0)
 
     def turn_of(self, placement: Ints) -> tuple[Ints, Ints | None]:
-        """Shots and rounds of some placements (n,); no rounds where each shot has one placement."""
-        if self._whose is None:
-            return placement, None
-        return self._whose[0][placement], self._whose[1][placement]
+        """Shots and rounds of some placements (n,); no rounds where each shot has one."""
+        turn = placement if self.pellets == 1 else placement // self.pellets
+        round_ = None
+        if self.rounds > 1:
+            turn, round_ = np.divmod(turn, self.rounds)
+        return turn if self._shot is None else np.full_like(turn, self._shot), round_
 
     @property
     def boxes(self) -> Ints:
@@ -204,9 +213,7 @@ class Volley:
     def nbytes(self) -> int:
         """Bytes of the table and of the columns."""
         words = self.xy.size + (0 if self._pattern is None else self._pattern.size)
-        if self._whose is not None:
-            words += 3 * len(self) + (self.origin_xy.size if self.scattered else 0)
-        return self.table.nbytes + 8 * words
+        return self.table.nbytes + 8 * (words + (self.turn_xy.size if self.scattered else 0))
 
     @property
     def count(self) -> Ints:
@@ -215,8 +222,8 @@ class Volley:
 
     @property
     def scattered(self) -> bool:
-        """Whether a round has several pellets."""
-        return self.xy is not self.origin_xy
+        """Whether pellets lie elsewhere than the pixel of their round."""
+        return self.xy is not self.turn_xy
 
 
 def checked_shots(
@@ -286,23 +293,19 @@ def volley_of(weapon: Weapon, shots: Shots) -> Volley:
     if not burst and not spread:
         return Volley(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
-    shot = np.repeat(np.arange(len(shots)), rounds * pellets)
-    round_ = np.tile(np.repeat(np.arange(rounds), pellets), len(shots))
-    pellet = np.tile(np.arange(pellets), len(shots) * rounds)
-    origin = shots.at_256[shot]
+    shot, round_ = np.repeat(np.arange(len(shots)), rounds), np.tile(np.arange(rounds), len(shots))
     direction: Ints | tuple[int, int] = STRAIGHT
     if plain.directed:
         direction = recoiled(shots.direction[shot], round_, burst.recoil_deg if burst else 0)
-    if burst:
-        origin = origin + round_[:, None] * snap(burst.recoil_xy)
-    origin_xy = pixel(origin)
-    xy = origin_xy
-    if spread:
-        offsets = kernels_of(draws).disc_offsets(
-            int(snap(spread.radius)), shots.seed[shot], shots.number[shot], round_, pellet
-        )
-        xy = origin_xy + offsets
-    return Volley(*_patterns(plain, direction), xy, origin_xy, (shot, round_, pellet), rounds)
+    table, pattern = _patterns(plain, direction)
+    turn_xy = pixel(shots.at_256[shot] + round_[:, None] * snap(burst.recoil_xy)) if burst else shots.xy
+    if not spread:
+        return Volley(table, pattern, turn_xy, turn_xy, rounds)
+    turns = (column[shot, None] for column in (shots.seed, shots.number))
+    xy = kernels_of(draws).disc_offsets(int(snap(spread.radius)), *turns, round_[:, None], np.arange(pellets))
+    xy += turn_xy[:, None]
+    pattern = None if pattern is None else pattern.repeat(pellets)
+    return Volley(table, pattern, xy.reshape(-1, 2), turn_xy, rounds, pellets)
 
 
 def _patterns(plain: Plain, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:
