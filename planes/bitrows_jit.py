@@ -23,6 +23,7 @@ __all__ = [
     "is_beyond",
     "is_far",
     "key_of",
+    "pixels_of",
     "row_order",
     "shared",
     "union",
@@ -107,6 +108,15 @@ def is_beyond(strips, pattern, x, y, left, top, right, bottom):
 
 
 @njit(inline="always")
+def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
+    """Tell squared distances and pixels of rows `first` .. `last` - 1 instead of keys and columns about an origin."""
+    for i in range(first, last):
+        x[i] += origin_x
+        y[i] = origin_y + ((distance2[i] >> 1) & (2 * SIDE - 1)) - SIDE
+        distance2[i] >>= SIDE_BITS
+
+
+@njit(inline="always")
 def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
     """Sort rows `first` .. `last` - 1 of a placement, in columns, by their keys, and tell pixels instead of these.
 
@@ -122,10 +132,7 @@ def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
             seen[j], samples[j], distance2[j], x[j] = seen[j - 1], samples[j - 1], distance2[j - 1], x[j - 1]
             j -= 1
         seen[j], samples[j], distance2[j], x[j] = item, count, key, across
-    for i in range(first, last):
-        x[i] += origin_x
-        y[i] = origin_y + ((distance2[i] >> 1) & (2 * SIDE - 1)) - SIDE
-        distance2[i] >>= SIDE_BITS
+    pixels_of(first, last, origin_x, origin_y, distance2, x, y)
 
 
 Kernel = Callable[..., tuple[int, int]]
@@ -133,29 +140,29 @@ Kernel = Callable[..., tuple[int, int]]
 tells where it stopped, -1 if it cannot decide."""
 
 
-def rows_by(kernel: Kernel, count: int, least: float, *given: Any) -> Found | None:
-    """Rows of all placements, in threads if there are enough of them; None if the kernel cannot decide them.
+def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any) -> Ints | None:
+    """Rows of all placements, as columns, in threads if there are enough; None if the kernel cannot decide them.
 
     Parameters
     ----------
     least : placements that are worth a thread
     given : to the kernel
     """
-    parts = in_parts(count, least, lambda first, last: _filled(kernel, first, last, given))
+    parts = in_parts(count, least, lambda first, last: _filled(kernel, columns, first, last, given))
     known = [part for part in parts if part is not None]
     if len(known) < len(parts):
         return None
-    return Found(*(known[0] if len(known) == 1 else np.concatenate(known, axis=1)))
+    return known[0] if len(known) == 1 else np.concatenate(known, axis=1)
 
 
-def _filled(kernel: Kernel, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
-    """Columns (6, n) of the rows of some placements; room that is not written to costs nothing."""
-    count, out = 0, np.empty((6, ROOM * (last - who) + ROOM_LEAST), np.int64)
+def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
+    """Columns of the rows of some placements; room that is not written to costs nothing."""
+    count, out = 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
     while True:
         who, count = kernel(who, last, count, out, *given)
         if who == last or who < 0:
             return out[:, :count] if who >= 0 else None
-        more = np.empty((6, 2 * out.shape[1]), np.int64)
+        more = np.empty((columns, 2 * out.shape[1]), np.int64)
         more[:, :count] = out[:, :count]
         out = more
 

@@ -320,10 +320,10 @@ def front_to_back(
     if not windows.shifted:
         each = PLACEMENT_NS + TILE_NS * len(pile.rank)
         found = rows_by(
-            _front_to_back, len(placed.x), PART_NS / each,
+            _front_to_back, 6, len(placed.x), PART_NS / each,
             *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips, *pile,
             accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
         )  # fmt: skip
     if found is None:
         return fronttoback.front_to_back(placed, windows, pile, accept, exclude, pierce, bounds)
-    return found
+    return Found(*found)

@@ -1,6 +1,6 @@
 """Placed patterns against all that can be seen, by the cells in which they are placed.
 
-A function from arrays to arrays; `lookup_jit` has the same one, compiled, in one pass.
+Functions from arrays to arrays; `lookup_jit` has the same ones, compiled, in one pass.
 """
 
 from __future__ import annotations
@@ -8,8 +8,9 @@ from __future__ import annotations
 from planes.bitrows import Beside, Found, Placed, Seen, Windows, found
 from planes.cells import Cells, listed_at
 from planes.itemrows import item_rows
+from planes.pellets import Gathered, gathered
 
-__all__ = ["looked_up"]
+__all__ = ["gathered_up", "looked_up"]
 
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:
@@ -27,3 +28,14 @@ def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside
     """
     placement, near = listed_at(cells, placed.x, placed.y)
     return item_rows(found(placed, windows, seen, placement, near, beside), placed, seen.rank)
+
+
+def gathered_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, each: int) -> Gathered:
+    """Count what rounds of so many pellets each share with what can be seen; see `pellets.gathered`.
+
+    Parameters
+    ----------
+    cells : of the seen tiles and the box around the patterns
+    """
+    placement, near = listed_at(cells, placed.x, placed.y)
+    return gathered(placed, windows, seen, placement, near, each)

@@ -106,7 +106,7 @@ OF_BITS = [
 ]
 OF_TILES = [
     *OF_BITS,
-    (BITFIRE, "counted", "samples", 10**4),
+    (BITFIRE, "gathered", "samples", 10**4),
     (planes.items.Items, "tiles", "tiles", 10**5),
     (Candidates, "near", "volumes", 10**6),
     (BITFIRE, "refused", "filter", 10**7),
@@ -532,8 +532,8 @@ START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
     "arrays bitrows cells compose constants cropping forms fronttoback grid256 heap image index itemrows items kept"
-    " labels lookup painting placing pointquery poses rasterise sampling scene scenefile schema sines snapping spans"
-    " sprite stack steps strips tiles turning twins visible"
+    " labels lookup painting pellets placing pointquery poses rasterise sampling scene scenefile schema sines snapping"
+    " spans sprite stack steps strips tiles turning twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"

@@ -10,18 +10,18 @@ of one pixel need no bit rows: they read the code plane, or, a few of them, the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from planes import bitrows, cells, fronttoback, lookup, pointquery
+from planes import bitrows, fronttoback, lookup, pointquery
 from planes.arrays import Ints
-from planes.bitrows import WORD, Seen, Windows
+from planes.bitrows import WORD, Windows
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
 from planes.items import Items, Stack
+from planes.pellets import NOT_BESIDE, gathered
 from planes.pointquery import Front
 from planes.scene import Scene
 from planes.tiles import Tiles
@@ -30,7 +30,7 @@ from planes.visible import SHOT_BITS, Composition, View, in_front, seen_of
 from weapons.arsenal import parts_of, pattern_of
 from weapons.candidates import Candidates, may_refuse, refused
 from weapons.costs import chosen_candidates, chosen_form
-from weapons.counting import NOT_BESIDE, counted, placed_of, rows_of
+from weapons.counting import placed_of, rows_of, rows_of_rounds
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
@@ -55,9 +55,6 @@ NEAR_AT_ONCE = 2**12
 
 BESIDE_BYTES_MOST = 2**26
 """Distances along the rows of tiles are not made if they take more."""
-
-PAIRS_AT_ONCE = 2**16
-"""Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
 
 OF_ALL = View(False, ALL, ()), View(True, ALL, ())
 """What shots see that refuse nothing: the front, and all that they pierce."""
@@ -217,11 +214,12 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
         windows = _windows(volley, plan)
         listed = composition.cells(_reach(windows.box_xyxy))
         plan.run("pre-filter", f"cells of {1 << listed.bits} px{', strips' * bool(len(windows.strips))}")
-        if volley.scattered:
-            placement, near = kernels_of(cells).listed_at(listed, volley.xy[:, 0], volley.xy[:, 1])
-            plan.run("pre-filter", "", placement.nbytes + near.nbytes)
-            return _counted(volley, windows, placement, near, seen, sight)
         kernels, beside = kernels_of(lookup), NOT_BESIDE
+        if volley.scattered:
+            together = kernels.gathered_up(placed_of(volley), windows, seen, listed, volley.pellets)
+            rows = rows_of_rounds(volley, together, sight.stack.ids)
+            plan.run("samples", "counted by bit rows", rows.nbytes)
+            return rows
         many = len(seen.rank) < len(volley) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
         if many and kernels is lookup and _is_disc(volley):
             beside = composition.beside
@@ -271,7 +269,10 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
             which, near, of, front = _seen_by_all(tiles, boxes, tile, view, sight)
         seen = seen_of(tiles, boxes, sight.bounds, which, of, front)
         sight.plan.run("visible", "what is in front of the tiles near placements", seen.words.nbytes)
-        return _counted(volley, windows, placement[pair], near, seen, sight)
+        together = gathered(placed_of(volley), windows, seen, placement[pair], near, volley.pellets)
+        rows = rows_of_rounds(volley, together, sight.stack.ids)
+        sight.plan.run("samples", "counted by bit rows", rows.nbytes)
+        return rows
 
     return read
 
@@ -334,22 +335,6 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
 def _is_disc(volley: Volley) -> bool:
     """Whether all placements are of one pattern that holds all pixels nearer to its origin than one of its own."""
     return not volley.scattered and len(volley.table.patterns) == 1 and volley.table.patterns[0].is_disc
-
-
-def _counted(volley: Volley, windows: Windows, placement: Ints, near: Ints, seen: Seen, sight: Sight) -> Rows:
-    """Count pairs, so many at a time as fit the cache, all of a shot together."""
-    edges = [0, len(placement)]
-    if len(placement) > PAIRS_AT_ONCE:
-        shot, _ = volley.turn_of(placement)
-        wanted = shot[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
-        edges = [0, *np.unique(np.searchsorted(shot, wanted)).tolist(), len(placement)]
-    parts = [
-        counted(volley, windows, placement[a:b], near[a:b], seen, sight.stack.ids, kernels_of(bitrows))
-        for a, b in pairwise(edges)
-    ]
-    rows = Rows.joined(parts)
-    sight.plan.run("samples", "counted by bit rows", rows.nbytes)
-    return rows
 
 
 def _reach(boxes_xyxy: Ints) -> Ints:
