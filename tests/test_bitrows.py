@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from planes import Scene, bitrows, cells, use_jit, visible
+from planes import Scene, bitrows, cells, pellets, use_jit, visible
 from planes.arrays import InputError
 from planes.bitrows import PAD, WORD, Placed, Seen
 from planes.spans import Spans
@@ -114,6 +114,28 @@ class Case:
                 told.append((who, at, len(shared), best[0], ox + best[2], oy + best[1]))
         return told
 
+    def scatter(self, count: int) -> None:
+        """Place so many patterns near the tiles, and so near to each other that they often lie on the same pixels."""
+        rng = self.rng
+        near = rng.choice([2, 20, 60])
+        pattern = np.array([rng.randrange(len(self.patterns)) for _ in range(count)])
+        x, y, origin_x, origin_y = np.array([[rng.randint(-near, near) for _ in range(count)] for _ in range(4)])
+        self.placed = Placed(*(as_read(c, rng) for c in (pattern, x, y, origin_x, origin_y)))
+
+    def gathered(self, pellets: range, ranks: list[int], turn: int, origin: Pixel) -> list[tuple[int, ...]]:
+        """What `gathered_up` must give of one round."""
+        rows = []
+        for rank in sorted(set(ranks)):
+            tiles = [tile for tile, own in enumerate(ranks) if own == rank]
+            hit = {(who, tile): shared for who in pellets for tile in tiles if (shared := self.shared(who, tile))}
+            if hit:
+                once = sum(len(set().union(*(s for (_, t), s in hit.items() if t == tile))) for tile in tiles)
+                every = {(x - origin[0], y - origin[1]) for s in hit.values() for x, y in s}
+                distance2, y, x = min((x * x + y * y, y, x) for x, y in every)
+                samples, hitting = sum(map(len, hit.values())), len({who for who, _ in hit})
+                rows.append((turn, rank, samples, once, hitting, distance2, origin[0] + x, origin[1] + y))
+        return sorted(rows, key=lambda row: (row[5], row[7], row[6], row[1]))
+
 
 NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
 
@@ -169,6 +191,35 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
             columns = [px - left for px, py in pixels if py == top + row]
             told = [min((abs(column - c) for c in columns), default=bitrows.NOWHERE) for column in range(WORD)]
             assert beside[tile, :, row].tolist() == told
+
+
+@settings(max_examples=120, deadline=None)
+@given(SEEDS, st.sampled_from([1, 64]), st.sampled_from([5, 2**16]))
+@pytest.mark.parametrize("name", ["lookup", "lookup_jit"])
+def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: int, at_once: int) -> None:
+    """Items of one or two tiles that may lie on each other; every pixel counted once, and by pellet."""
+    if name.endswith("jit"):
+        pytest.importorskip("numba")
+        bitrows_jit = importlib.import_module("planes.bitrows_jit")
+    case, kernels = Case(seed), importlib.import_module(f"planes.{name}")
+    case.scatter(12)
+    each = case.rng.choice([1, 3, 4, 6])
+    seen = case.seen._replace(rank=np.arange(len(case.tiles)) // case.rng.choice([1, 2]))
+    box = case.windows.box_xyxy
+    reach = np.concatenate([box[:, :2].min(axis=0), box[:, 2:].max(axis=0)])
+    listed = cells.cells_of(seen.box_xyxy, reach, case.rng.choice([2, 5]))
+    placed = case.placed._replace(origin_x=case.placed.origin_x[::each], origin_y=case.placed.origin_y[::each])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pellets, "PAIRS_AT_ONCE", at_once)
+        if name.endswith("jit"):
+            patch.setattr(bitrows_jit, "ROOM", 0)
+            patch.setattr(bitrows_jit, "ROOM_LEAST", room)
+        found = kernels.gathered_up(placed, case.windows, seen, listed, each)
+    told = []
+    for turn in range(len(placed.origin_x)):
+        origin = int(placed.origin_x[turn]), int(placed.origin_y[turn])
+        told += case.gathered(range(turn * each, turn * each + each), seen.rank.tolist(), turn, origin)
+    assert list(zip(*(column.tolist() for column in found), strict=True)) == told
 
 
 @pytest.mark.parametrize("last", [False, True])
