@@ -55,20 +55,17 @@ def front_at(codes: Codes, cells: Bools | None, plane_xyxy: Box, at_256: Ints, o
     ----------
     codes, plane_xyxy : a code plane (h, w), see `planes.compose`, and its box in the world
     cells : its coarse map, or None to read the plane alone
-    objects : by id, whether it can be hit
+    objects : by id + 1, whether it can be hit; False by 0
     """
     x, y = (at_256[:, axis] + (HALF - SUB * plane_xyxy[axis]) for axis in (0, 1))  # from the corner of its first pixel
     high, wide = codes.shape
     some = within(x, y, wide << SUB_BITS, high << SUB_BITS)
     if cells is not None:
         some = _narrowed(some, _read(cells, x, y, some, SUB_BITS + CELL_BITS).nonzero()[0])
-    code = _read(codes, x, y, some, SUB_BITS)
-    front = code.nonzero()[0]
-    item = (code.take(front) >> 1).astype(np.int64)
-    item -= 1
-    hit = objects.take(item).nonzero()[0]
-    place = _narrowed(some, front.take(hit))
-    return Front(place, item.take(hit), pixel(at_256.take(place, axis=0)))
+    front = _read(codes, x, y, some, SUB_BITS) >> 1
+    hit = objects.take(front).nonzero()[0]
+    place = _narrowed(some, hit)
+    return Front(place, front.take(hit).astype(np.int64) - 1, pixel(at_256.take(place, axis=0)))
 
 
 def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:

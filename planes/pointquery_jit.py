@@ -39,7 +39,7 @@ def _front_at(codes, cells, left, top, at_256, objects, place, item, xy):
             continue
         front = np.int64(codes[row, column] >> 1)  # it is written, and the next over it if it is none: without a branch
         place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
-        count += (front > 0) & objects[max(front - 1, 0)]
+        count += objects[front]
     return count
 
 

@@ -87,9 +87,9 @@ class Stack:
 
     @cached_property
     def is_object(self) -> Bools:
-        """Whether an id of the scene (count,) is of an item in the stack that can be hit."""
-        objects = np.zeros(self.count, np.bool_)
-        objects[self.ids[~self.occluder]] = True
+        """Whether an id + 1 (count + 1,), as code planes have it, is of an item that can be hit; 0 is of none."""
+        objects = np.zeros(self.count + 1, np.bool_)
+        objects[self.ids[~self.occluder] + 1] = True
         objects.flags.writeable = False
         return objects
 
