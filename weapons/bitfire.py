@@ -109,7 +109,8 @@ def fired_by_bits(
     point = traits.is_point and view == OF_ALL[False] and not stack.has_unmet
     alone = not traits.scattered and prefilter == broadphase == "auto"
     expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
-    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, point, placements)
+    kind = point, traits.scattered
+    name, why = chosen_form(strategy, (prefilter, broadphase), scene, stack, view, kind, placements)
     asked = 0 if alone or name == "composed" else placements
     candidates = chosen_candidates(prefilter, broadphase, scene, stack, False, asked)
     sight = Sight(stack, scene.bounds, traits.pierces, candidates, plan)

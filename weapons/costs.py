@@ -39,12 +39,14 @@ class Costs(NamedTuple):
     ----------
     call, placement, pair : more of a call, of each placement, and of each with each item, without a composition
     read : more of a call of single pixels without a code plane
+    scattered : more of a call of several pellets a round
     compose, item : of a composition, and of each item
     draw, pixel : of a code plane: of each item that is drawn, and of each pixel
     """
 
     call: float
     read: float
+    scattered: float
     placement: float
     pair: float
     compose: float
@@ -53,8 +55,8 @@ class Costs(NamedTuple):
     pixel: float
 
 
-IN_NUMPY = Costs(50_000, 50_000, 500, 4.0, 2_000_000, 2500, 7500, REDRAW_PIXEL_NS)
-COMPILED = Costs(5000, 25_000, 120, 0.3, 100_000, 1500, 400, 0.05)
+IN_NUMPY = Costs(50_000, 50_000, 120_000, 500, 4.0, 2_000_000, 2500, 7500, REDRAW_PIXEL_NS)
+COMPILED = Costs(5000, 25_000, 190_000, 120, 0.3, 100_000, 1500, 400, 0.05)
 """Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 
@@ -88,7 +90,13 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
 
 
 def chosen_form(
-    strategy: str, how: tuple[str, str], scene: Scene, stack: Stack, view: View | None, point: bool, placements: int
+    strategy: str,
+    how: tuple[str, str],
+    scene: Scene,
+    stack: Stack,
+    view: View | None,
+    kind: tuple[bool, bool],
+    placements: int,
 ) -> tuple[str, str]:
     """Strategy of a call that is counted by bit rows, and why: the one asked for, or the cheaper by the cost model.
 
@@ -96,7 +104,7 @@ def chosen_form(
     ----------
     how : pre-filter and broad phase that were asked for: they are of the direct strategy
     view : what all shots accept; None if they differ in it
-    point : whether one read of the code plane tells what a placement hits
+    kind : whether one read of the code plane tells what a placement hits; whether a round has several pellets
     """
     choice("strategy", strategy, STRATEGIES)
     if view is None:
@@ -105,13 +113,14 @@ def chosen_form(
         return strategy, "asked for"
     if how != ("auto", "auto"):
         return "direct", "a pre-filter was asked for"
+    point, scattered = kind
     plane = scene.code_plane() if point else None
     known = scene.compositions()
     if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
         return "composed", "it is there"
     costs = IN_NUMPY if kernels_of(bitrows) is bitrows else COMPILED
     lost = placements * (costs.placement + len(stack) * costs.pair)
-    lost += costs.call if plane is None else costs.read
+    lost += costs.read if plane is not None else costs.scattered if scattered else costs.call
     cost = costs.compose + len(stack) * costs.item
     if plane is not None:
         drawn = len(stack) * costs.draw if plane.codes is None else 0
