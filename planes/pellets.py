@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planes import bitrows
-from planes.arrays import Ints
-from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows
+from planes.arrays import Bools, Ints
+from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows, placed_boxes
 from planes.spans import ragged
 from planes.twins import kernels_of
 
@@ -21,6 +21,9 @@ NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
 
 PAIRS_AT_ONCE = 2**16
 """Pairs of placements and tiles counted at a time, about: half a megabyte for each of their columns."""
+
+PAIRED = 8
+"""Pellets on one tile up to which each is compared with each other."""
 
 
 class Gathered(NamedTuple):
@@ -109,10 +112,11 @@ def _distinct(
     begins = np.diff(found.seen, prepend=-1) != 0
     begins[first] = True
     tile = np.flatnonzero(begins)
-    together = _sums(found.samples, tile)
-    several = np.flatnonzero(np.diff(tile, append=len(begins)) > 1)
+    together, length = _sums(found.samples, tile), np.diff(tile, append=len(begins))
+    several = np.flatnonzero(length > 1)
+    several = several[_may_overlap(placed, windows, found.placement, tile[several], length[several])]
     if len(several):
-        length = np.diff(tile, append=len(begins))[several]
+        length = length[several]
         group, place = ragged(length)
         pair = tile[several][group] + place
         first_of = np.cumsum(length) - length
@@ -122,3 +126,23 @@ def _distinct(
     new = np.diff(found.placement[order], prepend=-1) != 0
     new[first] = True
     return _sums(new.astype(np.int64), first), _sums(together, np.searchsorted(tile, first))
+
+
+def _may_overlap(placed: Placed, windows: Windows, placement: Ints, begin: Ints, length: Ints) -> Bools:
+    """Whether boxes of pellets overlap in each group (n,), of `length` placements from `begin` on.
+
+    Of large groups, whose pairs are many, it is taken for granted.
+    """
+    few = np.flatnonzero(length <= PAIRED)
+    group, place = ragged(length[few])
+    pair, step = ragged(length[few][group] - 1 - place)
+    group, place = few[group[pair]], place[pair]
+    some = placed._replace(pattern=placed.pattern[placement], x=placed.x[placement], y=placed.y[placement])
+    left, top, right, low = placed_boxes(some, windows)
+    a = begin[group] + place
+    b = a + 1 + step
+    met = (left[a] <= right[b]) & (left[b] <= right[a])
+    met &= (top[a] <= low[b]) & (top[b] <= low[a])
+    overlap = length > PAIRED
+    overlap[group[met]] = True
+    return overlap

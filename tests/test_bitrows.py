@@ -117,7 +117,7 @@ class Case:
     def scatter(self, count: int) -> None:
         """Place so many patterns near the tiles, and so near to each other that they often lie on the same pixels."""
         rng = self.rng
-        near = rng.choice([2, 20, 60])
+        near = rng.choice([2, 20, 60, 300])
         pattern = np.array([rng.randrange(len(self.patterns)) for _ in range(count)])
         x, y, origin_x, origin_y = np.array([[rng.randint(-near, near) for _ in range(count)] for _ in range(4)])
         self.placed = Placed(*(as_read(c, rng) for c in (pattern, x, y, origin_x, origin_y)))
@@ -167,7 +167,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
         assert kernels.union(case.placed, case.windows, case.seen, placement, near, first).tolist() == together
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, bitrows.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
@@ -220,6 +220,29 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
         origin = int(placed.origin_x[turn]), int(placed.origin_y[turn])
         told += case.gathered(range(turn * each, turn * each + each), seen.rank.tolist(), turn, origin)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == told
+
+
+@settings(max_examples=80, deadline=None)
+@given(SEEDS)
+def test_groups_of_pellets_whose_boxes_overlap(seed: int) -> None:
+    """Each of up to PAIRED placements with each other one of its group; larger groups are taken for it."""
+    case, rng = Case(seed), random.Random(seed)
+    case.scatter(30)
+    placement = np.array(sorted(rng.sample(range(30), 25)))
+    begin = np.array([0, *sorted(rng.sample(range(1, 25), 5))])
+    length = np.diff(begin, append=25)
+
+    def columns_and_rows(who: int) -> tuple[set[int], set[int]]:
+        x_min, y_min, x_max, y_max = case.windows.box_xyxy[case.placed.pattern[who]].tolist()
+        x, y = int(case.placed.x[who]), int(case.placed.y[who])
+        return set(range(x + x_min, x + x_max + 1)), set(range(y + y_min, y + y_max + 1))
+
+    told = []
+    for first, count in zip(begin.tolist(), length.tolist(), strict=True):
+        boxes = [columns_and_rows(who) for who in placement[first : first + count].tolist()]
+        meet = any(a[0] & b[0] and a[1] & b[1] for k, a in enumerate(boxes) for b in boxes[:k])
+        told.append(meet or count > pellets.PAIRED)
+    assert pellets._may_overlap(case.placed, case.windows, placement, begin, length).tolist() == told
 
 
 @pytest.mark.parametrize("last", [False, True])
