@@ -30,7 +30,7 @@ Kind = TypeVar("Kind", bound=np.generic)
 WORD = 64
 """Columns of a tile, and rows at most."""
 
-PAD = 16
+PAD = 32
 """Empty rows between seen tiles: patterns of so few rows are counted by their own."""
 
 BESIDE_REACH = 113
