@@ -286,16 +286,16 @@ def _counted(placed: Placed, windows: Windows, seen: Seen, met: Meeting, height:
     rows &= windows_at(windows, height, pattern, left, top)
     samples = _sums(np.bitwise_count(rows))
     hit = samples.nonzero()[0]
-    who, at = who[hit], at[hit]
-    left = left[hit] + placed.x[who] - placed.origin_x[who]
-    top = top[hit] + placed.y[who] - placed.origin_y[who]
+    who, at = who.take(hit), at.take(hit)
+    origin_x, origin_y = placed.origin_x.take(who), placed.origin_y.take(who)
+    left, top = left.take(hit) + placed.x.take(who) - origin_x, top.take(hit) + placed.y.take(who) - origin_y
     if low or not len(beside):
-        distance2, across, down = nearest(rows[hit], left, top)
+        distance2, across, down = nearest(rows.take(hit, axis=0), left, top)
     else:
         distance2, across, down = _nearest_seen(seen, beside, at, left, top)
-    across += placed.origin_x[who]
-    down += placed.origin_y[who]
-    return Found(who, at, samples[hit], distance2, across, down)
+    across += origin_x
+    down += origin_y
+    return Found(who, at, samples.take(hit), distance2, across, down)
 
 
 def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
