@@ -103,6 +103,32 @@ def test_a_missing_row_ends_the_run() -> None:
     assert not race(Cell("static", "point", 6), easier, [[None], [None]], 2, 0.001).sides["pymunk"].compared
 
 
+def test_works_of_a_run_are_answered_in_a_row_and_all_compared() -> None:
+    """As many as there is time for; a part of the first by a side that is not whole."""
+    asked: dict[str, list[Any]] = {"numpy": [], "jit": [], "A pygame": []}
+
+    def side(name: str, wrong: int, whole: bool) -> Side:
+        def answer(work: int, units: int) -> list[Any]:
+            asked[name].append((work, units))
+            return [(shot, 1, 5 + (work == wrong)) for shot in range(units)]
+
+        return Side(name, answer, list, whole=whole)
+
+    runs = [[0, 1, 2], [10, 11, 12], [20, 21, 22]]
+    sides = [side("numpy", -1, True), side("jit", 22, True), side("A pygame", 11, False)]
+    cell = Cell("static", "point", 6)
+    with pytest.raises(DisagreementError, match="numpy and jit differ"):
+        race(cell, sides, runs, 64, 10.0)
+    assert [work for work, _ in asked["numpy"][-6:]] == [10, 11, 12, 20, 21, 22]
+    assert [work for work, _ in asked["A pygame"][-2:]] == [10, 20]
+    sides[1] = side("jit", -1, True)
+    cell = race(Cell("static", "point", 6), sides, runs, 64, 10.0)
+    assert cell.sides["numpy"].units == 3 * 64 and cell.rows == 1
+    assert set(cell.values["first of a run, median"]) == {"numpy", "jit"}
+    short = race(Cell("static", "point", 6), sides, runs, 64, 1e-9)
+    assert short.sides["numpy"].units == 64 and short.sides["A pygame"].units == 1
+
+
 def test_targets_are_judged_by_the_worst_cell() -> None:
     cells = [
         Cell("static", "point", m, {"numpy": Times([10.0, 90.0]), "A pygame": Times([a]), "C pygame": Times([30.0])})

@@ -44,7 +44,7 @@ def rows_of_rounds(volley: Volley, found: Gathered, ids: Ints) -> Rows:
     ----------
     ids : (M,) of the items of the stack
     """
-    shot, round_ = volley.turn_of(found.turn * volley.pellets)
+    shot, round_ = volley.shot_of(found.turn)
     several = volley.pellets > 1
     return Rows(
         shot, round_, ids[found.rank], found.samples, found.pixels if several else None, None,

@@ -196,7 +196,10 @@ class Volley:
 
     def turn_of(self, placement: Ints) -> tuple[Ints, Ints | None]:
         """Shots and rounds of some placements (n,); no rounds where each shot has one."""
-        turn = placement if self.pellets == 1 else placement // self.pellets
+        return self.shot_of(placement if self.pellets == 1 else placement // self.pellets)
+
+    def shot_of(self, turn: Ints) -> tuple[Ints, Ints | None]:
+        """Shots and rounds of some of the rounds of all shots (n,); no rounds where each shot has one."""
         round_ = None
         if self.rounds > 1:
             turn, round_ = np.divmod(turn, self.rounds)
