@@ -1,46 +1,26 @@
-"""Kernels on bit rows: 64 pixels of a row as one word, bit j for column j; a tile is up to 64 such rows.
+"""Kernels on bit rows: what two sets of pixels share is `&` of their words, its size their population count.
 
-What two sets of pixels share is `&` of their words, its size their population count. Rows lie one after another in
-flat arrays, with empty rows around each tile or pattern, so that any row offset reads as many rows without a test.
 Every function is from arrays to arrays; `bitrows_jit` has the same ones, compiled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from planes.arrays import Bools, Ints
+from planes.arrays import Ints
+from planes.bits import PAD, WORD, Seen, Words, every_stretch, rows_at, rows_of
+from planes.nearest import Beside, nearest, nearest_seen
 from planes.spans import Box
 from planes.strips import meets_strip
 
 __all__ = [
-    "BESIDE_REACH", "PAD", "WORD", "Beside", "Found", "Placed", "Seen", "Windows", "Words", "beside_of", "crossing",
-    "cut_off", "found", "nearest", "packed", "placed_boxes", "row_order", "rows_of", "union", "visible", "windows_at",
+    "Found", "Placed", "Windows", "crossing", "cut_off", "found", "placed_boxes", "row_order", "union", "visible",
+    "windows_at",
 ]  # fmt: skip
-
-Words = npt.NDArray[np.uint64]
-Beside = npt.NDArray[np.uint8]
-Kind = TypeVar("Kind", bound=np.generic)
-
-WORD = 64
-"""Columns of a tile, and rows at most."""
-
-PAD = 32
-"""Empty rows between seen tiles: patterns of so few rows are counted by their own."""
-
-BESIDE_REACH = 113
-"""Radius of the largest disc whose nearest pixel is told by distances along rows, px.
-
-The squares of what lies beyond it, twice as far to the side, add up within uint16.
-"""
-
-NOWHERE = BESIDE_REACH + 1
-"""Instead of the distance along a row that has no pixel, and of one up or down that is farther: it loses."""
 
 WORDS_AT_ONCE = 2**17
 """Words of pairs worked on at a time: a megabyte; with fewer the calls weigh more, with more the caches overflow."""
@@ -49,30 +29,8 @@ PAIRS_AT_ONCE = 2**16
 """Pairs whose boxes are compared at a time: 512 KB a column; of those that meet, so many as have enough words."""
 
 _ONE, _FULL = np.uint64(1), np.uint64(2**64 - 1)
-_PLACES = _ONE << np.arange(WORD, dtype=np.uint64)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _SUM = np.uint64(0x0001000100010001)
-_ROW_BITS = 6
-"""Of the row of a tile, in a number that sorts as (squared distance, row)."""
-
-
-class Seen(NamedTuple):
-    """Visible pixels of tiles, as columns.
-
-    Parameters
-    ----------
-    rank : (V,) place in the stack of the item of each
-    box_xyxy : (V, 4) inclusive, px
-    begin : (V,) its first row in `words`
-    words : flat rows, with PAD empty ones around each tile
-    height : rows of the highest tile, rounded up to a multiple of 8
-    """
-
-    rank: Ints
-    box_xyxy: Ints
-    begin: Ints
-    words: Words
-    height: int
 
 
 class Windows(NamedTuple):
@@ -132,33 +90,6 @@ class Found(NamedTuple):
     y: Ints
 
 
-def packed(masks: Sequence[Bools]) -> Words:
-    """Rows (n, 64) of masks (h, w), each of at most 64 x 64 pixels."""
-    bits = np.zeros((len(masks), WORD, WORD), np.bool_)
-    for own, mask in zip(bits, masks, strict=True):
-        own[: mask.shape[0], : mask.shape[1]] = mask
-    return np.packbits(bits.reshape(-1), bitorder="little").view("<u8").astype(np.uint64).reshape(-1, WORD)
-
-
-def rows_of(words: npt.NDArray[Kind], height: int, begin: Ints) -> npt.NDArray[Kind]:
-    """Rows (n, height) of a flat array from each of (n,) places on."""
-    return _rows_at(_every(words, height), begin, height, words.dtype)
-
-
-def _every(words: npt.NDArray[Any], height: int) -> npt.NDArray[np.void]:
-    """Stretches of so many numbers, of which each begins a number after the one before: each is one value.
-
-    Some of them are picked in half the time that rows of a matrix take.
-    """
-    kind = np.dtype((np.void, words.itemsize * height))
-    return np.ndarray((len(words) - height + 1,), kind, words, 0, words.strides)
-
-
-def _rows_at(every: npt.NDArray[np.void], begin: Ints, height: int, kind: np.dtype[Kind]) -> npt.NDArray[Kind]:
-    """Some stretches as rows (n, height)."""
-    return np.asarray(every[begin].view(kind)).reshape(len(begin), height)
-
-
 def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right: Ints) -> Words:
     """Pixels (n, height) of tiles on which no other lies.
 
@@ -171,7 +102,7 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     right : (m,) columns by which the other lies to its right, -63 .. 63
     """
     seen = rows_of(words, height, begin)
-    every = _every(words, height)
+    every = every_stretch(words, height)
     step = np.arange(len(of)) - np.searchsorted(of, of)
     at_once = WORDS_AT_ONCE // height
     by_step = np.argsort(step, kind="stable")
@@ -179,7 +110,7 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     for first, last in pairwise(ends):
         for at in range(first, last, at_once):
             now = by_step[at : min(at + at_once, last)]
-            cover = _rows_at(every, front[now], height, words.dtype)
+            cover = rows_at(every, front[now], height, words.dtype)
             cover <<= np.maximum(right[now], 0).astype(np.uint64)[:, None]
             cover >>= np.maximum(-right[now], 0).astype(np.uint64)[:, None]
             seen[of[now]] &= ~cover
@@ -292,7 +223,7 @@ def _counted(placed: Placed, windows: Windows, seen: Seen, met: Meeting, height:
     if low or not len(beside):
         distance2, across, down = nearest(rows.take(hit, axis=0), left, top)
     else:
-        distance2, across, down = _nearest_seen(seen, beside, at, left, top)
+        distance2, across, down = nearest_seen(seen, beside, at, left, top)
     across += origin_x
     down += origin_y
     return Found(who, at, samples.take(hit), distance2, across, down)
@@ -314,16 +245,16 @@ def windows_at(windows: Windows, height: int, pattern: Ints | int, left: Ints, t
     """Windows (n, height) of patterns: of 64 columns from `left` on, of rows from `top` on, about their pixel."""
     column = left - (windows.box_xyxy[pattern, 0] - (WORD - 1))
     begin = top - (windows.box_xyxy[pattern, 1] - windows.first[pattern])
-    every, kind = _every(windows.words, height), windows.words.dtype
+    every, kind = every_stretch(windows.words, height), windows.words.dtype
     if windows.shifted:
         column *= windows.shifted
         begin += column
-        return _rows_at(every, begin, height, kind)
+        return rows_at(every, begin, height, kind)
     shift = (column & (WORD - 1)).view(np.uint64)[:, None]
     column >>= 6
     begin += column * windows.rows[pattern]
-    low = _rows_at(every, begin, height, kind)
-    high = _rows_at(every, begin + windows.rows[pattern], height, kind)
+    low = rows_at(every, begin, height, kind)
+    high = rows_at(every, begin + windows.rows[pattern], height, kind)
     low >>= shift
     high <<= np.uint64(WORD) - shift
     low |= high
@@ -375,93 +306,3 @@ def _sums(counts: npt.NDArray[np.uint8]) -> Ints:
     total *= _SUM
     total >>= np.uint64(48)
     return total.astype(np.int64)
-
-
-def beside_of(seen: Seen) -> Beside:
-    """Distance (V, 64, height) from each pixel of a tile to the nearest visible one of its row, NOWHERE if none is."""
-    rows = rows_of(seen.words, seen.height, seen.begin)
-    made = np.empty((len(seen.rank), WORD, seen.height), np.uint8)
-    for columns in (range(WORD), range(WORD - 1, -1, -1)):
-        last = np.full((len(seen.rank), seen.height), NOWHERE, np.uint8)
-        for column in columns:
-            last += last != NOWHERE
-            last[(rows & _PLACES[column]) != 0] = 0
-            if columns.step > 0:
-                made[:, column] = last
-            else:
-                np.minimum(made[:, column], last, out=made[:, column])
-    return made
-
-
-def _nearest_seen(seen: Seen, beside: Beside, near: Ints, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
-    """Like `nearest`, of all visible pixels of tiles: a disc up to BESIDE_REACH that hits any hits the nearest."""
-    column = np.minimum(np.maximum(-left, 0), WORD - 1)
-    away = left + column
-    across = beside.reshape(-1, seen.height).take(near * WORD + column, axis=0)
-    up = -min(int(np.minimum.reduce(top, initial=0)), 0)
-    down = np.abs(np.arange(-up, max(int(np.maximum.reduce(top, initial=0)), 0) + seen.height))
-    squares = (np.minimum(down, NOWHERE) ** 2).astype(np.uint16)
-    distance2 = across + np.abs(away).astype(np.uint16)[:, None]
-    distance2 *= distance2
-    distance2 += rows_of(squares, seen.height, top + up)
-    row = distance2.argmin(axis=1)
-    every = np.arange(len(near))
-    step = across[every, row].astype(np.int64)
-    before = (seen.words[seen.begin[near] + row] >> (column - step).view(np.uint64)) & _ONE
-    return distance2[every, row].astype(np.int64), away + np.where(before, -step, step), row + top
-
-
-def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
-    """Pixel of each set (n, height), none empty, that is nearest to the origin; of those as near the least (y, x).
-
-    Parameters
-    ----------
-    left, top : (n,) where column 0 and row 0 lie, about the origin
-
-    Returns
-    -------
-    squared distance, x, y, about the origin
-    """
-    column = np.minimum(np.maximum(-left, 0), WORD - 1)  # the nearest to the origin
-    away = left + column
-    across = np.abs(away)
-    place = (met != 0).reshape(-1).nonzero()[0]  # of some 40 rows few have a pixel
-    pair = place // met.shape[1]
-    row = place - pair * met.shape[1]
-    key = _steps(met.reshape(-1).take(place), column.take(pair))
-    key += across.take(pair)
-    key *= key
-    down = top.take(pair)
-    down += row
-    down *= down
-    key += down
-    key <<= _ROW_BITS
-    key |= row
-    begins = np.ones(len(pair), np.bool_)
-    np.not_equal(pair[1:], pair[:-1], out=begins[1:])
-    key = np.minimum.reduceat(key, begins.nonzero()[0])
-    row, distance2 = key & (WORD - 1), key >> _ROW_BITS
-    down = row + top
-    step = np.sqrt((distance2 - down * down).astype(np.float64)).astype(np.int64)  # of a square that a float holds
-    step -= across
-    before = (met[np.arange(len(met)), row] >> (column - step).view(np.uint64)) & _ONE
-    return distance2, away + np.where(before, -step, step), down
-
-
-def _steps(words: Words, column: Ints) -> Ints:
-    """Distances (n,) from columns of words, none 0, to their nearest pixels."""
-    own = column.view(np.uint64)
-    after = words >> own
-    below = after - _ONE
-    np.invert(after, out=after)
-    after &= below
-    before = words << (np.uint64(WORD - 1) - own)
-    np.right_shift(before, _ONE, out=below)
-    np.invert(below, out=below)
-    before &= below
-    # The exponent of a float is the place of the highest bit, once no bit below it can round it up.
-    exponent = before.astype(np.float64).view(np.int64)
-    exponent >>= 52
-    np.subtract(1023 + WORD - 1, exponent, out=exponent)
-    np.minimum(exponent, np.bitwise_count(after), out=exponent)
-    return exponent

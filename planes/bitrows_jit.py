@@ -12,8 +12,10 @@ from numba.extending import intrinsic
 
 from planes import bitrows
 from planes.arrays import Ints
-from planes.bitrows import Beside, Found, Placed, Seen, Windows, Words
+from planes.bitrows import Found, Placed, Windows
+from planes.bits import Seen, Words
 from planes.compiled import compiled
+from planes.nearest import Beside
 from planes.twins import in_parts
 
 __all__ = [

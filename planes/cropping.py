@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes.arrays import Ints
-from planes.bitrows import Words
+from planes.bits import Words
 
 __all__ = ["moved", "sides_of"]
 

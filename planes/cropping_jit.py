@@ -6,7 +6,7 @@ import numpy as np
 from numba import types
 
 from planes.arrays import Ints
-from planes.bitrows import Words
+from planes.bits import Words
 from planes.compiled import compiled
 
 __all__ = ["moved", "sides_of"]

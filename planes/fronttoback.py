@@ -13,9 +13,11 @@ import numpy as np
 
 from planes import bitrows
 from planes.arrays import Bools, Ints
-from planes.bitrows import Found, Placed, Windows, Words
+from planes.bitrows import Found, Placed, Windows
+from planes.bits import Words, rows_of
 from planes.cells import met_boxes
 from planes.itemrows import item_rows
+from planes.nearest import nearest
 from planes.spans import Box, ragged
 
 __all__ = ["Pile", "front_to_back"]
@@ -146,7 +148,7 @@ def _parts(near: Near, most: int) -> Iterator[Near]:
 
 def _shared(placed: Placed, windows: Windows, pile: Pile, near: Near, height: int) -> tuple[Near, Words]:
     """Pairs that share pixels at all, and those pixels (n, height)."""
-    rows = bitrows.rows_of(pile.words, height, _first(pile, near.tile, near.top))
+    rows = rows_of(pile.words, height, _first(pile, near.tile, near.top))
     who = near.placement
     pattern = placed.pattern[who] if len(windows.first) > 1 else 0
     rows &= bitrows.windows_at(windows, height, pattern, near.left - placed.x[who], near.top - placed.y[who])
@@ -173,7 +175,7 @@ def _hide(rows: Words, pile: Pile, near: Near, pierce: bool) -> None:
     for first in range(0, len(of), step):
         now = slice(first, first + step)
         own, by = of[now], right[now]
-        cover = bitrows.rows_of(pile.words, height, _first(pile, front[now], near.top[own]))
+        cover = rows_of(pile.words, height, _first(pile, front[now], near.top[own]))
         cover <<= np.maximum(by, 0).view(np.uint64)[:, None]
         cover >>= np.maximum(-by, 0).view(np.uint64)[:, None]
         np.invert(cover, out=cover)
@@ -237,5 +239,5 @@ def _counted(placed: Placed, pile: Pile, near: Near, rows: Words) -> Found:
         near, rows, samples = near.at(hit), rows[hit], samples[hit]
     who = near.placement
     origin_x, origin_y = placed.origin_x[who], placed.origin_y[who]
-    distance2, x, y = bitrows.nearest(rows, near.left - origin_x, near.top - origin_y)
+    distance2, x, y = nearest(rows, near.left - origin_x, near.top - origin_y)
     return Found(who, near.tile, samples, distance2, x + origin_x, y + origin_y)

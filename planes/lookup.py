@@ -5,9 +5,11 @@ Functions from arrays to arrays; `lookup_jit` has the same ones, compiled, in on
 
 from __future__ import annotations
 
-from planes.bitrows import Beside, Found, Placed, Seen, Windows, found
+from planes.bitrows import Found, Placed, Windows, found
+from planes.bits import Seen
 from planes.cells import Cells, listed_at
 from planes.itemrows import item_rows
+from planes.nearest import Beside
 from planes.pellets import Gathered, gathered
 
 __all__ = ["gathered_up", "looked_up"]

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit, types
 
 from planes import lookup
-from planes.bitrows import Beside, Found, Placed, Seen, Windows
+from planes.bitrows import Found, Placed, Windows
 from planes.bitrows_jit import (
     BOXES,
     INTS,
@@ -24,9 +24,11 @@ from planes.bitrows_jit import (
     rows_by,
     shared,
 )
+from planes.bits import Seen
 from planes.cells import Cells
 from planes.cells_jit import cell_at
 from planes.compiled import compiled
+from planes.nearest import Beside
 from planes.pellets import Gathered
 
 __all__ = ["gathered_up", "looked_up"]

@@ -10,7 +10,9 @@ import numpy as np
 
 from planes import bitrows
 from planes.arrays import Bools, Ints
-from planes.bitrows import WORD, Beside, Found, Placed, Seen, Windows, placed_boxes
+from planes.bitrows import Found, Placed, Windows, placed_boxes
+from planes.bits import WORD, Seen
+from planes.nearest import Beside
 from planes.spans import ragged
 from planes.twins import kernels_of
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
-from planes.bitrows import WORD, Words, packed
+from planes.bits import WORD, Words, packed
 from planes.fronttoback import Pile
 from planes.spans import ragged
 from planes.stack import Stack

@@ -15,9 +15,10 @@ import numpy as np
 
 from planes import bitrows, cells, cropping
 from planes.arrays import Bools, Ints
-from planes.bitrows import PAD, Beside, Seen, Words, beside_of
+from planes.bits import PAD, Seen, Words
 from planes.cells import Cells
 from planes.items import Items, Stack
+from planes.nearest import Beside, beside_of
 from planes.spans import Box
 from planes.tiles import Tiles
 from planes.twins import kernels_of

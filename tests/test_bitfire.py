@@ -20,7 +20,7 @@ import weapons.pattern
 import weapons.windows
 from planes import History, Scene, Sprite
 from planes.arrays import Bools
-from planes.bitrows import WORD
+from planes.bits import WORD
 from planes.constants import ALL
 from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire
 

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from planes import Scene, bitrows, cells, pellets, use_jit, visible
+from planes import Scene, bitrows, bits, cells, nearest, pellets, use_jit, visible
 from planes.arrays import InputError
-from planes.bitrows import PAD, WORD, Placed, Seen
+from planes.bitrows import Placed
+from planes.bits import PAD, WORD, Seen
 from planes.spans import Spans
 from planes.tiles import STRIDE, TileAtlas, Tiles
 from planes.twins import LOADING_NS, kernels_of
@@ -78,7 +79,7 @@ class Case:
         height = -(-max(m.shape[0] for m in masks) // 8) * 8
         packed = np.zeros((len(masks), height), np.uint64)
         for row, mask in zip(packed, masks, strict=True):
-            row[: len(mask)] = bitrows.packed([mask])[0, : len(mask)]
+            row[: len(mask)] = bits.packed([mask])[0, : len(mask)]
         self.seen: Seen = visible._laid_out(np.arange(len(masks)), boxes, packed)
         most = rng.choice([3, 12, 40, 150])
         self.patterns = []
@@ -168,7 +169,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
 
 
 @settings(max_examples=50, deadline=None)
-@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, bitrows.BESIDE_REACH])))
+@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, nearest.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
     case = Case(seed)
@@ -182,14 +183,14 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
     )
     x, y = case.placed.x, case.placed.y
     case.placed = Placed(np.zeros_like(x), x, y, x, y)
-    beside = bitrows.beside_of(case.seen)
+    beside = nearest.beside_of(case.seen)
     found = bitrows.found(case.placed, case.windows, case.seen, case.placement, case.near, beside)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
     for tile, pixels in enumerate(case.tiles):
         left, top = case.seen.box_xyxy[tile, :2].tolist()
         for row in range(case.seen.height):
             columns = [px - left for px, py in pixels if py == top + row]
-            told = [min((abs(column - c) for c in columns), default=bitrows.NOWHERE) for column in range(WORD)]
+            told = [min((abs(column - c) for c in columns), default=nearest.NOWHERE) for column in range(WORD)]
             assert beside[tile, :, row].tolist() == told
 
 
@@ -248,7 +249,7 @@ def test_groups_of_pellets_whose_boxes_overlap(seed: int) -> None:
 @pytest.mark.parametrize("last", [False, True])
 def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: bool) -> None:
     """Tiles of one column of 64 rows, of which the first or the last has a pixel, on either side of the disc."""
-    reach = bitrows.BESIDE_REACH
+    reach = nearest.BESIDE_REACH
     side = np.arange(-reach, reach + 1)
     spans = Spans.from_mask(side[:, None] ** 2 + side**2 <= reach * reach, (-reach, -reach))
     rim = [(dx, math.isqrt(reach * reach - dx * dx)) for dx in range(reach + 1)]
@@ -259,7 +260,7 @@ def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: b
     seen = visible._laid_out(np.arange(len(rim)), boxes, packed)
     every, zero = np.arange(len(rim)), np.zeros(1, np.int64)
     made = windows._made([Pattern(spans, None)], False)
-    placed, beside = Placed(*[zero] * 5), bitrows.beside_of(seen)
+    placed, beside = Placed(*[zero] * 5), nearest.beside_of(seen)
     found = bitrows.found(placed, made, seen, np.zeros_like(every), every, beside)
     told = list(zip(found.x.tolist(), found.y.tolist(), found.distance2.tolist(), strict=True))
     assert told == [(x, y, x * x + y * y) for x, y in rim]
@@ -276,7 +277,7 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
     words = np.zeros(STRIDE * len(masks) + WORD, np.uint64)
     begin = np.arange(len(masks)) * STRIDE + WORD
     for mask, first in zip(masks, begin.tolist(), strict=True):
-        words[first : first + WORD] = bitrows.packed([mask])[0]
+        words[first : first + WORD] = bits.packed([mask])[0]
     pairs = sorted((rng.randrange(len(masks)), rng.randrange(len(masks))) for _ in range(rng.randint(0, 9)))
     shift = [(rng.randint(-63, 63), rng.randint(-63, 63)) for _ in pairs]
     of, other = np.array(pairs, np.int64).reshape(-1, 2).T
@@ -415,7 +416,7 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
         if bounds:
             left = {(x, y) for x, y in left if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
         truth.append((int(tiles.rank[tile]), left))
-    cropped = visible.cropped(seen.rank, seen.box_xyxy, bitrows.rows_of(seen.words, seen.height, seen.begin))
+    cropped = visible.cropped(seen.rank, seen.box_xyxy, bits.rows_of(seen.words, seen.height, seen.begin))
     for one, kept in ((seen, truth), (cropped, [(rank, left) for rank, left in truth if left])):
         told = zip(one.rank.tolist(), one.begin.tolist(), *one.box_xyxy[:, :2].T.tolist(), strict=True)
         assert [(rank, pixels_in(one.words, b, x, y, one.height)) for rank, b, x, y in told] == kept

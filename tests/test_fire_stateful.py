@@ -24,7 +24,7 @@ import weapons.resolve
 import weapons.runfire
 import weapons.windows
 from planes import ALL, InputError, Role, Scene, Sprite, load_scene
-from planes.bitrows import WORD
+from planes.bits import WORD
 from planes.compose import CodePlane
 from weapons import Disc, Hits, Point, fire
 

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
 ORDER = {
     "planes": (
         "constants", "arrays", "heap", "twins", "compiled", "schema", "exact", "sines", "sines_jit", "grid256",
-        "snapping", "snapping_jit", "spans", "strips", "stack", "bitrows", "bitrows_jit", "itemrows",
+        "snapping", "snapping_jit", "spans", "strips", "stack", "bits", "nearest", "bitrows", "bitrows_jit", "itemrows",
         "cells", "cells_jit", "pellets", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit", "tiles",
         "bigrows", "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids",
         "quadtree", "bvh", "broadphase", "triangles", "slabs", "image", "kept", "turning",

@@ -531,9 +531,9 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bitrows cells compose constants cropping forms fronttoback grid256 heap image index itemrows items kept"
-    " labels lookup painting pellets placing pointquery poses rasterise sampling scene scenefile schema sines snapping"
-    " spans sprite stack steps strips tiles turning twins visible"
+    "arrays bitrows bits cells compose constants cropping forms fronttoback grid256 heap image index itemrows items"
+    " kept labels lookup nearest painting pellets placing pointquery poses rasterise sampling scene scenefile schema"
+    " sines snapping spans sprite stack steps strips tiles turning twins visible"
 )
 OF_FIRE = (
     "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"

@@ -16,7 +16,8 @@ import numpy as np
 
 from planes import bitrows, fronttoback, lookup, pointquery
 from planes.arrays import Ints
-from planes.bitrows import WORD, Windows
+from planes.bitrows import Windows
+from planes.bits import WORD
 from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from planes.arrays import InputError, Ints
-from planes.bitrows import BESIDE_REACH, WORD
+from planes.bits import WORD
 from planes.constants import MASK_AREA_MAX, SUB, WEIGHT_FULL
+from planes.nearest import BESIDE_REACH
 from planes.sampling import Runs
 from planes.spans import Spans, ragged
 from planes.strips import Strip, strip_of

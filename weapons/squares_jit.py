@@ -20,8 +20,8 @@ from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from planes.arrays import Bools, Ints
-from planes.bitrows import WORD, Words
 from planes.bitrows_jit import in_order, key_of, shared
+from planes.bits import WORD, Words
 from planes.cells import Cells
 from planes.cells_jit import cell_at
 from planes.compiled import compiled

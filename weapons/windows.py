@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planes.bitrows import WORD, Windows, Words
+from planes.bitrows import Windows
+from planes.bits import WORD, Words
 from planes.kept import Kept
 from planes.spans import Spans
 from planes.strips import strips_of
