@@ -11,9 +11,12 @@ import pytest
 from test_bitfire import some_scene, some_shots
 
 from planes import InputError, twins, use_jit, use_threads
-from weapons import Disc, Point, Rounds, Stencil, Weapon, fire
+from weapons import Disc, Point, Rounds, Spread, Stencil, Weapon, fire
 
-WEAPONS: list[Weapon] = [Point(), Disc(40), Disc(9, pierce=True), Stencil(["#.#", "..#"]), Rounds(Disc(5), 3, (3, 2))]
+WEAPONS: list[Weapon] = [
+    Point(), Disc(40), Disc(9, pierce=True), Stencil(["#.#", "..#"]), Rounds(Disc(5), 3, (3, 2)),
+    Rounds(Spread(Disc(3, pierce=True), 5, 9), 2, (3, 2)),
+]  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
