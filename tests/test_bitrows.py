@@ -168,7 +168,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
         assert kernels.union(case.placed, case.windows, case.seen, placement, near, first).tolist() == together
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, nearest.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
@@ -194,7 +194,7 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
             assert beside[tile, :, row].tolist() == told
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(SEEDS, st.sampled_from([1, 64]), st.sampled_from([5, 2**16]))
 @pytest.mark.parametrize("name", ["lookup", "lookup_jit"])
 def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: int, at_once: int) -> None:
