@@ -208,5 +208,6 @@ def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
         return Spans.from_runs(y, zero, zero) if c == 0 else Spans.from_runs(zero[:1], y[:1], y[-1:])
     y = _rows(-longest, longest)
     x = y * c // s
-    on = (x * s == y * c) & ((SUB * x) ** 2 + (SUB * y) ** 2 <= longest * longest)
+    near = np.abs(x) <= longest // SUB  # of a shallow direction others are so far that their squares overflow
+    on = near & (x * s == y * c) & ((SUB * x) ** 2 + (SUB * y) ** 2 <= longest * longest)
     return Spans.from_runs(y[on], x[on], x[on])

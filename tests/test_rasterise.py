@@ -330,6 +330,14 @@ MAPS: dict[str, Callable[[Point], Point]] = {
 }
 
 
+@pytest.mark.parametrize("radii", [(0, 256), (0, 14 * 256), (3 * 256, 0), (0, FAR)])
+@pytest.mark.parametrize("slope", [1, 2, -2, 5])
+def test_a_flat_ellipse_all_but_along_an_axis_has_its_middle_alone(radii: tuple[int, int], slope: int) -> None:
+    """The next centre on it lies millions of pixels away, where squares overflow."""
+    for c, s in ((ONE, slope), (slope, ONE), (-ONE, slope), (slope, -ONE)):
+        assert pixel_set(rasterise.ellipse(*radii, c, s)) == {(0, 0)}
+
+
 @pytest.mark.parametrize("linear", MAPS)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_mirrors_and_quarter_turns(family: str, linear: str) -> None:
