@@ -36,12 +36,12 @@ __all__ = ["gathered_up", "looked_up"]
 PART_NS, PLACEMENT_NS, LISTED_NS = 8e5, 10.0, 40.0
 """What a thread must have to do to be worth it; what a placement takes, and each tile that is listed near it."""
 
-
 GIVEN = (
     types.int64, types.int64, types.int64, ROWS_OUT,
     *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS,
     *[types.int64] * 5, INTS, INTS,
 )  # fmt: skip
+"""Of both kernels: what `rows_by` tells them, and what `_given` gives."""
 
 
 @compiled(types.UniTuple(types.int64, 2)(*GIVEN))

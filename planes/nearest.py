@@ -60,8 +60,7 @@ def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     down = row + top
     step = np.sqrt((distance2 - down * down).astype(np.float64)).astype(np.int64)  # of a square that a float holds
     step -= across
-    before = (met[np.arange(len(met)), row] >> (column - step).view(np.uint64)) & _ONE
-    return distance2, away + np.where(before, -step, step), down
+    return distance2, away + _aside(met[np.arange(len(met)), row], column, step), down
 
 
 def _steps(words: Words, column: Ints) -> Ints:
@@ -113,5 +112,11 @@ def nearest_seen(seen: Seen, beside: Beside, near: Ints, left: Ints, top: Ints) 
     row = distance2.argmin(axis=1)
     every = np.arange(len(near))
     step = across[every, row].astype(np.int64)
-    before = (seen.words[seen.begin[near] + row] >> (column - step).view(np.uint64)) & _ONE
-    return distance2[every, row].astype(np.int64), away + np.where(before, -step, step), row + top
+    across_x = away + _aside(seen.words[seen.begin[near] + row], column, step)
+    return distance2[every, row].astype(np.int64), across_x, row + top
+
+
+def _aside(words: Words, column: Ints, step: Ints) -> Ints:
+    """Where the nearest pixels of words lie, `step` from columns (n,): before these if there is one, else after."""
+    before = (words >> (column - step).view(np.uint64)) & _ONE
+    return np.where(before, -step, step)

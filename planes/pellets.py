@@ -66,9 +66,7 @@ def gathered(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near
         wanted = turn[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
         edges = [0, *np.unique(np.searchsorted(turn, wanted)).tolist(), len(placement)]
     kernels = kernels_of(bitrows)
-    parts = [
-        _counted(placed, windows, seen, placement[a:b], near[a:b], each, kernels) for a, b in pairwise(edges)
-    ]  # fmt: skip
+    parts = [_counted(placed, windows, seen, placement[a:b], near[a:b], each, kernels) for a, b in pairwise(edges)]
     return parts[0] if len(parts) == 1 else Gathered(*map(np.concatenate, zip(*parts, strict=True)))
 
 

@@ -212,6 +212,7 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
     """Count what placements cover of what can be seen of all objects."""
 
     def read(_: Shots, volley: Volley) -> Rows:
+        """Look up the tiles that are listed where placements lie."""
         seen, plan = composition.seen, sight.plan
         windows = _windows(volley, plan)
         listed = composition.cells(_reach(windows.box_xyxy))
@@ -240,6 +241,7 @@ def _by_pile(items: Items, sight: Sight) -> Reader:
     sight.plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else pile.box_xyxy.nbytes)
 
     def read(shots: Shots, volley: Volley) -> Rows:
+        """Let each placement take its pixels from what is left of its pattern."""
         windows = _windows(volley, sight.plan)
         accept, exclude = None, None
         if may_refuse(stack, shots):
@@ -262,6 +264,7 @@ def _by_items(items: Items, view: View | None, sight: Sight) -> Reader:
     sight.plan.run("tiles", "bit rows of the masks", boxes.nbytes)
 
     def read(shots: Shots, volley: Volley) -> Rows:
+        """Find the tiles near placements, what can be seen of them, and what pellets cover of that."""
         windows = _windows(volley, sight.plan)
         placement, rank = _near_objects(shots, volley, sight)
         pair, tile = tiles.of(rank)

@@ -140,7 +140,7 @@ def _left_of(shape, pixels, scene, left, top, rest):
 def _met(scene, shape, box, near, close, rest, x, y):
     """How many items a round shares pixels with, in tiles that are near it, front to back.
 
-    After the list of those come columns: keys, columns of the nearest pixel, items, samples.
+    After the list of those come columns: keys, columns of the nearest pixel, items, samples, and room for its rows.
     """
     rank, items, blocks, first = _ints(scene[RANK]), _ints(scene[ITEM]), _ints(scene[BLOCKS]), _ints(scene[WORD_OF])
     tiles, step, room = _words(scene[WORDS]), shape[STEP], scene[TILES]
@@ -175,13 +175,8 @@ def _met(scene, shape, box, near, close, rest, x, y):
 @njit
 def _tell(met, every, count, x, y, buffer_at, room):
     """Write what `_met` told to a buffer, in order."""
-    key, across, item, samples, down = (
-        met[every:],
-        met[2 * every :],
-        met[3 * every :],
-        met[4 * every :],
-        met[5 * every :],
-    )
+    key, across, item = met[every:], met[2 * every :], met[3 * every :]
+    samples, down = met[4 * every :], met[5 * every :]
     in_order(0, count, x, y, item, samples, key, across, down)
     found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
     for row in range(count):

@@ -243,13 +243,8 @@ def preparation(settings: Settings) -> Iterator[Cell]:
             placed = rendered(pattern_mask(weapon))  # type: ignore[arg-type]
             cell = Cell("preparation", name, objects, asked=settings.shots)
             theirs = Side("A pygame", lambda w, n, m=peers, p=placed: _masks_batch(m, p, w, n))
-            race(
-                cell,
-                [*ours(settings, scene_of(objects), weapon), theirs],
-                [[work] for work in works],
-                settings.shots,
-                settings.seconds,
-            )
+            sides = [*ours(settings, scene_of(objects), weapon), theirs]
+            race(cell, sides, [[work] for work in works], settings.shots, settings.seconds)
             begin = time.perf_counter_ns()
             Baked(items, Plane(items)).cells(*placed[1:])
             cell.values["C pygame bakes, ns"] = time.perf_counter_ns() - begin
