@@ -31,6 +31,11 @@ from weapons.plan import Stage
 ROOT = Path(__file__).parents[1]
 VOLUMES = ("circle", "oriented box", "1 boxes", "4 boxes", "polygon", "swept")
 BROADPHASES = ("none", "grid", "quadtree", "bvh")
+PAIRS = [  # each with half of the others, and with all of them in the long tests
+    pytest.param(prefilter, broadphase, marks=[pytest.mark.long] * ((i + j) % 2))
+    for i, prefilter in enumerate(VOLUMES)
+    for j, broadphase in enumerate(BROADPHASES)
+]
 WEAPONS: list[Weapon] = [
     Point(), Disc(1.5), Disc(9, pierce=True), Ring(6, 7), Box(5, 2), Cone(reach=20, angle=25), Beam(length=40, width=1),
     Beam(length=70, width=6, pierce=True), Spread(Disc(1), count=5, radius=9), Stencil(["##...", "..###"]),
@@ -86,8 +91,7 @@ def trials() -> list[tuple[int, Weapon, Any, Any, Hits]]:
     return out
 
 
-@pytest.mark.parametrize("broadphase", BROADPHASES)
-@pytest.mark.parametrize("prefilter", VOLUMES)
+@pytest.mark.parametrize(("prefilter", "broadphase"), PAIRS)
 def test_no_hit_is_lost(prefilter: str, broadphase: str) -> None:
     found, scenes = 0, three_crowds()
     for which, weapon, at, aim, truth in trials():

@@ -383,7 +383,7 @@ GIANTS = [
 ]
 
 
-@pytest.mark.parametrize("bounded", [True, False])
+@pytest.mark.parametrize("bounded", [True, pytest.param(False, marks=pytest.mark.long)])
 @pytest.mark.parametrize("weapon, at", GIANTS, ids=lambda v: getattr(v, "kind", str(v)))
 def test_giant_patterns(weapon: Any, at: tuple[int, int], bounded: bool) -> None:
     """Of a pattern of up to 10^12 samples only those are walked or read that a scene of 40 x 30 px can meet."""

@@ -145,7 +145,7 @@ def answer(battle: Battle, strategy: str) -> Hits | str:
         return str(error)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=70, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds, count=st.integers(1, 12))
 def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
     battle = single(rng, count)

@@ -83,7 +83,7 @@ def test_a_small_step_changes_little(
 
 
 @pytest.mark.parametrize("weapon", WEAPONS, ids=lambda w: w.kind)
-@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_of_256_small_steps_one_moves_the_shot(weapon: Weapon, axis: int) -> None:
     scene = Scene((24, 20))
     scene.add(Sprite.box(24, 20), (12, 10))

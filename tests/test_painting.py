@@ -40,7 +40,7 @@ def boxes_in(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.stack([x[0], y[0], x[1], y[1]], axis=1)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.sampled_from([0, 1, 3, 7, 8, 9, 16, 17, 40]), st.integers(0, 9))
 @pytest.mark.parametrize("each", [False, True])
 @pytest.mark.parametrize("kind", [np.uint16, np.uint32])
@@ -67,7 +67,7 @@ def stepping(request: pytest.FixtureRequest) -> Any:
     return importlib.import_module(request.param)
 
 
-@settings(max_examples=17, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([1, 3, 60, 10**9]))
 @pytest.mark.parametrize("kind", [np.uint16, np.uint32])
 def test_a_plane_that_follows_steps_is_what_each_pixel_says(

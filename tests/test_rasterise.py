@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from planes import rasterise
 from planes.spans import Spans
 
-AGAINST = settings(max_examples=54, deadline=None)
-LAWS = settings(max_examples=40, deadline=None)
+AGAINST = settings(max_examples=40, deadline=None)
+LAWS = settings(max_examples=30, deadline=None)
 
 ONE = 2**30
 REACH = 14  # px: shapes are drawn this near, so that a reference can look at every pixel

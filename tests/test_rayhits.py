@@ -61,7 +61,7 @@ def many(rng: random.Random, count: int = 9) -> Battle:
 # Parts of a batch
 
 
-@settings(max_examples=27, deadline=None)
+@settings(max_examples=17, deadline=None)
 @given(worlds, st.sampled_from([1, 3, 10, 40]))
 def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> None:
     battle = many(rng)

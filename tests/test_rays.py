@@ -569,7 +569,7 @@ def far_battle(reach: int, slope: float, width: float, name: str) -> Battle:
 
 
 @pytest.mark.parametrize(("reach", "name"), [*((150, name) for name in TURNS), (2000, "half"), (2000, "a quarter")])
-@pytest.mark.parametrize("width", [0, 2, 6.5])
+@pytest.mark.parametrize("width", [0, pytest.param(2, marks=pytest.mark.long), 6.5])
 def test_long_rays(reach: int, width: float, name: str) -> None:
     """As far as products of lengths are large, and the middle of a thick ray does not tell all."""
     for slope in (0.25, 0.25 + 1 / 256, 1.5):
