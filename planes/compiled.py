@@ -1,6 +1,7 @@
-"""Compiled functions, kept on disk as long as the files of all of them are as they were.
+"""Compiled functions, kept on disk as long as the files of both packages are as they were.
 
-numba keeps what it compiled of a function until the function's own file changes; but kernels call those of other files.
+numba keeps what it compiled of a function until the function's own file changes; but kernels call those of other files,
+and numbers that other files name are part of what is compiled.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ __all__ = ["compiled"]
 
 @cache
 def _stamp() -> str:
-    """What tells whether any of the files of kernels has changed."""
-    every = [file for package in ("planes", "weapons") for file in files(package).iterdir()]
-    kernels = sorted((file.name, file.read_bytes()) for file in every if file.name.endswith("_jit.py"))
-    return hashlib.sha256(repr(kernels).encode()).hexdigest()
+    """What tells whether any of the files has changed."""
+    told = hashlib.sha256()
+    for package in ("planes", "weapons"):
+        for file in sorted(files(package).iterdir(), key=lambda file: file.name):
+            if file.name.endswith(".py"):
+                told.update(f"{file.name} ".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return told.hexdigest()
 
 
 def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:

@@ -22,16 +22,17 @@ def asked(number):
 """
 CALLED = """
 from numba import njit
+from planes.named import MORE
 
 @njit
 def told(number):
-    return number + {}
+    return number + MORE + {}
 """
 ASK = "from planes.calling_jit import asked as a; print(a(1), sum(a.stats.cache_hits.values()), end='')"
 
 
 @pytest.mark.long
-def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(tmp_path: Path) -> None:
+def test_a_kernel_is_compiled_anew_when_what_it_calls_or_names_changes(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     for package in ("planes", "weapons"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -41,6 +42,7 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(tmp_path: Path
         run = subprocess.run([sys.executable, "-c", ASK], cwd=tmp_path, capture_output=True, text=True, check=True)
         return run.stdout
 
-    for number, expected in ((1, ("2 0", "2 1")), (2, ("3 0", "3 1"))):
+    for number, more, expected in ((1, 0, ("2 0", "2 1")), (2, 0, ("3 0", "3 1")), (2, 10, ("13 0", "13 1"))):
         (tmp_path / "planes" / "called_jit.py").write_text(CALLED.format(number))
+        (tmp_path / "planes" / "named.py").write_text(f"MORE = {more}\n")
         assert (ask(), ask()) == expected
