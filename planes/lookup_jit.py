@@ -53,22 +53,16 @@ def _looked_up(
     whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
     while who < end:
         cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
-        if cell < 0:
+        if cell < 0 or begin[cell] == begin[cell + 1]:
             who += 1
             continue
-        entry, last = begin[cell], begin[cell + 1]
-        if entry == last:
-            who += 1
-            continue
-        if count + last - entry > room:
-            break
         kind, item, row = pattern[who], -1, count - 1
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
             return -1, 0
         step = following[kind]
-        for place in range(entry, last):
+        for place in range(begin[cell], begin[cell + 1]):
             at = listed[place]
             low, lowest = max(box[at, 1], top), min(box[at, 3], bottom)
             if (box[at, 0] > right) | (box[at, 2] < left) | (low > lowest):
@@ -89,6 +83,8 @@ def _looked_up(
                 if new < key[row]:
                     key[row], nearest_x[row] = new, across
             else:
+                if row + 1 == room:
+                    return who, count
                 row += 1
                 item = rank[at]
                 whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across

@@ -8,7 +8,6 @@ shot: it is worked out once for a version of a scene, or only for the objects th
 from __future__ import annotations
 
 import threading
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from planes.arrays import Bools, Ints
 from planes.bits import PAD, Seen, Words
 from planes.cells import Cells
 from planes.items import Items, Stack
+from planes.kept import Kept, once
 from planes.nearest import Beside, beside_of
 from planes.spans import Box
 from planes.tiles import Tiles
@@ -28,8 +28,14 @@ __all__ = ["Composition", "Compositions", "View", "cropped", "in_front", "seen_o
 VIEWS_MOST = 4
 """Compositions that a scene keeps: shots that accept other items see others."""
 
-REACHES_MOST = 8
-"""Boxes of patterns for which a composition keeps cells."""
+CELLS_BYTES = 2**25
+"""Cells that a composition keeps for the last few boxes of patterns, bytes."""
+
+WITHOUT_MOST = 128
+"""Placements that are compared with all that can be seen take as long as it takes to list that by cells."""
+
+PAIRS_MOST = 2**20
+"""Pairs of placements and tiles up to which they are."""
 
 SHOT_BITS = 4
 """Of the side of the cells of shot positions: 16 px; in larger ones more boxes are listed that no pattern meets."""
@@ -68,27 +74,58 @@ class Composition:
         rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
         self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
         self.ids = stack.ids[self.seen.rank]
-        self._cells: dict[tuple[int, ...], Cells] = {}
+        self._cells: Kept[tuple[int, ...], Cells] = Kept(CELLS_BYTES, lambda made: made.nbytes)
+        self._without = 0
 
-    @cached_property
+    @once
     def beside(self) -> Beside:
         """Distances along the rows of what is seen: with them the nearest pixel to the origin of a disc is found."""
         return beside_of(self.seen)
 
     def cells(self, reach_xyxy: Ints) -> Cells:
         """What patterns of a box may meet, by where they are placed; those of the last few boxes are kept."""
+        make = kernels_of(cells).cells_of
+        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: make(self.seen.box_xyxy, reach_xyxy, SHOT_BITS))
+
+    def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells, int]:
+        """The same for so many placements, and the bytes that were made; where few ask for a box, one cell with all.
+
+        When as many did with that as lists would have cost, those of the next box are made.
+        """
         reach = tuple(reach_xyxy.tolist())
-        if reach not in self._cells:
-            made = kernels_of(cells).cells_of(self.seen.box_xyxy, reach_xyxy, SHOT_BITS)
-            self._cells = dict([*self._cells.items(), (reach, made)][-REACHES_MOST:])
-        return self._cells[reach]
+        if reach in self._cells.values:
+            return self.cells(reach_xyxy), 0
+        self._without += placements
+        if self._without <= WITHOUT_MOST and placements * len(self.seen.rank) <= PAIRS_MOST:
+            return self._everything(*reach), 0
+        self._without = 0
+        made = self.cells(reach_xyxy)
+        return made, made.nbytes
+
+    def _everything(self, left: int, top: int, right: int, low: int) -> Cells:
+        """One cell with all tiles, where a pattern of a box may meet any."""
+        x, y, x_max, y_max = self._around
+        size = max(x_max - left - (x - right), y_max - top - (y - low))
+        return Cells(x - right, y - low, size.bit_length(), 1, 1, *self._listed)
+
+    @once
+    def _listed(self) -> tuple[Ints, Ints]:
+        """Where the list of that cell begins and ends, and the list."""
+        count = len(self.seen.rank)
+        return np.array([0, count]), np.arange(count)
+
+    @once
+    def _around(self) -> Box:
+        """Box around all tiles."""
+        low = self.seen.box_xyxy[:, :2].min(axis=0, initial=0)
+        high = self.seen.box_xyxy[:, 2:].max(axis=0, initial=0)
+        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     @property
     def nbytes(self) -> int:
-        """Bytes of what is seen and of the cells."""
+        """Bytes of what is seen."""
         seen = self.seen
-        columns = (seen.rank, seen.box_xyxy, seen.begin, seen.words)
-        return sum(int(column.nbytes) for column in (*columns, *(c.listed for c in self._cells.values())))
+        return sum(int(column.nbytes) for column in (seen.rank, seen.box_xyxy, seen.begin, seen.words))
 
 
 class Compositions:
@@ -111,7 +148,7 @@ class Compositions:
         """Whether a view has lost as much as a composition costs, with what it would lose now.
 
         So the cost is never more than twice that of the better choice (Karlin et al., "Competitive snoopy caching",
-        1988).
+        1988). One that had a composition, and finds it gone, loses anew.
         """
         with self._lock:
             self._forget(version)
@@ -125,6 +162,7 @@ class Compositions:
             found = Composition(items.stack(), items.tiles(), bounds, view)
             with self._lock:
                 self._forget(items.version)
+                self._missed[view] = 0.0
                 self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
         return found
 

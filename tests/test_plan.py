@@ -185,7 +185,7 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
             *OF_BITS,
             (BITFIRE, "rows_of", "samples", 10**4),
             (planes.visible.Compositions, "read", "composition", 10**5),
-            (planes.visible.Composition, "cells", "pre-filter", 10**6),
+            (planes.visible.Composition, "cells_for", "pre-filter", 10**6),
         ],
     ),
     "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),

@@ -22,6 +22,7 @@ from planes.compose import CodePlane
 from planes.constants import ALL, CHUNK_PAIRS, SUB
 from planes.grid256 import ONE
 from planes.items import Items, Stack
+from planes.nearest import Beside
 from planes.pellets import NOT_BESIDE, gathered
 from planes.pointquery import Front
 from planes.scene import Scene
@@ -215,23 +216,32 @@ def _by_composition(composition: Composition, sight: Sight) -> Reader:
         """Look up the tiles that are listed where placements lie."""
         seen, plan = composition.seen, sight.plan
         windows = _windows(volley, plan)
-        listed = composition.cells(_reach(windows.box_xyxy))
-        plan.run("pre-filter", f"cells of {1 << listed.bits} px{', strips' * bool(len(windows.strips))}")
-        kernels, beside = kernels_of(lookup), NOT_BESIDE
+        listed, made = composition.cells_for(_reach(windows.box_xyxy), len(volley))
+        told = "all tiles" if listed.wide * listed.high == 1 else f"cells of {1 << listed.bits} px"
+        plan.run("pre-filter", told + ", strips" * bool(len(windows.strips)), made)
+        kernels = kernels_of(lookup)
         if volley.scattered:
             together = kernels.gathered_up(placed_of(volley), windows, seen, listed, volley.pellets)
             rows = rows_of_rounds(volley, together, sight.stack.ids)
             plan.run("samples", "counted by bit rows", rows.nbytes)
             return rows
-        many = len(seen.rank) < len(volley) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
-        if many and kernels is lookup and _is_disc(volley):
-            beside = composition.beside
+        beside, made = _beside(composition, volley) if kernels is lookup else (NOT_BESIDE, 0)
         found = kernels.looked_up(placed_of(volley), windows, seen, listed, beside)
         rows = rows_of(volley, found, composition.ids)
-        plan.run("samples", "counted by bit rows", rows.nbytes)
+        plan.run("samples", "counted by bit rows", rows.nbytes + made)
         return rows
 
     return read
+
+
+def _beside(composition: Composition, volley: Volley) -> tuple[Beside, int]:
+    """Distances along the rows of tiles, where many discs make them worth it; and the bytes that were made for that."""
+    seen = composition.seen
+    many = len(seen.rank) < len(volley) and len(seen.rank) * WORD * seen.height <= BESIDE_BYTES_MOST
+    if not many or not _is_disc(volley):
+        return NOT_BESIDE, 0
+    known = "beside" in vars(composition)
+    return composition.beside, 0 if known else composition.beside.nbytes
 
 
 def _by_pile(items: Items, sight: Sight) -> Reader:

@@ -278,9 +278,9 @@ class Squares:
 
     def _compose(self, composed: Composition) -> None:
         """Look up what can be seen: nothing in it covers another, and it lies within the bounds."""
-        seen = composed.seen
+        seen, cells = composed.seen, composed.cells(self._reach)
         pile = Pile(seen.rank, composed.ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
-        self._place(pile, seen.box_xyxy, composed.cells(self._reach), (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
+        self._place(pile, seen.box_xyxy, cells, (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
 
     def _place(self, pile: Pile, boxes_xyxy: Ints, cells: Cells, told: tuple[int, ...]) -> None:
         """Tell the kernel where all lies."""

@@ -1,0 +1,131 @@
+"""What can be seen is composed, and listed by cells, when shots have lost as much without it; the rows are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planes.cells
+from planes import Scene, use_jit, visible
+from planes.constants import ALL
+from planes.twins import kernels_of
+from planes.visible import WITHOUT_MOST, Composition, View
+from weapons import Beam, Disc, fire
+
+CORNERS = [(0, 0), (-(10**9), 10**9), (10**12, -(10**12))]
+
+
+def crowd(count: int = 60, corner: tuple[int, int] = (0, 0)) -> Scene:
+    rng = np.random.default_rng(5)
+    scene = Scene()
+    for _ in range(count):
+        at = corner + rng.integers(0, 400, 2)
+        scene.add(rng.random((20, 30)) < 0.6, tuple(at.tolist()))
+    return scene
+
+
+@pytest.fixture
+def composed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
+    """The views of what is composed during a test."""
+    made: list[View] = []
+    begin = Composition.__init__
+
+    def noted(self: Composition, *given: Any) -> None:
+        made.append(given[-1])
+        begin(self, *given)
+
+    monkeypatch.setattr(Composition, "__init__", noted)
+    yield made
+
+
+def test_more_views_in_turn_than_are_kept_lose_anew_before_each_is_composed_again(composed: list[View]) -> None:
+    scene = crowd(300)
+    known = scene.compositions()
+    views = [View(False, 1 << k, ()) for k in range(visible.VIEWS_MOST + 1)]
+    lost, cost, rounds = 1.0, 10.0, 200
+    for _ in range(rounds):
+        for view in views:
+            if known.kept(view, scene.version) is None and known.pays(view, scene.version, lost, cost):
+                known.read(view, scene.items, scene.bounds)
+    assert len(views) <= len(composed) <= rounds * len(views) * lost / cost
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_few_placements_do_without_lists(jit: bool, corner: tuple[int, int]) -> None:
+    """Rows of the first shots, of those that pay for lists, and of shots far off are those of direct ones."""
+    scene = crowd(corner=corner)
+    rng = np.random.default_rng(2)
+    seen, rows = set(), 0
+    for k in range(WITHOUT_MOST // 4 + 8):
+        weapon = Beam(60 + k % 20, 5) if k % 2 else Disc(3 + k)
+        at = np.array(corner) + rng.integers(-50, 450, (4, 2)) + rng.choice([0, 0, 10**6], (4, 1))
+        hits = fire(scene, weapon, at, aim=float(k), strategy="composed")
+        rows += len(hits)
+        assert hits == fire(scene, weapon, at, aim=float(k), strategy="direct")
+        (stage,) = (stage for stage in hits.plan.ran if stage.name == "pre-filter")
+        seen.add((stage.why.split(",")[0], stage.bytes_made > 0))
+    assert rows > 50
+    assert {told == "all tiles" for told, _ in seen} == {True, False}
+    assert {made for told, made in seen if told == "all tiles"} == {False}
+    assert ("cells of 16 px", True) in seen
+
+
+def test_many_placements_are_worth_lists_and_those_that_are_there_cost_nothing() -> None:
+    composition = Composition(*what(crowd()))
+    small, large = np.array([-3, -3, 3, 3]), np.array([-40, -40, 40, 40])
+    cells, made = composition.cells_for(small, WITHOUT_MOST + 1)
+    assert made == cells.nbytes > 0 and composition.cells_for(small, 1) == (cells, 0)
+    everything, made = composition.cells_for(large, WITHOUT_MOST)
+    assert made == 0 and everything.listed.tolist() == list(range(len(composition.seen.rank)))
+    assert composition.cells_for(large, 1)[1] > 0
+
+
+def test_pairs_of_placements_and_tiles_that_are_compared_are_not_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    composition = Composition(*what(crowd()))
+    monkeypatch.setattr(visible, "PAIRS_MOST", 2 * len(composition.seen.rank))
+    reach = np.array([-3, -3, 3, 3])
+    assert composition.cells_for(reach, 2)[1] == 0 and composition.cells_for(reach, 3)[1] > 0
+
+
+def what(scene: Scene) -> Any:
+    return scene.items.stack(), scene.items.tiles(), scene.bounds, View(False, ALL, ())
+
+
+def test_nothing_can_be_seen_of_no_objects() -> None:
+    composition = Composition(*what(Scene()))
+    cells, made = composition.cells_for(np.array([-3, -3, 3, 3]), 1)
+    assert made == 0 and not len(cells.listed)
+
+
+def test_distances_along_rows_are_counted_where_they_are_made() -> None:
+    scene = crowd()
+    at = np.random.default_rng(3).integers(0, 400, (200, 2))
+    use_jit(False)
+    told = [fire(scene, Disc(9), at, strategy="composed").plan.ran for _ in range(2)]
+    first, second = (next(stage.bytes_made for stage in ran if stage.name == "samples") for ran in told)
+    use_jit(None)
+    composition = scene.compositions().kept(View(False, ALL, ()), scene.version)
+    assert composition is not None and first - second == composition.beside.nbytes > 0
+
+
+@pytest.mark.parametrize("size", [(1, 1), (250, 1), (1, 250), (70, 250)])
+@pytest.mark.parametrize("corner", CORNERS)
+def test_one_cell_with_all_is_wherever_a_pattern_meets_anything(
+    jit: bool, size: tuple[int, int], corner: tuple[int, int]
+) -> None:
+    scene = Scene()
+    for x in (0, size[0] - 1):
+        for y in (0, size[1] - 1):
+            scene.add([[True]], (corner[0] + x, corner[1] + y))
+    composition = Composition(*what(scene))
+    left, top = composition.seen.box_xyxy.T[:2]
+    reach = np.array([-2, -30, 40, 5])
+    cells, _ = composition.cells_for(reach, 1)
+    x, y = np.meshgrid(
+        [left.min() - reach[2], left.max() - reach[0]], [top.min() - reach[3], top.max() - reach[1]], indexing="ij"
+    )
+    place, _ = kernels_of(planes.cells).listed_at(cells, x.reshape(-1), y.reshape(-1))
+    assert np.bincount(place, minlength=4).tolist() == [len(left)] * 4
