@@ -19,6 +19,7 @@ from planes.nearest import Beside
 from planes.twins import in_parts
 
 __all__ = [
+    "FEW_ROWS",
     "bits_of",
     "found",
     "in_order",
@@ -28,6 +29,7 @@ __all__ = [
     "pixels_of",
     "row_order",
     "shared",
+    "sort_places",
     "union",
     "visible",
 ]
@@ -45,6 +47,9 @@ ONE = np.uint64(1)
 ROW_BITS, ROWS = 7, 127
 ROOM, ROOM_LEAST = 8, 64
 """Rows for each placement, and beside, for which there is room at first."""
+
+FEW_ROWS = 128
+"""Rows of a placement that are put in order one by one: of more that takes longer than to sort all rows."""
 
 SIDE, SIDE_BITS = np.int64(2**17), 19  # no pixel of a pattern is so far from its origin
 
@@ -110,6 +115,31 @@ def is_beyond(strips, pattern, x, y, left, top, right, bottom):
 
 
 @njit(inline="always")
+def _sooner(a, b, distance2, y, x):
+    if distance2[a] != distance2[b]:
+        return distance2[a] < distance2[b]
+    if y[a] != y[b]:
+        return y[a] < y[b]
+    return x[a] < x[b] if x[a] != x[b] else a < b
+
+
+@njit
+def sort_places(order, distance2, y, x):
+    """Sort places of rows by (distance2, y, x, place), as Shell (1959): they mostly are few, and in sorted runs."""
+    step = 1
+    while step < len(order) // 3:
+        step = 3 * step + 1
+    while step:
+        for i in range(step, len(order)):
+            row, j = order[i], i
+            while j >= step and _sooner(row, order[j - step], distance2, y, x):
+                order[j] = order[j - step]
+                j -= step
+            order[j] = row
+        step //= 3
+
+
+@njit(inline="always")
 def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
     """Tell squared distances and pixels of rows `first` .. `last` - 1 instead of keys and columns about an origin."""
     for i in range(first, last):
@@ -122,13 +152,15 @@ def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
 def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
     """Sort rows `first` .. `last` - 1 of a placement, in columns, by their keys, and tell pixels instead of these.
 
+    More than FEW_ROWS stay as they are: `rows_by` sorts them, or the caller.
+
     Parameters
     ----------
     origin_x, origin_y : the pixel from which distances are counted
     distance2, x : keys, and the columns of the nearest pixels about the origin; the first are then squared distances
     y : nothing yet
     """
-    for i in range(first + 1, last):
+    for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
         item, count, key, across, j = seen[i], samples[i], distance2[i], x[i], i
         while j > first and distance2[j - 1] > key:
             seen[j], samples[j], distance2[j], x[j] = seen[j - 1], samples[j - 1], distance2[j - 1], x[j - 1]
@@ -137,9 +169,12 @@ def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
     pixels_of(first, last, origin_x, origin_y, distance2, x, y)
 
 
-Kernel = Callable[..., tuple[int, int]]
+Kernel = Callable[..., tuple[int, int, int]]
 """Goes on with a placement, before a last one, after so many rows that it has written, by what it is given beside;
-tells where it stopped, -1 if it cannot decide."""
+tells where it stopped, -1 if it cannot decide, the rows, and how many a placement has at most.
+
+Columns of rows begin with the placement and what it hits, and end with squared distance, x and y.
+"""
 
 
 def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any) -> Ints | None:
@@ -159,11 +194,15 @@ def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any)
 
 def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
     """Columns of the rows of some placements; room that is not written to costs nothing."""
-    count, out = 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
+    count, crowd, out = 0, 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
     while True:
-        who, count = kernel(who, last, count, out, *given)
-        if who == last or who < 0:
-            return out[:, :count] if who >= 0 else None
+        who, count, most = kernel(who, last, count, out, *given)
+        crowd = max(crowd, most)
+        if who < 0:
+            return None
+        if who == last:
+            rows = out[:, :count]
+            return rows if crowd <= FEW_ROWS else rows[:, np.lexsort(rows[[1, -2, -1, -3, 0]])]
         more = np.empty((columns, 2 * out.shape[1]), np.int64)
         more[:, :count] = out[:, :count]
         out = more
@@ -314,15 +353,6 @@ def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     return out
 
 
-@njit(inline="always")
-def _sooner(a, b, distance2, y, x):
-    if distance2[a] != distance2[b]:
-        return distance2[a] < distance2[b]
-    if y[a] != y[b]:
-        return y[a] < y[b]
-    return x[a] < x[b] if x[a] != x[b] else a < b
-
-
 @compiled(types.void(*[INTS] * 4, OUT))
 def _row_order(group, distance2, y, x, order):
     begin = 0
@@ -331,17 +361,7 @@ def _row_order(group, distance2, y, x, order):
         while end < len(order) and group[end] == group[begin]:
             order[end] = end
             end += 1
-        step = 1
-        while step < (end - begin) // 3:
-            step = 3 * step + 1
-        while step:  # Shell (1959): sorted runs of few rows are what there mostly is
-            for i in range(begin + step, end):
-                row, j = order[i], i
-                while j - step >= begin and _sooner(row, order[j - step], distance2, y, x):
-                    order[j] = order[j - step]
-                    j -= step
-                order[j] = row
-            step //= 3
+        sort_places(order[begin:end], distance2, y, x)
         begin = end
 
 

@@ -227,7 +227,7 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
 
 
 @compiled(
-    types.UniTuple(types.int64, 2)(
+    types.UniTuple(types.int64, 3)(
             types.int64, types.int64, types.int64, ROWS_OUT,
             *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
             INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4)
@@ -237,20 +237,20 @@ def _front_to_back(
     who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
     rank, box, tile_begin, tiles, occluder, categories, owner, accept, exclude, pierce, bounds,
 ):  # fmt: skip
-    room, most = out.shape[1], 0
+    room, most, words = out.shape[1], 0, 0
     for kind in range(len(first)):
-        most = max(most, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
+        words = max(words, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
     begin = listed = cells = np.zeros(0, np.int64)
     if end - who > FEW and len(box):
         begin, listed, cells = _binned(box)
-    near, rest, last_kind = np.empty(len(box), np.int64), np.empty(most, np.uint64), -1
+    near, rest, last_kind = np.empty(len(box), np.int64), np.empty(words, np.uint64), -1
     whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
     while who < end:
         kind = pattern[who]
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
-            return -1, 0
+            return -1, 0, 0
         close = near_of(box, begin, listed, cells, left, top, right, bottom, near)
         if len(strips):
             close = _crossing(strips, kind, x[who], y[who], box, near, close)
@@ -296,9 +296,10 @@ def _front_to_back(
                 item = rank[at]
                 whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
         in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
+        most = max(most, row + 1 - count)
         count = row + 1
         who += 1
-    return who, count
+    return who, count, most
 
 
 NONE = np.zeros(0, np.int64)

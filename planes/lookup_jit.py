@@ -11,6 +11,7 @@ from planes import lookup
 from planes.bitrows import Found, Placed, Windows
 from planes.bitrows_jit import (
     BOXES,
+    FEW_ROWS,
     INTS,
     ONE,
     ROWS_OUT,
@@ -44,12 +45,12 @@ GIVEN = (
 """Of both kernels: what `rows_by` tells them, and what `_given` gives."""
 
 
-@compiled(types.UniTuple(types.int64, 2)(*GIVEN))
+@compiled(types.UniTuple(types.int64, 3)(*GIVEN))
 def _looked_up(
     who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
     rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
 ):  # fmt: skip
-    room = out.shape[1]
+    room, most = out.shape[1], 0
     whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
     while who < end:
         cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
@@ -60,7 +61,7 @@ def _looked_up(
         left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
         right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
         if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
-            return -1, 0
+            return -1, 0, 0
         step = following[kind]
         for place in range(begin[cell], begin[cell + 1]):
             at = listed[place]
@@ -84,14 +85,15 @@ def _looked_up(
                     key[row], nearest_x[row] = new, across
             else:
                 if row + 1 == room:
-                    return who, count
+                    return who, count, most
                 row += 1
                 item = rank[at]
                 whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
         in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
+        most = max(most, row + 1 - count)
         count = row + 1
         who += 1
-    return who, count
+    return who, count, most
 
 
 @njit
@@ -109,8 +111,8 @@ def _anew(together, tiles, tile, windows, word, step, shift, low, high):
 
 @njit(inline="always")
 def _in_order(first, last, item, samples, pixels, pellets, key, x):
-    """Sort rows `first` .. `last` - 1 by their keys; of pixels as near the item in front is first."""
-    for i in range(first + 1, last):
+    """Like `bitrows_jit.in_order`; of pixels as near the item in front is first."""
+    for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
         own = item[i], samples[i], pixels[i], pellets[i], key[i], x[i]
         j = i
         while j > first and (key[j - 1] > own[4] or (key[j - 1] == own[4] and item[j - 1] > own[0])):
@@ -120,12 +122,12 @@ def _in_order(first, last, item, samples, pixels, pellets, key, x):
         item[j], samples[j], pixels[j], pellets[j], key[j], x[j] = own
 
 
-@compiled(types.UniTuple(types.int64, 2)(*GIVEN, types.int64, types.int64))
+@compiled(types.UniTuple(types.int64, 3)(*GIVEN, types.int64, types.int64))
 def _gathered_up(
     turn, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
     rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed, each, height,
 ):  # fmt: skip
-    room = out.shape[1]
+    room, most = out.shape[1], 0
     whose, item, samples, pixels = out[0], out[1], out[2], out[3]
     pellets, key, nearest_x, nearest_y = out[4], out[5], out[6], out[7]  # the last one has the last pellet before
     stride, tiles_hit = height + 8, np.empty(len(rank), np.int64)
@@ -141,7 +143,7 @@ def _gathered_up(
             left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
             right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
             if is_far(origin_x[turn], origin_y[turn], left, top, right, bottom):
-                return -1, 0
+                return -1, 0, 0
             step = following[kind]
             for place in range(begin[cell], begin[cell + 1]):
                 at = listed[place]
@@ -192,9 +194,10 @@ def _gathered_up(
             break
         _in_order(count, row + 1, item, samples, pixels, pellets, key, nearest_x)
         pixels_of(count, row + 1, origin_x[turn], origin_y[turn], key, nearest_x, nearest_y)
+        most = max(most, row + 1 - count)
         count = row + 1
         turn += 1
-    return turn, count
+    return turn, count, most
 
 
 def looked_up(placed: Placed, windows: Windows, seen: Seen, cells: Cells, beside: Beside) -> Found:

@@ -20,7 +20,7 @@ from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from planes.arrays import Bools, Ints
-from planes.bitrows_jit import in_order, key_of, shared
+from planes.bitrows_jit import FEW_ROWS, in_order, key_of, shared, sort_places
 from planes.bits import WORD, Words
 from planes.cells import Cells
 from planes.cells_jit import cell_at
@@ -178,10 +178,16 @@ def _tell(met, every, count, x, y, buffer_at, room):
     key, across, item = met[every:], met[2 * every :], met[3 * every :]
     samples, down = met[4 * every :], met[5 * every :]
     in_order(0, count, x, y, item, samples, key, across, down)
+    order = met  # where the list of tiles was
+    for row in range(count):
+        order[row] = row
+    if count > FEW_ROWS:
+        sort_places(order[:count], key, down, across)
     found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
     for row in range(count):
-        found[row, 0], found[row, 1], found[row, 2] = item[row], samples[row], key[row]
-        found[row, 3], found[row, 4] = across[row], down[row]
+        at = order[row]
+        found[row, 0], found[row, 1], found[row, 2] = item[at], samples[at], key[at]
+        found[row, 3], found[row, 4] = across[at], down[at]
 
 
 @compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
