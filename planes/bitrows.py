@@ -19,7 +19,7 @@ from planes.strips import meets_strip
 
 __all__ = [
     "Found", "Placed", "Windows", "crossing", "cut_off", "found", "placed_boxes", "row_order", "union", "visible",
-    "windows_at",
+    "which", "windows_at",
 ]  # fmt: skip
 
 WORDS_AT_ONCE = 2**17
@@ -165,7 +165,7 @@ def _meeting(placed: Placed, windows: Windows, tiles: Ints, placement: Ints, nea
     box = windows.box_xyxy.T
     corner: list[Ints] = []
     for axis, place in ((0, placed.x), (1, placed.y)):
-        own, pattern = place.take(placement), _which(placed, windows, placement)
+        own, pattern = place.take(placement), which(placed, windows, placement)
         low, high = tiles[axis].take(near), tiles[axis + 2].take(near)
         low -= own
         high -= own
@@ -192,7 +192,7 @@ def crossing(placed: Placed, windows: Windows, tiles: Ints, placement: Ints, nea
         return placement, near
     wide, high = (int(np.maximum.reduce(tiles[side + 2] - tiles[side])) + 1 for side in (0, 1))
     left, top = tiles[0].take(near) - placed.x.take(placement), tiles[1].take(near) - placed.y.take(placement)
-    some = meets_strip(windows.strips, _which(placed, windows, placement), left, top, wide, high)
+    some = meets_strip(windows.strips, which(placed, windows, placement), left, top, wide, high)
     return placement.take(some), near.take(some)
 
 
@@ -208,7 +208,7 @@ def placed_boxes(placed: Placed, windows: Windows) -> Ints:
 def _counted(placed: Placed, windows: Windows, seen: Seen, met: Meeting, height: int, beside: Beside) -> Found:
     """What pairs share, compared in so many rows."""
     who, at, left, top = met
-    pattern, begin, low = _which(placed, windows, who), seen.begin[at], height < seen.height
+    pattern, begin, low = which(placed, windows, who), seen.begin[at], height < seen.height
     if low:
         begin -= top
         top = np.full_like(top, windows.box_xyxy[pattern, 1])
@@ -229,7 +229,7 @@ def _counted(placed: Placed, windows: Windows, seen: Seen, met: Meeting, height:
     return Found(who, at, samples.take(hit), distance2, across, down)
 
 
-def _which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
+def which(placed: Placed, windows: Windows, placement: Ints) -> Ints | int:
     """Patterns of placements; 0 where there is but one."""
     return placed.pattern[placement] if len(windows.first) > 1 else 0
 
@@ -271,7 +271,7 @@ def union(placed: Placed, windows: Windows, seen: Seen, placement: Ints, near: I
     """
     left, top = seen.box_xyxy[near, 0] - placed.x[placement], seen.box_xyxy[near, 1] - placed.y[placement]
     rows = rows_of(seen.words, seen.height, seen.begin[near])
-    rows &= windows_at(windows, seen.height, _which(placed, windows, placement), left, top)
+    rows &= windows_at(windows, seen.height, which(placed, windows, placement), left, top)
     together = np.bitwise_or.reduceat(rows, first, axis=0)
     return np.asarray(np.bitwise_count(together).sum(axis=1, dtype=np.int64))
 

@@ -18,7 +18,7 @@ from planes.bits import Words, rows_of
 from planes.cells import met_boxes
 from planes.itemrows import item_rows
 from planes.nearest import nearest
-from planes.spans import Box, ragged
+from planes.spans import Box, begins, ragged
 
 __all__ = ["Pile", "front_to_back"]
 
@@ -150,7 +150,7 @@ def _shared(placed: Placed, windows: Windows, pile: Pile, near: Near, height: in
     """Pairs that share pixels at all, and those pixels (n, height)."""
     rows = rows_of(pile.words, height, _first(pile, near.tile, near.top))
     who = near.placement
-    pattern = placed.pattern[who] if len(windows.first) > 1 else 0
+    pattern = bitrows.which(placed, windows, who)
     rows &= bitrows.windows_at(windows, height, pattern, near.left - placed.x[who], near.top - placed.y[who])
     some = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
     return near.at(some), rows[some]
@@ -179,18 +179,10 @@ def _hide(rows: Words, pile: Pile, near: Near, pierce: bool) -> None:
         cover <<= np.maximum(by, 0).view(np.uint64)[:, None]
         cover >>= np.maximum(-by, 0).view(np.uint64)[:, None]
         np.invert(cover, out=cover)
-        new = _begins(own).nonzero()[0]
+        new = begins(own).nonzero()[0]
         if len(new) < len(own):
             own, cover = own[new], np.bitwise_and.reduceat(cover, new, axis=0)
         rows[own] &= cover
-
-
-def _begins(group: Ints) -> Bools:
-    """Where groups (n,) begin, n > 0."""
-    new = np.empty(len(group), np.bool_)
-    new[0] = True
-    np.not_equal(group[1:], group[:-1], out=new[1:])
-    return new
 
 
 def _fronts(pile: Pile, near: Near, height: int) -> tuple[Ints, Ints, Ints]:

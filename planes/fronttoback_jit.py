@@ -30,6 +30,7 @@ from planes.bitrows_jit import (
     rows_by,
     shared,
 )
+from planes.bits import WORD
 from planes.compiled import compiled
 from planes.fronttoback import Pile
 from planes.spans import Box
@@ -45,8 +46,8 @@ FEW = 4
 CELL_BITS = 6
 """Of the side of those cells, at least: no tile is wider."""
 
-PAD = 64
-"""Empty rows before and after those of a pattern."""
+PAD = WORD
+"""Empty rows before and after those of a pattern, as `windows.columns_of` lays them out."""
 
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
 
@@ -91,10 +92,10 @@ def near_of(box, begin, listed, cells, left, top, right, bottom, near):
                 count += 1
         return count
     x, y, bits, wide, high = cells[0], cells[1], cells[2], cells[3], cells[4]
-    first, last = max((left - PAD + 1 - x) >> bits, 0), min((right - x) >> bits, wide - 1)
+    first, last = max((left - WORD + 1 - x) >> bits, 0), min((right - x) >> bits, wide - 1)
     if first > last:
         return 0
-    for row in range(max((top - PAD + 1 - y) >> bits, 0), min((bottom - y) >> bits, high - 1) + 1):
+    for row in range(max((top - WORD + 1 - y) >> bits, 0), min((bottom - y) >> bits, high - 1) + 1):
         for entry in range(begin[row * wide + first], begin[row * wide + last + 1]):
             tile = listed[entry]
             across = (box[tile, 0] <= right) & (box[tile, 2] >= left)

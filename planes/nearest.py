@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from planes.arrays import Ints
 from planes.bits import WORD, Seen, Words, rows_of
+from planes.spans import begins
 
 __all__ = ["BESIDE_REACH", "NOWHERE", "Beside", "beside_of", "nearest", "nearest_seen"]
 
@@ -53,9 +54,7 @@ def nearest(met: Words, left: Ints, top: Ints) -> tuple[Ints, Ints, Ints]:
     key += down
     key <<= _ROW_BITS
     key |= row
-    begins = np.ones(len(pair), np.bool_)
-    np.not_equal(pair[1:], pair[:-1], out=begins[1:])
-    key = np.minimum.reduceat(key, begins.nonzero()[0])
+    key = np.minimum.reduceat(key, begins(pair).nonzero()[0])
     row, distance2 = key & (WORD - 1), key >> _ROW_BITS
     down = row + top
     step = np.sqrt((distance2 - down * down).astype(np.float64)).astype(np.int64)  # of a square that a float holds

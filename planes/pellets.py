@@ -13,7 +13,7 @@ from planes.arrays import Bools, Ints
 from planes.bitrows import Found, Placed, Windows, placed_boxes
 from planes.bits import WORD, Seen
 from planes.nearest import Beside
-from planes.spans import ragged
+from planes.spans import begins, ragged
 from planes.twins import kernels_of
 
 __all__ = ["NOT_BESIDE", "Gathered", "gathered"]
@@ -81,7 +81,7 @@ def _counted(
     if each > 1 or (seen.rank[1:] == seen.rank[:-1]).any():
         order = kernels.row_order(turn, rank, found.seen, found.placement)
         found, rank, turn = Found(*(column[order] for column in found)), rank[order], turn[order]
-        first = np.flatnonzero((np.diff(turn, prepend=-1) != 0) | (np.diff(rank, prepend=-1) != 0))
+        first = np.flatnonzero(begins(turn) | begins(rank))
         samples = pixels = _sums(found.samples, first)
         if each > 1:
             pellets, pixels = _distinct(placed, windows, seen, found, first, kernels)
@@ -99,9 +99,9 @@ def _sums(values: Ints, first: Ints) -> Ints:
 
 def _nearest(found: Found, first: Ints, kernels: ModuleType) -> Ints:
     """The pair of each group whose pixel is nearest to the origin."""
-    begins = np.zeros(len(found.seen), np.int64)
-    begins[first] = 1
-    group = np.cumsum(begins)
+    new = np.zeros(len(found.seen), np.int64)
+    new[first] = 1
+    group = np.cumsum(new)
     return np.asarray(kernels.row_order(group, found.distance2, found.y, found.x)[first])
 
 
@@ -109,10 +109,10 @@ def _distinct(
     placed: Placed, windows: Windows, seen: Seen, found: Found, first: Ints, kernels: ModuleType
 ) -> tuple[Ints, Ints]:
     """Pellets that hit, and pixels counted once, of each group; its pairs are sorted by (tile, placement)."""
-    begins = np.diff(found.seen, prepend=-1) != 0
-    begins[first] = True
-    tile = np.flatnonzero(begins)
-    together, length = _sums(found.samples, tile), np.diff(tile, append=len(begins))
+    new = begins(found.seen)
+    new[first] = True
+    tile = np.flatnonzero(new)
+    together, length = _sums(found.samples, tile), np.diff(tile, append=len(new))
     several = np.flatnonzero(length > 1)
     several = several[_may_overlap(placed, windows, found.placement, tile[several], length[several])]
     if len(several):
@@ -121,9 +121,9 @@ def _distinct(
         pair = tile[several][group] + place
         first_of = np.cumsum(length) - length
         together[several] = kernels.union(placed, windows, seen, found.placement[pair], found.seen[pair], first_of)
-    group = np.searchsorted(first, np.arange(len(begins)), side="right") - 1
+    group = np.searchsorted(first, np.arange(len(new)), side="right") - 1
     order = kernels.row_order(group, found.placement, group, group)
-    new = np.diff(found.placement[order], prepend=-1) != 0
+    new = begins(found.placement[order])
     new[first] = True
     return _sums(new.astype(np.int64), first), _sums(together, np.searchsorted(tile, first))
 

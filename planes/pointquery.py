@@ -15,7 +15,7 @@ from planes.arrays import Bools, Codes, Ints
 from planes.cells import met_boxes, within
 from planes.constants import HALF, SUB
 from planes.grid256 import pixel
-from planes.spans import Box
+from planes.spans import Box, begins
 from planes.stack import Stack
 
 __all__ = ["CELL_BITS", "Front", "front_at", "front_of", "occupied"]
@@ -76,8 +76,7 @@ def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
     texel = stack.offset.take(rank) + down[:, 1] * stack.width.take(rank) + down[:, 0]
     on = stack.masks.take(texel).nonzero()[0]
     place, rank = place.take(on), rank.take(on)
-    front = np.ones(len(place), np.bool_)
-    np.not_equal(place[1:], place[:-1], out=front[1:])
+    front = begins(place)
     if stack.has_occluders:
         front &= ~stack.occluder.take(rank)
     if bounds is not None:

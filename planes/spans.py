@@ -16,9 +16,16 @@ import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
 
-__all__ = ["Spans", "each_pixel", "meets", "merged_runs", "pieces", "ragged"]
+__all__ = ["Spans", "begins", "each_pixel", "meets", "merged_runs", "pieces", "ragged"]
 
 Box = tuple[int, int, int, int]
+
+
+def begins(group: Ints) -> Bools:
+    """Which of numbers (n,) differ from those before them: the first ones of groups."""
+    new = np.ones(len(group), np.bool_)
+    np.not_equal(group[1:], group[:-1], out=new[1:])
+    return new
 
 
 def ragged(lengths: Ints) -> tuple[Ints, Ints]:

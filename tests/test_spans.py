@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes.spans import Spans
+from planes.spans import Spans, begins
 
 LAWS = settings(max_examples=200, deadline=None)
 
@@ -190,3 +190,8 @@ def test_unequal_by_one_pixel() -> None:
     spans = make([(0, 0, 4), (1, 2, 3)])
     for other in ([(0, 0, 4)], [(0, 0, 4), (1, 2, 4)], [(0, 0, 4), (1, 1, 3)], [(0, 0, 4), (2, 2, 3)], []):
         assert spans != make(other)
+
+
+@given(st.lists(st.integers(-3, 3)))
+def test_where_groups_begin(group: list[int]) -> None:
+    assert begins(np.array(group, np.int64)).tolist() == [i == 0 or group[i - 1] != g for i, g in enumerate(group)]

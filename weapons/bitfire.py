@@ -141,7 +141,7 @@ def _reader(scene: Scene, name: str, view: View | None, alone: bool, sight: Sigh
 
     Parameters
     ----------
-    alone : whether each placement has rows of its own, and no pre-filter but boxes was asked for
+    alone : whether each placement has rows of its own, and no pre-filter or broad phase was asked for
     """
     if name == "composed" and view is not None:
         known = scene.compositions()
@@ -150,7 +150,7 @@ def _reader(scene: Scene, name: str, view: View | None, alone: bool, sight: Sigh
         sight.plan.run("composition", "what can be seen of all objects", 0 if kept else composition.nbytes)
         return _by_composition(composition, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     if alone:
-        return _by_pile(scene.items, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
+        return _by_pile(scene.items, view, sight), PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE
     first = min(CHUNK_PAIRS // max(len(sight.stack), 1), NEAR_AT_ONCE)
     return _by_items(scene.items, view, sight), first, NEAR_AT_ONCE
 
@@ -244,7 +244,7 @@ def _beside(composition: Composition, volley: Volley) -> tuple[Beside, int]:
     return composition.beside, 0 if known else composition.beside.nbytes
 
 
-def _by_pile(items: Items, sight: Sight) -> Reader:
+def _by_pile(items: Items, view: View | None, sight: Sight) -> Reader:
     """Count what placements cover of tiles where they lie, front to back."""
     tiles, stack = items.tiles(), sight.stack
     pile = tiles.pile(stack)
@@ -253,8 +253,11 @@ def _by_pile(items: Items, sight: Sight) -> Reader:
     def read(shots: Shots, volley: Volley) -> Rows:
         """Let each placement take its pixels from what is left of its pattern."""
         windows = _windows(volley, sight.plan)
-        accept, exclude = None, None
-        if may_refuse(stack, shots):
+        accept: Ints | int | None = None
+        exclude: Ints | None = None
+        if may_refuse(stack, shots) and view is not None:
+            accept, exclude = view.accept, np.array([view.exclude], np.int64)
+        elif view is None:
             accept, exclude = shots.accept[volley.shot], shots.exclude[volley.shot]
         found = kernels_of(fronttoback).front_to_back(
             placed_of(volley), windows, pile, accept, exclude, sight.pierce, sight.bounds

@@ -55,8 +55,13 @@ class Costs(NamedTuple):
     pixel: float
 
 
-IN_NUMPY = Costs(50_000, 50_000, 120_000, 500, 4.0, 2_000_000, 2500, 7500, REDRAW_PIXEL_NS)
-COMPILED = Costs(5000, 25_000, 190_000, 120, 0.3, 100_000, 1500, 400, 0.05)
+IN_NUMPY = Costs(
+    call=50_000, read=50_000, scattered=120_000, placement=500, pair=4.0, compose=2_000_000, item=2500, draw=7500,
+    pixel=REDRAW_PIXEL_NS,
+)  # fmt: skip
+COMPILED = Costs(
+    call=5000, read=25_000, scattered=190_000, placement=120, pair=0.3, compose=100_000, item=1500, draw=400, pixel=0.05
+)
 """Measured with `tests/bench/strategies.py` on one machine; the choice hangs on their ratios only."""
 
 
@@ -71,7 +76,8 @@ def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTab
     choice("strategy", strategy, STRATEGIES)
     plane = scene.code_plane()
     if strategy == "composed" and plane is None:
-        raise InputError("strategy: expected bounds that fit one plane for 'composed', got a scene without them")
+        what = "'composed' of falloff or of patterns beyond 2048 px"
+        raise InputError(f"strategy: expected bounds that fit one plane for {what}, got a scene without them")
     if strategy != "auto":
         return strategy, "asked for"
     if plane is None:

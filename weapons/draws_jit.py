@@ -8,14 +8,13 @@ from numba import njit, types
 from planes.arrays import Ints
 from planes.compiled import compiled
 from planes.constants import SUB
-from weapons.draws import Words
+from weapons.draws import GOLDEN, Words
 
 __all__ = ["disc_offsets"]
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
 PELLETS = types.Array(types.int64, 2, "A", readonly=True)
 SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
-GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 AT_ONCE = 256
 """Pellets that are drawn at a time, or those of a round."""

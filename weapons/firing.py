@@ -64,8 +64,9 @@ def fire(
         before the pixels; it changes no row
     broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row; none
         without a pre-filter
-    strategy : "auto", "direct", "composed" (of rays only thin ones that end at their first hit): how pixels are looked
-        up; it changes no row
+    strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row. Composed are of rays only thin
+        ones that end at their first hit, and of patterns with falloff, or beyond 2048 px, those at a scene with bounds;
+        shots of other patterns that differ in what they accept are looked up direct, as the plan tells
 
     Each of aim, toward, accept, exclude, seed, shot and tick is one for all shots or one for each.
 

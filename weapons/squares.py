@@ -202,7 +202,7 @@ class Squares:
         """Forget what lies near boxes; False if that is so much that all may as well go."""
         wide = (SIDE + self._side) >> CELL_SHIFT
         if len(boxes_xyxy) * wide * wide > sum(map(len, self.made.values())):
-            return not len(boxes_xyxy)
+            return False
         hidden = meets(boxes_xyxy[:, None], stack.box_xyxy).any(axis=0)
         for item in (*ids.tolist(), *stack.ids[hidden].tolist()):
             for seen in self._tiles.pop(item, {}).values():

@@ -228,7 +228,7 @@ def _redraw(scene: Scene) -> Callable[[Any, int], Scene]:
     assert plane is not None
     plane.read(scene.items)
 
-    def answer(steps: Any, units: int) -> int:
+    def answer(steps: Any, units: int) -> Scene:
         for some, xy in steps[:units]:
             scene.move(some, xy)
             plane.read(scene.items)
