@@ -37,6 +37,7 @@ def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]],
     """
 
     def made(kernel: Callable[..., Any]) -> Any:
+        """Compile it, or find what is kept on disk."""
         dispatcher = njit(**{"nogil": True, **options})(kernel)
         dispatcher.enable_caching()
         dispatcher._cache._cache_file._source_stamp = _stamp()

@@ -32,10 +32,10 @@ CELLS_BYTES = 2**25
 """Cells that a composition keeps for the last few boxes of patterns, bytes."""
 
 WITHOUT_MOST = 128
-"""Placements that are compared with all that can be seen take as long as it takes to list that by cells."""
+"""So many placements are compared with all tiles that can be seen in the time that it takes to list those by cells."""
 
 PAIRS_MOST = 2**20
-"""Pairs of placements and tiles up to which they are."""
+"""Pairs of placements and tiles that a call compares like that, at most."""
 
 SHOT_BITS = 4
 """Of the side of the cells of shot positions: 16 px; in larger ones more boxes are listed that no pattern meets."""
@@ -90,7 +90,7 @@ class Composition:
     def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells, int]:
         """The same for so many placements, and the bytes that were made; where few ask for a box, one cell with all.
 
-        When as many did with that as lists would have cost, those of the next box are made.
+        When so many did with that as take as long as lists to be made, those of the next box are made.
         """
         reach = tuple(reach_xyxy.tolist())
         if reach in self._cells.values:

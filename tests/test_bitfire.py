@@ -353,8 +353,10 @@ def test_rows_of_a_crowd_by_many_pellets_are_the_same_compiled(seed: int) -> Non
     for place in rng.integers(-70, 70, (400, 2)).tolist():
         scene.add(rng.random((14, 14)) < 0.4, place)
     weapon, told = Spread(Disc(4, pierce=True), count=30, radius=60), []
-    for on in (False, True):
-        use_jit(on)
-        told.append(fire(scene, weapon, np.zeros((3, 2)), seed=seed, strategy="composed"))
-    use_jit(None)
+    try:
+        for on in (False, True):
+            use_jit(on)
+            told.append(fire(scene, weapon, np.zeros((3, 2)), seed=seed, strategy="composed"))
+    finally:
+        use_jit(None)
     assert told[0] == told[1] and len(told[0]) > 300

@@ -103,10 +103,12 @@ def test_nothing_can_be_seen_of_no_objects() -> None:
 def test_distances_along_rows_are_counted_where_they_are_made() -> None:
     scene = crowd()
     at = np.random.default_rng(3).integers(0, 400, (200, 2))
-    use_jit(False)
-    told = [fire(scene, Disc(9), at, strategy="composed").plan.ran for _ in range(2)]
+    try:
+        use_jit(False)
+        told = [fire(scene, Disc(9), at, strategy="composed").plan.ran for _ in range(2)]
+    finally:
+        use_jit(None)
     first, second = (next(stage.bytes_made for stage in ran if stage.name == "samples") for ran in told)
-    use_jit(None)
     composition = scene.compositions().kept(View(False, ALL, ()), scene.version)
     assert composition is not None and first - second == composition.beside.nbytes > 0
 

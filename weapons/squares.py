@@ -161,6 +161,7 @@ class Squares:
         pieces = pieces_of(one.spans, self._frame, stride)
 
         def look(x: int, y: int, hits: Answer) -> None:
+            """Look up the tiles near a pixel, and tell what is shared with them, the nearest first."""
             shared: list[Shared] = []
             for dx, dy, rows, depths in pieces:
                 left, top = x + dx, y + dy

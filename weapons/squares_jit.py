@@ -303,6 +303,7 @@ class Squares:
         buffers: list[Buffer] = []
 
         def look(x: float, y: float, hits: Answer) -> None:
+            """Let the kernel look, and read its rows from a buffer."""
             try:
                 buffer = buffers.pop()  # another thread has another one
             except IndexError:
