@@ -9,8 +9,9 @@ import numpy as np
 from planes import jumps
 from planes.arrays import Codes, Ints
 from planes.compose import CodePlane
-from planes.items import Items, clipped
+from planes.items import Items
 from planes.jumps import PAD, Clearance
+from planes.spans import Box
 from planes.twins import kernels_of
 
 __all__ = ["ClearancePlane"]
@@ -46,13 +47,19 @@ class ClearancePlane:
 
     def _is_made(self, items: Items) -> bool:
         if self._seen != items.version:
-            changed = items.changed_boxes(self._seen)
-            if changed is not None:
-                changed = clipped(changed, self.codes.box_xyxy)
-            if changed is None or (changed[:, :2] <= changed[:, 2:]).all(axis=1).any():
+            changes = items.changes(self._seen)
+            if changes is None or any(self._holds(box) for _, _, *both in changes for box in both):
                 self._clearance, self.missed = None, 0.0
             self._seen = items.version
         return self._clearance is not None
+
+    def _holds(self, boxes_xyxy: Ints | Box) -> bool:
+        """Whether one of some boxes lies on the plane, at least in part; those that end before they begin are empty."""
+        box, (left, top, right, low) = np.reshape(boxes_xyxy, (-1, 4)).T, self.codes.box_xyxy
+        there = (np.maximum(box[0], left) <= np.minimum(box[2], right)) & (
+            np.maximum(box[1], top) <= np.minimum(box[3], low)
+        )
+        return bool(there.any())
 
     def read(self, items: Items, codes: Codes) -> Clearance:
         """Distances (h + 2 PAD, w + 2 PAD) of the present version; `codes` are what the code plane reads then."""

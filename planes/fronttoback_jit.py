@@ -35,7 +35,9 @@ from planes.compiled import compiled
 from planes.fronttoback import Pile
 from planes.spans import Box
 
-__all__ = ["PAD", "cut_off", "front_to_back", "laid", "near_of", "struck", "take"]
+__all__ = [
+    "NOBODY", "NONE", "OWNERS", "PAD", "cut_off", "front_to_back", "laid", "near_of", "refuses", "struck", "take",
+]  # fmt: skip
 
 PART_NS, PLACEMENT_NS, TILE_NS = 8e5, 150.0, 0.7
 """What a thread must have to do to be worth it; about what a placement takes, and more for each tile there is."""
@@ -202,7 +204,7 @@ def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
 
 
 @njit(inline="always")
-def _refused(tile, categories, owner, accept, exclude, who):
+def refuses(tile, categories, owner, accept, exclude, who):
     """Whether a shot refuses the item of a tile; what there is one of is for all shots."""
     if categories[tile] & accept[who if len(accept) > 1 else 0] == 0:
         return True
@@ -218,7 +220,7 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
     kept = objects = 0
     for i in range(count):
         tile = near[i]
-        if len(accept) and _refused(tile, categories, owner, accept, exclude, who):
+        if len(accept) and refuses(tile, categories, owner, accept, exclude, who):
             continue
         near[kept] = tile
         kept += 1

@@ -9,7 +9,7 @@ from planes.compiled import compiled
 from planes.constants import HALF, SUB
 from planes.jumps import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 
-__all__ = ["clearance_of", "first_taken"]
+__all__ = ["clearance_of", "first_taken", "over"]
 
 BLOCK = 128
 """Rays that go on together, so that none waits for another's look: their columns fit the fastest cache."""
@@ -154,7 +154,7 @@ def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
 
 
 @compiled(error_model="numpy")
-def _over(numerator, denominator):  # type: ignore[no-untyped-def]
+def over(numerator, denominator):  # type: ignore[no-untyped-def]
     """The quotient of whole numbers, rounded down; division in floats is several times as fast."""
     if abs(numerator) < EXACT:
         return np.int64(np.floor(float(numerator) / float(denominator)))
@@ -183,12 +183,12 @@ def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: igno
     if dy == 0 and ay == -HALF:
         aside, c = width, 0
     first, stop = 0, last_x + last_y + 1
-    off_x, off_y = -_over(c - b * (room_x + 1), max(a, 1)), _over(c + b * room_y, max(SUB * dy, 1)) + 1
+    off_x, off_y = -over(c - b * (room_x + 1), max(a, 1)), over(c + b * room_y, max(SUB * dy, 1)) + 1
     stop = min(stop, off_x if last_x > room_x else stop, off_y if last_y > room_y else stop)
     if behind_x < 1:
-        first = max(first, -_over(c - b * (1 - behind_x), a))
+        first = max(first, -over(c - b * (1 - behind_x), a))
     if behind_y < 1:
-        first = max(first, _over(c - b * behind_y, SUB * dy) + 1)
+        first = max(first, over(c - b * behind_y, SUB * dy) + 1)
     if float(a) * stop + c >= EXACT:
         return UNDECIDED
     block[A, one], block[B, one], block[C, one] = a, b, c

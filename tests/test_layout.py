@@ -20,7 +20,7 @@ ORDER = {
         "turning_jit", "forms", "sprite", "hull", "cover", "outline", "fit", "bounding", "placing",
         "placing_jit", "items", "cropping", "cropping_jit", "visible", "index", "painting",
         "painting_jit", "steps", "steps_jit", "pointquery", "pointquery_jit", "compose", "jumps",
-        "jumps_jit", "clearance", "labels", "poses", "scenefile", "scene", "loading", "history",
+        "jumps_jit", "clearance", "raycast", "raycast_jit", "labels", "poses", "scenefile", "scene", "loading", "history",
         "render", "sampling",
     ),
     "weapons": (
@@ -28,7 +28,7 @@ ORDER = {
         "rays", "trace", "narrow", "candidates", "costs", "plan", "resolve", "explain", "margins",
         "hits", "counting", "oneshot", "pieces", "squares", "squares_jit", "runfire", "bitfire",
         "meetings", "flight", "ends", "passes", "tracing", "rayexplain", "leaving", "raymargins",
-        "rayhits", "firsthits", "rayways", "jumping", "rayfire", "firing", "ready", "clock", "orders",
+        "rayhits", "firsthits", "rayways", "jumping", "casting", "rayfire", "firing", "ready", "clock", "orders",
         "heat", "rayfacts", "thennow", "sieve", "facts", "schemas", "jsondiff", "record", "words",
         "raywords", "marks", "strokes", "signs", "world", "ghosts", "sketch", "panel", "overlay",
         "raymarks", "inset", "cards", "picture", "raychanges", "differences", "versus", "goldfile",

@@ -1,7 +1,7 @@
 """Fire rays: the whole flow of a traced weapon on one screen.
 
 scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
-                                 -> jumps to the first pixel that is taken -> ends -> rows
+                                 -> cast at all items, or jumps to the first pixel that is taken -> ends -> rows
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from planes.arrays import Ints
 from planes.constants import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
 from planes.scene import Scene
 from weapons.candidates import Candidates, may_refuse
+from weapons.casting import ends_by_casting
 from weapons.costs import chosen_candidates
 from weapons.ends import Ends
 from weapons.firsthits import FirstHits
@@ -27,14 +28,11 @@ from weapons.passes import Passes, Stops, passes_of, stops_of
 from weapons.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from weapons.rayhits import RayHits, Told, pixels_of, rows_of_passes
 from weapons.rays import Parts, Rays, rays_of
-from weapons.rayways import chosen_way, ends_at_first, jumps_at_all
+from weapons.rayways import Way, chosen_way, ends_at_first, jumps_at_all
 from weapons.trace import Lines
 from weapons.tracing import Range, expected_cells, trace
 from weapons.volley import Shots
 from weapons.weapon import Weapon
-
-if TYPE_CHECKING:
-    from planes.clearance import ClearancePlane
 
 __all__ = ["fired_rays"]
 
@@ -65,11 +63,11 @@ def fired_rays(
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
     prefilter, broadphase, strategy = how
-    plane, why = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
+    way = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack, False)
-    candidates = choose(0 if plane else each * len(shots))
+    candidates = choose(0 if way.plane or way.casts else each * len(shots))
     through = Range(scene.items, stack, scene.bounds, candidates, plan)
-    plan.run("plan", why if plane else candidates.why)
+    plan.run("plan", way.why if way.plane or way.casts else candidates.why)
     step = max(1, CHUNK_ROWS // each)
     rows: list[Rows] = []
     found: list[tuple[int, Followed | FirstHits]] = []
@@ -78,7 +76,7 @@ def fired_rays(
         rays = rays_of(parts, some)
         plan.run("rays", "both ends on the grid", rays.nbytes)
         if ends_at_first(ray):
-            ends = _first_ends(rays, ray, some, through, plane, choose)
+            ends = _first_ends(rays, ray, some, through, way, choose)
             first = FirstHits(rays, ray, ends, stack)
             rows.append(first.rows(len(some)))
             found.append((begin, first))
@@ -92,7 +90,7 @@ def fired_rays(
             rows[-1].shot[:] += begin
     hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
     plan.run("rows", "")
-    _leave_out_unused(plan, scene, through, shots, ray, plane is not None, why)
+    _leave_out_unused(plan, scene, through, shots, ray, way)
     plan.run("plan", "")
     return hits
 
@@ -109,19 +107,16 @@ def _later(columns: C, first_shot: int) -> C:
     return replace(columns, shot=columns.shot + first_shot) if first_shot else columns
 
 
-def _leave_out_unused(
-    plan: Plan, scene: Scene, through: Range, shots: Shots, ray: Traced, jumps: bool, why: str
-) -> None:
+def _leave_out_unused(plan: Plan, scene: Scene, through: Range, shots: Shots, ray: Traced, way: Way) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
     candidates, idle = through.candidates, "no ray was left to walk"
-    if not plan.has_run("walk"):
-        for name in ("pre-filter", "walk", "stops"):
-            plan.leave_out(name, idle)
-    plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("walk") else idle)
+    for name in ("pre-filter", "walk", "stops"):
+        plan.leave_out(name, idle)
+    plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("pre-filter") else idle)
     if ends_at_first(ray):
         plan.leave_out("passes", "told when they are asked for, as the stops are")
-    if jumps_at_all(ray) and not jumps:
-        plan.leave_out("jumps", why)
+    if jumps_at_all(ray) and way.plane is None:
+        plan.leave_out("jumps", way.why)
     plan.leave_out("cells between items", "only those inside their boxes are looked at")
     plan.leave_out("verdicts", "counted when asked for")
     plan.leave_out("volumes", "boxes are the pre-filter")
@@ -130,19 +125,22 @@ def _leave_out_unused(
     leave_out_imagery(plan, scene)
 
 
-def _first_ends(
-    rays: Rays, ray: Traced, shots: Shots, through: Range, plane: ClearancePlane | None, choose: Choose
-) -> Ends:
-    """Where rays end, of a weapon that ends at its first hit: by jumps if there is a plane, and else by walking."""
-    if plane is None:
-        return Ends.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
-    from weapons.jumping import ends_by_jumps  # few calls need it
+def _first_ends(rays: Rays, ray: Traced, shots: Shots, through: Range, way: Way, choose: Choose) -> Ends:
+    """Where rays end, of a weapon that ends at its first hit; the way tells how, and what is left of them walks."""
+    if way.plane is not None:
+        from weapons.jumping import ends_by_jumps  # few calls need it
 
-    ends, left = ends_by_jumps(rays, ray, shots, through.items, through.stack, plane, through.plan)
+        ends, left = ends_by_jumps(rays, ray, shots, through.items, through.stack, way.plane, through.plan)
+    elif way.casts:
+        ends, left = ends_by_casting(rays, ray, shots, through)
+    else:
+        return Ends.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
     if len(left):
-        candidates = choose(len(left))
+        walking, candidates = Way(None, way.plane is not None and way.casts, way.why), choose(len(left))
         through.plan.run("plan", "")
-        ends.put(left, _first_ends(rays.pick(left), ray, shots, replace(through, candidates=candidates), None, choose))
+        ends.put(
+            left, _first_ends(rays.pick(left), ray, shots, replace(through, candidates=candidates), walking, choose)
+        )
     return ends
 
 

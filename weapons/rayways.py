@@ -1,23 +1,35 @@
-"""Two ways of rays to their first hit: to walk past items, or to jump by the clearance plane; which one pays."""
+"""Ways of rays to their first hit: to walk past items, to be cast at them, or to jump by a plane; which one pays."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from planes import raycast
 from planes.arrays import InputError, choice
 from planes.items import Stack
 from planes.scene import Scene
+from planes.twins import kernels_of
 from weapons.costs import REDRAW_PIXEL_NS, STRATEGIES
 from weapons.guns import Projectile, Traced
 
 if TYPE_CHECKING:
     from planes.clearance import ClearancePlane
 
-__all__ = ["chosen_way", "ends_at_first", "jumps_at_all"]
+__all__ = ["Way", "chosen_way", "ends_at_first", "jumps_at_all"]
 
 WALK_CALL_NS, WALK_RAY_NS = 700_000.0, 12_000.0
 JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 300_000.0, 400.0, 5.5
+CAST_CALL_NS, CAST_RAY_NS, CAST_ITEM_NS = 300_000.0, 100_000.0, 50.0
+CAST_COMPILED_RAY_NS, CAST_COMPILED_ITEM_NS = 1000.0, 2.0
 """Measured with `tests/bench/rays.py` on one machine; the choice hangs on their ratios only."""
+
+
+class Way(NamedTuple):
+    """How rays go to their ends, and why: jumping by a plane, if there is one, or else cast at items, or walking."""
+
+    plane: ClearancePlane | None
+    casts: bool
+    why: str
 
 
 def ends_at_first(ray: Traced) -> bool:
@@ -30,10 +42,8 @@ def jumps_at_all(ray: Traced) -> bool:
     return ends_at_first(ray) and not ray.radius_256
 
 
-def chosen_way(
-    strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Stack, rays: int
-) -> tuple[ClearancePlane | None, str]:
-    """The plane by which so many rays of a weapon jump, or None where they walk, and why.
+def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Stack, rays: int) -> Way:
+    """The way of so many rays of a weapon.
 
     Parameters
     ----------
@@ -47,19 +57,28 @@ def chosen_way(
     """
     choice("strategy", strategy, STRATEGIES if jumps_at_all(ray) else STRATEGIES[:2])
     if not jumps_at_all(ray):
-        return None, "only thin rays that end at their first hit do"
-    if strategy == "direct" or (strategy == "auto" and (asked or not len(stack))):
-        return None, "every ray walks"
-    plane = scene.clearance()
+        return Way(None, False, "only thin rays that end at their first hit do")
+    plane = None if strategy == "direct" else scene.clearance()
     if strategy == "composed":
         if plane is None:
             raise InputError("strategy: expected bounds that fit one plane for 'composed', got a scene without them")
-        return plane, "asked for"
+        return Way(plane, False, "asked for")
+    if asked or not len(stack):
+        return Way(None, False, "every ray walks")
+    walk, cast = WALK_CALL_NS + rays * WALK_RAY_NS, _cast_ns(rays, len(stack))
+    casts, direct = cast < walk, min(cast, walk)
+    told = f"{direct / 1e3:.0f} us {'cast at items' if casts else 'walking'}"
     if plane is None:
-        return None, "no bounds that fit one plane"
-    walk, jump = WALK_CALL_NS + rays * WALK_RAY_NS, JUMP_CALL_NS + rays * JUMP_RAY_NS
-    owed = 0.0
+        return Way(None, casts, "direct is asked for" if strategy == "direct" else "no bounds that fit one plane")
+    jump, owed = JUMP_CALL_NS + rays * JUMP_RAY_NS, 0.0
     if not plane.is_made(scene.items):
         owed = plane.codes.cost(scene.items) * REDRAW_PIXEL_NS + plane.codes.size * CLEARANCE_PIXEL_NS
-    plane.missed += max(walk - jump, 0.0)
-    return (plane if plane.missed > owed else None), f"about {(jump + owed) / 1e3:.0f} us by jumps, {walk / 1e3:.0f} us"
+    plane.missed += max(direct - jump, 0.0)
+    return Way(plane if plane.missed > owed else None, casts, f"about {(jump + owed) / 1e3:.0f} us by jumps, {told}")
+
+
+def _cast_ns(rays: int, items: int) -> float:
+    """What it costs to cast rays at items, ns."""
+    if kernels_of(raycast) is raycast:
+        return CAST_CALL_NS + rays * (CAST_RAY_NS + items * CAST_ITEM_NS)
+    return CAST_CALL_NS + rays * (CAST_COMPILED_RAY_NS + items * CAST_COMPILED_ITEM_NS)

@@ -1,0 +1,205 @@
+"""The first item that a thin ray touches, of all items where they lie: no plane is made, and no list of cells.
+
+A ray looks at the boxes that it goes through in the order in which it enters them, and in each at its cells row by row,
+until nothing that is left comes before what it has found. Times are those of `weapons.trace`: whole numbers over
+max(1, |dx|) max(1, |dy|), so that which of two cells comes first is never a matter of rounding.
+
+Of cells that are entered at once those with an occluder come first, then those of the least y, then x; in a cell the
+item in front. `raycast_jit` has the same function, compiled.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planes.arrays import Ints
+from planes.constants import HALF, SUB
+from planes.spans import Box, meets
+from planes.stack import Stack, clipped
+
+__all__ = ["LONGEST", "NOTHING", "UNDECIDED", "Touched", "first_touched"]
+
+NOTHING, UNDECIDED = -1, -2
+"""Instead of a time: it touches nothing; or it is none of those that this can follow."""
+
+LONGEST = 2**30
+"""The farthest step along an axis, 1/256 px: products with it fit int64."""
+
+Pair = tuple[int, int]
+Span = tuple[int, int]
+
+
+class Touched(NamedTuple):
+    """What rays (R,) touch first, as columns.
+
+    Parameters
+    ----------
+    entry : when a ray enters the cell where it touches an item first; NOTHING; or UNDECIDED
+    x, y, rank : that cell, and the item
+    """
+
+    entry: Ints
+    x: Ints
+    y: Ints
+    rank: Ints
+
+
+class Near(NamedTuple):
+    """Items (n,) that a ray may touch, in the order in which it enters their boxes.
+
+    Parameters
+    ----------
+    rank : their places in the stack
+    entry, leave : when the ray enters and leaves their boxes
+    box_xyxy : (n, 4) the parts of them that lie within the bounds, about the pixel on which the ray begins
+    """
+
+    rank: Ints
+    entry: Ints
+    leave: Ints
+    box_xyxy: Ints
+
+
+def first_touched(
+    stack: Stack, bounds: Box | None, start_256: Ints, step_256: Ints, accept: Ints | None, exclude: Ints
+) -> Touched:
+    """Find what each ray touches first.
+
+    Parameters
+    ----------
+    bounds : of what can be touched; None for all
+    start_256, step_256 : (R, 2) rays, up to 2**48
+    accept : (R,) category bits of what a ray may touch; None if it may touch all
+    exclude : (R, K) owners of what it may not, beside
+
+    Returns
+    -------
+    A ray without length, or one whose step is longer than LONGEST, is UNDECIDED.
+    """
+    found = []
+    for ray, (start, step) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
+        if step == [0, 0] or max(map(abs, step)) > LONGEST:
+            found.append((UNDECIDED, 0, 0, -1))
+            continue
+        origin = (start[0] + HALF) // SUB, (start[1] + HALF) // SUB
+        one = Ray((start[0] - SUB * origin[0], start[1] - SUB * origin[1]), (step[0], step[1]))
+        accepts = None if accept is None else (accept[ray], exclude[ray])
+        found.append(_first(one, origin, _near(one, origin, stack, bounds, accepts), stack))
+    return Touched(*np.array(found, np.int64).reshape(-1, 4).T)
+
+
+class Ray:
+    """A thin ray about the pixel on which it begins, 1/256 px."""
+
+    def __init__(self, start: Pair, step: Pair) -> None:
+        self.start, self.step = start, step
+        self.across = max(abs(step[1]), 1), max(abs(step[0]), 1)
+        self.major = int(abs(step[1]) > abs(step[0]))
+
+    def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """When it enters and leaves boxes (n, 4) of pixels; one that it does not touch is left before it is entered."""
+        entry, leave = np.zeros(len(boxes_xyxy), np.int64), np.full(len(boxes_xyxy), self.across[0] * self.across[1])
+        for axis, across in enumerate(self.across):
+            low = SUB * boxes_xyxy[:, axis] - (HALF + self.start[axis])
+            high = SUB * boxes_xyxy[:, axis + 2] + (HALF - self.start[axis])
+            if not self.step[axis]:
+                leave[(low > 0) | (high < 0)] = -1
+                continue
+            near, far = (low, high) if self.step[axis] > 0 else (-high, -low)
+            np.maximum(entry, near * across, out=entry)
+            np.minimum(leave, far * across, out=leave)
+        return entry, leave
+
+    def rows(self, box: list[int], times: Span) -> range:
+        """Rows of a box that it comes to in some time, along the axis on which it goes less far, in its order."""
+        minor = 1 - self.major
+        begin, step, scale = self.start[minor], self.step[minor], self.across[0] * self.across[1]
+        at = sorted((begin + step * time // scale + HALF) // SUB for time in times)
+        first, last = max(at[0] - 1, box[minor]), min(at[1] + 1, box[minor + 2])  # on a border it is in two of them
+        return range(first, last + 1) if step >= 0 else range(last, first - 1, -1)
+
+    def run(self, row: int) -> Span:
+        """The first and last cell that it touches in a row, along the axis on which it goes farther; none of others."""
+        u, along = self.start[self.major], self.step[self.major]
+        begin, step = self.start[1 - self.major], self.step[1 - self.major]
+        first = max(min(begin, begin + step), SUB * row - HALF) - begin
+        last = min(max(begin, begin + step), SUB * row + HALF) - begin
+        if first > last:
+            return 1, 0
+        if step:
+            per, slope = abs(step), along if step > 0 else -along
+            low, high = sorted((u * per + first * slope, u * per + last * slope))
+        else:
+            per, low, high = 1, min(u, u + along), max(u, u + along)
+        return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+
+def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: tuple[Ints, Ints] | None) -> Near:
+    """Accepted items whose boxes a ray goes through."""
+    ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
+    around = [(low - HALF) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
+    around += [(high + HALF) // SUB + o for (_, high), o in zip(ends, origin, strict=True)]
+    rank = np.flatnonzero(meets(np.array(around), stack.box_xyxy))
+    if accepts is not None:
+        owned = (stack.owner[rank, None] == accepts[1]).any(axis=1)
+        rank = rank[(stack.categories[rank] & accepts[0] != 0) & ~owned]
+    box = stack.box_xyxy[rank]
+    if bounds is not None:
+        box = clipped(box, bounds)
+    box = box - np.array([*origin, *origin])
+    entry, leave = ray.times(box)
+    some = np.flatnonzero((entry <= leave) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
+    some = some[np.argsort(entry[some], kind="stable")]
+    return Near(rank[some], entry[some], leave[some], box[some])
+
+
+def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, int, int]:
+    """When a ray touches the first of some items, in which cell, and which."""
+    best: tuple[int, int, int] | None = None
+    for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
+        if best is not None and entry > best[0]:
+            break
+        found = _in(ray, origin, near.box_xyxy[k].tolist(), (entry, leave), stack, int(near.rank[k]))
+        if found is not None and (best is None or found[0] < best[0]):
+            best = found
+    if best is None:
+        return NOTHING, 0, 0, -1
+    y, x = (v.reshape(-1, 1) for v in np.mgrid[best[2] - 1 : best[2] + 2, best[1] - 1 : best[1] + 2])
+    entry, leave = ray.times(np.concatenate([x, y, x, y], axis=1))
+    cells = []
+    for k in np.flatnonzero((entry == best[0]) & (leave >= best[0])).tolist():
+        ranks = _holders(int(x[k, 0]), int(y[k, 0]), origin, near, stack)
+        if len(ranks):
+            cells.append((not stack.occluder[ranks].any(), k, int(ranks.min())))
+    _, k, rank = min(cells)
+    return best[0], int(x[k, 0]) + origin[0], int(y[k, 0]) + origin[1], rank
+
+
+def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:
+    """Ranks of the items that have a pixel."""
+    rank = near.rank[meets(np.array([x, y, x, y]), near.box_xyxy)]
+    own_x, own_y = x + origin[0] - stack.box_xyxy[rank, 0], y + origin[1] - stack.box_xyxy[rank, 1]
+    return np.asarray(rank[stack.masks[stack.offset[rank] + own_y * stack.width[rank] + own_x]])
+
+
+def _in(ray: Ray, origin: Pair, box: list[int], times: Span, stack: Stack, rank: int) -> tuple[int, int, int] | None:
+    """When a ray touches an item first, and a cell where it does."""
+    found, major, (left, top) = [], ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
+    width, mask = int(stack.width[rank]), stack.mask(rank).tobytes()
+    step = width if major else 1
+    for row in ray.rows(box, times):
+        first, last = ray.run(row)
+        first, last = max(first, box[major]), min(last, box[major + 2])
+        if first > last:
+            continue
+        begin = (first - top) * width + row - left if major else (row - top) * width + first - left
+        run = mask[begin : begin + (last - first) * step + 1 : step]
+        at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
+        if at >= 0:
+            x, y = (row, first + at) if major else (first + at, row)
+            found.append((int(ray.times(np.array([[x, y, x, y]]))[0][0]), x, y))
+            if ray.step[1 - major]:
+                break  # later rows are entered later
+    return min(found, default=None)

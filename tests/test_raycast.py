@@ -1,0 +1,236 @@
+"""Rays that are cast at items: the first that each touches, the way that is chosen, and the same hits as by walking."""
+
+from __future__ import annotations
+
+import random
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import oracle_rays
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+from test_jumps import answer, single, some_ray
+from test_rays import check_columns
+
+import weapons.rayfire
+from planes import Scene, raycast
+from planes.raycast import NOTHING, UNDECIDED
+from planes.stack import Stack
+from planes.twins import in_parts, kernels_of
+from weapons import Pistol, Rifle, Rounds, Spread, Sweep, Weapon, fire, rayways
+
+worlds = st.randoms(use_true_random=False)
+Bounds = tuple[int, int, int, int]
+
+
+@pytest.fixture
+def kernels(jit: bool) -> ModuleType:
+    """The kernels, and their compiled twins."""
+    return kernels_of(raycast)
+
+
+def some_stack(rng: random.Random) -> Stack:
+    """Items that overlap, some of them empty or with holes, some occluders, of three categories and owners."""
+    scene = Scene(None, categories=["a", "b"])
+    for number in range(rng.choice([0, 1, 3, 12])):
+        h, w, chance = rng.randint(1, 6), rng.randint(1, 6), rng.choice([0.2, 0.6, 1.0])
+        mask = np.array([[rng.random() < chance for _ in range(w)] for _ in range(h)])
+        role = rng.choice(["hittable", "hittable", "occluder"])
+        where = rng.randint(-7, 7), rng.randint(-7, 7)
+        scene.add(
+            mask, where, role=role, layer=rng.randint(0, 1), categories=rng.randint(0, 3), owner=rng.randint(0, number)
+        )
+    return scene.items.stack()
+
+
+def first_by_the_oracle(
+    stack: Stack,
+    bounds: Bounds | None,
+    at: tuple[int, int],
+    by: tuple[int, int],
+    accept: int | None,
+    exclude: list[int],
+) -> tuple[int, int, int, int]:
+    """Of all cells of a ray the first with an accepted item, one by one."""
+    cells, _ = oracle_rays.thin_times(at, (at[0] + by[0], at[1] + by[1]))
+    found = []
+    for (x, y), (time, _) in cells.items():
+        if bounds is not None and not (bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]):
+            continue
+        there = []
+        for rank in range(len(stack)):
+            left, top, right, low = stack.box_xyxy[rank].tolist()
+            if left <= x <= right and top <= y <= low and stack.mask(rank)[y - top, x - left]:
+                there.append(rank)
+        if accept is not None:
+            there = [k for k in there if stack.categories[k] & accept and stack.owner[k] not in exclude]
+        if there:
+            found.append((time, not any(stack.occluder[k] for k in there), y, x, there[0]))
+    if not found:
+        return NOTHING, 0, 0, -1
+    time, _, y, x, rank = min(found)
+    return time, x, y, rank
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds)
+def test_what_a_ray_touches_first_is_what_the_oracle_meets_first(kernels: ModuleType, rng: random.Random) -> None:
+    stack, bounds = some_stack(rng), rng.choice([None, (-4, -3, 5, 6), (2, 2, 2, 2), (-30, -30, 30, 30)])
+    rays = [some_ray(rng, 3, 3) for _ in range(rng.choice([1, 6]))]
+    accept = [rng.choice([1, 2, 3]) for _ in rays]
+    exclude = [[rng.choice([-1, 1, 2]) for _ in range(2)] for _ in rays]
+    note(f"{bounds} {stack.box_xyxy.tolist()} {rays} {accept} {exclude}")
+    start, step = (np.array(column) for column in zip(*rays, strict=True))
+    found = kernels.first_touched(stack, bounds, start, step, np.array(accept), np.array(exclude))
+    every = kernels.first_touched(stack, bounds, start, step, None, np.array(exclude))
+    for k, (at, by) in enumerate(rays):
+        if by == (0, 0):
+            assert found.entry[k] == every.entry[k] == UNDECIDED
+            continue
+        expected = first_by_the_oracle(stack, bounds, at, by, accept[k], exclude[k])
+        assert tuple(int(column[k]) for column in found) == expected
+        assert tuple(int(column[k]) for column in every) == first_by_the_oracle(stack, bounds, at, by, None, [])
+
+
+CORNERS: dict[str, tuple[list[tuple[tuple[int, int], str, int]], int]] = {
+    "both sides, the upper one first": ([((0, 1), "hittable", 0), ((1, 0), "hittable", 0)], 1),
+    "an occluder at the lower side": ([((1, 0), "hittable", 0), ((0, 1), "occluder", 0)], 1),
+    "an occluder under the object at the lower side": (
+        [((1, 0), "hittable", 0), ((0, 1), "hittable", 2), ((0, 1), "occluder", 0)], 1),
+    "an object under another is no occluder": (
+        [((1, 0), "hittable", 0), ((0, 1), "hittable", 2), ((0, 1), "hittable", 0)], 0),
+    "only the one that is passed by": ([((0, 1), "hittable", 0)], 0),
+    "a side, and behind it the diagonal": ([((1, 0), "hittable", 0), ((1, 1), "occluder", 0)], 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CORNERS)
+@pytest.mark.parametrize("start", [(0, 0), (128, 128), (-768, -768)], ids=["inside", "on the corner", "before"])
+def test_what_is_entered_at_once(kernels: ModuleType, name: str, start: tuple[int, int]) -> None:
+    pixels, expected = CORNERS[name]
+    scene = Scene(None)
+    for xy, role, layer in pixels:
+        scene.add(np.ones((1, 1), np.bool_), xy, role=role, layer=layer)
+    stack, none = scene.items.stack(), np.zeros((1, 0), np.int64)
+    found = kernels.first_touched(stack, None, np.array([start]), np.array([[1536, 1536]]), None, none)
+    assert stack.ids[found.rank].tolist() == [expected] and found.entry[0] == max(0, 128 - start[0]) * 1536
+
+
+def test_rays_from_anywhere(kernels: ModuleType) -> None:
+    """From as far off as a position may be, with the longest steps that can be followed, and longer ones."""
+    far, ones = 2**39, np.ones((40, 40), np.bool_)
+    scene = Scene(None)
+    for sign in (1, -1):
+        scene.add(ones, (sign * far, -sign * far))
+    stack = scene.items.stack()
+    start = 256 * np.array([[far - 4_000_000, -far], [-far, far + 4_000_000], [far - 3_000_000, 3_000_000 - far]])
+    step = np.array([[2**30, 1], [-7, -(2**30)], [2**30, -(2**30)]])
+    none = np.zeros((3, 0), np.int64)
+    found = kernels.first_touched(stack, None, start, step, None, none)
+    for k in range(3):
+        seen = first_by_fractions(stack, start[k].tolist(), step[k].tolist())
+        assert tuple(int(column[k]) for column in found) == seen and seen[3] >= 0
+    assert (
+        kernels.first_touched(stack, None, start, step + 3 * np.sign(step), None, none).entry.tolist()
+        == [UNDECIDED] * 3
+    )
+
+
+def first_by_fractions(stack: Stack, at: list[int], by: list[int]) -> tuple[int, int, int, int]:
+    """The first cell of the solid boxes of a stack that a long ray touches: only cells of their borders may be."""
+    scale, found = max(abs(by[0]), 1) * max(abs(by[1]), 1), []
+    for rank in range(len(stack)):
+        left, top, right, low = stack.box_xyxy[rank].tolist()
+        for x in range(left, right + 1):
+            for y in range(top, low + 1):
+                entry, leave = 0, scale
+                for v, begin, step, across in ((x, at[0], by[0], abs(by[1])), (y, at[1], by[1], abs(by[0]))):
+                    sides = sorted(
+                        ((256 * v + half - begin) * (1 if step > 0 else -1) * across) for half in (-128, 128)
+                    )
+                    entry, leave = max(entry, sides[0]), min(leave, sides[1])
+                if entry <= leave:
+                    found.append((entry, y, x, rank))
+    time, y, x, rank = min(found)
+    return time, x, y, rank
+
+
+# Fired
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds, count=st.integers(1, 4))
+def test_rays_that_are_cast_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
+    """A pre-filter is of the walk; without one all are cast, but for those left over."""
+    battle = single(rng, count)
+    note(repr(battle))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rayways, "CAST_CALL_NS", -1e12)
+        cast = answer(battle, "direct")
+        patch.setattr(rayways, "CAST_CALL_NS", 1e12)
+        assert cast == answer(battle, "direct")
+    if not isinstance(cast, str):
+        check_columns(cast, battle.walks(), battle.gun.falloff)
+
+
+SEVERAL: list[Weapon] = [
+    Pistol(90), Sweep(Pistol(90), 40, 5), Spread(Pistol(90, falloff="linear"), 6, 9),
+    Rounds(Pistol(90), 3, (1.5, 2), 4), Rounds(Spread(Rifle(70, max_hits=1), 3, 5), 2, (0, 3), 10),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", SEVERAL, ids=repr)
+def test_all_weapons_that_end_at_their_first_hit_are_cast(
+    kernels: ModuleType, weapon: Weapon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(5)
+    scene, at = Scene((100, 100)), rng.uniform(0, 100, (40, 2))
+    for k in range(30):
+        scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
+    walked = fire(scene, weapon, at, aim=30, prefilter="box")
+    monkeypatch.setattr(rayways, "CAST_CALL_NS", -1e12)
+    monkeypatch.setattr(weapons.rayfire, "trace", lambda *_: pytest.fail("walked"))
+    cast = fire(scene, weapon, at, aim=30, strategy="direct")
+    assert cast == walked and len(cast) > 20
+    stages = {stage.name for stage in cast.plan.ran}, {stage.name for stage in cast.plan.left_out}
+    assert "walk" in stages[0] and {"pre-filter", "broad phase", "jumps", "stops"} <= stages[1]
+
+
+def test_threads_share_rays_out(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not jit:
+        pytest.skip("only compiled kernels do")
+    kernels = kernels_of(raycast)
+    rng = np.random.default_rng(6)
+    scene = Scene((200, 200))
+    for _ in range(50):
+        scene.add(rng.random((9, 9)) < 0.7, rng.uniform(0, 200, 2), categories=int(rng.integers(1, 4)))
+    start, step = rng.integers(0, 51200, (90, 2)), rng.integers(-51200, 51200, (90, 2))
+    accept, exclude = rng.integers(1, 4, 90), np.full((90, 1), -1)
+    alone = kernels.first_touched(scene.items.stack(), scene.bounds, start, step, accept, exclude)
+    parts: list[Any] = []
+
+    def shared(count: int, _: float, work: Any) -> Any:
+        parts.append(count)
+        return [
+            in_parts(last - first, 1e9, lambda a, b, f=first: work(f + a, f + b)) for first, last in ((0, 31), (31, 90))
+        ]
+
+    monkeypatch.setattr(kernels, "in_parts", shared)
+    again = kernels.first_touched(scene.items.stack(), scene.bounds, start, step, accept, exclude)
+    assert parts == [90] and all((a == b).all() for a, b in zip(alone, again, strict=True))
+
+
+def test_rays_are_cast_where_it_pays(kernels: ModuleType) -> None:
+    """In numpy a few; compiled as many as there are, among up to thousands of items."""
+    scene, rng = Scene(None), np.random.default_rng(7)
+    for _ in range(100):
+        scene.add(np.ones((48, 48), np.bool_), rng.uniform(0, (1920, 1080)))
+
+    def is_cast(rays: int, **how: Any) -> bool:
+        plan = fire(scene, Pistol(1000), rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
+        return not plan.has_run("pre-filter")
+
+    assert is_cast(1) and is_cast(3) and is_cast(1, strategy="direct") and not is_cast(1, prefilter="box")
+    assert is_cast(300) == (kernels is not raycast)
