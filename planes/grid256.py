@@ -25,6 +25,7 @@ __all__ = [
     "rounded_div",
     "scaled",
     "snap",
+    "toward",
     "turned",
     "unit",
     "unit_toward",
@@ -85,7 +86,7 @@ def unit(degrees: object) -> tuple[Ints, Ints]:
 def unit_toward(dx: Ints | int, dy: Ints | int) -> tuple[Ints, Ints]:
     """Direction of integer vectors, (cos, sin) times 2**30, correctly rounded, without an angle."""
     x, y = np.broadcast_arrays(np.asarray(dx, np.int64), np.asarray(dy, np.int64))
-    pairs = [_toward(int(a), int(b)) for a, b in zip(x.ravel(), y.ravel(), strict=True)]
+    pairs = [toward(int(a), int(b)) for a, b in zip(x.ravel(), y.ravel(), strict=True)]
     both = np.array(pairs, np.int64).reshape((*x.shape, 2))
     return both[..., 0], both[..., 1]
 
@@ -142,7 +143,8 @@ def _taylor(degrees: float, first: int) -> int:
     return (2 * total * ONE + (1 << _FIXED_BITS)) >> (_FIXED_BITS + 1)
 
 
-def _toward(dx: int, dy: int) -> tuple[int, int]:
+def toward(dx: int, dy: int) -> tuple[int, int]:
+    """As `unit_toward`, of one vector, in Python's integers."""
     if dx == dy == 0:
         raise InputError("toward: expected a point other than the shot's own position, got the same")
     return _over_length(dx, dx * dx + dy * dy), _over_length(dy, dx * dx + dy * dy)

@@ -15,7 +15,7 @@ is touched as well, and looked at from the first. Of a ray along the border of t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -25,7 +25,7 @@ import numpy.typing as npt
 from planes.arrays import Bools, Floats, Ints
 from planes.constants import HALF, SUB
 
-__all__ = ["NOTHING", "PAD", "UNDECIDED", "clearance_of", "first_taken"]
+__all__ = ["NOTHING", "PAD", "UNDECIDED", "clearance_of", "first_taken", "one_taken"]
 
 PAD = 2
 """Free cells around a plane: a ray touches what is in it from a cell beside it at most, and looks one farther."""
@@ -156,19 +156,21 @@ def _follow(
 def _each(clearance: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
     """As `first_taken`, of a few rays."""
     flat, shape = clearance.reshape(-1).data, clearance.shape
-    found = [
-        (UNDECIDED, 0, False) if step == [0, 0] or max(map(abs, step)) > LONGEST else _one(flat, shape, start, step)
-        for start, step in zip(start_256.tolist(), step_256.tolist(), strict=True)
-    ]
+    rays = zip(start_256.tolist(), step_256.tolist(), strict=True)
+    found = [one_taken(flat, shape, start, step) for start, step in rays]
     entry, cell, several = zip(*found, strict=True) if found else ((), (), ())
     return np.array(entry, np.int64), np.array(cell, np.int64), np.array(several, np.bool_)
 
 
-def _one(flat: memoryview, shape: tuple[int, ...], start: list[int], step: list[int]) -> tuple[int, int, bool]:
-    """Entry and place of the first taken cell of one ray, and whether it is one of several.
+def one_taken(
+    flat: memoryview, shape: tuple[int, ...], start: Sequence[int], step: Sequence[int]
+) -> tuple[int, int, bool]:
+    """Entry and place of the first taken cell of one ray, and whether it is one of several: see `first_taken`.
 
     What lies off the plane is not looked up: there it jumps by its distance from the plane.
     """
+    if not any(step) or max(map(abs, step)) > LONGEST:
+        return UNDECIDED, 0, False
     (height, width), (dx, dy), (back_x, back_y) = shape, map(abs, step), (v < 0 for v in step)
     x, y = (start[0] + HALF - back_x) >> 8, (start[1] + HALF - back_y) >> 8
     sx, sy = 1 - 2 * back_x, 1 - 2 * back_y

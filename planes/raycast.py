@@ -112,6 +112,14 @@ class Ray:
             np.minimum(leave, far * across, out=leave)
         return entry, leave
 
+    def time(self, x: int, y: int) -> int:
+        """When it enters a pixel that it touches."""
+        entry = 0
+        for at, begin, step, across in zip((x, y), self.start, self.step, self.across, strict=True):
+            if step:
+                entry = max(entry, ((SUB * at - begin) * (1 if step > 0 else -1) - HALF) * across)
+        return entry
+
     def rows(self, box: list[int], times: Span) -> range:
         """Rows of a box that it comes to in some time, along the axis on which it goes less far, in its order."""
         minor = 1 - self.major
@@ -199,7 +207,7 @@ def _in(ray: Ray, origin: Pair, box: list[int], times: Span, stack: Stack, rank:
         at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
         if at >= 0:
             x, y = (row, first + at) if major else (first + at, row)
-            found.append((int(ray.times(np.array([[x, y, x, y]]))[0][0]), x, y))
+            found.append((ray.time(x, y), x, y))
             if ray.step[1 - major]:
                 break  # later rows are entered later
     return min(found, default=None)

@@ -40,7 +40,12 @@ def some_stack(rng: random.Random) -> Stack:
         role = rng.choice(["hittable", "hittable", "occluder"])
         where = rng.randint(-7, 7), rng.randint(-7, 7)
         scene.add(
-            mask, where, role=role, layer=rng.randint(0, 1), categories=rng.randint(0, 3), owner=rng.randint(0, number)
+            mask,
+            where,
+            role=role,
+            layer=rng.randint(0, 1),
+            categories=rng.randint(0, 3),
+            owner=rng.randint(0, min(number, 2)),
         )
     return scene.items.stack()
 
@@ -116,6 +121,23 @@ def test_what_is_entered_at_once(kernels: ModuleType, name: str, start: tuple[in
     stack, none = scene.items.stack(), np.zeros((1, 0), np.int64)
     found = kernels.first_touched(stack, None, np.array([start]), np.array([[1536, 1536]]), None, none)
     assert stack.ids[found.rank].tolist() == [expected] and found.entry[0] == max(0, 128 - start[0]) * 1536
+
+
+@pytest.mark.parametrize("forth", [True, False])
+@pytest.mark.parametrize("level", [True, False])
+def test_a_ray_along_a_border_touches_the_nearer_of_both_rows(kernels: ModuleType, level: bool, forth: bool) -> None:
+    """One object has a far pixel in the first row and a near one in the second."""
+    mask = np.zeros((2, 9), np.bool_)
+    mask[0, 6 if forth else 2], mask[1, 3 if forth else 5] = True, True
+    scene = Scene(None)
+    scene.add(mask if level else mask.T, (0, 0))
+    stack, none = scene.items.stack(), np.zeros((1, 0), np.int64)
+    left, top = stack.box_xyxy[0, :2].tolist()
+    start, step = (256 * (-20 if forth else 20), 128), (256 * 40 * (1 if forth else -1), 0)
+    at = np.array([start if level else start[::-1]]) + 256 * np.array([left, top])
+    found = kernels.first_touched(stack, None, at, np.array([step if level else step[::-1]]), None, none)
+    cell = (0 if forth else 3, 1) if level else (1, 0 if forth else 3)
+    assert (found.x[0] - left, found.y[0] - top) == cell
 
 
 def test_rays_from_anywhere(kernels: ModuleType) -> None:

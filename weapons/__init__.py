@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from weapons.guns import Sweep as Sweep
     from weapons.hits import Hits as Hits
     from weapons.picture import picture_of_report as picture_of_report
+    from weapons.preparing import prepare as prepare
     from weapons.rayhits import RayHits as RayHits
     from weapons.rayhits import Reason as Reason
     from weapons.ready import Ready as Ready
-    from weapons.ready import prepare as prepare
     from weapons.record import ShotRecord as ShotRecord
     from weapons.record import replay as replay
     from weapons.weapon import Weapon as Weapon
@@ -46,7 +46,7 @@ _HOME = {
     "FixedStep": "weapons.clock",
     "RayHits": "weapons.rayhits",
     "Ready": "weapons.ready",
-    "prepare": "weapons.ready",
+    "prepare": "weapons.preparing",
     "Reason": "weapons.rayhits",
     "ShotRecord": "weapons.record",
     "replay": "weapons.record",

@@ -10,7 +10,8 @@ import numpy as np
 
 from planes import raycast
 from planes.arrays import Ints
-from planes.raycast import UNDECIDED
+from planes.raycast import UNDECIDED, Touched
+from planes.stack import Stack
 from planes.twins import kernels_of
 from weapons.candidates import may_refuse
 from weapons.ends import Ends, Reason, endless
@@ -19,7 +20,7 @@ from weapons.rays import Rays
 from weapons.tracing import Range
 from weapons.volley import Shots
 
-__all__ = ["ends_by_casting"]
+__all__ = ["ends_by_casting", "ends_of_touched"]
 
 
 def ends_by_casting(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tuple[Ends, Ints]:
@@ -34,13 +35,19 @@ def ends_by_casting(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tu
     found = kernels_of(raycast).first_touched(
         stack, through.bounds, rays.start_256, rays.step_256, accept if may_refuse(stack, shots) else None, exclude
     )
-    ends, met = endless(len(rays)), np.flatnonzero(found.entry >= 0)
-    aside, rank = rays.origin_xy[met], found.rank[met]
-    ends.x[met], ends.y[met] = found.x[met] - aside[:, 0], found.y[met] - aside[:, 1]
-    ends.rank[met], ends.time[met] = rank, found.entry[met]
-    ends.reason[met] = np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
+    ends = ends_of_touched(found, rays.origin_xy, stack)
     through.plan.run("walk", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)
     unsure = found.entry == UNDECIDED
     if ray.inside != "hit":
         unsure |= found.entry == 0
     return ends, np.flatnonzero(unsure)
+
+
+def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Ends:
+    """Ends of rays at what they touch first, but for the parts of their lengths; `origin_xy` are where they begin."""
+    ends, met = endless(len(origin_xy)), np.flatnonzero(found.entry >= 0)
+    aside, rank = origin_xy[met], found.rank[met]
+    ends.x[met], ends.y[met] = found.x[met] - aside[:, 0], found.y[met] - aside[:, 1]
+    ends.rank[met], ends.time[met] = rank, found.entry[met]
+    ends.reason[met] = np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
+    return ends

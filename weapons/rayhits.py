@@ -48,22 +48,24 @@ class RayHits(Hits):
     rays : how many were fired
     """
 
+    rays: int = 1
+
     def __init__(
         self, rows: Rows, told: Told, rays: int, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, weapon, shots, plan)
-        self.rays, self._told = rays, told
+        self.rays, self._later = rays, told
 
     @cached_property
     def passes(self) -> Passes:
         """Each ray through each object."""
-        passes = self._told[0]()
+        passes = self._later[0]()
         return _unwritable(replace(passes, row=_rows_of(self._rows, passes)))
 
     @cached_property
     def stop(self) -> Stops:
         """Where each ray ended, and why."""
-        return _unwritable(self._told[1]())
+        return _unwritable(self._later[1]())
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hits):

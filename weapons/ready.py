@@ -12,21 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import InputError
-from planes.constants import ALL, HALF, POSITION_MAX, SUB
+from planes.constants import HALF, POSITION_MAX, SUB
 from planes.scene import Scene
 from planes.twins import kernels_of
 from weapons import squares
-from weapons.arsenal import has_no_range, parts_of, ray_parts_of
-from weapons.firing import category_bits, fire
+from weapons.arsenal import parts_of
+from weapons.firing import fire
 from weapons.hits import Hits
 from weapons.oneshot import Answer, Filter, Present, Told, answer_of
-from weapons.pieces import Frame, frame_of, rounds_of
+from weapons.pieces import Frame, rounds_of
 from weapons.squares import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
-from weapons.volley import checked_shots
 from weapons.weapon import Weapon
 
-__all__ = ["Ready", "prepare"]
+__all__ = ["PLAIN", "Ready", "ReadyPattern", "plain_pair"]
 
 AIMS_BYTES = 32 * 2**20
 """Patterns of other aims and numbers that are kept as integer rows, bytes."""
@@ -39,30 +37,6 @@ Looks = list[tuple[int, int, Look]]
 
 PLAIN = float, int
 NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
-
-
-def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: object = None, seed: object = 0) -> Ready:
-    """Make a weapon ready to be fired at a scene one shot a call.
-
-    Parameters
-    ----------
-    scene : what is fired at; it may change at any time: each shot is of the scene as it is then
-    weapon, accept, exclude, seed : those of `fire`, the same for all shots; `exclude` is a number or a list (K,)
-
-    Raises
-    ------
-    InputError
-        Naming the argument.
-    """
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    toward = (1, 0) if has_no_range(weapon) else None
-    shots = checked_shots(weapon, (0, 0), None, toward, category_bits(scene, accept), exclude, seed, None)
-    kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
-    if ray_parts_of(weapon) is not None:
-        return Ready(scene, weapon, kept)
-    frame = frame_of(weapon)
-    return Ready(scene, weapon, kept) if frame is None else _ReadyPattern(scene, weapon, kept, frame)
 
 
 class Ready:
@@ -82,7 +56,9 @@ class Ready:
     kernels are used.
 
     Patterns of up to 96 px, and of up to 1000 px cut into tiles, at a position given as two numbers, are answered like
-    this. Rays, larger patterns, bursts whose recoil is not of whole pixels, batches and bad input go the way of `fire`.
+    this; thin rays up to their first hit are cast, see `readyray`. All others, larger patterns, bursts whose recoil is
+    not of whole pixels, batches and bad input go the way of `fire`.
+
     Threads may fire one Ready at a scene that none of them changes.
     """
 
@@ -100,7 +76,7 @@ class Ready:
         )  # fmt: skip
 
 
-class _ReadyPattern(Ready):
+class ReadyPattern(Ready):
     """One of a pattern that is looked up."""
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, frame: Frame) -> None:

@@ -3,9 +3,8 @@
 At first each shot walks the stack from the front. When shots have spent as much on that as it takes to compose what can
 be seen of the objects, that is done, and listed by cells of shot positions.
 
-A call of a compiled function takes 100 ns more for each array that it is given, so this one is given the address of a
-buffer, in which there are those of the scene and of the pixels of a round. It does not let other threads run: that
-would take as long as many a shot.
+The kernel is given the address of a buffer, in which there are those of the scene and of the pixels of a round. It does
+not let other threads run: that would take as long as many a shot.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ import threading
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
 from numba import carray, njit, types
-from numba.extending import intrinsic
 
+from planes.addresses import address, ints_at, pointer, words_at
 from planes.arrays import Bools, Ints
 from planes.bitrows_jit import FEW_ROWS, in_order, key_of, shared, sort_places
 from planes.bits import WORD, Words
@@ -77,35 +75,13 @@ FIRST, ROW_BYTES = 8 * FOUND, 8 * ROW
 read = struct.Struct("5q").unpack_from
 
 
-@intrinsic
-def _pointer(_: Any, address: Any) -> Any:
-    """An address as a pointer."""
-
-    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
-
-    return types.voidptr(types.int64), made
-
-
-@njit(inline="always")
-def _ints(address):
-    """Whole numbers at an address: as many as there are, which nothing checks."""
-    return carray(_pointer(address), (2**40,), np.int64)
-
-
-@njit(inline="always")
-def _words(address):
-    """The same, as words."""
-    return carray(_pointer(address), (2**40,), np.uint64)
-
-
 @njit
 def _listed(scene, box, x, y, left, top, right, bottom, near):
     """Tiles in the cell of a pixel whose boxes meet one, front to back; how many."""
     cell, count = cell_at(x, y, scene[X], scene[Y], scene[BITS], scene[WIDE], scene[HIGH]), 0
     if cell < 0:
         return 0
-    begin, listed = _ints(scene[BEGIN]), _ints(scene[LISTED])
+    begin, listed = ints_at(scene[BEGIN]), ints_at(scene[LISTED])
     for entry in range(begin[cell], begin[cell + 1]):
         tile = listed[entry]
         across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
@@ -142,8 +118,13 @@ def _met(scene, shape, box, near, close, rest, x, y):
 
     After the list of those come columns: keys, columns of the nearest pixel, items, samples, and room for its rows.
     """
-    rank, items, blocks, first = _ints(scene[RANK]), _ints(scene[ITEM]), _ints(scene[BLOCKS]), _ints(scene[WORD_OF])
-    tiles, step, room = _words(scene[WORDS]), shape[STEP], scene[TILES]
+    rank, items, blocks, first = (
+        ints_at(scene[RANK]),
+        ints_at(scene[ITEM]),
+        ints_at(scene[BLOCKS]),
+        ints_at(scene[WORD_OF]),
+    )
+    tiles, step, room = words_at(scene[WORDS]), shape[STEP], scene[TILES]
     key, across = near[room:], near[2 * room :]
     item, samples = near[3 * room :], near[4 * room :]
     left, top, bottom, count, last = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], y + shape[ROUND_LOW], 0, -1
@@ -183,7 +164,7 @@ def _tell(met, every, count, x, y, buffer_at, room):
         order[row] = row
     if count > FEW_ROWS:
         sort_places(order[:count], key, down, across)
-    found = carray(_pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
+    found = carray(pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
     for row in range(count):
         at = order[row]
         found[row, 0], found[row, 1], found[row, 2] = item[at], samples[at], key[at]
@@ -196,9 +177,9 @@ def _shot(at_x, at_y, buffer_at):
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
     x, y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
-    buffer = _ints(buffer_at)
-    scene, shape = _ints(buffer[SCENE]), _ints(buffer[ROUND])
-    box, near = carray(_pointer(scene[BOX]), (scene[TILES], 4), np.int64), _ints(scene[SCRATCH])
+    buffer = ints_at(buffer_at)
+    scene, shape = ints_at(buffer[SCENE]), ints_at(buffer[ROUND])
+    box, near = carray(pointer(scene[BOX]), (scene[TILES], 4), np.int64), ints_at(scene[SCRATCH])
     left, top, right, bottom = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], x + shape[ROUND_RIGHT], y + shape[ROUND_LOW]
     if scene[COMPOSED]:
         close = _listed(scene, box, x, y, left, top, right, bottom, near)
@@ -208,9 +189,9 @@ def _shot(at_x, at_y, buffer_at):
             return COMPOSE
     if close == 0:
         return 0
-    room, rest = buffer[ROOM], _words(buffer[ROUND] + 8 * PIXELS)
+    room, rest = buffer[ROOM], words_at(buffer[ROUND] + 8 * PIXELS)
     if not scene[COMPOSED]:
-        pixels, rest = rest, _words(buffer_at + 8 * (FOUND + ROW * room))
+        pixels, rest = rest, words_at(buffer_at + 8 * (FOUND + ROW * room))
         _left_of(shape, pixels, scene, left, top, rest)
     count = _met(scene, shape, box, near, close, rest, x, y)
     if count <= room:
@@ -220,12 +201,6 @@ def _shot(at_x, at_y, buffer_at):
 
 shot = _shot.overloads[_shot.signatures[0]].entry_point
 """It, without the choice among its types, which takes twice as long as the call."""
-
-
-def _address(array: Any) -> int:
-    """Where an array lies: it must be kept as long as that is used."""
-    assert array.flags.c_contiguous
-    return int(array.__array_interface__["data"][0])
 
 
 class Pile(NamedTuple):
@@ -292,8 +267,8 @@ class Squares:
         """Tell the kernel where all lies."""
         columns = tuple(map(np.ascontiguousarray, (cells.begin, cells.listed, boxes_xyxy, *pile)))
         scratch = np.empty(6 * len(boxes_xyxy), np.int64)
-        begin, listed, *rest = map(_address, columns)
-        here = [*told, *cells[:5], begin, listed, len(boxes_xyxy), *rest, _address(scratch)]
+        begin, listed, *rest = map(address, columns)
+        here = [*told, *cells[:5], begin, listed, len(boxes_xyxy), *rest, address(scratch)]
         self._here[:] = np.array(here, np.int64)
         self._kept = columns, scratch  # after that: until then another thread may read what was there before
 
@@ -337,8 +312,8 @@ class Squares:
 
     def _buffer(self, pixels: Ints, rows: int) -> Buffer:
         numbers = np.zeros(FOUND + ROW * rows + len(pixels), np.int64)
-        numbers[:FOUND] = _address(self._here), _address(pixels), rows
-        return Buffer(_address(numbers), rows, memoryview(numbers).cast("B"), numbers)
+        numbers[:FOUND] = address(self._here), address(pixels), rows
+        return Buffer(address(numbers), rows, memoryview(numbers).cast("B"), numbers)
 
 
 def _numbers(spans: Spans) -> Ints:

@@ -1,0 +1,220 @@
+"""A weapon of one ray made ready: each shot is what `fire` gives, of the scene as it is, also when asked later."""
+
+from __future__ import annotations
+
+import random
+from concurrent.futures import ThreadPoolExecutor
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+from ray_battles import some_battle
+from test_jumps import single
+from test_ready import changed, crowd, same
+
+from planes import InputError, Scene, use_jit
+from planes.grid256 import unit
+from planes.twins import kernels_of
+from weapons import Hits, Laser, Pistol, RayHits, Ready, Rifle, Rounds, Spread, Weapon, castone, fire, prepare
+from weapons.readyray import OneRay, ReadyRay, direction
+
+worlds = st.randoms(use_true_random=False)
+AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
+
+
+@pytest.fixture
+def kernels(jit: bool) -> ModuleType:
+    """What rays are cast by, and its compiled twin."""
+    return kernels_of(castone)
+
+
+def both(
+    ready: Ready, scene: Scene, weapon: Weapon, how: dict[str, Any], shot: dict[str, Any]
+) -> tuple[Hits, ...] | str:
+    """What a ready weapon tells and what `fire` does; or the error that both raise."""
+    try:
+        truth = fire(scene, weapon, **how, **shot)
+    except InputError as error:
+        with pytest.raises(InputError) as told:
+            ready.fire(**shot)
+        assert str(told.value) == str(error)
+        return str(error)
+    return ready.fire(**shot), truth
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rng=worlds)
+def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
+    """Any weapon of rays, most of them of one that ends at its first hit, while the scene changes between the shots."""
+    battle = single(rng, 3) if rng.random() < 0.8 else some_battle(rng)
+    note(repr(battle))
+    scene, weapon, first = battle.scene(), battle.gun.weapon(), battle.shots[0]
+    how: dict[str, Any] = {"accept": first.accept, "exclude": list(first.exclude) or None, "seed": battle.seed}
+    ready = prepare(scene, weapon, **how)
+    for one in battle.shots * 2:
+        aimed = {"toward": one.toward} if one.toward is not None else {"aim": one.aim}
+        shot = {"at": tuple(one.at), "shot": one.number, **aimed}
+        told = both(ready, scene, weapon, how, shot)
+        if not isinstance(told, str):
+            same(*told)
+        if rng.random() < 0.5:
+            changed(scene, rng)
+
+
+@pytest.mark.parametrize("weapon", [Pistol(150), Pistol(90, falloff="smooth"), Rifle(120, max_hits=1)], ids=repr)
+@pytest.mark.parametrize("exclude", [None, 3, [1, 4]])
+@pytest.mark.parametrize("bounded", [True, False])
+def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: bool) -> None:
+    """Many shots at a scene that stands still: in numpy they come to jump, if no object is refused."""
+    scene, rng = crowd(7, (220, 160) if bounded else None), np.random.default_rng(3)
+    ready, rows = prepare(scene, weapon, exclude=exclude), 0
+    assert type(ready) is ReadyRay
+    for step in range(3):
+        for k in range(60):
+            at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
+            shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": 9}][k % 4]
+            got = ready.fire(at, **shot)
+            assert type(got) is OneRay
+            same(got, fire(scene, weapon, at, exclude=exclude, strategy="direct", **shot))
+            rows += len(got)
+        scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
+    assert 40 < rows < 180
+
+
+def test_rays_jump_once_a_scene_stood_still_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = crowd(5)
+    use_jit(False)
+    try:
+        ready = prepare(scene, Pistol(200))
+        cast = [0]
+        truly = castone.raycast.first_touched
+
+        def counted(*args: Any) -> Any:
+            cast[0] += 1
+            return truly(*args)
+
+        monkeypatch.setattr(castone.raycast, "first_touched", counted)
+        for _ in range(2):
+            cast[0] = 0
+            for k in range(80):
+                ready.fire((20.5, k), aim=0.5)
+            assert 0 < cast[0] < 40
+            scene.move(0, (50, 50))
+    finally:
+        use_jit(None)
+
+
+def test_what_is_asked_of_a_ray(kernels: ModuleType) -> None:
+    """Whatever reads an answer of `fire` reads this one."""
+    scene = crowd(2)
+    ready = prepare(scene, Pistol(200), exclude=3)
+    for aim in range(0, 360, 60):
+        got, truth = ready.fire(AT, aim=aim), fire(scene, Pistol(200), AT, aim=aim, exclude=3)
+        assert isinstance(got, OneRay) and isinstance(truth, RayHits)
+        assert got.passes == truth.passes and got.stop == truth.stop and got.rays == truth.rays == 1
+        assert got.by_owner() == truth.by_owner()
+        assert got.why_not() == truth.why_not() and got.nearest_miss() == truth.nearest_miss()
+        assert got.blockers() == truth.blockers() and got.margins() == truth.margins()
+        assert got.pixels_at() == truth.pixels_at() and got.passes_at(0) == truth.passes_at(0)
+        told = [{k: v for k, v in hits.to_dict().items() if k != "plan"} for hits in (got, truth)]
+        assert told[0] == told[1] and repr(got) == repr(truth)
+        assert got.plan.ran[0].name == "prepared"
+        with pytest.raises(InputError, match="got those of rays"):
+            got.shares()
+
+
+def test_a_ray_of_the_past_is_still_what_it_was(kernels: ModuleType) -> None:
+    scene, rng = crowd(4), np.random.default_rng(4)
+    ready = prepare(scene, Pistol(120))
+    places = [tuple(at) for at in rng.uniform((0, 0), (220, 160), (20, 2)).tolist()]
+    truths = [fire(scene, Pistol(120), at, aim=30) for at in places]
+    told = [(list(one), one.passes, one.stop) for one in truths if isinstance(one, RayHits)]
+    shots = [ready.fire(at, aim=30) for at in places]
+    scene.move(scene.ids(), rng.uniform((0, 0), (220, 160), (len(scene), 2)))
+    scene.remove(scene.ids()[::2])
+    for got, (rows, passes, stop) in zip(shots, told, strict=True):
+        assert isinstance(got, RayHits)
+        assert list(got) == rows and got.passes == passes and got.stop == stop
+        with pytest.raises(InputError, match="fire again"):
+            got.why_not()
+
+
+@pytest.mark.parametrize("shot", [
+    {"at": AT, "aim": "up"}, {"at": AT, "aim": 30, "toward": TOWARD}, {"at": AT, "toward": AT}, {"at": (1, 2, 3)},
+    {"at": AT, "aim": float("nan")}, {"at": (float("inf"), 0)}, {"at": AT, "shot": -1}, {"at": AT, "shot": 1.5},
+    {"at": AT, "toward": (1e300, 0)}, {"at": None},
+], ids=repr)  # fmt: skip
+def test_bad_input_is_refused_as_by_fire(kernels: ModuleType, shot: dict[str, Any]) -> None:
+    scene = crowd(1)
+    assert isinstance(both(prepare(scene, Pistol(90)), scene, Pistol(90), {}, shot), str)
+
+
+def test_a_ray_without_a_range(kernels: ModuleType) -> None:
+    """It must be told where it goes, and not too far."""
+    scene, weapon = crowd(1), Pistol(None)
+    ready = prepare(scene, weapon)
+    for shot in ({"at": AT}, {"at": AT, "aim": 3}, {"at": AT, "toward": (2e7, 0)}):
+        assert isinstance(both(ready, scene, weapon, {}, shot), str)
+    for toward in (TOWARD, (30, 40), (-5e3, 0.5), (30.25, 99)):
+        same(ready.fire(AT, toward=toward), fire(scene, weapon, AT, toward=toward))
+
+
+@pytest.mark.parametrize("at", [[30, 40], np.array([30.5, 40]), np.array([[30.5, 40], [7, 9]]), (np.float32(30), 40)])
+def test_positions_of_any_kind(kernels: ModuleType, at: object) -> None:
+    scene = crowd(1)
+    same_rows = prepare(scene, Pistol(300)).fire(at, aim=10), fire(scene, Pistol(300), at, aim=10)
+    assert same_rows[0] == same_rows[1]
+
+
+@pytest.mark.parametrize("weapon", [
+    Laser(90), Pistol(90, width=3), Rifle(90, max_hits=2), Rounds(Pistol(90), 2), Spread(Pistol(90), 3, 4),
+], ids=repr)  # fmt: skip
+def test_other_weapons_of_rays_go_the_way_of_fire(weapon: Weapon) -> None:
+    scene = crowd(3)
+    ready = prepare(scene, weapon, accept=["glass"], seed=3)
+    assert type(ready) is Ready
+    assert ready.fire(AT, aim=77, shot=2) == fire(scene, weapon, AT, aim=77, accept=["glass"], seed=3, shot=2)
+
+
+def test_far_off_and_as_long_as_can_be(kernels: ModuleType) -> None:
+    scene = Scene(None)
+    for x in (2.0**39, -(2.0**39)):
+        scene.add(np.ones((40, 40), np.bool_), (x, -x))
+    weapon = Pistol(2**20 - 400)
+    ready = prepare(scene, weapon)
+    for x in (2.0**39, -(2.0**39)):
+        for away in (0.25, 700.5, 1e6):
+            for aim in (180.0, 0, 179.9999):
+                same(ready.fire((x + away, -x), aim=aim), fire(scene, weapon, (x + away, -x), aim=aim))
+
+
+@given(st.floats(-(2.0**40), 2.0**40) | st.integers(-720, 720).map(float) | st.sampled_from([44.99999, 45.0, -45.0]))
+def test_directions_are_those_of_unit(degrees: float) -> None:
+    assert direction(degrees) == tuple(int(v) for v in unit(degrees))
+
+
+def test_threads_fire_one_ready_weapon(kernels: ModuleType) -> None:
+    scene, rng = crowd(9), np.random.default_rng(9)
+    ready = prepare(scene, Pistol(200))
+    shots = [(tuple(at), aim) for at, aim in zip(rng.uniform(0, 160, (400, 2)).tolist(), range(400), strict=True)]
+    truths = [fire(scene, Pistol(200), at, aim=aim) for at, aim in shots]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda one: ready.fire(one[0], aim=one[1]), shots))
+    assert found == truths
+
+
+def test_kernels_may_change_between_shots() -> None:
+    pytest.importorskip("numba")
+    scene = crowd(6)
+    ready = prepare(scene, Pistol(200))
+    truth = fire(scene, Pistol(200), AT, aim=20)
+    try:
+        for compiled in (True, False, True):
+            use_jit(compiled)
+            assert ready.fire(AT, aim=20) == truth
+            scene.move(0, (1000, 1000))
+    finally:
+        use_jit(None)
