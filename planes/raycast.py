@@ -112,13 +112,16 @@ class Ray:
             np.minimum(leave, far * across, out=leave)
         return entry, leave
 
-    def time(self, x: int, y: int) -> int:
-        """When it enters a pixel that it touches."""
-        entry = 0
+    def spell(self, x: int, y: int) -> Span:
+        """The same of one pixel."""
+        entry, leave = 0, self.across[0] * self.across[1]
         for at, begin, step, across in zip((x, y), self.start, self.step, self.across, strict=True):
+            ahead = SUB * at - begin if step > 0 else begin - SUB * at
             if step:
-                entry = max(entry, ((SUB * at - begin) * (1 if step > 0 else -1) - HALF) * across)
-        return entry
+                entry, leave = max(entry, (ahead - HALF) * across), min(leave, (ahead + HALF) * across)
+            elif abs(ahead) > HALF:
+                return 1, 0
+        return entry, leave
 
     def rows(self, box: list[int], times: Span) -> range:
         """Rows of a box that it comes to in some time, along the axis on which it goes less far, in its order."""
@@ -174,15 +177,15 @@ def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, 
             best = found
     if best is None:
         return NOTHING, 0, 0, -1
-    y, x = (v.reshape(-1, 1) for v in np.mgrid[best[2] - 1 : best[2] + 2, best[1] - 1 : best[1] + 2])
-    entry, leave = ray.times(np.concatenate([x, y, x, y], axis=1))
     cells = []
-    for k in np.flatnonzero((entry == best[0]) & (leave >= best[0])).tolist():
-        ranks = _holders(int(x[k, 0]), int(y[k, 0]), origin, near, stack)
-        if len(ranks):
-            cells.append((not stack.occluder[ranks].any(), k, int(ranks.min())))
-    _, k, rank = min(cells)
-    return best[0], int(x[k, 0]) + origin[0], int(y[k, 0]) + origin[1], rank
+    for x, y in ((best[1] + k % 3 - 1, best[2] + k // 3 - 1) for k in range(9)):
+        first, last = ray.spell(x, y)
+        if first == best[0] <= last:
+            ranks = _holders(x, y, origin, near, stack)
+            if len(ranks):
+                cells.append((not stack.occluder[ranks].any(), y, x, int(ranks.min())))
+    _, y, x, rank = min(cells)
+    return best[0], x + origin[0], y + origin[1], rank
 
 
 def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:
@@ -207,7 +210,7 @@ def _in(ray: Ray, origin: Pair, box: list[int], times: Span, stack: Stack, rank:
         at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
         if at >= 0:
             x, y = (row, first + at) if major else (first + at, row)
-            found.append((ray.time(x, y), x, y))
+            found.append((ray.spell(x, y)[0], x, y))
             if ray.step[1 - major]:
                 break  # later rows are entered later
     return min(found, default=None)

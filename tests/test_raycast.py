@@ -189,9 +189,9 @@ def test_rays_that_are_cast_hit_what_rays_that_walk_hit(kernels: ModuleType, rng
     battle = single(rng, count)
     note(repr(battle))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rayways, "CAST_CALL_NS", -1e12)
+        patch.setattr(rayways, "WALK_CALL_NS", 1e12)
         cast = answer(battle, "direct")
-        patch.setattr(rayways, "CAST_CALL_NS", 1e12)
+        patch.setattr(rayways, "WALK_CALL_NS", -1e12)
         assert cast == answer(battle, "direct")
     if not isinstance(cast, str):
         check_columns(cast, battle.walks(), battle.gun.falloff)
@@ -212,7 +212,7 @@ def test_all_weapons_that_end_at_their_first_hit_are_cast(
     for k in range(30):
         scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
     walked = fire(scene, weapon, at, aim=30, prefilter="box")
-    monkeypatch.setattr(rayways, "CAST_CALL_NS", -1e12)
+    monkeypatch.setattr(rayways, "WALK_CALL_NS", 1e12)
     monkeypatch.setattr(weapons.rayfire, "trace", lambda *_: pytest.fail("walked"))
     cast = fire(scene, weapon, at, aim=30, strategy="direct")
     assert cast == walked and len(cast) > 20

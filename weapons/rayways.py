@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Way", "chosen_way", "ends_at_first", "jumps_at_all"]
 
-WALK_CALL_NS, WALK_RAY_NS = 700_000.0, 12_000.0
-JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 300_000.0, 400.0, 5.5
-CAST_CALL_NS, CAST_RAY_NS, CAST_ITEM_NS = 300_000.0, 100_000.0, 50.0
-CAST_COMPILED_RAY_NS, CAST_COMPILED_ITEM_NS = 1000.0, 2.0
-"""Measured with `tests/bench/rays.py` on one machine; the choice hangs on their ratios only."""
+WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS = 700_000.0, 100.0, 12_000.0
+JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 190_000.0, 400.0, 5.5
+CAST_CALL_NS, CAST_RAY_NS, CAST_PAIR_NS = 270_000.0, 75_000.0, 15.0
+COMPILED_CALL_NS, COMPILED_RAY_NS, COMPILED_PAIR_NS = 170_000.0, 600.0, 1.3
+"""Of a call, of each ray, and of each ray and item: by walking, jumping, and casting in numpy and compiled. Measured
+with `tests/bench/rays.py` on one machine; the choice hangs on their ratios only."""
 
 
 class Way(NamedTuple):
@@ -65,7 +66,8 @@ def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Sta
         return Way(plane, False, "asked for")
     if asked or not len(stack):
         return Way(None, False, "every ray walks")
-    walk, cast = WALK_CALL_NS + rays * WALK_RAY_NS, _cast_ns(rays, len(stack))
+    walk = WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * WALK_RAY_NS
+    cast = _cast_ns(rays, len(stack))
     casts, direct = cast < walk, min(cast, walk)
     told = f"{direct / 1e3:.0f} us {'cast at items' if casts else 'walking'}"
     if plane is None:
@@ -80,5 +82,5 @@ def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Sta
 def _cast_ns(rays: int, items: int) -> float:
     """What it costs to cast rays at items, ns."""
     if kernels_of(raycast) is raycast:
-        return CAST_CALL_NS + rays * (CAST_RAY_NS + items * CAST_ITEM_NS)
-    return CAST_CALL_NS + rays * (CAST_COMPILED_RAY_NS + items * CAST_COMPILED_ITEM_NS)
+        return CAST_CALL_NS + rays * (CAST_RAY_NS + items * CAST_PAIR_NS)
+    return COMPILED_CALL_NS + rays * (COMPILED_RAY_NS + items * COMPILED_PAIR_NS)
