@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from planes.bigrows import pixels_of, rows_of_spans
+from planes.arrays import Ints
+from planes.bigrows import packed, pixels_of, rows_of_spans
 from planes.constants import SUB
 from planes.grid256 import snap, unit_toward
 from planes.spans import Spans
@@ -31,20 +31,15 @@ TURNED_PX = 2
 """How far beyond its reach a pattern that turns may have pixels: those whose squares its axis meets, and rounding."""
 
 
-OFTEN = 64
-"""Answers of a piece after which its nested sets are made: they take some ms, and save about 20 us an answer."""
-
-DEPTHS_BYTES = 4 * 2**20
-"""Nested sets of a piece that are kept, bytes; of a larger one the pixels are gone through."""
-
-DEPTH_BYTES = 40
-"""What a set costs beside its pixels, bytes."""
+OFTEN = 8
+"""Answers of a piece after which it is worth to make planes of its pixels: they take as long as so many without."""
 
 
 class Depths:
     """The pixels of a piece by their distance from the round's pixel.
 
-    The sets of those within each distance are nested: bisection finds the first that something has a pixel in.
+    Each distance has a number, the nearest 0. For each binary place there is a plane of the pixels whose number has no
+    bit there: from the highest place on, what something shares with a plane is nearer than all else of it.
 
     Parameters
     ----------
@@ -53,44 +48,41 @@ class Depths:
     """
 
     def __init__(self, rows: int, stride: int, x: int, y: int) -> None:
-        self._rows, self._stride, self._x, self._y = rows, stride, x, y
-        self._sets: list[int] | None = None
+        self._rows, self._stride, self._x, self._y, self._corner = rows, stride, x, y, np.array([x, y])
+        self._planes: list[int] | None = None
         self._calls = 0
 
     def nearest(self, bits: int) -> tuple[int, int, int]:
         """Of some pixels of the piece the nearest: squared distance, y and x from the round's pixel; ties by (y, x)."""
-        if self._sets is None:
+        if self._planes is None:
             self._calls += 1
-            if self._calls < OFTEN or not self._nested():
-                pixels = pixels_of(bits, self._stride) + np.array([self._x, self._y])
-                distance2 = (pixels**2).sum(axis=1)
+            if self._calls <= OFTEN:
+                pixels, distance2 = self._pixels(bits)
                 first = int(distance2.argmin())
-                x, y = pixels[first].tolist()
+                x, y = (pixels[first] + self._corner).tolist()
                 return int(distance2[first]), y, x
-        assert self._sets is not None
-        within = bits & self._sets[bisect_left(self._sets, 1, key=bits.__and__)]
-        y, x = divmod((within ^ within - 1).bit_length() - 1, self._stride)
+            self._planes = self._made()
+        for plane in self._planes:
+            nearer = bits & plane
+            if nearer:
+                bits = nearer
+        y, x = divmod((bits ^ bits - 1).bit_length() - 1, self._stride)
         x, y = x + self._x, y + self._y
         return x * x + y * y, y, x
 
-    def _nested(self) -> bool:
-        """Make the sets, if they are not too many."""
-        pixels = pixels_of(self._rows, self._stride)
-        distance2 = ((pixels + np.array([self._x, self._y])) ** 2).sum(axis=1)
-        cuts = np.unique(distance2)
-        if len(cuts) * (self._rows.bit_length() // 8 + DEPTH_BYTES) > DEPTHS_BYTES:
-            return False
-        order = np.argsort(distance2, kind="stable")
-        ends = np.searchsorted(distance2[order], cuts, side="right").tolist()
-        bit = (pixels[:, 1] * self._stride + pixels[:, 0])[order].tolist()
-        sets, within, begin = [], 0, 0
-        for end in ends:
-            for one in bit[begin:end]:
-                within |= 1 << one
-            sets.append(within)
-            begin = end
-        self._sets = sets
-        return True
+    def _pixels(self, bits: int) -> tuple[Ints, Ints]:
+        """Pixels (n, 2) of the piece, and their squared distances."""
+        pixels = pixels_of(bits, self._stride)
+        return pixels, ((pixels + self._corner) ** 2).sum(axis=1)
+
+    def _made(self) -> list[int]:
+        """The planes, the highest place first."""
+        pixels, distance2 = self._pixels(self._rows)
+        number = np.unique(distance2, return_inverse=True)[1].reshape(-1)
+        places = np.arange(int(number.max(initial=0)).bit_length() - 1, -1, -1)
+        mask = np.zeros((len(places), int(pixels[:, 1].max(initial=0)) + 1, self._stride), np.bool_)
+        mask[:, pixels[:, 1], pixels[:, 0]] = (number >> places[:, None]) & 1 == 0
+        return [packed(plane, self._stride) for plane in mask]
 
 
 class Round(NamedTuple):

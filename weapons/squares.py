@@ -65,6 +65,9 @@ CELL_BYTES, SEEN_BYTES = 400, 400
 PIECE_BYTES = 200
 """What a piece costs beside its pixels, bytes."""
 
+PLANES = 10
+"""About as many times a piece has its pixels: with the planes that tell the nearest of them."""
+
 Seen = tuple[int, int, int, int, int, int, int]
 """Of a tile of an object: the least and greatest x, and y, where a part of a shot is looked up whose box meets it; what
 is seen of it as integer rows, and their place as a number of bits in the world; and the id."""
@@ -178,7 +181,7 @@ class Squares:
             for distance2, dy, dx, _, item, n in shared:
                 tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
 
-        return look, sum(PIECE_BYTES + rows.bit_length() // 7 for _, _, rows, _ in pieces)
+        return look, sum(PIECE_BYTES + PLANES * rows.bit_length() // 7 for _, _, rows, _ in pieces)
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""
