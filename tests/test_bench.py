@@ -37,7 +37,7 @@ def _kernels_as_before() -> Iterator[None]:
 def test_a_quick_run_tells_tables_and_writes_json(tmp_path: Path, monkeypatch: Any, capsys: Any) -> None:
     monkeypatch.setattr(speed, "QUICK", TINY)
     path = tmp_path / "speed.json"
-    speed.main(["--quick", "--objects", "10", "--only", "static,moving,redrawn", "--json", str(path)])
+    speed.main(["--quick", "--objects", "10", "--only", "static,moving,moving rays,redrawn", "--json", str(path)])
     found = json.loads(path.read_text())
     told = capsys.readouterr().out
     assert [cell["what"] for cell in found["cells"] if cell["section"] == "static"] == list(PATTERNS)

@@ -14,27 +14,27 @@ from planes.items import Stack
 from planes.jumps import NOTHING, PAD
 from planes.scene import Scene
 from planes.visible import View
-from weapons.guns import Traced
 from weapons.oneshot import Filter
-from weapons.rayways import chosen_way
+from weapons.rayways import CAST_PAIR_NS, CAST_RAY_NS, owed_ns
 
 __all__ = ["Caster"]
 
 
 class Caster:
-    """What rays are cast at, with the filter that they have."""
+    """Rays of one filter, at a scene."""
 
-    def __init__(self, scene: Scene, ray: Traced, kept: Filter) -> None:
-        self._scene, self._ray = scene, ray
+    def __init__(self, scene: Scene, kept: Filter) -> None:
+        self._scene = scene
         self._accept, self._exclude = np.array([kept.accept]), kept.exclude
         self._view = View(False, kept.accept, tuple(set(kept.exclude[0].tolist()) - {-1}))
         self._stack: Stack
         self._refuses = False
+        self._owed: float | None
         self._plane: tuple[memoryview, tuple[int, ...], memoryview, int, int] | None
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now."""
-        self._stack, self._plane = stack, None
+        self._stack, self._plane, self._owed = stack, None, None
         self._refuses = not self._view.accepts(stack).all()
 
     def cast(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
@@ -48,13 +48,19 @@ class Caster:
         return tuple(int(column[0]) for column in touched)
 
     def _made(self) -> bool:
-        """Whether there is a plane now, as it pays."""
-        way = chosen_way("auto", False, self._ray, self._scene, self._stack, 1)
-        if way.plane is not None:
-            codes = way.plane.codes.read(self._scene.items)
-            clearance, (left, top) = way.plane.read(self._scene.items, codes), way.plane.corner_xy.tolist()
-            self._plane = clearance.reshape(-1).data, clearance.shape, codes.reshape(-1).data, left, top
-        return self._plane is not None
+        """Whether there is a plane now: it is made for the first ray by which it would have paid."""
+        plane = self._scene.clearance()
+        if plane is None:
+            return False
+        if self._owed is None:
+            self._owed = owed_ns(plane, self._scene)
+        plane.missed += CAST_RAY_NS + len(self._stack) * CAST_PAIR_NS
+        if plane.missed <= self._owed:
+            return False
+        codes = plane.codes.read(self._scene.items)
+        clearance, (left, top) = plane.read(self._scene.items, codes), plane.corner_xy.tolist()
+        self._plane = clearance.reshape(-1).data, clearance.shape, codes.reshape(-1).data, left, top
+        return True
 
     def _jumped(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...] | None:
         """The same of a ray that jumps; None if it cannot tell."""

@@ -15,7 +15,6 @@ from planes.items import Stack
 from planes.raycast_jit import touched
 from planes.scene import Scene
 from planes.visible import View
-from weapons.guns import Traced
 from weapons.oneshot import Filter
 
 __all__ = ["Caster"]
@@ -44,7 +43,7 @@ cast = _cast.overloads[_cast.signatures[0]].entry_point
 class Caster:
     """See `castone.Caster`."""
 
-    def __init__(self, scene: Scene, _: Traced, kept: Filter) -> None:
+    def __init__(self, scene: Scene, kept: Filter) -> None:
         self._scene = scene
         self._view = View(False, kept.accept, tuple(sorted(set(kept.exclude[0].tolist()) - {-1})))
         self._forms = -1

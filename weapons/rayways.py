@@ -15,7 +15,7 @@ from weapons.guns import Projectile, Traced
 if TYPE_CHECKING:
     from planes.clearance import ClearancePlane
 
-__all__ = ["Way", "chosen_way", "ends_at_first", "jumps_at_all"]
+__all__ = ["CAST_PAIR_NS", "CAST_RAY_NS", "Way", "chosen_way", "ends_at_first", "jumps_at_all", "owed_ns"]
 
 WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS = 700_000.0, 100.0, 12_000.0
 JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 190_000.0, 400.0, 5.5
@@ -72,11 +72,16 @@ def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Sta
     told = f"{direct / 1e3:.0f} us {'cast at items' if casts else 'walking'}"
     if plane is None:
         return Way(None, casts, "direct is asked for" if strategy == "direct" else "no bounds that fit one plane")
-    jump, owed = JUMP_CALL_NS + rays * JUMP_RAY_NS, 0.0
-    if not plane.is_made(scene.items):
-        owed = plane.codes.cost(scene.items) * REDRAW_PIXEL_NS + plane.codes.size * CLEARANCE_PIXEL_NS
+    jump, owed = JUMP_CALL_NS + rays * JUMP_RAY_NS, owed_ns(plane, scene)
     plane.missed += max(direct - jump, 0.0)
     return Way(plane if plane.missed > owed else None, casts, f"about {(jump + owed) / 1e3:.0f} us by jumps, {told}")
+
+
+def owed_ns(plane: ClearancePlane, scene: Scene) -> float:
+    """What it costs to make the plane, ns."""
+    if plane.is_made(scene.items):
+        return 0.0
+    return plane.codes.cost(scene.items) * REDRAW_PIXEL_NS + plane.codes.size * CLEARANCE_PIXEL_NS
 
 
 def _cast_ns(rays: int, items: int) -> float:

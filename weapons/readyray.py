@@ -77,7 +77,6 @@ class ReadyRay(Ready):
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: Traced) -> None:
         super().__init__(scene, weapon, kept)
-        self._traced = ray
         self._length, self._fades, self._inside = ray.length_256, ray.fades, ray.inside == "hit"
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
@@ -136,7 +135,7 @@ class ReadyRay(Ready):
                 return
             kernels = kernels_of(castone)
             if kernels is not self._kernels:
-                self._kernels, self._caster = kernels, kernels.Caster(self.scene, self._traced, self._filter)
+                self._kernels, self._caster = kernels, kernels.Caster(self.scene, self._filter)
             stack = self._items.stack()
             self._caster.follow(stack)
             self._cast, self._ids, self._blocks = self._caster.cast, stack.ids.data, stack.occluder.data

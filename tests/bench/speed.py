@@ -23,7 +23,7 @@ from typing import Any
 
 from speed_clock import Cell, bandwidth, told
 from speed_far import cold, huge, rewind
-from speed_moving import moving, redrawn
+from speed_moving import moving, moving_rays, redrawn
 from speed_single import preparation, single
 from speed_static import modes, special, static
 from speed_targets import judged
@@ -37,6 +37,7 @@ SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
     "static": static,
     "special": special,
     "moving": moving,
+    "moving rays": moving_rays,
     "redrawn": redrawn,
     "single": single,
     "preparation": preparation,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import repeat
+from itertools import islice, repeat
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from speed_clock import Cell, DisagreementError, Side, race
 from speed_engines import EASIER, Space
 from speed_peers import Masks, first, pygame_mask, rendered
 from speed_static import Settings, hit_rows, modes, touched
-from speed_world import WORLD, Volleys, items_of, pattern_mask, scene_of
+from speed_world import PATTERNS, WORLD, Volleys, items_of, pattern_mask, scene_of, volleys
 
 from planes import Scene
 from planes.arrays import Floats, Ints
 from planes.compose import CodePlane
-from weapons import Disc, fire
+from weapons import Disc, fire, prepare
 
-__all__ = ["Own", "frames_of", "moving", "redrawn"]
+__all__ = ["Own", "frames_of", "moving", "moving_rays", "redrawn"]
 
 STEP = 3
 """Objects move so many px a frame at most, in x and in y."""
@@ -185,6 +185,77 @@ def moving(settings: Settings) -> Iterator[Cell]:
                 works = ([next(rounds)] for _ in range(settings.rounds + 1))
                 cell = Cell("moving", what, objects, unit="ns a frame")
                 yield race(cell, sides, works, frames, settings.seconds)
+
+
+def moving_rays(settings: Settings) -> Iterator[Cell]:
+    """Rays of 1000 px at objects that all move: fired in one call a frame, and one a call by a prepared weapon."""
+    for objects in settings.moving:
+        for shots in (1, 10, 100):
+            sides = []
+            for mode, ready in modes(settings).items():
+                for name, way in ((mode, _in_one_call), (f"{mode}, prepared", _one_a_call)):
+                    sides.append(Side(name, way(scene_of(objects)), _ray_rows, ready=ready, whole=True))
+            shadow = scene_of(objects)
+            sides.append(_space_of_rays(shadow))
+            frames = settings.frames if objects < 5000 else max(2, settings.frames // 4)
+            rays = volleys("ray 1000", shots, shots)
+            rounds = islice(frames_of(shadow, frames, 2, 0.0, shots), settings.rounds + 1)
+            works = ([list(zip(one, islice(rays, frames), strict=True))] for one in rounds)
+            cell = Cell("moving rays", f"{shots} rays", objects, unit="ns a frame")
+            yield race(cell, sides, works, frames, settings.seconds)
+
+
+Aimed = Sequence[tuple[Frame, Volleys]]
+"""Frames, and the rays of each."""
+
+
+def _in_one_call(scene: Scene) -> Callable[[Aimed, int], list[Any]]:
+    ids = scene.ids("hittable")
+
+    def answer(frames: Aimed, units: int) -> list[Any]:
+        found = []
+        for one, rays in frames[:units]:
+            scene.move(ids, one.xy)
+            found.append(list(fire(scene, RAY, rays.at, aim=rays.aim)))
+        return found
+
+    return answer
+
+
+def _one_a_call(scene: Scene) -> Callable[[Aimed, int], list[Any]]:
+    ids, ready = scene.ids("hittable"), prepare(scene, RAY)
+
+    def answer(frames: Aimed, units: int) -> list[Any]:
+        found = []
+        for one, rays in frames[:units]:
+            scene.move(ids, one.xy)
+            shots = zip(rays.lists["places"], rays.lists["aim"], strict=True)
+            found.append([row._replace(shot=k) for k, (at, aim) in enumerate(shots) for row in ready.fire(at, aim=aim)])
+        return found
+
+    return answer
+
+
+def _ray_rows(found: list[Any]) -> Any:
+    """Rows of all frames: shots are numbered by frame."""
+    return [((number << 20) + row.shot, row.object, row.samples) for number, rows in enumerate(found) for row in rows]
+
+
+def _space_of_rays(scene: Scene) -> Side:
+    """pymunk: the first shape on each segment."""
+    space = Space([item for item in items_of(scene) if not item.occluder], moving=True)
+
+    def answer(frames: Aimed, units: int) -> int:
+        found = 0
+        for one, rays in frames[:units]:
+            space.move(one.corners)
+            found += space.rays(rays, len(rays.at))
+        return found
+
+    return Side("pymunk", answer, easier=EASIER, whole=True)
+
+
+RAY = PATTERNS["ray 1000"]
 
 
 def redrawn(settings: Settings) -> Iterator[Cell]:
