@@ -11,14 +11,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import cv2
 import numpy as np
 import pymunk
 from turns import least
 
-from planes import Role, Scene, Sprite
-from weapons import Laser, Pistol, RayHits, Rifle, Weapon, fire, tracing
+from planes import Role, Scene, Sprite, use_jit
+from weapons import Laser, Pistol, RayHits, Rifle, Weapon, fire, rayways, tracing
 
 LENGTH, BATCH, SINGLE = 1000, 10_000, 100
 WORLD = (1920, 1080)
@@ -153,6 +154,37 @@ def savings(scene: Scene, size_wh: tuple[int, int]) -> None:
             print(f"{name:14} {width:5} {plain:9.1f} " + " ".join(f"{t / plain:10.2f} x" for t in others), flush=True)
 
 
+def ways(scene: Scene, size_wh: tuple[int, int]) -> None:
+    """Microseconds of a call of so many rays by each way to their first hit, and by the one chosen, once planes are there.
+
+    The rows are the same.
+    """
+    print(f"{'way, us':14} {'rays':>5} {'walk':>9} {'cast':>9} {'jump':>9} {'chosen':>9}")
+    for count in (1, 3, 10, 100, 1000):
+        shots = shots_of(count, size_wh)
+        found = []
+        for name, how in WAYS.items():
+            with patched(name):
+                answer = rays(scene, Pistol(LENGTH), shots, **how)
+                assert not found or answer == found[0][0]
+                found.append((answer, 1e6 * least(lambda h=how, s=shots: rays(scene, Pistol(LENGTH), s, **h))[0]))
+        print(f"{'pistol':14} {count:5} " + " ".join(f"{us:9.0f}" for _, us in found), flush=True)
+
+
+WAYS = {"walk": {"strategy": "direct"}, "cast": {"strategy": "direct"}, "jump": {"strategy": "composed"}, "chosen": {}}
+
+
+@contextmanager
+def patched(name: str) -> Iterator[None]:
+    """Let rays that do not jump all walk, or all be cast."""
+    cost = rayways.WALK_CALL_NS
+    rayways.WALK_CALL_NS = {"walk": -1e18, "cast": 1e18}.get(name, cost)
+    try:
+        yield
+    finally:
+        rayways.WALK_CALL_NS = cost
+
+
 def main(counts: list[int]) -> None:
     """Print the tables."""
     worlds = [(count, WORLD) for count in counts]
@@ -163,6 +195,11 @@ def main(counts: list[int]) -> None:
         print(f"\n{objects} objects, {walls} occluders, {size_wh[0]} x {size_wh[1]}; pymunk {pymunk.version}")
         table(scene, size_wh)
         savings(scene, size_wh)
+        for mode in (False, True) if find_spec("numba") else (False,):
+            use_jit(mode)
+            print("with compiled kernels" if mode else "in numpy")
+            ways(scene, size_wh)
+        use_jit(None)
 
 
 if __name__ == "__main__":
