@@ -155,7 +155,7 @@ def savings(scene: Scene, size_wh: tuple[int, int]) -> None:
 
 
 def ways(scene: Scene, size_wh: tuple[int, int]) -> None:
-    """Microseconds of a call of so many rays by each way to their first hit, and by the one chosen, once planes are there.
+    """Microseconds of a call of rays by each way to their first hit, and by the one chosen, once the plane is there.
 
     The rows are the same.
     """
