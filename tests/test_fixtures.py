@@ -18,6 +18,7 @@ from planes.overlap import contains_point
 from planes.sampling import Verdict
 from weapons import Hits, arsenal_of, fire
 from weapons.arsenal import KINDS, ray_parts_of
+from weapons.cli import main
 from weapons.orders import fire_order, orders_of
 from weapons.rayhits import RayHits, Reason
 
@@ -325,6 +326,24 @@ def test_far_scene_tells_positions_of_one_step_apart() -> None:
     (x, y), (x_next, y_next) = scene.shots[0]["at"], scene.shots[1]["at"]
     assert x_next - x == 1 / 256 and y == y_next
     assert [bool(hits) for hits in fired_at(scene)[:2]] == [True, False]
+
+
+# --- the pictures of reports in the README -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["gallery", "corridor"])
+def test_the_pictures_of_reports_are_what_the_command_draws(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Text is part of it, as it tells the stages that ran; where OpenCV draws all of it otherwise, that is not told."""
+    monkeypatch.chdir(tmp_path)
+    main(["report", str(FIXTURES / name)])
+    drawn, kept = read_png(tmp_path / "report.png"), read_png(FIXTURES / f"{name}.png")
+    assert drawn.shape == kept.shape
+    other = (drawn != kept).any(axis=2).mean()
+    if other > 0.04:
+        pytest.skip("OpenCV of this version draws text otherwise")
+    assert other == 0
 
 
 # --- the picture of volumes -----------------------------------------------------------------------------------------
