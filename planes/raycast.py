@@ -63,7 +63,12 @@ class Near(NamedTuple):
 
 
 def first_touched(
-    stack: Stack, bounds: Box | None, start_256: Ints, step_256: Ints, accept: Ints | None, exclude: Ints
+    stack: Stack,
+    bounds: Box | None,
+    start_256: Ints,
+    step_256: Ints,
+    accept: Ints | None = None,
+    exclude: Ints | None = None,
 ) -> Touched:
     """Find what each ray touches first.
 
@@ -71,8 +76,7 @@ def first_touched(
     ----------
     bounds : of what can be touched; None for all
     start_256, step_256 : (R, 2) rays, up to 2**48
-    accept : (R,) category bits of what a ray may touch; None if it may touch all
-    exclude : (R, K) owners of what it may not, beside
+    accept, exclude : (R,) category bits of what a ray may touch, and (R, K) owners of what it may not; or neither
 
     Returns
     -------
@@ -85,7 +89,7 @@ def first_touched(
             continue
         origin = (start[0] + HALF) // SUB, (start[1] + HALF) // SUB
         one = Ray((start[0] - SUB * origin[0], start[1] - SUB * origin[1]), (step[0], step[1]))
-        accepts = None if accept is None else (accept[ray], exclude[ray])
+        accepts = None if accept is None or exclude is None else (accept[ray], exclude[ray])
         found.append(_first(one, origin, _near(one, origin, stack, bounds, accepts), stack))
     return Touched(*np.array(found, np.int64).reshape(-1, 4).T)
 

@@ -200,7 +200,12 @@ def _each(
 
 
 def first_touched(
-    stack: Stack, bounds: Box | None, start_256: Ints, step_256: Ints, accept: Ints | None, exclude: Ints
+    stack: Stack,
+    bounds: Box | None,
+    start_256: Ints,
+    step_256: Ints,
+    accept: Ints | None = None,
+    exclude: Ints | None = None,
 ) -> Touched:
     """See `raycast.first_touched`."""
     found = np.empty((4, len(start_256)), np.int64)
@@ -212,7 +217,7 @@ def first_touched(
     def some(first: int, last: int) -> None:
         """Rays first .. last - 1."""
         part = slice(first, last)
-        whose = (NONE, NOBODY) if accept is None else (accept[part], exclude[part])
+        whose = (NONE, NOBODY) if accept is None or exclude is None else (accept[part], exclude[part])
         _each(start_256[part], step_256[part], found[:, part], *given, *whose, within)
 
     in_parts(len(start_256), PART_NS / (RAY_NS + ITEM_NS * len(stack)), some)

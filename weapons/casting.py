@@ -31,12 +31,10 @@ def ends_by_casting(rays: Rays, ray: Traced, shots: Shots, through: Range) -> tu
     the ends, and the rays for which they are yet to be found
     """
     stack = through.stack
-    accept, exclude = shots.accept[rays.shot], shots.exclude[rays.shot]
-    found = kernels_of(raycast).first_touched(
-        stack, through.bounds, rays.start_256, rays.step_256, accept if may_refuse(stack, shots) else None, exclude
-    )
+    whose = (shots.accept[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
+    found = kernels_of(raycast).first_touched(stack, through.bounds, rays.start_256, rays.step_256, *whose)
     ends = ends_of_touched(found, rays.origin_xy, stack)
-    through.plan.run("walk", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)
+    through.plan.run("cast", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)
     unsure = found.entry == UNDECIDED
     if ray.inside != "hit":
         unsure |= found.entry == 0

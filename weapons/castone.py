@@ -25,7 +25,7 @@ class Caster:
 
     def __init__(self, scene: Scene, kept: Filter) -> None:
         self._scene = scene
-        self._accept, self._exclude = np.array([kept.accept]), kept.exclude
+        self._whose = np.array([kept.accept]), kept.exclude
         self._view = View(False, kept.accept, tuple(set(kept.exclude[0].tolist()) - {-1}))
         self._stack: Stack
         self._refuses = False
@@ -43,8 +43,8 @@ class Caster:
             found = self._jumped(x, y, dx, dy)
             if found is not None:
                 return found
-        start, step, accept = np.array([[x, y]]), np.array([[dx, dy]]), self._accept if self._refuses else None
-        touched = raycast.first_touched(self._stack, self._scene.bounds, start, step, accept, self._exclude)
+        start, step, whose = np.array([[x, y]]), np.array([[dx, dy]]), self._whose if self._refuses else ()
+        touched = raycast.first_touched(self._stack, self._scene.bounds, start, step, *whose)
         return tuple(int(column[0]) for column in touched)
 
     def _made(self) -> bool:

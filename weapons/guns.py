@@ -8,6 +8,7 @@ from typing import ClassVar
 from planes.arrays import InputError
 from planes.constants import PELLETS_MAX, REACH_MAX, STEPS_MAX
 from planes.grid256 import snap
+from planes.kept import once
 from planes.schema import Number, Optional, Value, Whole, Word
 from weapons.pattern import FALLOFFS
 from weapons.weapon import LENGTH, Part, Weapon
@@ -77,12 +78,12 @@ class Laser(Traced):
     width: float = field(default=0, kw_only=True)
     falloff: str | None = field(default=None, kw_only=True)
 
-    @property
+    @once
     def length_256(self) -> int | None:
         """The range."""
         return None if self.range is None else int(snap(self.range))
 
-    @property
+    @once
     def radius_256(self) -> int:
         """Half of the width."""
         return int(snap(self.width / 2))
@@ -160,12 +161,12 @@ class Projectile(Traced):
     radius: float
     steps: int | None = field(default=None, kw_only=True)
 
-    @property
+    @once
     def length_256(self) -> int:
         """What it flies in a frame."""
         return int(snap(self.speed))
 
-    @property
+    @once
     def radius_256(self) -> int:
         """The radius."""
         return int(snap(self.radius))

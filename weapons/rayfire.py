@@ -109,20 +109,27 @@ def _later(columns: C, first_shot: int) -> C:
 
 def _leave_out_unused(plan: Plan, scene: Scene, through: Range, shots: Shots, ray: Traced, way: Way) -> None:
     """Complete a plan with what this scene and this weapon did not need."""
-    candidates, idle = through.candidates, "no ray was left to walk"
-    for name in ("pre-filter", "walk", "stops"):
-        plan.leave_out(name, idle)
-    plan.leave_out("broad phase", candidates.why_unindexed if plan.has_run("pre-filter") else idle)
-    if ends_at_first(ray):
-        plan.leave_out("passes", "told when they are asked for, as the stops are")
-    if jumps_at_all(ray) and way.plane is None:
-        plan.leave_out("jumps", way.why)
-    plan.leave_out("cells between items", "only those inside their boxes are looked at")
-    plan.leave_out("verdicts", "counted when asked for")
-    plan.leave_out("volumes", "boxes are the pre-filter")
+    filtered = plan.has_run("pre-filter")
+    plan.leave_out_all(_unused, through.candidates.why_unindexed if filtered else None, ray, way)
     choosy = may_refuse(through.stack, shots)
     leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
     leave_out_imagery(plan, scene)
+
+
+def _unused(why_unindexed: str | None, ray: Traced, way: Way) -> Iterator[tuple[str, str]]:
+    idle = "no ray was left to walk"
+    for name in ("pre-filter", "walk", "stops"):
+        yield name, idle
+    yield "broad phase", why_unindexed or idle
+    if ends_at_first(ray):
+        yield "passes", "told when they are asked for, as the stops are"
+    if jumps_at_all(ray) and way.plane is None:
+        yield "jumps", way.why
+    if jumps_at_all(ray) and not way.casts:
+        yield "cast", way.why
+    yield "cells between items", "only those inside their boxes are looked at"
+    yield "verdicts", "counted when asked for"
+    yield "volumes", "boxes are the pre-filter"
 
 
 def _first_ends(rays: Rays, ray: Traced, shots: Shots, through: Range, way: Way, choose: Choose) -> Ends:
