@@ -1,6 +1,6 @@
-"""Arrays that compiled functions find at addresses: to be given an array takes such a call 100 ns, a number a tenth.
+"""Arrays that compiled functions find at addresses: each array that such a call is given costs it 100 ns, a number 10.
 
-Whoever tells an address keeps the array as long as it is used.
+Whoever tells an address keeps the array as long as it is used; nothing checks where it ends.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def pointer(_: Any, address: Any) -> Any:
 
 @njit(inline="always")
 def ints_at(address):
-    """Whole numbers at an address: as many as there are, which nothing checks."""
+    """Whole numbers from an address on."""
     return carray(pointer(address), (2**40,), np.int64)
 
 

@@ -123,7 +123,8 @@ def bools(field: str, values: object, shape: Shape) -> Bools:
     array = _numeric(field, values, shape, "biu")
     if array.dtype.kind != "b":
         _first_bad(field, array, (array == 0) | (array == 1), "0 or 1")
-    return array.astype(np.bool_)
+        return array.astype(np.bool_)
+    return np.not_equal(array.view(np.uint8), 0)  # a view of other bytes as booleans may have any true byte
 
 
 def real(field: str, value: object, low: float, high: float) -> float:

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from planes.arrays import Bools, Floats, Ints
 from planes.constants import HALF, SUB
 
-__all__ = ["NOTHING", "PAD", "UNDECIDED", "clearance_of", "first_taken", "one_taken"]
+__all__ = ["LONGEST", "NOTHING", "PAD", "UNDECIDED", "clearance_of", "first_taken", "one_taken"]
 
 PAD = 2
 """Free cells around a plane: a ray touches what is in it from a cell beside it at most, and looks one farther."""
@@ -44,6 +44,9 @@ LONGEST = 2**30
 
 WORTH_TAKING = 0.75
 """Rays that are done are set aside when this part of them or less is left."""
+
+LOOKS_MOST = 512
+"""Cells that one ray looks at in Python's own integers at most: along a surface it goes on pixel by pixel."""
 
 FEW, ONE_BY_ONE = 50, 4
 """So few rays are followed faster one by one, in Python's own integers; and so few are begun so."""
@@ -96,7 +99,7 @@ def first_taken(
     Returns
     -------
     entry : (R,) when a ray enters it, as a whole number over max(1, |dx|) max(1, |dy|); NOTHING; or UNDECIDED for a ray
-        that has no length, or may be too long
+        that has no length, or may be too long, and for one of a few, in numpy, that looks at very many cells
     cell : (R,) its place in `clearance`
     several : (R,) whether it is one of those that the ray comes to at once: then it may be that not this one is taken,
         but another. At 0 those are the cells in which it starts. Else it goes along the border of two rows or columns,
@@ -183,8 +186,11 @@ def one_taken(
     level, upright = dy == 0 and ay == -HALF, dx == 0 and ax == -HALF
     a, b, c = SUB * dx, SUB * (dx + dy), 0 if level else dx * (HALF - ay) + dy * (HALF + ax)
     aside = width if level else 1 if upright else sx - sy * width
-    n = 0
+    n = looks = 0
     while n <= last_x + last_y:
+        looks += 1
+        if looks > LOOKS_MOST:
+            return UNDECIDED, 0, False
         i, rest = divmod(a * n + c, b)
         u, v = x + sx * i, y + sy * (n - i)
         off = max(1 - u, u - width + 2, 0) + max(1 - v, v - height + 2, 0)

@@ -16,19 +16,18 @@ import numpy as np
 
 from planes.arrays import Ints
 from planes.constants import HALF, SUB
+from planes.jumps import LONGEST, NOTHING, UNDECIDED
 from planes.spans import Box, meets
 from planes.stack import Stack, clipped
 
-__all__ = ["LONGEST", "NOTHING", "UNDECIDED", "Touched", "first_touched"]
+__all__ = ["Touched", "first_touched"]
 
-NOTHING, UNDECIDED = -1, -2
-"""Instead of a time: it touches nothing; or it is none of those that this can follow."""
-
-LONGEST = 2**30
-"""The farthest step along an axis, 1/256 px: products with it fit int64."""
+ROWS_MOST = 400
+"""Rows of masks that one ray looks at in Python's own integers at most: more take longer than to walk."""
 
 Pair = tuple[int, int]
-Span = tuple[int, int]
+Spell = tuple[int, int]
+"""When a ray enters something, and when it leaves it."""
 
 
 class Touched(NamedTuple):
@@ -36,7 +35,7 @@ class Touched(NamedTuple):
 
     Parameters
     ----------
-    entry : when a ray enters the cell where it touches an item first; NOTHING; or UNDECIDED
+    entry : when a ray enters the cell where it touches an item first; NOTHING; or UNDECIDED, if it was not followed
     x, y, rank : that cell, and the item
     """
 
@@ -80,7 +79,8 @@ def first_touched(
 
     Returns
     -------
-    A ray without length, or one whose step is longer than LONGEST, is UNDECIDED.
+    A ray without length, or one whose step is longer than LONGEST, is UNDECIDED; in numpy, too, one that passes so many
+    pixels by that it takes long.
     """
     found = []
     for ray, (start, step) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
@@ -116,7 +116,7 @@ class Ray:
             np.minimum(leave, far * across, out=leave)
         return entry, leave
 
-    def spell(self, x: int, y: int) -> Span:
+    def spell(self, x: int, y: int) -> Spell:
         """The same of one pixel."""
         entry, leave = 0, self.across[0] * self.across[1]
         for at, begin, step, across in zip((x, y), self.start, self.step, self.across, strict=True):
@@ -127,7 +127,7 @@ class Ray:
                 return 1, 0
         return entry, leave
 
-    def rows(self, box: list[int], times: Span) -> range:
+    def rows(self, box: list[int], times: Spell) -> range:
         """Rows of a box that it comes to in some time, along the axis on which it goes less far, in its order."""
         minor = 1 - self.major
         begin, step, scale = self.start[minor], self.step[minor], self.across[0] * self.across[1]
@@ -135,7 +135,7 @@ class Ray:
         first, last = max(at[0] - 1, box[minor]), min(at[1] + 1, box[minor + 2])  # on a border it is in two of them
         return range(first, last + 1) if step >= 0 else range(last, first - 1, -1)
 
-    def run(self, row: int) -> Span:
+    def run(self, row: int) -> Spell:
         """The first and last cell that it touches in a row, along the axis on which it goes farther; none of others."""
         u, along = self.start[self.major], self.step[self.major]
         begin, step = self.start[1 - self.major], self.step[1 - self.major]
@@ -173,10 +173,16 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: tup
 def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, int, int]:
     """When a ray touches the first of some items, in which cell, and which."""
     best: tuple[int, int, int] | None = None
+    left = ROWS_MOST
     for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
         if best is not None and entry > best[0]:
             break
-        found = _in(ray, origin, near.box_xyxy[k].tolist(), (entry, leave), stack, int(near.rank[k]))
+        box = near.box_xyxy[k].tolist()
+        rows = ray.rows(box, (entry, leave))
+        left -= len(rows) + 1
+        if left < 0:
+            return UNDECIDED, 0, 0, -1
+        found = _in(ray, origin, box, rows, stack, int(near.rank[k]))
         if found is not None and (best is None or found[0] < best[0]):
             best = found
     if best is None:
@@ -199,18 +205,18 @@ def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:
     return np.asarray(rank[stack.masks[stack.offset[rank] + own_y * stack.width[rank] + own_x]])
 
 
-def _in(ray: Ray, origin: Pair, box: list[int], times: Span, stack: Stack, rank: int) -> tuple[int, int, int] | None:
-    """When a ray touches an item first, and a cell where it does."""
+def _in(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> tuple[int, int, int] | None:
+    """When a ray touches an item first in some rows, and a cell where it does."""
     found, major, (left, top) = [], ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
-    width, mask = int(stack.width[rank]), stack.mask(rank).tobytes()
+    width, corner = int(stack.width[rank]), int(stack.offset[rank])
     step = width if major else 1
-    for row in ray.rows(box, times):
+    for row in rows:
         first, last = ray.run(row)
         first, last = max(first, box[major]), min(last, box[major + 2])
         if first > last:
             continue
-        begin = (first - top) * width + row - left if major else (row - top) * width + first - left
-        run = mask[begin : begin + (last - first) * step + 1 : step]
+        begin = corner + ((first - top) * width + row - left if major else (row - top) * width + first - left)
+        run = stack.masks[begin : begin + (last - first) * step + 1 : step].tobytes()
         at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
         if at >= 0:
             x, y = (row, first + at) if major else (first + at, row)

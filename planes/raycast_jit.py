@@ -10,8 +10,9 @@ from planes.bitrows_jit import BOXES, EVERYWHERE, FLAGS, INTS
 from planes.compiled import compiled
 from planes.constants import HALF, SUB
 from planes.fronttoback_jit import NOBODY, NONE, OWNERS, refuses
+from planes.jumps import LONGEST, NOTHING, UNDECIDED
 from planes.jumps_jit import over
-from planes.raycast import LONGEST, NOTHING, UNDECIDED, Touched
+from planes.raycast import Touched
 from planes.spans import Box
 from planes.stack import Stack
 from planes.twins import in_parts
@@ -23,6 +24,9 @@ PART_NS, RAY_NS, ITEM_NS = 4e5, 3000.0, 1.5
 
 LATE = 2**62
 """After all times."""
+
+PICKED = 16
+"""Boxes that a ray looks for one by one, the next that it enters among all; if it enters more, the rest are sorted."""
 
 PAIRS = types.Array(types.int64, 2, "A", readonly=True)
 
@@ -157,10 +161,16 @@ def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accep
         near[count], times[count] = at, entry
         count += entry <= leave
     best, column, row = np.int64(LATE), np.int64(0), np.int64(0)
-    for _ in range(count):
+    order = near[:0]
+    for k in range(count):
         next_ = 0
-        for i in range(1, count):
-            next_ = i if times[i] < times[next_] else next_
+        if k == PICKED:
+            order = np.argsort(times[:count])  # those that were looked at are late, and come last
+        if k < PICKED:
+            for i in range(1, count):
+                next_ = i if times[i] < times[next_] else next_
+        else:
+            next_ = order[k - PICKED]
         if times[next_] > best:
             break
         times[next_], at = LATE, near[next_]

@@ -555,7 +555,7 @@ def test_what_is_loaded_by_importing_and_by_a_shot() -> None:
     started = {f"planes.{name}" for name in OF_SCENES.split()} | {f"weapons.{name}" for name in OF_FIRE.split()}
     assert loaded("import planes, weapons", START) == started
     assert loaded(START, SHOT.format("Disc(3)")) == set()
-    of_ray = {f"weapons.{name}" for name in OF_A_RAY.split()} | {"planes.raycast", "planes.slabs"}
+    of_ray = {f"weapons.{name}" for name in OF_A_RAY.split()} | {"planes.jumps", "planes.raycast", "planes.slabs"}
     assert loaded(START, SHOT.format("Pistol(3)")) == of_ray
 
 

@@ -16,10 +16,10 @@ from test_rays import check_columns
 
 import weapons.rayfire
 from planes import Scene, raycast
-from planes.raycast import NOTHING, UNDECIDED
+from planes.jumps import NOTHING, UNDECIDED
 from planes.stack import Stack
 from planes.twins import in_parts, kernels_of
-from weapons import Pistol, Rifle, Rounds, Spread, Sweep, Weapon, fire, rayways
+from weapons import Pistol, Rifle, Rounds, Spread, Sweep, Weapon, fire, prepare, rayways
 
 worlds = st.randoms(use_true_random=False)
 Bounds = tuple[int, int, int, int]
@@ -177,6 +177,37 @@ def first_by_fractions(stack: Stack, at: list[int], by: list[int]) -> tuple[int,
                     found.append((entry, y, x, rank))
     time, y, x, rank = min(found)
     return time, x, y, rank
+
+
+@pytest.mark.parametrize("aim", [0.0, 90.0, 30.0])
+def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: float) -> None:
+    """The object behind them is found: compiled by itself, in numpy by the walk, as it would take long."""
+    scene, frame = Scene(None), np.ones((41, 41), np.bool_)
+    frame[1:-1, 1:-1] = False
+    turn = np.array([np.cos(np.radians(aim)), np.sin(np.radians(aim))])
+    for far in range(300):
+        scene.add(frame, np.rint(turn * 3 * far), categories=2)
+    behind = scene.add(np.ones((3, 3), np.bool_), np.rint(turn * 1000))
+    for accept, first in ((1, behind), (3, None)):
+        hits = fire(scene, Pistol(2000), (0, 0), aim=aim, accept=accept, strategy="direct")
+        assert hits == fire(scene, Pistol(2000), (0, 0), aim=aim, accept=accept, prefilter="box")
+        assert len(hits) == 1 and (first is None or hits.object[0] == first)
+    hollow, corners = Scene(None), np.zeros((41, 41), np.bool_)
+    corners[0, 0] = corners[40, 40] = True
+    for far in range(300):
+        hollow.add(corners, (3 * far, 10))
+    last = hollow.add(np.ones((99, 3), np.bool_), (1000, 10))
+    hits = fire(hollow, Pistol(2000), (-5, 10), strategy="direct")
+    assert hits == fire(hollow, Pistol(2000), (-5, 10), prefilter="box") and hits.object.tolist() == [last]
+    assert hits.plan.has_run("cast") and hits.plan.has_run("walk") == (kernels is raycast)
+
+
+def test_a_true_byte_may_be_any(kernels: ModuleType) -> None:
+    scene = Scene((99, 99))
+    scene.add(np.full((6, 6), 254, np.uint8).view(np.bool_), (50, 50))
+    for how in ({}, {"prefilter": "box"}, {"strategy": "composed"}, {"strategy": "direct"}):
+        assert len(fire(scene, Pistol(90), (2.0, 50.0), **how)) == 1
+    assert len(prepare(scene, Pistol(90)).fire((2.0, 50.0))) == 1
 
 
 # Fired

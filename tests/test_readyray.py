@@ -70,18 +70,18 @@ def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
 def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: bool) -> None:
     """Many shots at a scene that stands still: in numpy they come to jump, if no object is refused."""
     scene, rng = crowd(7, (220, 160) if bounded else None), np.random.default_rng(3)
-    ready, rows = prepare(scene, weapon, exclude=exclude), 0
+    ready, rows, alone = prepare(scene, weapon, exclude=exclude), 0, 0
     assert type(ready) is ReadyRay
     for step in range(3):
         for k in range(60):
             at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
             shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": 9}][k % 4]
             got = ready.fire(at, **shot)
-            assert type(got) is OneRay
+            alone += type(got) is OneRay
             same(got, fire(scene, weapon, at, exclude=exclude, strategy="direct", **shot))
             rows += len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
-    assert 40 < rows < 180
+    assert 40 < rows < 180 and alone > 150
 
 
 def test_rays_jump_once_a_scene_stood_still_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,6 +105,29 @@ def test_rays_jump_once_a_scene_stood_still_for_long_enough(monkeypatch: pytest.
             scene.move(0, (50, 50))
     finally:
         use_jit(None)
+
+
+def test_a_ray_along_a_surface_does_not_jump_pixel_by_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is cast, as the wall that it passes by has no pixel on its way."""
+    scene = Scene((4000, 60))
+    scene.add(np.ones((10, 3800), np.bool_), (2000, 50))
+    scene.add(np.ones((9, 9), np.bool_), (3900, 42))
+    use_jit(False)
+    try:
+        fire(scene, Pistol(3900), (30, 42.25), strategy="composed")  # the plane is there
+        looks = [0]
+        monkeypatch.setattr(
+            castone.raycast, "first_touched", lambda *_, f=castone.raycast.first_touched: count(looks, f(*_))
+        )
+        hits = prepare(scene, Pistol(3900)).fire((30, 42.25))
+        assert hits == fire(scene, Pistol(3900), (30, 42.25), prefilter="box") and len(hits) == 1 == looks[0]
+    finally:
+        use_jit(None)
+
+
+def count(calls: list[int], value: Any) -> Any:
+    calls[0] += 1
+    return value
 
 
 def test_what_is_asked_of_a_ray(kernels: ModuleType) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from planes import raycast
 from planes.arrays import Ints
-from planes.raycast import UNDECIDED, Touched
+from planes.jumps import UNDECIDED
+from planes.raycast import Touched
 from planes.stack import Stack
 from planes.twins import kernels_of
 from weapons.candidates import may_refuse

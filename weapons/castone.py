@@ -1,7 +1,8 @@
 """One ray a call, cast at the items of a scene that may change in between; `castone_jit` has the same class, compiled.
 
 In numpy a ray jumps instead, in Python's own integers, as soon as the scene stood still for so many that the plane for
-it pays; those that touch several things at once, or refuse any, are cast.
+it pays; not where the filter refuses any item, and not one that touches several things at once. Compiled rays are all
+cast.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ from planes.constants import SUB
 from planes.items import Stack
 from planes.jumps import NOTHING, PAD
 from planes.scene import Scene
-from planes.visible import View
 from weapons.oneshot import Filter
 from weapons.rayways import CAST_PAIR_NS, CAST_RAY_NS, owed_ns
 
 __all__ = ["Caster"]
+
+
+JUMP_NS = 10_000.0
+"""What a ray takes that jumps, one a call: by `tests/bench/speed.py`."""
 
 
 class Caster:
@@ -26,7 +30,7 @@ class Caster:
     def __init__(self, scene: Scene, kept: Filter) -> None:
         self._scene = scene
         self._whose = np.array([kept.accept]), kept.exclude
-        self._view = View(False, kept.accept, tuple(set(kept.exclude[0].tolist()) - {-1}))
+        self._view = kept.view(pierce=False)
         self._stack: Stack
         self._refuses = False
         self._owed: float | None
@@ -38,7 +42,7 @@ class Caster:
         self._refuses = not self._view.accepts(stack).all()
 
     def cast(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
-        """What `raycast.first_touched` tells of a ray from (x, y) to (x + dx, y + dy), 1/256 px."""
+        """What `raycast.first_touched` tells of a ray from (x, y) to (x + dx, y + dy), 1/256 px: four whole numbers."""
         if not self._refuses and (self._plane is not None or self._made()):
             found = self._jumped(x, y, dx, dy)
             if found is not None:
@@ -54,8 +58,8 @@ class Caster:
             return False
         if self._owed is None:
             self._owed = owed_ns(plane, self._scene)
-        plane.missed += CAST_RAY_NS + len(self._stack) * CAST_PAIR_NS
-        if plane.missed <= self._owed:
+        plane.missed += CAST_RAY_NS - JUMP_NS + len(self._stack) * CAST_PAIR_NS
+        if plane.missed <= self._owed and not plane.is_made(self._scene.items):
             return False
         codes = plane.codes.read(self._scene.items)
         clearance, (left, top) = plane.read(self._scene.items, codes), plane.corner_xy.tolist()

@@ -1,4 +1,7 @@
-"""What `castone` does, compiled: one call of a kernel that is given numbers."""
+"""What `castone` does, compiled: one call of a kernel that is given numbers.
+
+All calls work in the same room: the kernel keeps other threads of Python waiting.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from planes.fronttoback_jit import NOBODY, NONE
 from planes.items import Stack
 from planes.raycast_jit import touched
 from planes.scene import Scene
-from planes.visible import View
 from weapons.oneshot import Filter
 
 __all__ = ["Caster"]
@@ -45,7 +47,7 @@ class Caster:
 
     def __init__(self, scene: Scene, kept: Filter) -> None:
         self._scene = scene
-        self._view = View(False, kept.accept, tuple(sorted(set(kept.exclude[0].tolist()) - {-1})))
+        self._view = kept.view(pierce=False)
         self._forms = -1
         self._here = np.zeros(TIMES + 1, np.int64)  # it is changed in place: the kernel has its address
         self._at = address(self._here)

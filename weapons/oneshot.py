@@ -14,6 +14,7 @@ from planes.kept import once
 from planes.sampling import OF_PATTERNS
 from planes.scene import Scene
 from planes.spans import Box
+from planes.visible import View
 from weapons.arsenal import parts_of, pierces
 from weapons.candidates import Candidates
 from weapons.hits import HitRow, Hits, Rows, rows_of_met
@@ -35,6 +36,10 @@ class Filter:
     accept: int
     exclude: Ints
     seed: int
+
+    def view(self, pierce: bool) -> View:
+        """What all its shots accept."""
+        return View(pierce, self.accept, tuple(sorted(set(self.exclude[0].tolist()) - {-1})))
 
     def shots(self, weapon: Weapon, at: object, told: Told) -> Shots:
         """One shot as a batch."""

@@ -117,6 +117,7 @@ def _leave_out_unused(plan: Plan, scene: Scene, through: Range, shots: Shots, ra
 
 
 def _unused(why_unindexed: str | None, ray: Traced, way: Way) -> Iterator[tuple[str, str]]:
+    """Stages that rays did not need, and why; `why_unindexed` only if any went through the pre-filter."""
     idle = "no ray was left to walk"
     for name in ("pre-filter", "walk", "stops"):
         yield name, idle

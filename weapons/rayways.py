@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CAST_PAIR_NS", "CAST_RAY_NS", "Way", "chosen_way", "ends_at_first", "jumps_at_all", "owed_ns"]
 
-WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS = 700_000.0, 100.0, 12_000.0
+WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS, WALK_PAIR_NS = 700_000.0, 100.0, 12_000.0, 3.0
 JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 190_000.0, 400.0, 5.5
 CAST_CALL_NS, CAST_RAY_NS, CAST_PAIR_NS = 270_000.0, 75_000.0, 15.0
 COMPILED_CALL_NS, COMPILED_RAY_NS, COMPILED_PAIR_NS = 170_000.0, 600.0, 1.3
@@ -66,15 +66,16 @@ def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Sta
         return Way(plane, False, "asked for")
     if asked or not len(stack):
         return Way(None, False, "every ray walks")
-    walk = WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * WALK_RAY_NS
+    walk = WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * (WALK_RAY_NS + len(stack) * WALK_PAIR_NS)
     cast = _cast_ns(rays, len(stack))
     casts, direct = cast < walk, min(cast, walk)
-    told = f"{direct / 1e3:.0f} us {'cast at items' if casts else 'walking'}"
+    told = f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
     if plane is None:
-        return Way(None, casts, "direct is asked for" if strategy == "direct" else "no bounds that fit one plane")
+        why = "direct is asked for" if strategy == "direct" else "no bounds that fit one plane"
+        return Way(None, casts, f"{why}: {told}")
     jump, owed = JUMP_CALL_NS + rays * JUMP_RAY_NS, owed_ns(plane, scene)
     plane.missed += max(direct - jump, 0.0)
-    return Way(plane if plane.missed > owed else None, casts, f"about {(jump + owed) / 1e3:.0f} us by jumps, {told}")
+    return Way(plane if plane.missed > owed else None, casts, f"{told}, {(jump + owed) / 1e3:.0f} us by jumps")
 
 
 def owed_ns(plane: ClearancePlane, scene: Scene) -> float:

@@ -15,8 +15,9 @@ import numpy as np
 
 from planes.constants import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from planes.grid256 import ONE, over_one, quarter_turns, toward
+from planes.jumps import NOTHING
 from planes.kept import once
-from planes.raycast import NOTHING, Touched
+from planes.raycast import Touched
 from planes.scene import Scene
 from planes.twins import kernels_of
 from weapons import castone
@@ -24,8 +25,8 @@ from weapons.arsenal import ray_parts_of
 from weapons.casting import ends_of_touched
 from weapons.firsthits import FirstHits
 from weapons.guns import Traced
-from weapons.hits import HitRow, Hits, Rows
-from weapons.oneshot import Answer, Filter, Present
+from weapons.hits import HitRow, Hits
+from weapons.oneshot import Filter, OneShot, Present
 from weapons.passes import Passes, Stops, weights_at
 from weapons.rayhits import RayHits
 from weapons.rays import rays_of
@@ -38,22 +39,12 @@ __all__ = ["OneRay", "ReadyRay"]
 Pair = tuple[float, float]
 
 
-class OneRay(Answer, RayHits, list[HitRow]):
+class OneRay(OneShot, RayHits):
     """What one prepared ray hit: the list of its row, if it has one; all else is made when it is asked for."""
 
-    __slots__ = ("_at", "_found", "_present", "_told")  # what is set at each shot
+    __slots__ = ("_found", "_told")  # what is set at each shot, too
 
     _found: tuple[int, ...]
-
-    __init__ = list.__init__
-    __len__ = list.__len__
-    __iter__ = list.__iter__
-
-    def __bool__(self) -> bool:
-        return len(self) > 0
-
-    def _columns(self) -> Rows:
-        return Rows(*(np.array(column, np.int64) for column in zip(*self, strict=True))) if self else Rows.none()
 
     @cached_property
     def _first(self) -> FirstHits:

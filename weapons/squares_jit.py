@@ -28,7 +28,7 @@ from planes.fronttoback_jit import PAD, cut_off, laid, near_of, struck, take
 from planes.items import Stack
 from planes.scene import Scene
 from planes.spans import Spans
-from planes.visible import Composition, View
+from planes.visible import Composition
 from weapons.costs import COMPILED
 from weapons.hits import HitRow
 from weapons.oneshot import Answer, Filter, answer_of
@@ -229,7 +229,7 @@ class Squares:
         self.quick = None  # each shot is looked up
         self._scene, self._tell = scene, answer_of(weapon)[1]
         self._reach = np.array([-frame.reach, -frame.reach, frame.reach, frame.reach])
-        self._view = View(pierce, kept.accept, tuple(sorted(set(kept.exclude[0].tolist()) - {-1})))
+        self._view = kept.view(pierce)
         self._forms = -1
         self._tiles: tuple[Bools, Pile]
         self._here = np.zeros(SCRATCH + 1, np.int64)  # it is changed in place: buffers have its address
