@@ -1,8 +1,8 @@
 """One ray a call, cast at the items of a scene that may change in between; `castone_jit` has the same class, compiled.
 
 In numpy a ray jumps instead, in Python's own integers, as soon as the scene stood still for so many that the plane for
-it pays; not where the filter refuses any item, and not one that touches several things at once. Compiled rays are all
-cast.
+it pays; those that come to something that the filter refuses, or to several things at once, are cast. Compiled rays
+are all cast.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from planes import jumps, raycast
+from planes.arrays import Bools
 from planes.constants import SUB
 from planes.items import Stack
 from planes.jumps import NOTHING, PAD
@@ -32,6 +33,7 @@ class Caster:
         self._whose = np.array([kept.accept]), kept.exclude
         self._view = kept.view(pierce=False)
         self._stack: Stack
+        self._accepts: Bools
         self._refuses = False
         self._owed: float | None
         self._plane: tuple[memoryview, tuple[int, ...], memoryview, int, int] | None
@@ -39,11 +41,12 @@ class Caster:
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now."""
         self._stack, self._plane, self._owed = stack, None, None
-        self._refuses = not self._view.accepts(stack).all()
+        self._accepts = self._view.accepts(stack)
+        self._refuses = not self._accepts.all()
 
     def cast(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
         """What `raycast.first_touched` tells of a ray from (x, y) to (x + dx, y + dy), 1/256 px: four whole numbers."""
-        if not self._refuses and (self._plane is not None or self._made()):
+        if self._plane is not None or self._made():
             found = self._jumped(x, y, dx, dy)
             if found is not None:
                 return found
@@ -77,4 +80,5 @@ class Caster:
             return None
         row, column = divmod(cell, width)
         code = codes[(row - PAD) * (width - 2 * PAD) + column - PAD]
-        return entry, column + left, row + top, int(self._stack.rank_by_code[code >> 1])
+        rank = int(self._stack.rank_by_code[code >> 1])
+        return (entry, column + left, row + top, rank) if self._accepts[rank] else None

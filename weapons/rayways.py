@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 __all__ = ["CAST_PAIR_NS", "CAST_RAY_NS", "Way", "chosen_way", "ends_at_first", "jumps_at_all", "owed_ns"]
 
-WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS, WALK_PAIR_NS = 700_000.0, 100.0, 12_000.0, 3.0
+WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS, WALK_MET_NS = 700_000.0, 20.0, 12_000.0, 3000.0
 JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 190_000.0, 400.0, 5.5
-CAST_CALL_NS, CAST_RAY_NS, CAST_PAIR_NS = 270_000.0, 75_000.0, 15.0
+CAST_CALL_NS, CAST_RAY_NS, CAST_PAIR_NS = 270_000.0, 75_000.0, 30.0
 COMPILED_CALL_NS, COMPILED_RAY_NS, COMPILED_PAIR_NS = 170_000.0, 600.0, 1.3
-"""Of a call, of each ray, and of each ray and item: by walking, jumping, and casting in numpy and compiled. Measured
-with `tests/bench/rays.py` on one machine; the choice hangs on their ratios only."""
+"""Of a call, of an item, of each ray, and of each ray and item, or box that it is expected to begin in: by walking,
+jumping, and casting in numpy and compiled. Measured with `tests/bench/rays.py` on one machine; the choice hangs on
+their ratios only."""
 
 
 class Way(NamedTuple):
@@ -66,8 +67,7 @@ def chosen_way(strategy: str, asked: bool, ray: Traced, scene: Scene, stack: Sta
         return Way(plane, False, "asked for")
     if asked or not len(stack):
         return Way(None, False, "every ray walks")
-    walk = WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * (WALK_RAY_NS + len(stack) * WALK_PAIR_NS)
-    cast = _cast_ns(rays, len(stack))
+    walk, cast = _walk_ns(rays, stack), _cast_ns(rays, len(stack))
     casts, direct = cast < walk, min(cast, walk)
     told = f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
     if plane is None:
@@ -83,6 +83,13 @@ def owed_ns(plane: ClearancePlane, scene: Scene) -> float:
     if plane.is_made(scene.items):
         return 0.0
     return plane.codes.cost(scene.items) * REDRAW_PIXEL_NS + plane.codes.size * CLEARANCE_PIXEL_NS
+
+
+def _walk_ns(rays: int, stack: Stack) -> float:
+    """What it costs to let rays walk, ns, among items that are spread evenly over the box around all."""
+    item_wh, world_wh = stack.sizes
+    met = min(len(stack) * float((item_wh / world_wh).prod()), len(stack))
+    return WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * (WALK_RAY_NS + met * WALK_MET_NS)
 
 
 def _cast_ns(rays: int, items: int) -> float:
