@@ -140,28 +140,23 @@ def _front(x, y, near, count, box, offset, masks, occluder, origin_x, origin_y, 
 
 
 @njit
-def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accept, exclude, who, bounds, near, times):
-    """When a ray enters the cell where it touches an item first, the cell, and its rank.
-
-    Parameters
-    ----------
-    near, times : room for a number of each item
-    """
-    if (dx == 0 and dy == 0) or max(abs(dx), abs(dy)) > LONGEST:
-        return np.int64(UNDECIDED), np.int64(0), np.int64(0), np.int64(-1)
-    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
-    ray = x - SUB * origin_x, y - SUB * origin_y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
+def _entered(box, categories, owner, accept, exclude, who, origin_x, origin_y, ray, bounds, near, times):
+    """Accepted items whose boxes a ray enters, and when it does; how many."""
     count = 0
     for i in range(_near(box, origin_x, origin_y, ray, bounds, near)):
         at = near[i]
         if len(accept) and refuses(at, categories, owner, accept, exclude, who):
             continue
         left, top, right, low = _part(box, at, origin_x, origin_y, bounds)
-        entry, leave = _times(left, top, right, low, ray)
-        near[count], times[count] = at, entry
-        count += entry <= leave
-    best, column, row = np.int64(LATE), np.int64(0), np.int64(0)
-    order = near[:0]
+        near[count], (times[count], leave) = at, _times(left, top, right, low, ray)
+        count += times[count] <= leave
+    return count
+
+
+@njit
+def _earliest(box, offset, masks, origin_x, origin_y, ray, bounds, near, times, count):
+    """When a ray touches the first of some items, LATE if it touches none, and a cell where it does."""
+    best, column, row, order = np.int64(LATE), np.int64(0), np.int64(0), near[:0]
     for k in range(count):
         next_ = 0
         if k == PICKED:
@@ -180,13 +175,30 @@ def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accep
         found, found_x, found_y = _in(part, mask, ray, entry, leave)
         if found < best:
             best, column, row = found, found_x, found_y
+    return best, column, row
+
+
+@njit
+def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accept, exclude, who, bounds, near, times):
+    """When a ray enters the cell where it touches an item first, the cell, and its rank.
+
+    Parameters
+    ----------
+    near, times : room for a number of each item
+    """
+    if (dx == 0 and dy == 0) or max(abs(dx), abs(dy)) > LONGEST:
+        return np.int64(UNDECIDED), np.int64(0), np.int64(0), np.int64(-1)
+    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
+    ray = x - SUB * origin_x, y - SUB * origin_y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
+    count = _entered(box, categories, owner, accept, exclude, who, origin_x, origin_y, ray, bounds, near, times)
+    best, column, row = _earliest(box, offset, masks, origin_x, origin_y, ray, bounds, near, times, count)
     if best == LATE:
         return np.int64(NOTHING), np.int64(0), np.int64(0), np.int64(-1)
     front, blocked, first_x, first_y = np.int64(-1), False, np.int64(0), np.int64(0)
-    for k in range(9):
+    for k in range(9):  # of cells that are entered at once an occluder's comes first, then by (y, x)
         at_x, at_y = column + k % 3 - 1, row + k // 3 - 1
         entry, leave = _times(at_x, at_y, at_x, at_y, ray)
-        if entry != best or entry > leave or (blocked and front >= 0):
+        if entry != best or entry > leave or blocked:
             continue
         at, blocks = _front(at_x, at_y, near, count, box, offset, masks, occluder, origin_x, origin_y, bounds)
         if at >= 0 and (front < 0 or blocks):
@@ -219,9 +231,7 @@ def first_touched(
 ) -> Touched:
     """See `raycast.first_touched`."""
     found = np.empty((4, len(start_256)), np.int64)
-    given = (
-        stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner,
-    )  # fmt: skip
+    given = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
     within = EVERYWHERE if bounds is None else bounds
 
     def some(first: int, last: int) -> None:
