@@ -179,6 +179,24 @@ def first_by_fractions(stack: Stack, at: list[int], by: list[int]) -> tuple[int,
     return time, x, y, rank
 
 
+@pytest.mark.parametrize("way", ["cast", "jump", "ready", "ready, jumping"])
+@pytest.mark.parametrize("accept", [1, 2, 3])
+@pytest.mark.parametrize("exclude", [None, 0, 1, [0, 1], [0, 2]], ids=repr)
+def test_a_ray_goes_through_what_it_refuses(kernels: ModuleType, way: str, accept: int, exclude: object) -> None:
+    """Of four objects in a row it hits the first of a category that it accepts, of an owner that is not excluded."""
+    scene, out = Scene((99, 9), categories=["other"]), np.atleast_1d(-1 if exclude is None else exclude)
+    for k in range(4):
+        scene.add(np.ones((3, 3), np.bool_), (20 + 20 * k, 4), categories=1 + k % 2)
+    if way.endswith("jumping"):
+        fire(scene, Pistol(90), (2, 4), strategy="composed")  # the plane is there
+    if way.startswith("ready"):
+        hits = prepare(scene, Pistol(90), accept=accept, exclude=exclude).fire((2, 4))
+    else:
+        strategy = "composed" if way == "jump" else "direct"
+        hits = fire(scene, Pistol(90), (2, 4), accept=accept, exclude=exclude, strategy=strategy)
+    assert hits.object.tolist() == [k for k in range(4) if accept & 1 + k % 2 and k not in out][:1]
+
+
 @pytest.mark.parametrize("aim", [0.0, 90.0, 30.0])
 def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: float) -> None:
     """The object behind them is found: compiled by itself, in numpy by the walk, as it would take long."""
