@@ -218,6 +218,8 @@ def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: f
     hits = fire(hollow, Pistol(2000), (-5, 10), strategy="direct")
     assert hits == fire(hollow, Pistol(2000), (-5, 10), prefilter="box") and hits.object.tolist() == [last]
     assert hits.plan.has_run("cast") and hits.plan.has_run("walk") == (kernels is raycast)
+    sooner = hollow.add(np.ones((99, 3), np.bool_), (50, 10))  # some twenty boxes are entered before
+    assert fire(hollow, Pistol(2000), (-5, 10), strategy="direct").object.tolist() == [sooner]
 
 
 def test_a_true_byte_may_be_any(kernels: ModuleType) -> None:
