@@ -11,7 +11,7 @@ from planes.arrays import Codes, Ints
 from planes.compose import CodePlane
 from planes.items import Items
 from planes.jumps import PAD, Clearance
-from planes.spans import Box
+from planes.spans import Box, meets
 from planes.twins import kernels_of
 
 __all__ = ["ClearancePlane"]
@@ -55,11 +55,10 @@ class ClearancePlane:
 
     def _holds(self, boxes_xyxy: Ints | Box) -> bool:
         """Whether one of some boxes lies on the plane, at least in part; those that end before they begin are empty."""
-        box, (left, top, right, low) = np.reshape(boxes_xyxy, (-1, 4)).T, self.codes.box_xyxy
-        there = (np.maximum(box[0], left) <= np.minimum(box[2], right)) & (
-            np.maximum(box[1], top) <= np.minimum(box[3], low)
+        box = np.reshape(boxes_xyxy, (-1, 4))
+        return bool(
+            (meets(box, np.array(self.codes.box_xyxy)) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3])).any()
         )
-        return bool(there.any())
 
     def read(self, items: Items, codes: Codes) -> Clearance:
         """Distances (h + 2 PAD, w + 2 PAD) of the present version; `codes` are what the code plane reads then."""
