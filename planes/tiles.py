@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planes.arrays import Bools, Ints
+from planes.bigrows import BigTiles
 from planes.bits import WORD, Words, packed
 from planes.fronttoback import Pile
 from planes.spans import ragged
@@ -42,6 +43,7 @@ class Tiles:
     begin : (T,) its first row in `words`
     words : flat rows of all tiles
     whole : whether each item is one tile
+    bigs : tiles as integers, by their stride
     """
 
     rank: Ints
@@ -51,6 +53,7 @@ class Tiles:
     begin: Ints
     words: Words
     whole: bool
+    bigs: dict[int, BigTiles]
 
     def __len__(self) -> int:
         return len(self.rank)
@@ -74,6 +77,11 @@ class Tiles:
         corner = np.stack([items_xyxy[self.rank, 0] + self.left, items_xyxy[self.rank, 1] + self.top], axis=1)
         return np.concatenate([corner, corner + self.size_wh - 1], axis=1)
 
+    def big(self, stride: int) -> BigTiles:
+        """Tiles as integer rows of a stride, by `begin`."""
+        known = self.bigs.get(stride)
+        return self.bigs.setdefault(stride, BigTiles(stride)) if known is None else known
+
     def pile(self, stack: Stack) -> Pile:
         """The tiles where they lie, with what decides who hits them; `stack` is the one whose they are."""
         occluder = self.each(stack.occluder) if stack.has_occluders else NO_FLAGS
@@ -94,6 +102,7 @@ class TileAtlas:
         self._places: dict[int, tuple[int, int]] = {}  # of each mask: its first slot, and how many
         self._number, self._slots = NO_NUMBERS, np.zeros((0, 2), np.int64)  # of the last stack: masks, their places
         self._last: tuple[int, Tiles] | None = None
+        self._bigs: dict[int, BigTiles] = {}
         self._lock = threading.Lock()
 
     def known(self, forms: int) -> Tiles | None:
@@ -123,7 +132,7 @@ class TileAtlas:
         columns = self._columns.take(slot, axis=0)
         whole &= not columns[:, :2].any()
         left, top, size = columns[:, 0], columns[:, 1], columns[:, 2:]
-        return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole)
+        return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole, self._bigs)
 
     def _found(self, mask_of: Callable[[int], Bools], number: Ints) -> Ints:
         """First slot and count (2, M) of each mask of a stack; only what the last stack had not is looked for."""
@@ -152,7 +161,7 @@ class TileAtlas:
         self.words.reshape(-1, STRIDE)[:kept], self._columns[:kept] = words[slots], columns[slots]
         begin = (np.cumsum(count) - count).tolist()
         self._places = dict(zip(used, zip(begin, count.tolist(), strict=True), strict=True))
-        self._used = kept
+        self._used, self._bigs = kept, {}
 
     def _allot(self, slots: int) -> None:
         self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 4), np.int64)

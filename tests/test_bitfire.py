@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from test_fire import Shot, Volley, expected, told
 
+import planes.bigrows
 import planes.bitrows
 import planes.cells
 import planes.items
 import planes.tiles
 import planes.visible
 import weapons.bitfire
+import weapons.fewfire
 import weapons.firing
 import weapons.pattern
 import weapons.windows
@@ -38,6 +40,7 @@ PARTS: dict[str, dict[str, int]] = {
     "whole": {},
     "parts": {
         "WALKED_MOST": 0,
+        "PLACEMENTS_MOST": 0,
         "PLACEMENTS_AT_ONCE": 7,
         "WORDS_AT_ONCE": 640,
         "PAIRS_AT_ONCE": 50,
@@ -46,11 +49,13 @@ PARTS: dict[str, dict[str, int]] = {
     },
     "single": {"CHUNK_PAIRS": 1, "WORDS_AT_ONCE": WORD, "PAIRS_AT_ONCE": 1, "PATTERNS_BYTES_MOST": 1, "OFTEN": 10**9},
     "few cells": {"WITHOUT_MOST": 0, "CELLS_MOST": 4, "BRUTE_PAIRS": 9, "TABLE_BYTES_MOST": 0, "ENTRIES_A_BOX": 2},
+    "in integers": {"REACH": 999, "PLACEMENTS_MOST": 9999, "BOXES_MOST": 10**9, "PAIRS_MOST": 10**9, "OFTEN": 2},
 }
 """Limits that cut a batch, and choose between two ways to do the same."""
 
 OWNERS = (
-    weapons.bitfire, weapons.windows, planes.bitrows, planes.cells, planes.visible, planes.tiles
+    weapons.bitfire, weapons.fewfire, weapons.windows, planes.bigrows, planes.bitrows, planes.cells, planes.visible,
+    planes.tiles,
 )  # fmt: skip
 
 
@@ -125,7 +130,7 @@ def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[
 def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng([seed, len(limits)])
     cut(monkeypatch, PARTS[limits])
-    rows = ways = 0
+    rows = ways = few = 0
     for _ in range(4 if seed else 2):
         scene = some_scene(rng)
         for weapon in WEAPONS:
@@ -135,11 +140,13 @@ def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, mon
                 hits = fire(scene, weapon, at, strategy=strategy, **how)
                 assert hits == truth, f"{weapon} {strategy} {how}"
                 assert hits.plan.has_left_out("verdicts")
+                few += any(stage.why == "direct: few shots" for stage in hits.plan.left_out)
                 ways |= (
                     hits.plan.has_run("composition") + 2 * hits.plan.has_run("tiles") + 4 * hits.plan.has_run("read")
                 )
             rows += len(truth)
     assert rows > 300 and ways & 3 == 3
+    assert kernels == "jit" or limits != "in integers" or few
 
 
 def test_the_oracle_says_the_same(kernels: str) -> None:

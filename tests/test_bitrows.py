@@ -527,7 +527,7 @@ def test_kernels_are_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
         assert kernels_of(bitrows, LOADING_NS * 2) is kernels_of(bitrows) is twin
         use_jit(None)
         monkeypatch.setattr("weapons.bitfire.SHOT_NS", 2 * LOADING_NS)
-        fire(Scene((50, 40)), Disc(3), (9, 9))
+        fire(Scene((50, 40)), Disc(3), [(9, 9)] * 65)
         assert kernels_of(bitrows) is twin
         for on, expected in ((True, twin), (False, bitrows)):
             use_jit(on)

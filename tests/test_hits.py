@@ -597,21 +597,23 @@ def test_auto_says_why_and_changes_no_row() -> None:
 
 
 def test_auto_composes_for_bit_rows_when_it_pays() -> None:
-    """One shot is not worth a composition, 4000 are; what is there is read, and who asks for a pre-filter gets it."""
+    """A hundred shots are not worth a composition, 4000 are; what is there is read, but for a few shots."""
     scene = Scene((64, 64))
     for number in range(200):
         scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
     at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
     direct = fire(scene, Disc(8), at, strategy="direct")
-    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"].startswith("direct: about")
+    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "direct: few shots"
+    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"].startswith("direct: about")
     many = fire(scene, Disc(8), at)
     assert stages(many)[0]["plan"].startswith("composed: about") and many == direct
-    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "composed: it is there"
+    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"] == "composed: it is there"
+    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "direct: few shots"
     assert stages(fire(scene, Disc(8), at[0], prefilter="box"))[0]["plan"] == "direct: a pre-filter was asked for"
     differ = fire(scene, Disc(8), at[:2], exclude=[1, 2], strategy="composed")
     assert stages(differ)[0]["plan"] == "direct: shots accept different items"
     scene.move(0, (9, 9))
-    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"].startswith("direct: about")
+    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"].startswith("direct: about")
 
 
 # Bad arguments

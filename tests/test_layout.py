@@ -14,8 +14,8 @@ ORDER = {
     "planes": (
         "constants", "arrays", "heap", "twins", "compiled", "addresses", "schema", "exact", "sines", "sines_jit",
         "grid256", "snapping", "snapping_jit", "spans", "strips", "stack", "bits", "nearest", "bitrows", "bitrows_jit",
-        "itemrows", "cells", "cells_jit", "pellets", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit", "tiles",
-        "bigrows", "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids",
+        "itemrows", "cells", "cells_jit", "pellets", "lookup", "lookup_jit", "fronttoback", "fronttoback_jit",
+        "bigrows", "tiles", "bigfront", "rasterise", "rings", "volumes", "parts", "axes", "overlap", "boxes", "grids",
         "quadtree", "bvh", "broadphase", "triangles", "slabs", "image", "kept", "turning",
         "turning_jit", "forms", "sprite", "hull", "cover", "outline", "fit", "bounding", "placing",
         "placing_jit", "items", "cropping", "cropping_jit", "visible", "index", "painting",
@@ -26,7 +26,7 @@ ORDER = {
     "weapons": (
         "draws", "draws_jit", "weapon", "columns", "pattern", "windows", "guns", "arsenal", "volley",
         "rays", "trace", "narrow", "candidates", "costs", "plan", "resolve", "explain", "margins",
-        "hits", "counting", "oneshot", "pieces", "squares", "squares_jit", "runfire", "bitfire",
+        "hits", "counting", "fewfire", "oneshot", "pieces", "squares", "squares_jit", "runfire", "bitfire",
         "meetings", "flight", "ends", "passes", "tracing", "rayexplain", "leaving", "raymargins",
         "rayhits", "firsthits", "rayways", "jumping", "casting", "rayfire", "firing", "ready", "castone",
         "castone_jit", "readyray", "preparing", "clock", "orders",

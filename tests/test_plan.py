@@ -409,6 +409,7 @@ def mixed() -> dict[str, Hits]:
         "direct": fire(yard(), Disc(9, falloff="linear"), SHOTS, strategy="direct"),
         "composed": fire(yard(), Disc(9, pierce=True, falloff="linear"), SHOTS, strategy="composed"),
         "bit rows": fire(yard(), Disc(9), SHOTS, strategy="direct"),
+        "few": fire(yard(), Disc(9), SHOTS),
         "points": fire(yard(), Point(), SHOTS, strategy="composed"),
         "rays": fire(yard(), Laser(60), SHOTS, aim=30),
         "unbounded": fire(yard(None), Disc(9, falloff="linear"), SHOTS),
@@ -531,13 +532,13 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("pl
 START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bitrows bits cells compose constants cropping forms fronttoback grid256 heap image index itemrows items"
-    " kept labels lookup nearest painting pellets placing pointquery poses rasterise sampling scene scenefile schema"
-    " sines snapping spans sprite stack steps strips tiles turning twins visible"
+    "arrays bigfront bigrows bitrows bits cells compose constants cropping forms fronttoback grid256 heap image index"
+    " itemrows items kept labels lookup nearest painting pellets placing pointquery poses rasterise sampling scene"
+    " scenefile schema sines snapping spans sprite stack steps strips tiles turning twins visible"
 )
 OF_FIRE = (
-    "arsenal bitfire candidates columns costs counting draws explain firing guns hits pattern plan resolve runfire"
-    " volley weapon windows"
+    "arsenal bitfire candidates columns costs counting draws explain fewfire firing guns hits pattern plan resolve"
+    " runfire volley weapon windows"
 )
 OF_A_RAY = "casting ends firsthits flight meetings passes rayexplain rayfire rayhits rays rayways trace tracing"
 

@@ -23,7 +23,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_fire import Volley, expected, some_battle, some_place, some_pose, told
 
-import weapons.pieces
+import planes.bigrows
 import weapons.ready
 import weapons.squares
 from planes import InputError, Scene, Sprite, use_jit
@@ -79,7 +79,8 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
     @given(st.integers(0, 10**6))
     def check(seed: int) -> None:
         with ExitStack() as patches:
-            patches.enter_context(mock.patch.object(weapons.pieces, "OFTEN", 2))
+            patches.enter_context(mock.patch.object(planes.bigrows, "OFTEN", 2))
+            patches.enter_context(mock.patch.object(weapons.squares, "OFTEN", 1 + seed % 3))
             if compiled and seed % 2:
                 costs = squares.COMPILED._replace(compose=seed % 1000, item=0)
                 patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=costs))
@@ -173,7 +174,8 @@ def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.Monke
 
 
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(weapons.pieces, "OFTEN", 1 if bounded else 3)
+    monkeypatch.setattr(planes.bigrows, "OFTEN", 1 if bounded else 3)
+    monkeypatch.setattr(weapons.squares, "OFTEN", 2 if bounded else 3)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0
@@ -254,6 +256,7 @@ def test_only_what_lies_near_a_change_is_made_anew(monkeypatch: pytest.MonkeyPat
     for x in range(50, 2000, 100):
         for y in range(50, 2000, 100):
             scene.add(Sprite.circle(20), (x, y))
+    monkeypatch.setattr(weapons.squares, "OFTEN", 0)
     ready = prepare(scene, Disc(10))
     every = [(x, y) for x in range(16, 2000, 32) for y in range(16, 2000, 32)]
     for at in every:

@@ -33,6 +33,7 @@ from weapons.arsenal import parts_of, pattern_of
 from weapons.candidates import Candidates, may_refuse, refused
 from weapons.costs import chosen_candidates, chosen_form
 from weapons.counting import placed_of, rows_of, rows_of_rounds
+from weapons.fewfire import fired_by_few
 from weapons.hits import Hits, Rows
 from weapons.plan import Plan, leave_out_uncounted
 from weapons.resolve import Sight, near_pairs
@@ -57,6 +58,9 @@ NEAR_AT_ONCE = 2**12
 
 BESIDE_BYTES_MOST = 2**26
 """Distances along the rows of tiles are not made if they take more."""
+
+AUTO = "auto", "auto", "auto"
+"""Pre-filter, broad phase and strategy, of which none was asked for."""
 
 OF_ALL = View(False, ALL, ()), View(True, ALL, ())
 """What shots see that refuse nothing: the front, and all that they pierce."""
@@ -109,6 +113,11 @@ def fired_by_bits(
     each, view = traits.placements, view_of(traits.pierces, shots)
     placements = each * len(shots)
     point = traits.is_point and view == OF_ALL[False] and not stack.has_unmet
+    few = fired_by_few(scene, weapon, shots, stack, plan) if how == AUTO and not point else None
+    if few is not None:
+        plan.run("plan", "direct: few shots")
+        sight = Sight(stack, scene.bounds, traits.pierces, Candidates(scene.items, stack), plan)
+        return _hits(scene, weapon, shots, sight, [few], ("direct", "few shots"))
     alone = not traits.scattered and prefilter == broadphase == "auto"
     expect(placements * (SHOT_NS + len(stack) * ITEM_NS))
     kind = point, traits.scattered
@@ -126,9 +135,14 @@ def fired_by_bits(
         read, first, most = _reader(scene, name, view, alone, sight)
         part_of = _parts(weapon, shots, first // each, most // each, candidates)
         parts = [read(part, volley).later(begin) for begin, part, volley in part_of]
-    rows = Rows.joined(parts)
+    return _hits(scene, weapon, shots, sight, parts, (name, why))
+
+
+def _hits(scene: Scene, weapon: Weapon, shots: Shots, sight: Sight, parts: list[Rows], chosen: tuple[str, str]) -> Hits:
+    """Hits of parts of a batch, and what they did not need; `chosen` are the strategy and why."""
+    rows, plan, candidates = Rows.joined(parts), sight.plan, sight.candidates
     hits = Hits(rows, lambda: verdicts_of(weapon, shots, sight), scene, weapon, shots, plan)
-    leave_out_uncounted(plan, scene, candidates, may_refuse(stack, shots), name, why)
+    leave_out_uncounted(plan, scene, candidates, may_refuse(sight.stack, shots), *chosen)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits
 

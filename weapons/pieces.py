@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planes.arrays import Ints
-from planes.bigrows import packed, pixels_of, rows_of_spans
+from planes.bigrows import Depths, rows_of_spans
 from planes.constants import SUB
 from planes.grid256 import snap, unit_toward
 from planes.spans import Spans
@@ -16,7 +15,7 @@ from weapons.arsenal import parts_of
 from weapons.volley import Shots, volley_of
 from weapons.weapon import Weapon
 
-__all__ = ["Depths", "Frame", "Piece", "Round", "frame_of", "pieces_of", "rounds_of"]
+__all__ = ["Frame", "Piece", "Round", "frame_of", "pieces_of", "rounds_of"]
 
 WHOLE = 96
 """A pattern within a box of this side is looked up as a whole, px: of a larger one most is empty where an object is."""
@@ -29,60 +28,6 @@ PARTS_MAX = 256
 
 TURNED_PX = 2
 """How far beyond its reach a pattern that turns may have pixels: those whose squares its axis meets, and rounding."""
-
-
-OFTEN = 8
-"""Answers of a piece after which it is worth to make planes of its pixels: they take as long as so many without."""
-
-
-class Depths:
-    """The pixels of a piece by their distance from the round's pixel.
-
-    Each distance has a number, the nearest 0. For each binary place there is a plane of the pixels whose number has no
-    bit there: from the highest place on, what something shares with a plane is nearer than all else of it.
-
-    Parameters
-    ----------
-    rows, stride : the piece
-    x, y : its first column and row, from the round's pixel
-    """
-
-    def __init__(self, rows: int, stride: int, x: int, y: int) -> None:
-        self._rows, self._stride, self._x, self._y, self._corner = rows, stride, x, y, np.array([x, y])
-        self._planes: list[int] | None = None
-        self._calls = 0
-
-    def nearest(self, bits: int) -> tuple[int, int, int]:
-        """Of some pixels of the piece the nearest: squared distance, y and x from the round's pixel; ties by (y, x)."""
-        if self._planes is None:
-            self._calls += 1
-            if self._calls <= OFTEN:
-                pixels, distance2 = self._pixels(bits)
-                first = int(distance2.argmin())
-                x, y = (pixels[first] + self._corner).tolist()
-                return int(distance2[first]), y, x
-            self._planes = self._made()
-        for plane in self._planes:
-            nearer = bits & plane
-            if nearer:
-                bits = nearer
-        y, x = divmod((bits ^ bits - 1).bit_length() - 1, self._stride)
-        x, y = x + self._x, y + self._y
-        return x * x + y * y, y, x
-
-    def _pixels(self, bits: int) -> tuple[Ints, Ints]:
-        """Pixels (n, 2) of the piece, and their squared distances."""
-        pixels = pixels_of(bits, self._stride)
-        return pixels, ((pixels + self._corner) ** 2).sum(axis=1)
-
-    def _made(self) -> list[int]:
-        """The planes, the highest place first."""
-        pixels, distance2 = self._pixels(self._rows)
-        number = np.unique(distance2, return_inverse=True)[1].reshape(-1)
-        places = np.arange(int(number.max(initial=0)).bit_length() - 1, -1, -1)
-        mask = np.zeros((len(places), int(pixels[:, 1].max(initial=0)) + 1, self._stride), np.bool_)
-        mask[:, pixels[:, 1], pixels[:, 0]] = (number >> places[:, None]) & 1 == 0
-        return [packed(plane, self._stride) for plane in mask]
 
 
 class Round(NamedTuple):

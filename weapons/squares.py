@@ -1,27 +1,30 @@
 """Squares of shot positions, each with the objects that a pattern fired from there may hit, and what is seen of them.
 
-A square is made when the first shot falls into it, and what is seen of an object when the first square needs it: its
-mask without what lies before it, as integer rows. After a change of the scene those near what changed are made anew.
-`squares_jit` walks the stack instead, compiled.
+The first shots that fall into a square walk the tiles of the items, front to back; for the next one it is made, and
+what is seen of an object when the first square needs it: its mask without what lies before it, as integer rows. After a
+change of the scene those near what changed are forgotten: where all moves, shots walk. `squares_jit` walks the stack,
+or what is composed of it, instead.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from planes.arrays import Bools, Ints
-from planes.bigrows import packed
+from planes.arrays import Bools
+from planes.bigfront import Ground, hit_by_one
+from planes.bigrows import BigPattern, big_pattern, packed
 from planes.constants import POSITION_MAX, WEIGHT_FULL
 from planes.items import Stack
 from planes.scene import Scene
 from planes.spans import Box, meets
 from planes.turning import sides_of
 from weapons.candidates import refused
+from weapons.fewfire import accepted
 from weapons.hits import HitRow
 from weapons.oneshot import Answer, Filter, answer_of
 from weapons.pieces import Frame, Round, pieces_of
@@ -43,6 +46,18 @@ BLOCK_SHIFT = 2
 
 TILE_MIN, TILE = 32, 64
 """Objects are looked up whole, or in tiles of so many px a side: of a larger one most is empty where a shot falls."""
+
+OFTEN = 4
+"""Shots that walk before a square is made: in that square; or in all, and twice as many as when last all had moved.
+
+It takes as long as a few of them to make one where all has moved, and less than one of them where nothing does.
+"""
+
+WALKS_MOST = 2**12
+"""Shots that walk, at most, if as many did before."""
+
+FEW = 8
+"""So many changes, or of a quarter of the items, are not taken for those of all."""
 
 KEPT_BYTES = 64 * 2**20
 """Squares and objects kept for one prepared weapon, bytes; beyond it all are made anew."""
@@ -74,6 +89,8 @@ is seen of it as integer rows, and their place as a number of bits in the world;
 
 Cell = tuple[Seen, ...]
 
+UNMADE: Cell = ((0, -1, 0, -1, 0, 0, 0),)
+"""Instead of a square that is not made yet."""
 
 Shared = tuple[int, int, int, int, int, int]
 """What a round shares with an object: of the nearest pixel the squared distance, y and x, from the round's pixel; a
@@ -87,6 +104,9 @@ One of compiled kernels takes any position, and raises an error of a key or a va
 
 new = tuple.__new__
 """It makes a row in half the time that `HitRow` takes."""
+
+
+ZERO = np.zeros(1, np.int64)
 
 
 class Near(NamedTuple):
@@ -144,12 +164,15 @@ class Squares:
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
-        self.made: Made[Cell] = Made(self._square)
+        self.made: Made[Cell] = Made(self._square if frame.tiled else self._asked)
+        self._walked: dict[tuple[int, int], int] = {}  # shots that walked since all was forgotten, by square
+        self._walks = self._before = 0  # all of them, and before that
         self.stride = self._tile = 0
         self._tell = answer_of(weapon)[1]
         self._scene, self._shots, self._pierce = scene, kept.shots(weapon, (0, 0), (None, None, None)), pierce
         self._frame, self._corner, self._side = frame, frame.corner, frame.side
         self._stack: Stack | None = None
+        self._ground: Ground
         self._seen = -1
         self._blocks: dict[tuple[int, int], list[Near]] = {}
         self._tiles: dict[int, dict[tuple[int, int], Seen]] = {}
@@ -162,13 +185,19 @@ class Squares:
         """A function that looks up what a round hits; and how many bytes are kept for it."""
         made, stride, number, tell = self.made, self.stride, one.number, self._tell
         pieces = pieces_of(one.spans, self._frame, stride)
+        pattern = big_pattern(one.spans)
 
         def look(x: int, y: int, hits: Answer) -> None:
             """Look up the tiles near a pixel, and tell what is shared with them, the nearest first."""
             shared: list[Shared] = []
             for dx, dy, rows, depths in pieces:
                 left, top = x + dx, y + dy
-                for x_min, x_max, y_min, y_max, bits, place, item in made[left >> CELL_SHIFT][top >> CELL_SHIFT]:
+                cell = made[left >> CELL_SHIFT][top >> CELL_SHIFT]
+                if cell is UNMADE:
+                    for distance2, py, px, item, n in self._hit_by(pattern, x, y):
+                        tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (px, py), distance2)))
+                    return
+                for x_min, x_max, y_min, y_max, bits, place, item in cell:
                     if x_min <= left <= x_max and y_min <= top <= y_max:
                         shift = top * stride + left - place
                         hit = (bits >> shift if shift >= 0 else bits << -shift) & rows
@@ -181,7 +210,19 @@ class Squares:
             for distance2, dy, dx, _, item, n in shared:
                 tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
 
-        return look, sum(PIECE_BYTES + PLANES * rows.bit_length() // 7 for _, _, rows, _ in pieces)
+        return look, pattern.nbytes + sum(PIECE_BYTES + PLANES * rows.bit_length() // 7 for _, _, rows, _ in pieces)
+
+    def _hit_by(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int]]:
+        """Walk the tiles that a placed pattern may meet: squared distance, y, x, id and count of each hit object."""
+        square = x >> CELL_SHIFT, y >> CELL_SHIFT
+        self._walked[square] = self._walked.get(square, 0) + 1
+        self._walks += 1
+        ground, left, top = self._ground, x + pattern.x, y + pattern.y
+        box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
+        tile = meets(box, ground.boxes_xyxy).nonzero()[0]
+        _, tile = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
+        for _, distance2, py, px, rank, n in hit_by_one(pattern, x, y, tile, ground):
+            yield distance2, py, px, ground.stack.ids.item(rank), n
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""
@@ -191,10 +232,18 @@ class Squares:
                 largest = int((stack.box_xyxy[:, 2:] - stack.box_xyxy[:, :2]).max(initial=0)) + 1
                 self._tile = min(max(largest, TILE_MIN), TILE) if len(stack) else TILE
                 self.stride = self._side + self._tile - 1
-            boxes, ids = items.changed_boxes(self._seen), items.changed_ids(self._seen)
-            if boxes is None or ids is None or not self._forget(boxes, ids, stack):
+            changes = items.changes(self._seen)
+            few = max(len(stack) // 4, FEW)
+            if changes is None or sum(np.size(ids) for _, ids, _, _ in changes) > few:
+                self._before, self._walks = min(self._walks, WALKS_MOST), 0
+                self._walked.clear()
+                self._clear()
+            elif not self._forget(stack):
                 self._clear()
             self._blocks.clear()
+            tiles = items.tiles()
+            boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # a side after the other, as they are compared
+            self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds)
             self._stack, self._seen = stack, items.version
 
     def _clear(self) -> None:
@@ -202,10 +251,11 @@ class Squares:
         self._tiles.clear()
         self.nbytes = 0
 
-    def _forget(self, boxes_xyxy: Ints, ids: Ints, stack: Stack) -> bool:
-        """Forget what lies near boxes; False if that is so much that all may as well go."""
-        wide = (SIDE + self._side) >> CELL_SHIFT
-        if len(boxes_xyxy) * wide * wide > sum(map(len, self.made.values())):
+    def _forget(self, stack: Stack) -> bool:
+        """Forget what lies near what changed; False if that is not known, or so much that all may as well go."""
+        items, wide = self._scene.items, (SIDE + self._side) >> CELL_SHIFT
+        boxes_xyxy, ids = items.changed_boxes(self._seen), items.changed_ids(self._seen)
+        if boxes_xyxy is None or ids is None or len(boxes_xyxy) * wide * wide > sum(map(len, self.made.values())):
             return False
         hidden = meets(boxes_xyxy[:, None], stack.box_xyxy).any(axis=0)
         for item in (*ids.tolist(), *stack.ids[hidden].tolist()):
@@ -221,6 +271,11 @@ class Squares:
                     if j in column:
                         self.nbytes -= _size(column.pop(j))
         return True
+
+    def _asked(self, i: int, j: int) -> Cell:
+        """The square (i, j), if it is worth it by now to make it."""
+        often = self._walks >= OFTEN + 2 * self._before or self._walked.get((i, j), 0) >= OFTEN
+        return self._square(i, j) if often else UNMADE
 
     def _square(self, i: int, j: int) -> Cell:
         """Make the square (i, j), if it is not there."""

@@ -1,4 +1,4 @@
-"""Patterns as bit rows: the windows of 64 columns in which tiles meet them."""
+"""Patterns as bit rows: the windows of 64 columns in which tiles meet them; and as rows in one integer."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planes.bigrows import BigPattern, big_pattern
 from planes.bitrows import Windows
 from planes.bits import WORD, Words
 from planes.kept import Kept
@@ -13,7 +14,7 @@ from planes.spans import Spans
 from planes.strips import strips_of
 from weapons.pattern import Pattern
 
-__all__ = ["columns_of", "fits", "windows_of"]
+__all__ = ["big_of", "columns_of", "fits", "windows_of"]
 
 TABLE_BYTES_MOST = 2**22
 """All shifts of a pattern are not made beyond it: in a larger table each window is a miss of the cache."""
@@ -32,6 +33,8 @@ _kept: Kept[tuple[tuple[Pattern, ...], bool], Windows] = Kept(
 )
 
 _kept_columns: Kept[Pattern, Words] = Kept(WINDOW_CACHE_BYTES, lambda words: words.nbytes)
+
+_kept_bigs: Kept[Pattern, BigPattern] = Kept(WINDOW_CACHE_BYTES, lambda big: big.nbytes)
 
 _FULL = np.uint64(2**64 - 1)
 
@@ -55,6 +58,11 @@ def windows_of(patterns: Sequence[Pattern], placements: int) -> Windows:
         told["placed"] = placed = told.get("placed", 0) + placements
         often = placed > OFTEN
     return _kept.get((tuple(patterns), often), lambda: _made(patterns, often))
+
+
+def big_of(pattern: Pattern) -> BigPattern:
+    """A pattern as integer rows; those of the last calls are kept."""
+    return _kept_bigs.get(pattern, lambda: big_pattern(pattern.spans))
 
 
 def _made(patterns: Sequence[Pattern], often: bool) -> Windows:

@@ -1,0 +1,131 @@
+"""A few shots, counted in integers: pictures by hand, and the rows of the arrays on random piles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_bitfire import some_scene, some_shots
+
+import weapons.squares
+from planes import Scene, Sprite, use_jit
+from planes.bigrows import BigTiles, big_pattern
+from planes.spans import Spans
+from weapons import Box, Disc, Rounds, Stencil, Weapon, fire, prepare
+
+
+@pytest.fixture(autouse=True)
+def in_numpy() -> Any:
+    use_jit(False)
+    yield
+    use_jit(None)
+
+
+def rows_of(hits: Any) -> list[tuple[int, int, int, tuple[int, int], int]]:
+    assert any(stage.why == "direct: few shots" for stage in hits.plan.left_out)
+    return [(row.shot, row.object, row.samples, row.first_xy, row.distance2) for row in hits]
+
+
+def test_a_picture_by_hand() -> None:
+    """The wall takes its column of the box; the front object a pixel of the one behind; outside nothing is hit.
+
+        x  0 1 2 3 4 5 6
+    y = 0  a a | b b . .
+    y = 1  a a | b b c c
+    y = 2  . . | . . c c
+    """
+    scene = Scene((7, 3))
+    b = scene.add(np.ones((2, 2), np.bool_), (3.5, 0.5))
+    c = scene.add(np.ones((2, 3), np.bool_), (5, 1.5))  # its first column lies under b
+    a = scene.add(np.ones((2, 2), np.bool_), (0.5, 0.5))
+    scene.set([b], layer=1)
+    scene.add(np.ones((3, 1), np.bool_), (2, 1), role="occluder", layer=2)
+    every = rows_of(fire(scene, Box(15, 9), (3, 1)))
+    assert every == [(0, b, 4, (3, 1), 0), (0, c, 5, (4, 2), 2), (0, a, 4, (1, 1), 4)]
+    pierced = rows_of(fire(scene, Box(15, 9, pierce=True), (3, 1)))
+    assert pierced == [(0, b, 4, (3, 1), 0), (0, c, 6, (4, 1), 1), (0, a, 4, (1, 1), 4)]
+    glass = rows_of(fire(scene, Box(3, 1), [(1, 0), (5, 0), (-1, 1), (0, 1)], exclude=[b, b, a, 99]))
+    assert glass == [(0, a, 2, (1, 0), 0), (3, a, 2, (0, 1), 0)]
+
+
+@pytest.mark.parametrize("far", [0, 2**31, -(2**39)])
+def test_wide_masks_are_counted_once(far: int) -> None:
+    """Of an object in several tiles: one row, the nearest pixel of all of them."""
+    scene = Scene()
+    wide = scene.add(np.ones((70, 200), np.bool_), (far, far))
+    near = [(x, y) for x in range(-40, 41) for y in range(-40, 41) if x * x + y * y <= 1600]
+    samples = [sum(-99 <= x + at <= 100 and -34 <= y <= 35 for x, y in near) for at in (-120, 34)]
+    hits = fire(scene, Rounds(Disc(40), 2, (154, 0)), (far - 120, far))
+    assert rows_of(hits) == [
+        (0, wide, samples[0], (far - 99, far), 21 * 21), (0, wide, samples[1], (far + 34, far), 0)
+    ]  # fmt: skip
+    assert hits.round.tolist() == [0, 1]
+
+
+def test_random_piles() -> None:
+    """Filters, layers, bounds, wide masks, single pixels; a few shots at a time."""
+    rng, rows = np.random.default_rng(4), 0
+    weapons: list[Weapon] = [
+        Disc(9.3), Disc(12, pierce=True), Disc(40), Box(5, 4), Stencil([".."]), Rounds(Disc(5), 3, (3, 2))
+    ]  # fmt: skip
+    for _ in range(120):
+        scene = some_scene(rng, 40, 20)
+        weapon = weapons[rng.integers(len(weapons))]
+        at, how = some_shots(rng, scene, 9)
+        hits = fire(scene, weapon, at, **how)
+        assert hits == fire(scene, weapon, at, strategy="direct", **how)
+        rows += len(hits)
+    assert rows > 100
+
+
+@pytest.mark.parametrize("bounds", [(-9, -9, 9, 9), (-2, -9, 9, 9), (-9, 0, 9, 9), (-9, -9, 1, 9), (-9, -9, 9, -1)])
+@pytest.mark.parametrize("at", [(0, 0), (2, -3)])
+def test_patterns_within_bounds(bounds: tuple[int, int, int, int], at: tuple[int, int]) -> None:
+    spans = Spans.from_mask(np.random.default_rng(2).random((6, 80)) < 0.5, (-3, -4))
+    pattern = big_pattern(spans)
+    assert pattern.stride == 192 and pattern.wide + 63 <= pattern.stride
+    pixels = spans.pixels() + at
+    inside = ((pixels >= bounds[:2]) & (pixels <= bounds[2:])).all(axis=1)
+    truth = sum(1 << int(y - at[1] + 4) * 192 + int(x - at[0] + 3) for x, y in pixels[inside].tolist())
+    assert pattern.within(*at, bounds) == truth
+    assert pattern.within(50, 50, bounds) == 0
+
+
+def test_tiles_as_integers_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planes.bigrows.TILES_BYTES_MOST", 4 * 64 * 16)
+    words = np.arange(9 * 64, dtype=np.uint64)
+    tiles = BigTiles(128)
+    for begin in range(0, 8 * 64, 64):
+        assert tiles.read(words, begin) == sum(int(words[begin + row]) << 128 * row for row in range(64))
+        assert len(tiles) <= 5
+
+
+def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shots walk; when the scene stands still for twice as many of them as before, squares are made."""
+    scene, rng = Scene((400, 400)), np.random.default_rng(1)
+    ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
+    made: list[tuple[int, int]] = []
+    real = weapons.squares.Squares._found
+    monkeypatch.setattr(weapons.squares.Squares, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j))
+    ready = prepare(scene, Disc(20))
+
+    def shots(count: int) -> None:
+        for x, y in rng.uniform(0, 400, (count, 2)).tolist():
+            assert ready.fire((x, y)) == fire(scene, Disc(20), (x, y))
+
+    shots(9)
+    assert made
+    for _ in range(5):
+        scene.move(ids, rng.uniform(0, 400, (60, 2)))
+        made.clear()
+        shots(9)
+    assert not made
+    scene.move(ids[:3], rng.uniform(0, 400, (3, 2)))  # a change of a few is not one of all
+    shots(40)
+    assert made
+    made.clear()
+    scene.move(ids, rng.uniform(0, 400, (60, 2)))
+    for _ in range(weapons.squares.OFTEN + 1):
+        assert ready.fire((5, 5)) == fire(scene, Disc(20), (5, 5))
+    assert made == [(0, 0)]

@@ -1,0 +1,79 @@
+"""Fire a few shots of patterns: one by one, in Python's own integers, where arrays would take longer to set up.
+
+scene -> stack -> weapon -> patterns -> tiles near placements -> filters -> what they share, front to back -> rows
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planes import fronttoback
+from planes.arrays import Ints
+from planes.bigfront import Ground, Hit, hit_by_few
+from planes.bitrows import Found
+from planes.cells import met_boxes
+from planes.constants import SUB
+from planes.items import Stack
+from planes.scene import Scene
+from planes.twins import kernels_of
+from weapons.arsenal import parts_of
+from weapons.candidates import may_refuse, refused
+from weapons.counting import placed_of, rows_of
+from weapons.hits import Rows
+from weapons.plan import Plan
+from weapons.volley import Shots, Volley, placements_of, volley_of
+from weapons.weapon import Weapon
+from weapons.windows import big_of
+
+__all__ = ["accepted", "fired_by_few"]
+
+REACH = 48
+"""Reach of a pattern, px, up to which integers are as fast as arrays where it hits something."""
+
+PLACEMENTS_MOST, BOXES_MOST, PAIRS_MOST = 64, 2**15, 96
+"""Placements, their boxes compared with those of tiles, and those of them that meet: with more, arrays are as fast."""
+
+
+def fired_by_few(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, plan: Plan) -> Rows | None:
+    """Rows of what shots hit; None if they, or what they come near, are too many for that, or compiled."""
+    _, spread, plain = parts_of(weapon)
+    placements = placements_of(weapon) * len(shots)
+    small = placements <= PLACEMENTS_MOST and placements * len(stack) <= BOXES_MOST
+    if not small or spread or plain.reach_256 > SUB * REACH or kernels_of(fronttoback) is not fronttoback:
+        return None
+    volley = volley_of(weapon, shots)
+    tiles = scene.items.tiles()
+    ground = Ground(stack, tiles, tiles.boxes(stack.box_xyxy), plain.pierce, scene.bounds)
+    near = met_boxes(volley.boxes, ground.boxes_xyxy)
+    if len(near[0]) > PAIRS_MOST:
+        return None
+    plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
+    patterns = [big_of(pattern) for pattern in volley.table.patterns]
+    plan.run("patterns", f"{len(patterns)} distinct", volley.nbytes)
+    hits = hit_by_few(placed_of(volley), patterns, accepted(near, ground, shots, volley.shot), ground)
+    rows = _rows_of(volley, hits, stack)
+    plan.run("samples", "counted in integers, front to back: boxes, filters and occluders, too", rows.nbytes)
+    return rows
+
+
+def accepted(near: tuple[Ints, Ints], ground: Ground, shots: Shots, shot: Ints) -> tuple[Ints, Ints]:
+    """Pairs of placements and tiles that shots do not refuse.
+
+    Parameters
+    ----------
+    near : pairs (n,) of a placement and a tile
+    shot : (P,) which shot's each placement is
+    """
+    placement, tile = near
+    if not may_refuse(ground.stack, shots):
+        return near
+    some = (~refused(ground.stack, ground.tiles.rank[tile], shots, shot[placement])).nonzero()[0]
+    return placement[some], tile[some]
+
+
+def _rows_of(volley: Volley, hits: list[Hit], stack: Stack) -> Rows:
+    """Rows of hits, which are in order."""
+    if not hits:
+        return Rows.none()
+    placement, distance2, y, x, rank, samples = np.array(hits, np.int64).T
+    return rows_of(volley, Found(placement, rank, samples, distance2, x, y), stack.ids)
