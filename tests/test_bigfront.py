@@ -101,6 +101,19 @@ def test_tiles_as_integers_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> Non
         assert len(tiles) <= 5
 
 
+def test_masks_that_are_no_longer_used_leave_no_integers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their places in the atlas are those of other masks later."""
+    monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 0)
+    rng, scene, dropped = np.random.default_rng(3), Scene((60, 60)), 0
+    for k in range(30):
+        ids = [scene.add(rng.random((9, 9)) < 0.5, rng.uniform(20, 40, 2)) for _ in range(1 + k % 7)]
+        places = scene.items.tiles().bigs
+        assert fire(scene, Disc(15), (30, 30)) == fire(scene, Disc(15), (30, 30), strategy="direct")
+        scene.remove(ids)
+        dropped += scene.items.tiles().bigs is not places
+    assert dropped > 3
+
+
 def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """Shots walk; when the scene stands still for twice as many of them as before, squares are made."""
     scene, rng = Scene((400, 400)), np.random.default_rng(1)
@@ -122,7 +135,7 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
         shots(9)
     assert not made
     scene.move(ids[:3], rng.uniform(0, 400, (3, 2)))  # a change of a few is not one of all
-    shots(40)
+    shots(20)
     assert made
     made.clear()
     scene.move(ids, rng.uniform(0, 400, (60, 2)))

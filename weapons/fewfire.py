@@ -30,7 +30,7 @@ __all__ = ["accepted", "fired_by_few"]
 REACH = 48
 """Reach of a pattern, px, up to which integers are as fast as arrays where it hits something."""
 
-PLACEMENTS_MOST, BOXES_MOST, PAIRS_MOST = 64, 2**15, 96
+PLACEMENTS_MOST, BOXES_MOST, PAIRS_MOST = 64, 2**16, 128
 """Placements, their boxes compared with those of tiles, and those of them that meet: with more, arrays are as fast."""
 
 
