@@ -56,9 +56,11 @@ def test_a_quick_run_tells_tables_and_writes_json(tmp_path: Path, monkeypatch: A
 def test_the_other_sections_run(monkeypatch: Any) -> None:
     monkeypatch.setattr(speed, "bandwidth", dict)
     lines: list[str] = []
-    found = speed.measured(TINY, ["special", "single", "preparation", "rewind", "huge", "planner"], lines.append)
+    found = speed.measured(
+        TINY, ["special", "single", "preparation", "rewind", "huge", "planner", "floors"], lines.append
+    )
     assert {cell["section"] for cell in found["cells"]} == {
-        "special", "single", "preparation", "rewind", "huge", "planner",
+        "special", "single", "preparation", "rewind", "huge", "planner", "floors",
     }  # fmt: skip
     assert all(cell["sides"] for cell in found["cells"])
 

@@ -23,6 +23,7 @@ from typing import Any
 
 from speed_clock import Cell, bandwidth, told
 from speed_far import cold, huge, rewind
+from speed_floors import floors
 from speed_moving import moving, moving_rays, redrawn
 from speed_single import preparation, single
 from speed_static import modes, special, static
@@ -44,6 +45,7 @@ SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
     "rewind": rewind,
     "huge": huge,
     "planner": planner,
+    "floors": floors,
     "cold": cold,
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ import weapons
 from planes import Scene
 from weapons import Pistol, Weapon, fire
 
-__all__ = ["preparation", "single"]
+__all__ = ["masks_call", "own_calls", "preparation", "single", "timed_calls", "works_of"]
 
 SINGLE = ("point", "shotgun 8 x r=2", "disc r=40", "ray 1000")
 
@@ -47,11 +47,13 @@ def single(settings: Settings) -> Iterator[Cell]:
             else:
                 calls["A pygame"] = (masks_call(masks, weapon), None)
                 calls["C pygame"] = (baked_call(baked, weapon), None)
-            works = list(_works(name, objects, settings))
-            yield timed_calls(Cell("single", name, objects, unit="ns a call", asked=settings.calls), calls, works)
+            works = list(works_of(name, objects, settings))
+            yield timed_calls(
+                Cell("single", name, objects, unit="ns a call", asked=settings.calls), calls, works, {"pymunk": EASIER}
+            )
 
 
-def _works(name: str, objects: int, settings: Settings) -> Iterator[list[tuple[Any, float]]]:
+def works_of(name: str, objects: int, settings: Settings) -> Iterator[list[tuple[Any, float]]]:
     rounds = volleys(name, settings.calls, objects)
     for _ in range(settings.rounds + 1):
         work = next(rounds)
@@ -156,8 +158,9 @@ def pymunk_ray(space: Space) -> Call:
     return call
 
 
-def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
-    """Time every call; blocks of the sides take turns; a round is told by its median. All rows are compared.
+def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any], easier: Mapping[str, str]) -> Cell:
+    """Time every call; blocks of the sides take turns; a round is told by its median. All rows are compared, but those
+    of who answers an easier question.
 
     The order is drawn anew for each block: who always came after the same one would always find its caches, full of
     what is of use to both, or emptied.
@@ -174,7 +177,7 @@ def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
                 taken, got = _block(call, work[begin : begin + BLOCK])
                 answers[name] += got
                 spent[name] += taken
-        _compare_calls(cell, answers)
+        _compare_calls(cell, {name: answer for name, answer in answers.items() if name not in easier})
         for name in calls:
             if number == 0:
                 spent[name].clear()  # that was for warming up
@@ -183,8 +186,8 @@ def timed_calls(cell: Cell, calls: dict[str, Any], works: list[Any]) -> Cell:
                 times.rounds.append(float(np.median(spent[name][-len(work) :])) - nothing)
     for name, ns in spent.items():
         times = cell.sides[name]
-        times.easier = EASIER if name == "pymunk" else ""
-        times.compared = name != "pymunk" and "len" not in name and "A pygame" in calls
+        times.easier = easier.get(name, "")
+        times.compared = name not in easier and "len" not in name and "A pygame" in calls
         cell.values[name] = {
             "median_ns": float(np.median(ns)) - nothing,
             "p99_ns": float(np.percentile(ns, 99)) - nothing,
@@ -212,7 +215,7 @@ def _empty_ns() -> float:
 def _compare_calls(cell: Cell, answers: dict[str, list[Any]]) -> None:
     found = {}
     for name, answer in answers.items():
-        if name == "pymunk" or "len" in name:
+        if "len" in name:
             continue
         rows = [(shot, *pair) for shot, one in enumerate(answer) for pair in _pairs(name, one)]
         found[name] = sorted_rows(rows)
