@@ -142,3 +142,15 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
     for _ in range(weapons.squares.OFTEN + 1):
         assert ready.fire((5, 5)) == fire(scene, Disc(20), (5, 5))
     assert made == [(0, 0)]
+
+
+def test_where_much_is_near_large_patterns_go_the_way_of_fire(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither integers nor squares are made of what arrays answer sooner."""
+    scene, rng = Scene((400, 400)), np.random.default_rng(1)
+    for _ in range(60):
+        scene.add(Sprite.circle(9), rng.uniform(0, 400, 2))
+    ready = prepare(scene, Disc(150))
+    for k in range(20):
+        assert ready.fire((200, 200 + k % 3)) == fire(scene, Disc(150), (200, 200 + k % 3))
+        assert ready.fire((-90, -90)) == fire(scene, Disc(150), (-90, -90))
+    assert [ready.fire(at).plan.ran[0].name for at in ((200, 200), (-90, -90))] == ["shots", "prepared"]

@@ -176,6 +176,7 @@ def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.Monke
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planes.bigrows, "OFTEN", 1 if bounded else 3)
     monkeypatch.setattr(weapons.squares, "OFTEN", 2 if bounded else 3)
+    monkeypatch.setattr(weapons.squares, "BITS_MOST", 2**30 if bounded else 10**5)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0

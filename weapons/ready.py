@@ -131,7 +131,10 @@ class ReadyPattern(Ready):
             return super().fire(at, aim, toward, shot)
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
         told = aim, None if toward is None else plain_pair(toward), shot
-        return self._told_of(place, told, x, y, looks)
+        try:
+            return self._told_of(place, told, x, y, looks)
+        except KeyError:  # what is near is too much to be looked up
+            return super().fire(at, aim, toward, shot)
 
     def _told_of(self, at: tuple[float, float], told: Told, x: int, y: int, looks: Looks) -> Answer:
         """Look up all rounds of a shot at a pixel."""

@@ -56,6 +56,9 @@ It takes as long as a few of them to make one where all has moved, and less than
 WALKS_MOST = 2**12
 """Shots that walk, at most, if as many did before."""
 
+BITS_MOST = 2**21
+"""Tiles that a shot walks, times the bits of its pattern, at most: with more, arrays are as fast."""
+
 FEW = 8
 """So many changes, or of a quarter of the items, are not taken for those of all."""
 
@@ -164,9 +167,10 @@ class Squares:
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
-        self.made: Made[Cell] = Made(self._square if frame.tiled else self._asked)
+        self.made: Made[Cell] = Made(self._asked)
         self._walked: dict[tuple[int, int], int] = {}  # shots that walked since all was forgotten, by square
         self._walks = self._before = 0  # all of them, and before that
+        self._crowded = False  # whether anything was too much for a shot to walk
         self.stride = self._tile = 0
         self._tell = answer_of(weapon)[1]
         self._scene, self._shots, self._pierce = scene, kept.shots(weapon, (0, 0), (None, None, None)), pierce
@@ -213,13 +217,22 @@ class Squares:
         return look, pattern.nbytes + sum(PIECE_BYTES + PLANES * rows.bit_length() // 7 for _, _, rows, _ in pieces)
 
     def _hit_by(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int]]:
-        """Walk the tiles that a placed pattern may meet: squared distance, y, x, id and count of each hit object."""
+        """Walk the tiles that a placed pattern may meet: squared distance, y, x, id and count of each hit object.
+
+        Raises
+        ------
+        KeyError
+            If they are so many, and it is so large, that `fire` is faster.
+        """
         square = x >> CELL_SHIFT, y >> CELL_SHIFT
-        self._walked[square] = self._walked.get(square, 0) + 1
-        self._walks += 1
         ground, left, top = self._ground, x + pattern.x, y + pattern.y
         box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
+        if len(tile) * pattern.stride * pattern.high > BITS_MOST:
+            self._crowded = True
+            raise KeyError(square)
+        self._walked[square] = self._walked.get(square, 0) + 1
+        self._walks += 1
         _, tile = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
         for _, distance2, py, px, rank, n in hit_by_one(pattern, x, y, tile, ground):
             yield distance2, py, px, ground.stack.ids.item(rank), n
@@ -235,7 +248,7 @@ class Squares:
             changes = items.changes(self._seen)
             few = max(len(stack) // 4, FEW)
             if changes is None or sum(np.size(ids) for _, ids, _, _ in changes) > few:
-                self._before, self._walks = min(self._walks, WALKS_MOST), 0
+                self._before, self._walks, self._crowded = min(self._walks, WALKS_MOST), 0, False
                 self._walked.clear()
                 self._clear()
             elif not self._forget(stack):
@@ -274,6 +287,8 @@ class Squares:
 
     def _asked(self, i: int, j: int) -> Cell:
         """The square (i, j), if it is worth it by now to make it."""
+        if self._crowded:
+            return UNMADE
         often = self._walks >= OFTEN + 2 * self._before or self._walked.get((i, j), 0) >= OFTEN
         return self._square(i, j) if often else UNMADE
 
