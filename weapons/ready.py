@@ -45,7 +45,8 @@ class Ready:
     What makes a shot cheap is found out when the first shot needs it, and once:
 
     - the pattern of each aim, and of each number of a `Spread`, with a bit for a pixel;
-    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit.
+    - for squares of 32 px of shot positions, the objects near them, with the pixels that a shot could hit; where all
+      has moved shots walk the items near them instead, until the scene stands still for more of them.
 
     With compiled kernels there are no squares. One call of a kernel walks the items, until shots have spent on that as
     much as it takes to compose what can be seen of all objects; or looks at those, if that is done, by any caller.
@@ -56,8 +57,8 @@ class Ready:
     kernels are used.
 
     Patterns of up to 96 px, and of up to 1000 px cut into tiles, at a position given as two numbers, are answered like
-    this; thin rays up to their first hit are cast, see `readyray`. All others, larger patterns, bursts whose recoil is
-    not of whole pixels, batches and bad input go the way of `fire`.
+    this; thin rays up to their first hit are cast, see `readyray`. All others, larger patterns, in numpy those near
+    which much lies, bursts whose recoil is not of whole pixels, batches and bad input go the way of `fire`.
 
     Threads may fire one Ready at a scene that none of them changes.
     """
