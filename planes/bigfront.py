@@ -20,7 +20,13 @@ from planes.spans import Box
 from planes.stack import Stack
 from planes.tiles import Tiles
 
-__all__ = ["Ground", "Hit", "hit_by_few", "hit_by_one"]
+__all__ = ["Ground", "Hit", "hit_by_few", "hit_by_one", "pays"]
+
+PAIR_NS, BIT_NS = 3000.0, 0.16
+"""What a tile near a placement takes, of which a part is hit, and more for each bit of the pattern's rows."""
+
+ARRAYS_NS = 300_000.0
+"""What arrays take for a few placements: with more than that, they are as fast."""
 
 Hit = tuple[int, int, int, int, int, int]
 """A placement; the squared distance, y and x of the nearest pixel; the rank of the item; and how many pixels."""
@@ -46,6 +52,11 @@ class Ground(NamedTuple):
     boxes_xyxy: Ints
     pierce: bool
     bounds: Box | None
+
+
+def pays(patterns: Sequence[BigPattern], pairs: int) -> bool:
+    """Whether integers are faster than arrays, for so many pairs of a pattern and a tile near it."""
+    return pairs * (PAIR_NS + BIT_NS * max(one.stride * one.high for one in patterns)) <= ARRAYS_NS
 
 
 def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
@@ -92,11 +103,13 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Near], ground: G
         shift = top * stride + left - corner
         hit = (rows << shift if shift >= 0 else rows >> -shift) & rest
         if hit:
-            if blocks or not pierce:
-                rest ^= hit
             if not blocks:
                 distance2, down, right = nearest(hit)
                 yield who, distance2, y + down, x + right, rank, hit.bit_count()
+            if blocks or not pierce:
+                rest ^= hit
+                if not rest:
+                    return
 
 
 def _in_order(hits: list[Hit], ground: Ground) -> list[Hit]:

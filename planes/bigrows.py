@@ -23,10 +23,10 @@ __all__ = ["BigPattern", "BigTiles", "Depths", "big_pattern", "packed", "pixels_
 OFTEN = 8
 """Answers of a piece after which it is worth to make planes of its pixels: they take as long as so many without."""
 
-PATTERN_BYTES, PLANES = 500, 11
-"""What a pattern costs beside its pixels, bytes; and about as many times it has them."""
+PATTERN_BYTES, PLANES = 500, 10
+"""What a pattern costs beside its pixels, bytes; and about as many times it has them, with the planes of its depths."""
 
-TILES_BYTES_MOST = 2**24
+TILES_BYTES_MOST = 2**23
 """Tiles are not kept as integers of one stride beyond it."""
 
 
@@ -66,6 +66,11 @@ class Depths:
         self._rows, self._stride, self._x, self._y, self._corner = rows, stride, x, y, np.array([x, y])
         self._planes: list[int] | None = None
         self._calls = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the pixels, with the planes that tell the nearest of them: an integer has 30 bits in 4 bytes."""
+        return PLANES * self._rows.bit_length() // 7
 
     def nearest(self, bits: int) -> tuple[int, int, int]:
         """Of some pixels of the piece the nearest: squared distance, y and x from the round's pixel; ties by (y, x)."""
@@ -124,7 +129,7 @@ class BigPattern:
     @property
     def nbytes(self) -> int:
         """Bytes of the pixels, with the planes that tell the nearest of them."""
-        return PATTERN_BYTES + PLANES * self.stride * self.high // 8
+        return PATTERN_BYTES + self.depths.nbytes
 
     def within(self, x: int, y: int, bounds: Box) -> int:
         """Its pixels within bounds, where it is placed on a pixel."""

@@ -25,6 +25,9 @@ STRIDE = 3 * WORD
 ATLAS_SLACK = 1024
 """Tiles no longer in use that an atlas keeps, beside as many as are."""
 
+STRIDES_MOST = 8
+"""Strides of which tiles are kept as integers."""
+
 PACKED_AT_ONCE = 1024
 """Tiles whose pixels, 4 KB each, are packed in one go."""
 
@@ -80,7 +83,11 @@ class Tiles:
     def big(self, stride: int) -> BigTiles:
         """Tiles as integer rows of a stride, by `begin`."""
         known = self.bigs.get(stride)
-        return self.bigs.setdefault(stride, BigTiles(stride)) if known is None else known
+        if known is None:
+            if len(self.bigs) >= STRIDES_MOST:
+                self.bigs.clear()
+            known = self.bigs[stride] = BigTiles(stride)
+        return known
 
     def pile(self, stack: Stack) -> Pile:
         """The tiles where they lie, with what decides who hits them; `stack` is the one whose they are."""

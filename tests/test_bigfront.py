@@ -139,18 +139,50 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
     assert made
     made.clear()
     scene.move(ids, rng.uniform(0, 400, (60, 2)))
-    for _ in range(weapons.squares.OFTEN + 1):
+    for _ in range(weapons.squares.WALKS_LEAST + 1):
         assert ready.fire((5, 5)) == fire(scene, Disc(20), (5, 5))
     assert made == [(0, 0)]
 
 
-def test_where_much_is_near_large_patterns_go_the_way_of_fire(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither integers nor squares are made of what arrays answer sooner."""
+@pytest.mark.parametrize(("count", "moved", "times"), [(1, 1, 1), (8, 8, 1), (60, 16, 1), (60, 8, 3)])
+def test_what_counts_as_all_that_moved(count: int, moved: int, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of a few, or more than a quarter of many; one that moved several times is one."""
+    scene = Scene((400, 400))
+    ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(count)]
+    walked: list[int] = []
+    real = weapons.squares.hit_by_one
+    monkeypatch.setattr(weapons.squares, "hit_by_one", lambda *told: walked.append(1) or real(*told))
+    ready = prepare(scene, Disc(20))
+    for k in range(4):
+        assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
+        assert len(walked) == (k if moved * 4 > count else 0)
+        for _ in range(times):
+            scene.move(ids[:moved], [(6.0 * i, 100 + k) for i in range(moved)])
+
+
+def test_at_a_scene_that_stands_still_nothing_is_walked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor are all masks made into tiles for it: a square needs what lies near it."""
+    scene = Scene((4000, 4000))
+    for k in range(5):
+        scene.add(Sprite.box(3000, 40), (2000, 400 * k))
+    far = scene.add(Sprite.circle(9), (3900, 3900))
+    for weapon in (Disc(20), Disc(90)):
+        ready = prepare(scene, weapon)
+        for k in range(5):
+            assert len(ready.fire((500, 10 + k))) == 1
+            scene.move(far, (3900 - k, 3900))
+        assert not scene.items._tiles
+
+
+def test_where_much_is_near_large_patterns_go_the_way_of_fire() -> None:
+    """Where all moves neither integers nor squares are made of what arrays answer sooner."""
     scene, rng = Scene((400, 400)), np.random.default_rng(1)
-    for _ in range(60):
-        scene.add(Sprite.circle(9), rng.uniform(0, 400, 2))
+    ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
     ready = prepare(scene, Disc(150))
-    for k in range(20):
-        assert ready.fire((200, 200 + k % 3)) == fire(scene, Disc(150), (200, 200 + k % 3))
-        assert ready.fire((-90, -90)) == fire(scene, Disc(150), (-90, -90))
-    assert [ready.fire(at).plan.ran[0].name for at in ((200, 200), (-90, -90))] == ["shots", "prepared"]
+    assert ready.fire((200, 200)).plan.ran[0].name == "prepared"
+    for k in range(9):
+        scene.move(ids, rng.uniform(0, 400, (60, 2)))
+        for at, first in (((200, 200 + k), "shots"), ((-90, -90), "prepared")):
+            hits = ready.fire(at)
+            assert hits == fire(scene, Disc(150), at)
+            assert hits.plan.ran[0].name == first

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_fire import Shot, Volley, expected, told
 
+import planes.bigfront
 import planes.bigrows
 import planes.bitrows
 import planes.cells
@@ -49,13 +50,13 @@ PARTS: dict[str, dict[str, int]] = {
     },
     "single": {"CHUNK_PAIRS": 1, "WORDS_AT_ONCE": WORD, "PAIRS_AT_ONCE": 1, "PATTERNS_BYTES_MOST": 1, "OFTEN": 10**9},
     "few cells": {"WITHOUT_MOST": 0, "CELLS_MOST": 4, "BRUTE_PAIRS": 9, "TABLE_BYTES_MOST": 0, "ENTRIES_A_BOX": 2},
-    "in integers": {"REACH": 999, "PLACEMENTS_MOST": 9999, "BOXES_MOST": 10**9, "PAIRS_MOST": 10**9, "OFTEN": 2},
+    "in integers": {"REACH": 999, "PLACEMENTS_MOST": 9999, "BOXES_MOST": 10**9, "ARRAYS_NS": 10**9, "OFTEN": 2},
 }
 """Limits that cut a batch, and choose between two ways to do the same."""
 
 OWNERS = (
-    weapons.bitfire, weapons.fewfire, weapons.windows, planes.bigrows, planes.bitrows, planes.cells, planes.visible,
-    planes.tiles,
+    weapons.bitfire, weapons.fewfire, weapons.windows, planes.bigfront, planes.bigrows, planes.bitrows, planes.cells,
+    planes.visible, planes.tiles,
 )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_fire import Volley, expected, some_battle, some_place, some_pose, told
 
+import planes.bigfront
 import planes.bigrows
 import weapons.ready
 import weapons.squares
@@ -80,7 +81,9 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
     def check(seed: int) -> None:
         with ExitStack() as patches:
             patches.enter_context(mock.patch.object(planes.bigrows, "OFTEN", 2))
-            patches.enter_context(mock.patch.object(weapons.squares, "OFTEN", 1 + seed % 3))
+            patches.enter_context(
+                mock.patch.multiple(weapons.squares, WALKS_LEAST=1 + seed % 3, WALKS_AT_FIRST=seed % 4)
+            )
             if compiled and seed % 2:
                 costs = squares.COMPILED._replace(compose=seed % 1000, item=0)
                 patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=costs))
@@ -175,8 +178,9 @@ def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.Monke
 
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planes.bigrows, "OFTEN", 1 if bounded else 3)
-    monkeypatch.setattr(weapons.squares, "OFTEN", 2 if bounded else 3)
-    monkeypatch.setattr(weapons.squares, "BITS_MOST", 2**30 if bounded else 10**5)
+    monkeypatch.setattr(weapons.squares, "WALKS_LEAST", 2 if bounded else 3)
+    monkeypatch.setattr(weapons.squares, "WALKS_AT_FIRST", 0)
+    monkeypatch.setattr(planes.bigfront, "ARRAYS_NS", 10**9 if bounded else 10**5)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0
@@ -257,7 +261,6 @@ def test_only_what_lies_near_a_change_is_made_anew(monkeypatch: pytest.MonkeyPat
     for x in range(50, 2000, 100):
         for y in range(50, 2000, 100):
             scene.add(Sprite.circle(20), (x, y))
-    monkeypatch.setattr(weapons.squares, "OFTEN", 0)
     ready = prepare(scene, Disc(10))
     every = [(x, y) for x in range(16, 2000, 32) for y in range(16, 2000, 32)]
     for at in every:

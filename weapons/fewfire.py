@@ -9,7 +9,7 @@ import numpy as np
 
 from planes import fronttoback
 from planes.arrays import Ints
-from planes.bigfront import Ground, Hit, hit_by_few
+from planes.bigfront import Ground, Hit, hit_by_few, pays
 from planes.bitrows import Found
 from planes.cells import met_boxes
 from planes.constants import SUB
@@ -28,27 +28,30 @@ from weapons.windows import big_of
 __all__ = ["accepted", "fired_by_few"]
 
 REACH = 48
-"""Reach of a pattern, px, up to which integers are as fast as arrays where it hits something."""
+"""Reach of a pattern, px: of a larger one arrays are as fast where it hits something."""
 
-PLACEMENTS_MOST, BOXES_MOST, PAIRS_MOST = 64, 2**16, 128
-"""Placements, their boxes compared with those of tiles, and those of them that meet: with more, arrays are as fast."""
+PLACEMENTS_MOST, BOXES_MOST = 64, 2**15
+"""Placements, and their boxes compared with those of tiles: of more, too many meet, and the comparison was in vain."""
 
 
 def fired_by_few(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, plan: Plan) -> Rows | None:
     """Rows of what shots hit; None if they, or what they come near, are too many for that, or compiled."""
     _, spread, plain = parts_of(weapon)
     placements = placements_of(weapon) * len(shots)
-    small = placements <= PLACEMENTS_MOST and placements * len(stack) <= BOXES_MOST
-    if not small or spread or plain.reach_256 > SUB * REACH or kernels_of(fronttoback) is not fronttoback:
+    if spread or not 0 < placements <= PLACEMENTS_MOST or plain.reach_256 > SUB * REACH:
+        return None
+    if kernels_of(fronttoback) is not fronttoback or placements * len(stack) > BOXES_MOST:
+        return None
+    tiles = scene.items.tiles()
+    if placements * len(tiles) > BOXES_MOST:
         return None
     volley = volley_of(weapon, shots)
-    tiles = scene.items.tiles()
+    patterns = [big_of(pattern) for pattern in volley.table.patterns]
     ground = Ground(stack, tiles, tiles.boxes(stack.box_xyxy), plain.pierce, scene.bounds)
     near = met_boxes(volley.boxes, ground.boxes_xyxy)
-    if len(near[0]) > PAIRS_MOST:
+    if not pays(patterns, len(near[0])):
         return None
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
-    patterns = [big_of(pattern) for pattern in volley.table.patterns]
     plan.run("patterns", f"{len(patterns)} distinct", volley.nbytes)
     hits = hit_by_few(placed_of(volley), patterns, accepted(near, ground, shots, volley.shot), ground)
     rows = _rows_of(volley, hits, stack)

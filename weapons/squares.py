@@ -16,10 +16,11 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from planes.arrays import Bools
-from planes.bigfront import Ground, hit_by_one
+from planes.bigfront import Ground, hit_by_one, pays
 from planes.bigrows import BigPattern, big_pattern, packed
 from planes.constants import POSITION_MAX, WEIGHT_FULL
 from planes.items import Stack
+from planes.kept import Kept
 from planes.scene import Scene
 from planes.spans import Box, meets
 from planes.turning import sides_of
@@ -47,20 +48,18 @@ BLOCK_SHIFT = 2
 TILE_MIN, TILE = 32, 64
 """Objects are looked up whole, or in tiles of so many px a side: of a larger one most is empty where a shot falls."""
 
-OFTEN = 4
-"""Shots that walk before a square is made: in that square; or in all, and twice as many as when last all had moved.
+WALKS_LEAST, WALKS_AT_FIRST, WALKS_MOST = 4, 64, 2**12
+"""After all has moved shots walk, instead of making a square: so many into that square, or in all, and twice as many as
+walked when all had moved before; how many that is taken for at first, and at most.
 
-It takes as long as a few of them to make one where all has moved, and less than one of them where nothing does.
+To make a square takes as long as a few of them where all has moved, and less than one of them where nothing does.
 """
-
-WALKS_MOST = 2**12
-"""Shots that walk, at most, if as many did before."""
-
-BITS_MOST = 2**21
-"""Tiles that a shot walks, times the bits of its pattern, at most: with more, arrays are as fast."""
 
 FEW = 8
 """So many changes, or of a quarter of the items, are not taken for those of all."""
+
+BIGS_BYTES = 2**25
+"""Patterns of shots that walk, kept for one prepared weapon, bytes."""
 
 KEPT_BYTES = 64 * 2**20
 """Squares and objects kept for one prepared weapon, bytes; beyond it all are made anew."""
@@ -82,9 +81,6 @@ CELL_BYTES, SEEN_BYTES = 400, 400
 
 PIECE_BYTES = 200
 """What a piece costs beside its pixels, bytes."""
-
-PLANES = 10
-"""About as many times a piece has its pixels: with the planes that tell the nearest of them."""
 
 Seen = tuple[int, int, int, int, int, int, int]
 """Of a tile of an object: the least and greatest x, and y, where a part of a shot is looked up whose box meets it; what
@@ -110,6 +106,7 @@ new = tuple.__new__
 
 
 ZERO = np.zeros(1, np.int64)
+"""The number of the only shot."""
 
 
 class Near(NamedTuple):
@@ -169,14 +166,15 @@ class Squares:
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
         self.made: Made[Cell] = Made(self._asked)
         self._walked: dict[tuple[int, int], int] = {}  # shots that walked since all was forgotten, by square
-        self._walks = self._before = 0  # all of them, and before that
+        self._walks, self._before = WALKS_AT_FIRST, 0  # all of them, and before that
+        self._bigs: Kept[object, BigPattern] = Kept(BIGS_BYTES, lambda big: big.nbytes)
         self._crowded = False  # whether anything was too much for a shot to walk
         self.stride = self._tile = 0
         self._tell = answer_of(weapon)[1]
         self._scene, self._shots, self._pierce = scene, kept.shots(weapon, (0, 0), (None, None, None)), pierce
         self._frame, self._corner, self._side = frame, frame.corner, frame.side
         self._stack: Stack | None = None
-        self._ground: Ground
+        self._ground: Ground | None = None
         self._seen = -1
         self._blocks: dict[tuple[int, int], list[Near]] = {}
         self._tiles: dict[int, dict[tuple[int, int], Seen]] = {}
@@ -188,8 +186,7 @@ class Squares:
     def look(self, one: Round) -> tuple[Look, int]:
         """A function that looks up what a round hits; and how many bytes are kept for it."""
         made, stride, number, tell = self.made, self.stride, one.number, self._tell
-        pieces = pieces_of(one.spans, self._frame, stride)
-        pattern = big_pattern(one.spans)
+        pieces, own = pieces_of(one.spans, self._frame, stride), object()
 
         def look(x: int, y: int, hits: Answer) -> None:
             """Look up the tiles near a pixel, and tell what is shared with them, the nearest first."""
@@ -198,7 +195,7 @@ class Squares:
                 left, top = x + dx, y + dy
                 cell = made[left >> CELL_SHIFT][top >> CELL_SHIFT]
                 if cell is UNMADE:
-                    for distance2, py, px, item, n in self._hit_by(pattern, x, y):
+                    for distance2, py, px, item, n in self._hit_by(one, own, x, y):
                         tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (px, py), distance2)))
                     return
                 for x_min, x_max, y_min, y_max, bits, place, item in cell:
@@ -214,28 +211,43 @@ class Squares:
             for distance2, dy, dx, _, item, n in shared:
                 tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
 
-        return look, pattern.nbytes + sum(PIECE_BYTES + PLANES * rows.bit_length() // 7 for _, _, rows, _ in pieces)
+        return look, sum(PIECE_BYTES + depths.nbytes for *_, depths in pieces)
 
-    def _hit_by(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int]]:
-        """Walk the tiles that a placed pattern may meet: squared distance, y, x, id and count of each hit object.
+    def _hit_by(self, one: Round, own: object, x: int, y: int) -> Iterator[tuple[int, int, int, int, int]]:
+        """Walk the tiles that a round may meet: squared distance, y, x, id and count of each object that it hits.
+
+        Parameters
+        ----------
+        own : what no other round has
 
         Raises
         ------
         KeyError
             If they are so many, and it is so large, that `fire` is faster.
         """
-        square = x >> CELL_SHIFT, y >> CELL_SHIFT
-        ground, left, top = self._ground, x + pattern.x, y + pattern.y
+        pattern, ground = self._bigs.get(own, lambda: big_pattern(one.spans)), self._walked_on()
+        left, top = x + pattern.x, y + pattern.y
         box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
-        if len(tile) * pattern.stride * pattern.high > BITS_MOST:
+        if not pays([pattern], len(tile)):
             self._crowded = True
-            raise KeyError(square)
+            raise KeyError(x, y)
+        square = x >> CELL_SHIFT, y >> CELL_SHIFT
         self._walked[square] = self._walked.get(square, 0) + 1
         self._walks += 1
         _, tile = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
         for _, distance2, py, px, rank, n in hit_by_one(pattern, x, y, tile, ground):
             yield distance2, py, px, ground.stack.ids.item(rank), n
+
+    def _walked_on(self) -> Ground:
+        """What shots walk; it is made for the first of them."""
+        with self._lock:
+            if self._ground is None:
+                stack, tiles = self._stack, self._scene.items.tiles()
+                assert stack is not None  # `follow` goes before
+                boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # side after side, as they are compared
+                self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds)
+            return self._ground
 
     def follow(self, stack: Stack) -> None:
         """Take note of the scene as it is now: what lies near a change is forgotten."""
@@ -245,19 +257,26 @@ class Squares:
                 largest = int((stack.box_xyxy[:, 2:] - stack.box_xyxy[:, :2]).max(initial=0)) + 1
                 self._tile = min(max(largest, TILE_MIN), TILE) if len(stack) else TILE
                 self.stride = self._side + self._tile - 1
-            changes = items.changes(self._seen)
-            few = max(len(stack) // 4, FEW)
-            if changes is None or sum(np.size(ids) for _, ids, _, _ in changes) > few:
+            if self._all_moved(stack):
                 self._before, self._walks, self._crowded = min(self._walks, WALKS_MOST), 0, False
                 self._walked.clear()
                 self._clear()
             elif not self._forget(stack):
                 self._clear()
             self._blocks.clear()
-            tiles = items.tiles()
-            boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # a side after the other, as they are compared
-            self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds)
+            self._ground = None
             self._stack, self._seen = stack, items.version
+
+    def _all_moved(self, stack: Stack) -> bool:
+        """Whether so much changed that squares will hardly pay, if that goes on; not at first."""
+        if self._stack is None:
+            return False
+        changes = self._scene.items.changes(self._seen)
+        if changes is None:
+            return True
+        ids = [np.ravel(ids) for _, ids, _, _ in changes]
+        few = min(max(len(stack) // 4, FEW), max(len(stack) - 1, 0))
+        return sum(map(len, ids)) > few and len(np.unique(np.concatenate(ids)) if len(ids) > 1 else ids[0]) > few
 
     def _clear(self) -> None:
         self.made.clear()
@@ -289,7 +308,7 @@ class Squares:
         """The square (i, j), if it is worth it by now to make it."""
         if self._crowded:
             return UNMADE
-        often = self._walks >= OFTEN + 2 * self._before or self._walked.get((i, j), 0) >= OFTEN
+        often = self._walks >= WALKS_LEAST + 2 * self._before or self._walked.get((i, j), 0) >= WALKS_LEAST
         return self._square(i, j) if often else UNMADE
 
     def _square(self, i: int, j: int) -> Cell:
