@@ -144,8 +144,13 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
     assert made == [(0, 0)]
 
 
-@pytest.mark.parametrize(("count", "moved", "times"), [(1, 1, 1), (8, 8, 1), (60, 16, 1), (60, 8, 3)])
-def test_what_counts_as_all_that_moved(count: int, moved: int, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("count", "moved", "times", "all_of_it"),
+    [(1, 1, 1, True), (8, 8, 1, True), (12, 8, 1, False), (60, 16, 1, True), (60, 8, 3, False)],
+)
+def test_what_counts_as_all_that_moved(
+    count: int, moved: int, times: int, all_of_it: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All of a few, or more than a quarter of many; one that moved several times is one."""
     scene = Scene((400, 400))
     ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(count)]
@@ -155,7 +160,7 @@ def test_what_counts_as_all_that_moved(count: int, moved: int, times: int, monke
     ready = prepare(scene, Disc(20))
     for k in range(4):
         assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
-        assert len(walked) == (k if moved * 4 > count else 0)
+        assert len(walked) == (k if all_of_it else 0)
         for _ in range(times):
             scene.move(ids[:moved], [(6.0 * i, 100 + k) for i in range(moved)])
 
@@ -186,3 +191,26 @@ def test_where_much_is_near_large_patterns_go_the_way_of_fire() -> None:
             hits = ready.fire(at)
             assert hits == fire(scene, Disc(150), at)
             assert hits.plan.ran[0].name == first
+    for _ in range(99):
+        assert ready.fire((-90, -90)) == fire(scene, Disc(150), (-90, -90))
+    assert ready.fire((200, 200)).plan.ran[0].name == "shots"
+
+
+def test_shots_that_walked_before_all_moved_are_not_counted() -> None:
+    scene = Scene((400, 400))
+    ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(9)]
+    ready: Any = prepare(scene, Disc(20))
+    for k in range(9):
+        for _ in range(weapons.squares.WALKS_LEAST - 1):
+            assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
+        assert not k or not any(ready._squares.made.values())
+        scene.move(ids, [(6.0 * i, 100 + k) for i in range(9)])
+
+
+def test_many_near_tiles_are_left_to_arrays() -> None:
+    scene = Scene((400, 400))
+    for k in range(40):
+        scene.add(Sprite.circle(9), (170 + k, 200))
+    few, many = fire(scene, Disc(40), (200, 200)), fire(scene, Disc(40), [(200, 200 + k) for k in range(3)])
+    told = [any(stage.why == "direct: few shots" for stage in hits.plan.left_out) for hits in (few, many)]
+    assert told == [True, False] and many.of(0) == list(few)
