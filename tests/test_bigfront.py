@@ -194,6 +194,10 @@ def test_where_much_is_near_large_patterns_go_the_way_of_fire() -> None:
     for _ in range(99):
         assert ready.fire((-90, -90)) == fire(scene, Disc(150), (-90, -90))
     assert ready.fire((200, 200)).plan.ran[0].name == "shots"
+    scene.move(ids, [(390, 390)] * 60)  # nothing is crowded now
+    for _ in range(300):
+        assert not ready.fire((20, 20))
+    assert any(vars(ready)["_squares"].made.values())
 
 
 def test_shots_that_walked_before_all_moved_are_not_counted() -> None:
