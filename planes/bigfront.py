@@ -25,7 +25,7 @@ __all__ = ["Ground", "Hit", "hit_by_few", "hit_by_one", "pays"]
 PAIR_NS, BIT_NS = 3000.0, 0.16
 """What a tile near a placement takes, of which a part is hit, and more for each bit of the pattern's rows."""
 
-ARRAYS_NS = 300_000.0
+ARRAYS_NS = 350_000.0
 """What arrays take for a few placements: with more than that, they are as fast."""
 
 Hit = tuple[int, int, int, int, int, int]
