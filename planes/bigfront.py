@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planes.arrays import Ints
-from planes.bigrows import BigPattern
+from planes.bigrows import BigPattern, stride_of
 from planes.bitrows import Placed
 from planes.spans import Box
 from planes.stack import Stack
@@ -31,7 +31,7 @@ ARRAYS_NS = 350_000.0
 Hit = tuple[int, int, int, int, int, int]
 """A placement; the squared distance, y and x of the nearest pixel; the rank of the item; and how many pixels."""
 
-Near = tuple[int, int, int, int, int, bool]
+Pair = tuple[int, int, int, int, int, bool]
 """A placement, and a tile near it: its corner, px, its first row in the atlas, the rank of its item, and whether that
 only blocks."""
 
@@ -54,9 +54,9 @@ class Ground(NamedTuple):
     bounds: Box | None
 
 
-def pays(patterns: Sequence[BigPattern], pairs: int) -> bool:
-    """Whether integers are faster than arrays, for so many pairs of a pattern and a tile near it."""
-    return pairs * (PAIR_NS + BIT_NS * max(one.stride * one.high for one in patterns)) <= ARRAYS_NS
+def pays(pairs: int, wide: int, high: int) -> bool:
+    """Whether integers are faster than arrays, for pairs of a pattern (columns, rows) and a tile near it."""
+    return pairs * (PAIR_NS + BIT_NS * stride_of(wide) * high) <= ARRAYS_NS
 
 
 def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
@@ -80,7 +80,7 @@ def hit_by_one(pattern: BigPattern, x: int, y: int, tile: Ints, ground: Ground) 
     return _in_order(list(_hit_by(pattern, x, y, _near(np.zeros_like(tile), tile, ground), ground)), ground)
 
 
-def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Near]:
+def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:
     """Pairs of placements and tiles, with what is told of these."""
     if not len(tile):
         return iter(())
@@ -90,7 +90,7 @@ def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Near]:
     return zip(*(column.tolist() for column in columns), strict=True)
 
 
-def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Near], ground: Ground) -> Iterator[Hit]:
+def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: Ground) -> Iterator[Hit]:
     """What one placed pattern hits of each tile, front to back."""
     _, tiles, _, pierce, bounds = ground
     rest = pattern.rows if bounds is None else pattern.within(x, y, bounds)

@@ -18,7 +18,7 @@ from planes.arrays import Bools, Ints
 from planes.bits import WORD, Words
 from planes.spans import Box, Spans
 
-__all__ = ["BigPattern", "BigTiles", "Depths", "big_pattern", "packed", "pixels_of", "rows_of_spans"]
+__all__ = ["BigPattern", "BigTiles", "Depths", "big_pattern", "packed", "pixels_of", "rows_of_spans", "stride_of"]
 
 OFTEN = 8
 """Answers of a piece after which it is worth to make planes of its pixels: they take as long as so many without."""
@@ -144,10 +144,15 @@ class BigPattern:
         return self.rows & int.from_bytes(row * (lower - upper + 1), "little") << self.stride * upper
 
 
+def stride_of(wide: int) -> int:
+    """Stride of a pattern of so many columns."""
+    return WORD * -(-(wide + WORD - 1) // WORD)
+
+
 def big_pattern(spans: Spans) -> BigPattern:
-    """A set of pixels about the pixel that it is placed on; not empty."""
+    """A set of pixels about the pixel that it is placed on."""
     x, y, x_max, y_max = spans.box_xyxy or (0, 0, 0, 0)
-    stride = WORD * -(-(x_max - x + WORD) // WORD)
+    stride = stride_of(x_max - x + 1)
     rows = rows_of_spans(spans, (x, y), stride)
     return BigPattern(x, y, x_max - x + 1, y_max - y + 1, stride, rows, Depths(rows, stride, x, y))
 

@@ -46,11 +46,12 @@ def fired_by_few(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, plan:
     if placements * len(tiles) > BOXES_MOST:
         return None
     volley = volley_of(weapon, shots)
-    patterns = [big_of(pattern) for pattern in volley.table.patterns]
     ground = Ground(stack, tiles, tiles.boxes(stack.box_xyxy), plain.pierce, scene.bounds)
-    near = met_boxes(volley.boxes, ground.boxes_xyxy)
-    if not pays(patterns, len(near[0])):
+    near, box = met_boxes(volley.boxes, ground.boxes_xyxy), volley.table.box_xyxy
+    wide, high = (int((box[:, axis + 2] - box[:, axis]).max()) + 1 for axis in (0, 1))
+    if not pays(len(near[0]), wide, high):
         return None
+    patterns = [big_of(pattern) for pattern in volley.table.patterns]
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
     plan.run("patterns", f"{len(patterns)} distinct", volley.nbytes)
     hits = hit_by_few(placed_of(volley), patterns, accepted(near, ground, shots, volley.shot), ground)

@@ -1,9 +1,9 @@
 """Squares of shot positions, each with the objects that a pattern fired from there may hit, and what is seen of them.
 
-The first shots that fall into a square walk the tiles of the items, front to back; for the next one it is made, and
-what is seen of an object when the first square needs it: its mask without what lies before it, as integer rows. After a
-change of the scene those near what changed are forgotten: where all moves, shots walk. `squares_jit` walks the stack,
-or what is composed of it, instead.
+A square is made when the first shot falls into it, and what is seen of an object when the first square needs it: its
+mask without what lies before it, as integer rows. After a change of the scene those near what changed are made anew.
+After all has moved shots walk the items instead, front to back, until the scene stands still for more of them.
+`squares_jit` walks the stack, or what is composed of it, compiled.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ class Squares:
         left, top = x + pattern.x, y + pattern.y
         box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
-        if not pays([pattern], len(tile)):
+        if not pays(len(tile), pattern.wide, pattern.high):
             self._crowded = True
             raise KeyError(x, y)
         square = x >> CELL_SHIFT, y >> CELL_SHIFT
