@@ -4,7 +4,8 @@ scene -> stack -> weapon -> patterns -> windows -> what they share with tiles of
 
 Composed: with what can be seen of all, by cells of shot positions. Direct: with tiles where they lie, front to back; of
 pellets that scatter, and where a pre-filter is asked for, with what can be seen of the items that they come near. Shots
-of one pixel need no bit rows: they read the code plane, or, a few of them, the masks of the items themselves.
+of one pixel need no bit rows: they read the code plane, or, a few of them, the masks of the items themselves. A few
+shots of small patterns are counted in integers where there are no compiled kernels: `fewfire`.
 """
 
 from __future__ import annotations
