@@ -75,9 +75,9 @@ def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints,
     return _in_order(hits, ground)
 
 
-def hit_by_one(pattern: BigPattern, x: int, y: int, tile: Ints, ground: Ground) -> list[Hit]:
-    """The same of one pattern on a pixel, near some tiles (n,)."""
-    return _in_order(list(_hit_by(pattern, x, y, _near(np.zeros_like(tile), tile, ground), ground)), ground)
+def hit_by_one(pattern: BigPattern, x: int, y: int, near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
+    """The same of one pattern on a pixel."""
+    return _in_order(list(_hit_by(pattern, x, y, _near(*near, ground), ground)), ground)
 
 
 def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:

@@ -114,7 +114,8 @@ def fired_by_bits(
     each, view = traits.placements, view_of(traits.pierces, shots)
     placements = each * len(shots)
     point = traits.is_point and view == OF_ALL[False] and not stack.has_unmet
-    few = fired_by_few(scene, weapon, shots, stack, plan) if how == AUTO and not point else None
+    each_alone = how == AUTO and not point and not traits.scattered
+    few = fired_by_few(scene, weapon, shots, stack, placements, plan) if each_alone else None
     if few is not None:
         plan.run("plan", "direct: few shots")
         sight = Sight(stack, scene.bounds, traits.pierces, Candidates(scene.items, stack), plan)

@@ -21,7 +21,7 @@ from weapons.candidates import may_refuse, refused
 from weapons.counting import placed_of, rows_of
 from weapons.hits import Rows
 from weapons.plan import Plan
-from weapons.volley import Shots, Volley, placements_of, volley_of
+from weapons.volley import Shots, Volley, volley_of
 from weapons.weapon import Weapon
 from weapons.windows import big_of
 
@@ -34,13 +34,12 @@ PLACEMENTS_MOST, BOXES_MOST = 64, 2**15
 """Placements, and their boxes compared with those of tiles: of more, too many meet, and the comparison was in vain."""
 
 
-def fired_by_few(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, plan: Plan) -> Rows | None:
-    """Rows of what shots hit; None if they, or what they come near, are too many for that, or compiled."""
-    _, spread, plain = parts_of(weapon)
-    placements = placements_of(weapon) * len(shots)
-    if spread or not 0 < placements <= PLACEMENTS_MOST or plain.reach_256 > SUB * REACH:
+def fired_by_few(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, placements: int, plan: Plan) -> Rows | None:
+    """Rows of what shots without pellets hit; None if they, or what they come near, are too many, or are compiled."""
+    plain = parts_of(weapon)[2]
+    if kernels_of(fronttoback) is not fronttoback or not 0 < placements <= PLACEMENTS_MOST:
         return None
-    if kernels_of(fronttoback) is not fronttoback or placements * len(stack) > BOXES_MOST:
+    if plain.reach_256 > SUB * REACH:
         return None
     tiles = scene.items.tiles()
     if placements * len(tiles) > BOXES_MOST:

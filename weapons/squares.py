@@ -235,8 +235,8 @@ class Squares:
         square = x >> CELL_SHIFT, y >> CELL_SHIFT
         self._walked[square] = self._walked.get(square, 0) + 1
         self._walks += 1
-        _, tile = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
-        for _, distance2, py, px, rank, n in hit_by_one(pattern, x, y, tile, ground):
+        near = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
+        for _, distance2, py, px, rank, n in hit_by_one(pattern, x, y, near, ground):
             yield distance2, py, px, ground.stack.ids.item(rank), n
 
     def _walked_on(self) -> Ground:
