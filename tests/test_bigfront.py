@@ -165,7 +165,7 @@ def test_what_counts_as_all_that_moved(
             scene.move(ids[:moved], [(6.0 * i, 100 + k) for i in range(moved)])
 
 
-def test_at_a_scene_that_stands_still_nothing_is_walked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_at_a_scene_that_stands_still_nothing_is_walked() -> None:
     """Nor are all masks made into tiles for it: a square needs what lies near it."""
     scene = Scene((4000, 4000))
     for k in range(5):

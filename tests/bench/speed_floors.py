@@ -29,6 +29,12 @@ MOVING = ((100, 100), (1000, 10), (1000, 100))
 """Objects that all move, and shots a frame."""
 
 NOTHING, COUNTS, LEAST = "nothing there", "counts alone", "a call of Python"
+LESS = {
+    NOTHING: "the same objects as movers, which no shot can hit",
+    COUNTS: "samples of each object, in no order, without the nearest pixel",
+    LEAST: "looks at a version, checks two numbers, begins an answer",
+}
+"""In what the question of a side is easier than ours."""
 
 
 def floors(settings: Settings) -> Iterator[Cell]:
@@ -50,16 +56,15 @@ def asked(settings: Settings, cell: Cell, section: str, what: str) -> Cell:
     return cell
 
 
-def unhittable(objects: int) -> Scene:
-    """The same objects, none of which decides anything."""
-    scene = scene_of(objects)
+def unhittable(scene: Scene) -> Scene:
+    """A scene, now none of whose objects decides anything."""
     scene.set(scene.ids(), role="mover")
     return scene
 
 
 def named(side: Side, what: str) -> Side:
     """A side that answers less."""
-    side.name, side.rows, side.easier = f"{side.name}, {what}", None, what
+    side.name, side.rows, side.easier = f"{side.name}, {what}", None, LESS[what]
     return side
 
 
@@ -68,7 +73,7 @@ def _batch(settings: Settings, name: str, objects: int) -> Cell:
     scene, weapon = scene_of(objects), PATTERNS[name]
     masks, placed = Masks(items_of(scene)), rendered(pattern_mask(weapon))  # type: ignore[arg-type]
     sides = ours(settings, scene, weapon)
-    sides += [named(side, NOTHING) for side in ours(settings, unhittable(objects), weapon)]
+    sides += [named(side, NOTHING) for side in ours(settings, unhittable(scene_of(objects)), weapon)]
     if name != "point":
         sides.append(_counts(ours(settings, scene, weapon)[0]))
         sides.append(Side("A pygame", lambda w, n: masks.areas(*first(w, n), repeat(placed)), list))
@@ -102,7 +107,7 @@ def _frame(settings: Settings, objects: int, shots: int) -> Cell:
         sides.append(Side(mode, Own(scene_of(objects)).answer, own_rows, ready=ready, whole=True))
     for mode, ready in modes(settings).items():
         still = Own(scene_of(objects))
-        still.scene.set(still.scene.ids(), role="mover")
+        unhittable(still.scene)
         sides.append(named(Side(mode, still.answer, ready=ready, whole=True), NOTHING))
     shadow = scene_of(objects)
     sides.append(masks_side(shadow))
@@ -129,7 +134,7 @@ class Least:
 
 def _call(settings: Settings, objects: int) -> Cell:
     """One point a call, made ready."""
-    scene, empty, weapon, least = scene_of(objects), unhittable(objects), PATTERNS["point"], Least()
+    scene, empty, weapon, least = scene_of(objects), unhittable(scene_of(objects)), PATTERNS["point"], Least()
     calls: dict[str, Any] = {}
     for mode, ready in modes(settings).items():
         name = f"ready, {mode}"
@@ -139,4 +144,4 @@ def _call(settings: Settings, objects: int) -> Cell:
     calls["A pygame"] = masks_call(Masks(items_of(scene)), weapon), None
     works = list(works_of("point", objects, settings))
     cell = Cell("floors", "point, prepared", objects, unit="ns a call", asked=settings.calls)
-    return timed_calls(cell, calls, works, easier={name: name for name in calls if NOTHING in name or name == LEAST})
+    return timed_calls(cell, calls, works, {name: LESS[what] for name in calls for what in LESS if what in name})

@@ -54,6 +54,7 @@ def single(settings: Settings) -> Iterator[Cell]:
 
 
 def works_of(name: str, objects: int, settings: Settings) -> Iterator[list[tuple[Any, float]]]:
+    """Places and aims of the calls of each round, and of one before for warming up."""
     rounds = volleys(name, settings.calls, objects)
     for _ in range(settings.rounds + 1):
         work = next(rounds)
