@@ -127,8 +127,10 @@ def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[
 
 
 @pytest.mark.parametrize("limits", PARTS)
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 4))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 5))])
 def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if kernels == "jit" and limits == "in integers":
+        pytest.skip("compiled kernels count all shots")
     rng = np.random.default_rng([seed, len(limits)])
     cut(monkeypatch, PARTS[limits])
     rows = ways = few = 0
@@ -147,7 +149,7 @@ def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, mon
                 )
             rows += len(truth)
     assert rows > 300 and ways & 3 == 3
-    assert kernels == "jit" or limits != "in integers" or few
+    assert few or limits != "in integers"
 
 
 def test_the_oracle_says_the_same(kernels: str) -> None:

@@ -168,7 +168,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
         assert kernels.union(case.placed, case.windows, case.seen, placement, near, first).tolist() == together
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, nearest.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
