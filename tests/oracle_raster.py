@@ -123,8 +123,14 @@ def unit_toward(dx: int, dy: int) -> tuple[int, int]:
 
 
 def quarter_turns(degrees: float | Fraction) -> tuple[int, int, int]:
-    """Give (k, c, s) with degrees = 90 k + r modulo 360, r in [-45, 45) and (c, s) the direction of r."""
+    """Give (k, c, s) with degrees = 90 k + r modulo 360, r in [-45, 45) and (c, s) the direction of r.
+
+    What rounds to the direction of an odd multiple of 45 degrees is that multiple.
+    """
     angle = Fraction(degrees)
+    across, down = unit(angle)
+    if abs(across) == abs(down):
+        angle = Fraction(45 * round(angle / 45))
     k = math.floor((angle + 45) / 90)
     return (k % 4, *unit(angle - 90 * k))
 

@@ -70,7 +70,7 @@ class Pass:
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a ray ended; without an item, cell or normal where nothing but its length or budget ended it."""
+    """Where a ray ended: at an item, in the object that took the last of its budget, or without one in no cell."""
 
     reason: str
     time: Time
@@ -238,17 +238,20 @@ class Spending:
         return sum(cost * covered(self.unions[i], time) for i, cost in self.costs.items())
 
     def over(self, time: Time) -> bool:
-        """Whether more than the budget is spent before a time."""
+        """Whether nothing of the budget is left at a time."""
         full = self.budget_256
-        return full is not None and self.spent(time) ** 2 * self.path.length2 > (full * self.path.scale) ** 2
+        return full is not None and self.spent(time) ** 2 * self.path.length2 >= (full * self.path.scale) ** 2
 
     def used_up(self) -> Time:
-        """The last time at which no more than the budget is spent."""
+        """The first time at which nothing of the budget is left."""
         moments = sorted({0, self.path.scale, *(t for both in self.path.cells.values() for t in both)})
+        if self.over(0):
+            return 0
         before, after = max(t for t in moments if not self.over(t)), min(t for t in moments if self.over(t))
         low, high = self.spent(before), self.spent(after)
         full = root(Fraction((int(self.budget_256 or 0) * self.path.scale) ** 2, self.path.length2))
-        return before + (full - low) * (after - before) / (high - low)
+        time = before + (full - low) * (after - before) / (high - low)
+        return int(time) if time.denominator == 1 else time
 
 
 def goes_through(
@@ -270,6 +273,21 @@ def goes_through(
     if spending.over(path.scale):
         return met, len(order), "budget", spending.used_up(), None
     return met, len(order), "range", path.scale, None
+
+
+def nearest(point: Point) -> Pixel:
+    """The pixel of a point; on a border the greater one."""
+    return (point[0] + HALF) // PX, (point[1] + HALF) // PX
+
+
+def spent_in(present: Sequence[tuple[Item, Times]], time: Time) -> Stop | None:
+    """The end in the front-most object that costs something up to a time, in its first cell by (y, x)."""
+    for item, times in present:
+        cells = [(y, x) for (x, y), (entry, leave) in times.items() if entry < time <= leave]
+        if cells and item.cost and not item.occluder:
+            y, x = min(cells)
+            return Stop("budget", time, item.id, (x, y))
+    return None
 
 
 def walk(
@@ -295,6 +313,8 @@ def walk(
         normal, material = normal_at(by_id[i], its[0], a, b, r), path.px(covered(unions[i], time))
         out = min(last[0], time)
         passes.append(Pass(i, place, its, cells[its[0]][0], out, (last[3], last[2]), material, normal))
+    if reason == "budget":
+        return Walk(path, order, walked, passes, spent_in(present, time) or Stop(reason, time, None, nearest(a)))
     if ended is None:
         return Walk(path, order, walked, passes, Stop(reason, time))
     cell = order[walked - 1]

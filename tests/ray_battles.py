@@ -15,9 +15,8 @@ import oracle_raster
 import oracle_rays
 from oracle_rays import Item, Pass, StartsInside, Walk
 
-from planes import ALL, Scene, Sprite
-from weapons import Hits, Laser, Pistol, Rifle, Rounds, Spread, Sweep, Weapon, fire
-from weapons.draws import disc_offsets
+from hitplanes import ALL, Hits, Laser, Pistol, Rifle, Rounds, Scene, Spread, Sprite, Sweep, Weapon, fire
+from hitplanes.weapons.kinds.placements import disc_offsets
 
 Pixel = tuple[int, int]
 Place = tuple[float, float]
@@ -273,12 +272,12 @@ def pass_of(which: int, ray: Ray, walked: Walk, one: Pass, falloff: str | None) 
 
 
 def stop_of(which: int, ray: Ray, walked: Walk) -> dict[str, Any]:
-    """A row of `hits.stop`; None where the sheet leaves it open."""
+    """A row of `hits.stop`; None where the sheet leaves it open: the cell of a far end, and a thick ray's normal."""
     stop = walked.stop
     return {
         "shot": which, "round": ray[0], "pellet": ray[1],
         "reason": ("range", "occluder", "hits", "budget").index(stop.reason),
-        "item": -1 if stop.reason == "range" else stop.item, "cell_xy": stop.cell_xy and list(stop.cell_xy),
+        "item": -1 if stop.item is None else stop.item, "cell_xy": stop.cell_xy and list(stop.cell_xy),
         "fraction": part_at(walked, stop.time), "distance": Close(walked.path.px(stop.time)),
         "point_xy": point_at(ray, walked, stop.time), "normal_xy": stop.normal and list(stop.normal),
     }  # fmt: skip

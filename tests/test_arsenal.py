@@ -3,44 +3,54 @@
 from __future__ import annotations
 
 import copy
+import gc
 import json
+import math
 import pickle
+import tracemalloc
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from math import floor, isqrt
 from typing import Any
+from weakref import ref
 
 import numpy as np
+import oracle_raster
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from planes import InputError, Scene, Sprite
-from planes.grid256 import ONE, unit
-from planes.kept import Kept
-from planes.spans import Spans
-from weapons import (
+from hitplanes import (
     Beam,
     Box,
     Cone,
     Disc,
+    InputError,
     Laser,
     Point,
     Polygon,
     Ring,
     Rounds,
+    Scene,
     Spread,
+    Sprite,
     Stencil,
     Sweep,
     Weapon,
-    arsenal,
     fire,
     weapon_from_json,
 )
-from weapons.arsenal import Plain, pattern_of
-from weapons.pattern import falloff_weights
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.grid.fixed_point import ONE, unit
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.weapons.fire import prefilter as narrow
+from hitplanes.weapons.kinds import areas
+from hitplanes.weapons.kinds import weapon as windows
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
+from hitplanes.weapons.kinds.weapon import falloff_weights
 
 ARROW = ["..#..", ".###.", "#####", "..#.."]
-PLAIN: list[Plain] = [
+PLAIN: list[AreaWeapon] = [
     Point(),
     Disc(4.5, falloff="linear"),
     Ring(3, 6.25),
@@ -86,7 +96,7 @@ def test_box_is_exactly_its_size_and_even_sides_lie_right_and_below(width: int, 
 
 @pytest.mark.parametrize("weapon", PLAIN, ids=lambda w: w.kind)
 @pytest.mark.parametrize("degrees", [0, 11, 45, 100.5])
-def test_a_quarter_turn_of_the_aim_turns_the_pattern(weapon: Plain, degrees: float) -> None:
+def test_a_quarter_turn_of_the_aim_turns_the_pattern(weapon: AreaWeapon, degrees: float) -> None:
     c, s = (int(v) for v in unit(degrees))
     turned = {(-y, x) for x, y in weapon.spans(c, s).pixels().tolist()}
     assert {tuple(p) for p in weapon.spans(-s, c).pixels().tolist()} == turned
@@ -97,6 +107,67 @@ def test_stencil_is_aimed_like_a_sprite() -> None:
     assert drawn(stencil.spans(ONE, 0)) == ARROW
     assert drawn(stencil.spans(0, ONE)) == [".#..", ".##.", "####", ".##.", ".#.."]
     assert stencil.spans(ONE, 0).box_xyxy == (-2, -1, 2, 2)
+
+
+diagonals = st.integers(-9, 9).map(lambda n: 90.0 * n + 45.0)
+near_diagonals = st.one_of(
+    diagonals,
+    st.builds(math.nextafter, diagonals, st.sampled_from([-1e3, 1e3])),
+    st.builds(lambda angle, offset: angle + offset, diagonals, st.floats(-1e-6, 1e-6)),
+    st.builds(lambda angle, offset: angle + offset, diagonals, st.floats(-4e-8, 4e-8)),  # they round to the diagonal
+)
+beside_diagonals = st.builds(
+    lambda x, y, length, off: (x * length, y * length + off),
+    *2 * [st.sampled_from([-1, 1])],
+    st.sampled_from([3, 2**24, 2**30, 2**38]),
+    st.integers(-3, 3),
+)
+any_angle = st.one_of(near_diagonals, st.integers(-24, 24).map(lambda n: 15.0 * n), st.floats(-1e4, 1e4))
+masks = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
+    lambda shape: st.lists(st.booleans(), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]).map(
+        lambda pixels: np.array([True, *pixels[1:]]).reshape(shape)
+    )
+)
+pivots = st.none() | st.tuples(*2 * [st.integers(-4, 9).map(lambda n: n / 2)])
+TURNS = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def fired_pixels(stencil: Stencil, **aimed: Any) -> set[tuple[int, int]]:
+    """Pixels of a shot from (0, 0)."""
+    return {(x, y) for x, y in fire(Scene(), stencil, (0, 0), **aimed).samples_at(0).xy.tolist()}
+
+
+def turned_pixels(mask: np.ndarray, pivot: tuple[float, float] | None, angle: float) -> set[tuple[int, int]]:
+    """Pixels of a sprite at (0, 0)."""
+    scene = Scene()
+    scene.add(Sprite.from_mask(mask, pivot_xy=pivot), (0, 0), angle=angle)
+    found, (left, top) = scene.mask(0)
+    return {(x + left, y + top) for y, x in np.argwhere(found).tolist()}
+
+
+@TURNS
+@given(masks, pivots, any_angle)
+@example(np.ones((3, 4), np.bool_), None, 44.99999999)
+@example(np.ones((3, 4), np.bool_), None, math.nextafter(-135.0, 0))
+@example(np.ones((4, 3), np.bool_), (1.5, 0.0), 45.00000002)
+def test_a_stencil_covers_the_pixels_of_a_sprite_turned_by_its_aim(
+    jit: bool, mask: np.ndarray, pivot: tuple[float, float] | None, angle: float
+) -> None:
+    assert fired_pixels(Stencil(mask, pivot), aim=angle) == turned_pixels(mask, pivot, angle)
+
+
+@TURNS
+@given(masks, pivots, st.one_of(beside_diagonals, st.tuples(*2 * [st.integers(-3000, 3000)])))
+@example(np.ones((3, 4), np.bool_), None, (2**38, 2**38 - 1))
+@example(np.ones((3, 4), np.bool_), None, (-7, -7))
+def test_a_stencil_fired_toward_a_point_is_turned_by_the_same_rule(
+    jit: bool, mask: np.ndarray, pivot: tuple[float, float] | None, toward_256: tuple[int, int]
+) -> None:
+    """As a sprite by the angle whose direction, once rounded, is that of the point."""
+    x, y = toward_256
+    angle = math.degrees(math.atan2(y, x))
+    assume((x or y) and oracle_raster.unit(angle) == oracle_raster.unit_toward(x, y))
+    assert fired_pixels(Stencil(mask, pivot), toward=(x / 256, y / 256)) == turned_pixels(mask, pivot, angle)
 
 
 def test_arrays_are_taken_and_left_as_they_were() -> None:
@@ -247,12 +318,139 @@ def test_pellets_of_a_burst_are_limited_as_a_whole() -> None:
 
 
 def test_patterns_that_are_kept_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = Kept(20_000, arsenal._kept.size)
-    monkeypatch.setattr(arsenal, "_kept", kept)
+    kept = caches(monkeypatch, 40_000)[0]
     for degrees in range(60):
         pattern_of(Beam(40, 2), *(int(v) for v in unit(degrees)))
-        assert kept.bytes == sum(p.nbytes for p in kept.values.values()) <= 20_000
+        text = len(Beam(40, 2).text)
+        assert kept.bytes == sum(p.nbytes + text for p in kept.values.values()) <= 40_000
     assert len(kept.values) > 3
+
+
+def caches(monkeypatch: pytest.MonkeyPatch, limit: int) -> list[LruCache[Any, Any]]:
+    """Empty caches of a limit for all that is kept of patterns, the patterns themselves first."""
+    made = []
+    for module, name in (
+        (areas, "_kept"), (windows, "_kept"), (windows, "_kept_columns"), (windows, "_kept_bigs"), (narrow, "_kept")
+    ):  # fmt: skip
+        old = getattr(module, name)
+        made.append(LruCache(limit, old.size, old.key_size))
+        monkeypatch.setattr(module, name, made[-1])
+    return made
+
+
+@pytest.fixture
+def uncollected() -> Iterator[None]:
+    """Do without the garbage collector."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def fire_every_way(scene: Scene, weapon: Weapon) -> None:
+    """One shot and many, by every strategy and pre-filter; all that is worked out of a pattern is."""
+    many = [(10 + 3 * i, 20) for i in range(70)]
+    for strategy in ("auto", "direct", "composed"):
+        fire(scene, weapon, many, aim=17, strategy=strategy)
+        fire(scene, weapon, (50, 50), aim=17, strategy=strategy)
+    for prefilter in ("none", "box", "circle", "oriented box", "4 boxes", "polygon", "swept"):
+        fire(scene, weapon, many, aim=17, prefilter=prefilter, strategy="direct")
+    fire(scene, weapon, many, aim=list(range(70)))
+    hits = fire(scene, weapon, (50, 50), aim=17)
+    assert hits.verdict_counts() and hits.shares() is not None and hits.pixels_at() is not None
+
+
+def aimed_world() -> Scene:
+    scene = Scene((200, 200))
+    scene.add(Sprite.circle(30), (60, 60))
+    scene.add(Sprite.box(5, 90), (120, 60), angle=20, role="occluder")
+    return scene
+
+
+def warmed(weapon: Weapon) -> Scene:
+    """A scene, after kernels for a weapon were loaded: what loads them may leave cycles that hold what was fired."""
+    scene = aimed_world()
+    if isinstance(weapon, AreaWeapon):
+        fire_every_way(scene, weapon)
+    fire(scene, weapon, (50, 50), aim=17)
+    fire(scene, weapon, [(50, 50), (60, 20)], aim=17)
+    gc.collect()
+    return scene
+
+
+@pytest.mark.parametrize("weapon", PLAIN, ids=lambda w: w.kind)
+@pytest.mark.usefixtures("jit", "uncollected")
+def test_a_pattern_that_is_given_up_goes_without_the_garbage_collector(
+    weapon: AreaWeapon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may be known again by other caches, which hold what is made of it; none of them holds it."""
+    scene = warmed(weapon)
+    kept, weapon = caches(monkeypatch, 2**26)[0], copy.copy(weapon)  # one that knows no pattern yet
+    fire_every_way(scene, weapon)
+    patterns = [ref(pattern) for pattern in kept.values.values()]
+    kept.values.clear()
+    assert patterns and not any(pattern() for pattern in patterns)
+    again = weapon_from_json(weapon.to_json())
+    assert fire(scene, again, (50, 50), aim=17) == fire(scene, weapon, (50, 50), aim=17)
+
+
+@pytest.mark.parametrize("weapon", [*EVERY, Laser(9), Sweep(Laser(9), 3, 20)], ids=lambda w: w.kind)
+@pytest.mark.usefixtures("jit", "uncollected")
+def test_a_weapon_that_was_fired_goes_without_the_garbage_collector(weapon: Weapon) -> None:
+    """As one that is made anew for each shot."""
+    scene, own = warmed(weapon), weapon_from_json(weapon.to_json())
+    known = ref(own)
+    fire(scene, own, (50, 50), aim=17)
+    fire(scene, own, [(50, 50), (60, 20)], aim=17)
+    del own
+    assert known() is None
+
+
+DISTINCT: dict[str, Callable[[int], AreaWeapon]] = {
+    "ring": lambda i: Ring(40, 41 + i / 9),
+    "faded disc": lambda i: Disc(20 + i / 9, falloff="smooth"),
+    "beam": lambda i: Beam(60 + i / 9, 2),
+    "point": lambda i: Disc(i / 200),
+    "stencil": lambda i: Stencil(["#" * 30] * (i + 1), pivot_xy=(9, i)),
+    "long text": lambda i: Polygon([(i, 0), *((i + 2, j / 99) for j in range(300))]),
+}
+
+
+def work_out(weapon: AreaWeapon) -> None:
+    """All that is worked out of a pattern and kept, here or there."""
+    pattern = pattern_of(weapon, *(int(v) for v in unit(17)))
+    for worked_out in ("spans", "prefix", "count", "box_xyxy"):
+        getattr(pattern.table, worked_out)
+    for worked_out in ("strip", "window_bytes", "is_disc"):
+        getattr(pattern, worked_out)
+    for _ in range(2):
+        windows.pattern_bits_of([pattern], windows.OFTEN)
+    nearest = windows.big_of(pattern).depths.nearest
+    for _ in range(9):
+        nearest(1)
+    for prefilter in ("circle", "oriented box", "boxes", "polygon", "swept"):
+        narrow.pattern_volumes(prefilter, [pattern])
+
+
+@pytest.mark.parametrize("kind", DISTINCT)
+@pytest.mark.usefixtures("uncollected")
+def test_caches_of_patterns_hold_no_more_than_they_count(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many patterns and all that is worked out of them, as the allocator tells, without the garbage collector."""
+    work_out(DISTINCT[kind](99))
+    limit = 2**17
+    made = caches(monkeypatch, limit)
+    monkeypatch.setattr("hitplanes.planes.scene.sprite._kept", LruCache(1, lambda variant: variant.mask.nbytes))
+    tracemalloc.start()
+    for i in range(20):
+        work_out(DISTINCT[kind](i))
+    assert all(one.bytes <= limit or len(one.values) == 1 for one in made)
+    for one in made:
+        before = tracemalloc.get_traced_memory()[0]
+        one.values.clear()
+        assert before - tracemalloc.get_traced_memory()[0] <= one.bytes + 4096
+    left = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert left < limit, "what was given up is still held"
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import InputError, Scene, Sprite, load_scene, read_png
-from planes.image import check_output, write_png, write_text
-from weapons.cli import main
+from hitplanes import InputError, Scene, Sprite, load_scene, read_png
+from hitplanes.planes.files.png import check_output, write_png, write_text
+from hitplanes.weapons.cli.command import main
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
@@ -276,8 +276,8 @@ WORDS: dict[str, tuple[list[str], str]] = {
     "scene of no name": (["report", ""], "scene.json: cannot read it: No such file"),
     "scene, a file": (["report", str(GALLERY / "duck.png")], "scene.json: cannot read it: Not a directory"),
     "scene, 300 characters": (["report", "x" * 300], "scene.json: cannot read it: File name too long"),
-    "scene, zero byte": (["report", "a\0b"], "scene.json: .*null"),
-    "weapon unknown": (words_of("--weapon", "lazer", "--at", "1,2"), "weapon: .*got 'lazer' .did you mean 'laser'"),
+    "scene, zero byte": (["report", "a\0b"], r"folder: expected a path, got .*x00.*zero byte"),
+    "weapon unknown": (words_of("--weapon", "bean", "--at", "1,2"), "weapon: .*got 'bean' .did you mean 'beam'"),
     "weapon of no name": (words_of("--weapon", "", "--at", "1,2"), "weapon: expected a text of .*got ''"),
     "at missing": (words_of("--weapon", "laser"), "--at: expected X,Y with --weapon, got nothing"),
     "at without weapon": (words_of("--at", "1,2"), "--at: expected only together with --weapon"),
@@ -301,7 +301,7 @@ WORDS: dict[str, tuple[list[str], str]] = {
     "output, below a file": (words_of("-o", "old.png/r.png"), "output: cannot write old.png/r.png"),
     "output, 300 characters": (words_of("-o", "x" * 300 + ".png"), "output: cannot write xxx.*: File name too long"),
     "output, 250 characters": (words_of("-o", "x" * 246 + ".png"), "output: cannot write xxx.*: File name too long"),
-    "output, zero byte": (words_of("-o", "a\0.png"), "output: cannot write .*: expected the name of a file"),
+    "output, zero byte": (words_of("-o", "a\0.png"), "output: expected a path, got .*zero byte"),
     "output, JPEG": (words_of("-o", "r.jpg"), "--output: expected a name that ends in .png, got 'r.jpg'"),
     "output, dot behind": (words_of("-o", "r.png."), "--output: expected a name that ends in .png"),
     "facts, no name": (words_of("--json", "."), r"output: cannot write \.: expected the name of a file"),
@@ -476,7 +476,7 @@ def in_process(code: str, *words: str, stdout: Any = subprocess.PIPE) -> subproc
     return subprocess.run(run, cwd=ROOT, stdout=stdout, stderr=subprocess.PIPE, text=True, check=False, timeout=60)
 
 
-REPORT = "import sys; from weapons.cli import main; sys.exit(main(sys.argv[1:]))"
+REPORT = "import sys; from hitplanes.weapons.cli.command import main; sys.exit(main(sys.argv[1:]))"
 
 
 def test_a_full_disk_leaves_the_old_report(tmp_path: Path) -> None:
@@ -532,7 +532,7 @@ def test_a_place_for_no_file_is_named_before_any_work(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for call in (check_output, lambda path: write_text(path, "text")):
-        with pytest.raises(InputError, match="output: cannot write"):
+        with pytest.raises(InputError, match=r"output: cannot write|output: expected a path, got .*zero byte"):
             call(Path(name))
     assert not list(tmp_path.iterdir())
 
@@ -632,6 +632,45 @@ def test_a_name_cannot_speak_to_the_terminal(tmp_path: Path, capfd: pytest.Captu
     (tmp_path / "scene.json").write_text(json.dumps(changed(f"{DUCK}.name", "a\nb\x1b[31m")))
     assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
     assert "\x1b" not in (out := capfd.readouterr().out) and out.count("\n") == 1
+
+
+HOSTILE = "a\n\x1b\x7f\x9b\u2028\u202e\u2066\u061c"
+
+
+def test_no_name_of_anything_speaks_to_the_terminal(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = Path(HOSTILE)
+    folder.mkdir()
+    for x in (16, 17):
+        data = changed(f"{DUCK}.name", HOSTILE)
+        data["name"] = HOSTILE
+        data["weapons"][HOSTILE] = {"kind": "point"}
+        data["shots"] = [{"weapon": HOSTILE, "at": [x, 10]}]
+        (folder / "scene.json").write_text(json.dumps(data))
+        assert main(["report", HOSTILE, "-o", f"{HOSTILE}.png", "--json", f"{HOSTILE}{x}.json"]) == 0
+    (folder / "log.jsonl").write_text(json.dumps({"weapon": HOSTILE, "at": [16, 10]}) + "\n")
+    hits = f"{HOSTILE}.jsonl"
+    assert main(["fire", HOSTILE, f"{HOSTILE}/log.jsonl", "-o", hits, "--plan"]) == 0
+    assert main(["compare", f"{HOSTILE}16.json", f"{HOSTILE}17.json"]) == 1
+    assert main(["compare", f"{HOSTILE}16.json", f"{HOSTILE}18.json"]) == 2
+    assert main(["report", HOSTILE, "--weapon", "b", "--at", "1,2"]) == 2
+    assert main(["new", HOSTILE]) == 2
+    (folder / "log.jsonl").write_text(json.dumps({"weapon": HOSTILE, "at": [16, 10]}) + "\n" + "no\n")
+    assert main(["fire", HOSTILE, f"{HOSTILE}/log.jsonl", "-o", hits]) == 2
+    assert main(["fire", HOSTILE, f"{HOSTILE}/log.jsonl", "-o", hits]) == 2  # it goes on, and says so
+    monkeypatch.setattr("hitplanes.weapons.replay.stream._chunks", interrupt)
+    assert main(["fire", HOSTILE, f"{HOSTILE}/log.jsonl", "-o", hits]) == 130
+    with pytest.raises(SystemExit):
+        main(["report", "x", HOSTILE])
+    told = capfd.readouterr()
+    assert all(line.isprintable() for line in told.out.split("\n") + told.err.split("\n"))
+    assert "going on after them" in told.err and "is kept" in told.err
+
+
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
 
 
 def test_an_output_that_another_writer_makes_meanwhile_is_no_error(

@@ -30,7 +30,7 @@ from oracle_png import (
     stream,
 )
 
-from planes import InputError, read_png
+from hitplanes import InputError, read_png
 
 pytestmark = pytest.mark.usefixtures("bounded")
 

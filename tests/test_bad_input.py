@@ -2,19 +2,57 @@
 
 from __future__ import annotations
 
+import io
 import math
+import pickle
 import re
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from planes import InputError, Scene, Sprite, load_scene, read_png
-from weapons import Beam, Box, Cone, Disc, Polygon, Ring, Rounds, Spread, Stencil, arsenal_of, fire, weapon_from_json
-from weapons.orders import orders_of
+from hitplanes import (  # fmt: skip
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    History,
+    InputError,
+    Pistol,
+    Polygon,
+    Ring,
+    Rounds,
+    Scene,
+    ShotRecord,
+    Spread,
+    Sprite,
+    Stencil,
+    Sweep,
+    arsenal_of,
+    fire,
+    load_scene,
+    picture_of_report,
+    read_png,
+    replay,
+    report_of,
+    use_jit,
+    weapon_from_json,
+    write_png,
+)
+from hitplanes.weapons.cli.schemas import read_report
+from hitplanes.weapons.cli.starter import write_starter
+from hitplanes.weapons.lab.demo import moments, write_demo, write_frames, write_gif
+from hitplanes.weapons.lab.stability.stability import load_study, run_stability
+from hitplanes.weapons.lab.study.study import Effort, write_study
+from hitplanes.weapons.replay.shot_log import orders_of
+from hitplanes.weapons.replay.stream import Progress, fire_log
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 TRIANGLE = [(0, 0), (9, 0), (0, 9)]
@@ -133,7 +171,8 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "sprite, four dimensions": (lambda: world().add(np.zeros((1, 1, 1, 1))), r"sprite: .*got \(1, 1, 1, 1\)"),
     "sprite, 10^5 deep": (lambda: world().add(DEEP), r"sprite: expected an array, got \[\[\["),
     "sprite made by hand": (lambda: world().add(Sprite(())), "sprite: expected one that a class method made"),
-    "sprite of float pixels": (lambda: world().add(sheet() / 255), "image: expected bytes .*float64"),
+    "sprite of float pixels": (lambda: world().add(sheet() / 255), "^sprite: image: expected bytes .*float64"),
+    "sprite of twos": (lambda: world().add([[0, 2]]), r"^sprite: mask\[0\]\[1\]: expected 0 or 1, got 2"),
     "sprite of booleans in three planes": (
         lambda: world().add(np.ones((2, 2, 3), bool)), "image: expected bytes .*bool"),
     "position with a masked value": (lambda: world().add(Sprite.circle(1), masked[1]), r"position_xy\[1\]: .*masked"),
@@ -171,10 +210,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "ids, two dimensions": (lambda: world().remove([[0, 1]]), r"ids: expected shape \(any,\), got \(1, 2\)"),
     "ids, float16 NaN": (lambda: world().remove(np.array([0, np.nan], np.float16)), r"ids\[1\]: expected a whole"),
     "positions, too few": (
-        lambda: world().move([0, 1], [(1, 2)]), r"position_xy: expected shape \(2, 2\), got \(1, 2\)"),
+        lambda: world().move([0, 1], [(1, 2)]), r"^xy: expected shape \(2, 2\), got \(1, 2\)"),
     "position, masked": (
-        lambda: world().move([0, 1], masked), r"position_xy\[1\]\[1\]: expected a value, got a masked"),
-    "position of one for all": (lambda: world().move([0, 1], (3, math.inf)), r"position_xy\[1\]: expected a finite"),
+        lambda: world().move([0, 1], masked), r"^xy\[1\]\[1\]: expected a value, got a masked"),
+    "position of one for all": (lambda: world().move([0, 1], (3, math.inf)), r"^xy\[1\]: expected a finite"),
     "layer of a row": (
         lambda: world().set([0, 1], layer=[1, 2**31]), r"layer\[1\]: expected a whole number .*2147483648"),
     "layers in float16": (lambda: world().set([0, 1], layer=np.array([1, 0.5], np.float16)), r"layer\[1\]: .*got 0.5"),
@@ -192,8 +231,8 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "find, a book": (lambda: world().find("duc" * 10**6), r"name: expected one of .*got 'ducduc.*\.\.\."),
     "find among many": (lambda: crowd().find("30"), "name: expected one of '0', '1', .*'19' and 10 more, got '30'"),
     "mask of what was removed": (lambda: world().mask(2), "expected an object in the scene, got 2, which was removed"),
-    "mask of true": (lambda: world().mask(True), "id: expected a whole number from 0 to 2, got True"),
-    "name of nothing": (lambda: world().name_of(3), "id: expected a whole number from 0 to 2, got 3"),
+    "mask of true": (lambda: world().mask(True), "^item: expected a whole number from 0 to 2, got True"),
+    "name of nothing": (lambda: world().name_of(3), "^item: expected a whole number from 0 to 2, got 3"),
     "bits of a category": (lambda: world().category_bits("freind"), "category: .*did you mean 'friend'"),
     "bits of a number": (
         lambda: world().category_bits(1), "category: expected one of .*got 1"),  # type: ignore[arg-type]
@@ -255,16 +294,16 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: Sprite.from_image(sheet(), rects_xywh=np.ones((65_537, 4))), "rects_xywh: expected 1 to 65536"),
     "rectangle that leaves": (
         lambda: Sprite.from_image(sheet(), rects_xywh=[[0, 0, 5, 1]]), r"rects_xywh\[0\]: .*4 x 3"),
-    "polygon of two": (lambda: Sprite.polygon([(0, 0), (1, 1)]), "polygon: expected 3 points or more, got 2"),
+    "polygon of two": (lambda: Sprite.polygon([(0, 0), (1, 1)]), "^points_xy: expected 3 points or more, got 2"),
     "polygon, far point": (
-        lambda: Sprite.polygon([*TRIANGLE, (0, 1e6)]), r"polygon\[3\]\[1\]: expected a number within"),
+        lambda: Sprite.polygon([*TRIANGLE, (0, 1e6)]), r"^points_xy\[3\]\[1\]: expected a number within"),
     "holes, a number": (
         lambda: Sprite.polygon(TRIANGLE, 3), "holes: expected a list of rings, got 3"),  # type: ignore[arg-type]
     "holes, no dimension": (
         lambda: Sprite.polygon(TRIANGLE, np.array(3)), "holes: expected a list of rings"),  # type: ignore[arg-type]
     "hole": (lambda: Sprite.polygon(TRIANGLE, [TRIANGLE, [(0, 0)]]), r"holes\[1\]: expected 3 points or more, got 1"),
-    "circle": (lambda: Sprite.circle(-1), "circle: expected a number from 0 to 32768, got -1"),
-    "box": (lambda: Sprite.box(5, -1), r"box_wh\[1\]: expected a number from 0 to 32768, got -1"),
+    "circle": (lambda: Sprite.circle(-1), "^radius: expected a number from 0 to 32768, got -1"),
+    "box": (lambda: Sprite.box(5, -1), "^height: expected a number from 0 to 32768, got -1"),
     # weapons
     "ring inside out": (lambda: Ring(5, 3), "inner_radius: expected at most 3.0, got 5.0"),
     "box weapon of half a pixel": (
@@ -352,14 +391,14 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "load, None": (lambda: load_scene(None), "folder: expected a path, got None"),  # type: ignore[arg-type]
     "load, bytes": (lambda: load_scene(b"x"), "folder: expected a path, got b'x'"),  # type: ignore[arg-type]
     "load, missing": (lambda: load_scene("/no/such"), "/no/such/scene.json: cannot read it: No such file"),
-    "load, a zero byte": (lambda: load_scene("a\0b"), "scene.json: .*null"),
+    "load, a zero byte": (lambda: load_scene("a\0b"), "folder: expected a path, got .*zero byte"),
     "load, 300 characters": (lambda: load_scene("x" * 300), "scene.json: cannot read it: File name too long"),
     "save, None": (lambda: world().save(None), "folder: expected a path, got None"),  # type: ignore[arg-type]
     "save below a file": (lambda: world().save(GALLERY / "duck.png" / "x"), "folder: cannot make .*: Not a directory"),
     "PNG, None": (lambda: read_png(None), "image: expected a path, got None"),  # type: ignore[arg-type]
     "PNG, its bytes": (lambda: read_png(b"\x89PNG"), "image: expected a path, got b"),  # type: ignore[arg-type]
     "PNG, missing": (lambda: read_png("no.png"), "image: expected a PNG file, got 'no.png': No such file or directory"),
-    "PNG, a zero byte": (lambda: read_png("a\0.png"), "image: expected a PNG file, got .*null byte"),
+    "PNG, a zero byte": (lambda: read_png("a\0.png"), "image: expected a path, got .*zero byte"),
     "PNG, 300 characters": (lambda: read_png("x" * 300), "image: expected a PNG file, got 'xxx.*: File name too long"),
     "PNG, a folder": (lambda: read_png(GALLERY), "image: expected a PNG file, got 'gallery', which is a folder"),
 }  # fmt: skip
@@ -380,7 +419,7 @@ NOT_YET = [
     pytest.param(lambda: Scene(name=DIGITS), "name: ", id="name, 5000 digits"),  # type: ignore[arg-type]
     pytest.param(lambda: world().add(Sprite.circle(1), name=DEEP), "name: ", id="name, 10^5 deep"),  # type: ignore[arg-type]
     pytest.param(lambda: load_scene(DEEP), "folder: ", id="folder, 10^5 deep"),  # type: ignore[arg-type]
-    pytest.param(lambda: world().save("a\0b"), "folder: cannot make", id="save, a zero byte"),
+    pytest.param(lambda: world().save("a\0b"), "folder: expected a path, got .*zero byte", id="save, a zero byte"),
 ]
 
 
@@ -412,7 +451,7 @@ def test_a_bad_call_is_named(call: Callable[[], object], told: str, capfd: pytes
 
 
 def test_labels_are_counted_before_they_are_objects(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planes.labels.ITEMS_MAX", 3)
+    monkeypatch.setattr("hitplanes.planes.scene.render.ITEMS_MAX", 3)
     assert len(Scene.from_planes(hittable=[[1, 2, 3, 0]])) == 3
     with pytest.raises(InputError, match="hittable: expected at most 3 objects, got 4"):
         Scene.from_planes(hittable=[[1, 2, 3, 9]])
@@ -431,7 +470,7 @@ def placed(**pose: Any) -> object:
 
 
 def in_file(**entry: Any) -> object:
-    from planes.scenefile import OBJECT, READERS
+    from hitplanes.planes.files.scene_folder import OBJECT, READERS
 
     (kind,) = entry
     checked = OBJECT[kind].check("object", {**entry, "position_xy": [0, 0]})
@@ -472,16 +511,16 @@ FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
     "set layer": (lambda v: world().set([0, 1], layer=[0, v]), "layer", (2**31, 0.5)),
     "set categories": (lambda v: world().set([0, 1], categories=[1, v]), "categor", (-1, 2**32)),
     "set owner": (lambda v: world().set([0, 1], owner=[1, v]), "owner", (-1, 3, 0.5)),
-    "mask's id": (lambda v: world().mask(v), "id", (-1, 3, 0.5)),
-    "name's id": (lambda v: world().name_of(v), "id", (-1, 3, 0.5)),
+    "mask's id": (lambda v: world().mask(v), "item", (-1, 3, 0.5)),
+    "name's id": (lambda v: world().name_of(v), "item", (-1, 3, 0.5)),
     "hits.of": (lambda v: shot().of(v), "shot", (-1, 1, 0.5)),
     "hits.why_not": (lambda v: shot().why_not(v), "shot", (-1, 1, 0.5)),
     "hits.blockers": (lambda v: shot().blockers(v), "shot", (-1, 1, 0.5)),
     "hits.margins": (lambda v: shot().margins(v), "shot", (-1, 1, 0.5)),
     "hits.samples_at": (lambda v: shot().samples_at(v), "shot", (-1, 1, 0.5)),
-    "circle": (Sprite.circle, "circle", (-1, 32_769)),
-    "box's width": (lambda v: Sprite.box(v, 1), "box_wh", (-1, 32_769)),
-    "polygon": (lambda v: Sprite.polygon([*TRIANGLE, (1, v)]), "polygon", (32_769,)),
+    "circle": (Sprite.circle, "radius", (-1, 32_769)),
+    "box's width": (lambda v: Sprite.box(v, 1), "width", (-1, 32_769)),
+    "polygon": (lambda v: Sprite.polygon([*TRIANGLE, (1, v)]), "points_xy", (32_769,)),
     "hole": (lambda v: Sprite.polygon(TRIANGLE, [[*TRIANGLE, (1, v)]]), r"holes\[0\]", (32_769,)),
     "pivot_xy": (lambda v: Sprite.from_mask([[1]], pivot_xy=(v, 0)), "pivot_xy", (32_769,)),
     "color": (lambda v: Sprite.circle(1, color=(0, v, 0)), "color", (-1, 256, 0.5)),
@@ -600,3 +639,203 @@ def test_masks_and_images_in_any_form_are_taken_and_left_as_they_were(form: str)
         frame = Sprite.from_image(frozen(view)).frames[0]
         assert frame.image is not None and np.array_equal(frame.image, image)
     assert np.array_equal(np.asarray(given), mask) and all(np.array_equal(view, seen) for view in views)
+
+
+# Paths and words
+
+
+def record(path: Any) -> None:
+    with ShotRecord(path) as written:
+        written.fire(world(), Disc(3), (1, 1))
+
+
+def quiet() -> Progress:
+    return Progress(io.StringIO())
+
+
+NO_STUDY = Effort.quick()
+FRAME = np.zeros((2, 2, 3), np.uint8)
+TAKES_A_PATH: dict[str, Callable[[Any], object]] = {
+    "load_scene": load_scene,
+    "save": lambda path: world().save(path),
+    "read_png": read_png,
+    "write_png": lambda path: write_png(path, FRAME),
+    "ShotRecord": record,
+    "replay": lambda path: replay(path, world()),
+    "fire_log, log": lambda path: fire_log(world(), path, Path("hits.jsonl"), quiet()),
+    "fire_log, output": lambda path: fire_log(world(), Path("empty.jsonl"), path, quiet()),
+    "read_report": read_report,
+    "load_study": load_study,
+    "write_starter": write_starter,
+    "write_frames": lambda path: write_frames(path, [FRAME]),
+    "write_gif": lambda path: write_gif(path, [FRAME], 10),
+    "write_demo": lambda path: write_demo("grid", path, 1),
+    "write_study": lambda path: write_study(world(), path, 0, NO_STUDY, 0.1, quiet()),
+    "run_stability": lambda path: run_stability(path, 0, True, io.StringIO()),
+}
+NO_PATHS = [
+    "a\0b",
+    Path("a\0b"),
+    "\ud800",
+    Path("\ud800"),
+    b"abc",
+    None,
+    5,
+    1.5,
+    [],
+    {},
+    {"a"},
+    np.array(["a"]),
+    object(),
+]
+
+
+def refuse(*_: object) -> None:
+    raise InputError("nothing is studied here")
+
+
+@pytest.mark.parametrize("name", TAKES_A_PATH)
+def test_what_is_no_path_is_named_everywhere(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("empty.jsonl").touch()
+    for value in NO_PATHS:
+        check(lambda value=value: TAKES_A_PATH[name](value), r"^\w+: expected a path, got ")  # type: ignore[misc]
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.jsonl"]
+
+
+@pytest.mark.parametrize("name", TAKES_A_PATH)
+@pytest.mark.parametrize("path", ["x" * 300, "empty.jsonl/a", "/dev/null/x", "", ".", "/", "no/such/place", "\udc80/a"])
+def test_a_path_that_leads_nowhere_is_bad_input(
+    name: str, path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hitplanes.weapons.lab.study.study.run_study", refuse)
+    monkeypatch.setattr("hitplanes.weapons.lab.stability.stability._ask", refuse)
+    monkeypatch.chdir(tmp_path)
+    Path("empty.jsonl").touch()
+    with suppress(InputError):
+        TAKES_A_PATH[name](path)
+
+
+WORDS: dict[str, Callable[[Any], object]] = {
+    **{
+        f"{field} of {weapon.kind}, {n} shots": (
+            lambda word, field=field, weapon=weapon, n=n: shot(weapon=weapon, at=[(32, 20)] * n, aim=0, **{field: word})
+        )
+        for field in ("prefilter", "broadphase", "strategy")
+        for weapon in (Disc(3), Spread(Disc(2), 3, 9), Pistol(50), Sweep(Pistol(50), 9, 3))
+        for n in (0, 1, 2, 100)
+    },
+    "prefilter of a past": lambda word: fire(past(), Disc(3), (1, 1), tick=0, prefilter=word),
+    "prefilter of a report": lambda word: told(prefilter=word),
+    "broadphase of a report": lambda word: told(broadphase=word),
+    "index": lambda word: world().index(word),
+    "volumes": lambda word: world().volumes([0], word),
+    "role": lambda word: world().ids(word),
+    "flip": lambda word: world().add(Sprite.circle(1), flip=word),
+    "falloff": lambda word: Disc(3, falloff=word),
+    "inside": lambda word: Pistol(3, inside=word),
+    "kind": lambda word: weapon_from_json({"kind": word}),
+    "demo": lambda word: next(moments(word, 1)),
+}
+NO_WORDS = [
+    np.array(["auto", "none"]), np.array("auto"), np.zeros(3), np.zeros(0), {"auto"}, ["auto"], ("auto",), {}, 5, 1.5,
+    math.nan, b"auto", True, object(), "", "\ud800", "a\0", "autoo", "\u00b2 boxes", "9" * 99 + " boxes", len,
+]  # fmt: skip
+
+
+def past() -> History:
+    history = History(world())
+    history.record()
+    return history
+
+
+def told(**given: Any) -> object:
+    scene = world()
+    return report_of(scene, [fire(scene, Disc(3), (32, 20))], **given)
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_what_is_none_of_the_words_is_named_everywhere(name: str) -> None:
+    for word in NO_WORDS:
+        with pytest.raises(InputError) as caught:
+            WORDS[name](word)
+        assert len(str(caught.value)) < 1000
+
+
+class NoCopy:
+    """What cannot be copied."""
+
+    def __reduce__(self) -> Any:
+        raise RuntimeError("no copy")
+
+
+class NoReturn:
+    """What cannot be made again of its copy."""
+
+    def __reduce__(self) -> Any:
+        return int, ("x",)
+
+
+@pytest.mark.parametrize("value", [lambda: 0, threading.Lock(), NoCopy(), DEEP], ids=["lambda", "lock", "own", "deep"])
+def test_a_history_refuses_weapons_that_cannot_be_copied(value: object) -> None:
+    scene = world()
+    history = History(scene)
+    history.record()
+    for field in ("weapons", "shots"):
+        setattr(scene, field, {"gun": value} if field == "weapons" else [value])
+        check(history.record, "^scene: expected weapons and shots of plain JSON, got a value that cannot be kept: ")
+        setattr(scene, field, {} if field == "weapons" else [])
+    assert history.ticks == [0] and history.record() == 1
+
+
+def test_a_history_refuses_weapons_that_do_not_come_back() -> None:
+    scene = world()
+    scene.weapons = {"gun": NoReturn()}
+    history = History(scene)
+    history.record()
+    check(lambda: history.at(0), "^scene: expected weapons and shots of plain JSON")
+
+
+@pytest.mark.parametrize("value", [5, None, [], np.zeros(3), "report", {}, {"format": 5}, {"format": np.zeros(3)}])
+def test_what_is_no_report_is_not_drawn(value: Any) -> None:
+    check(lambda: picture_of_report(value, world()), "^report: ")
+
+
+def test_other_calls_with_what_they_do_not_take() -> None:
+    scene = world()
+    report = report_of(scene, [fire(scene, Disc(3), (32, 20))])
+    for names in (5, 1.5, "disc", b"disc", {"disc": 1}, np.array(5), object()):
+        check(lambda names=names: told(names=names), "^names: expected a list of names, got ")  # type: ignore[misc]
+    check(lambda: picture_of_report(report, None), "^scene: expected a Scene, got NoneType")  # type: ignore[arg-type]
+    check(lambda: picture_of_report(report, scene, text=np.zeros(3)), "^text: ")  # type: ignore[arg-type]
+    check(lambda: use_jit(np.zeros(3)), "^on: expected true or false, got ")  # type: ignore[arg-type]
+    scene.weapons = [5]  # type: ignore[assignment]
+    check(lambda: arsenal_of(scene), "^weapons: expected an object, got ")
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.text("ab/\n\t\x1b\x7f\x9b\u2028\u202e\u2066\u061c\u200f\ud800", min_size=1))
+def test_an_error_can_be_printed_whatever_it_names(text: str) -> None:
+    calls: list[Callable[[], object]] = [
+        lambda: load_scene(f"{text}/no"),
+        lambda: read_png(text + ".no"),
+        lambda: replay(f"{text}/no", world()),
+        lambda: weapon_from_json({"kind": text}),
+        lambda: weapon_from_json({"kind": "disc", "radius": -1}, text),
+        lambda: weapon_from_json({"kind": "disc", text: 1}),
+        lambda: shot(accept=[text]),
+        lambda: shot(strategy=text),
+        lambda: world().find(text),
+        lambda: Scene(categories=[text, text]),
+        lambda: report_of(world(), [shot()], [text, text]),
+    ]
+    for call in calls:
+        with pytest.raises(InputError) as caught:
+            call()
+        assert str(caught.value).isprintable()
+
+
+def test_an_error_says_what_it_says_and_can_be_copied() -> None:
+    error = InputError("name: expected 鴨 and é, got \x7f")
+    assert str(error) == "name: expected 鴨 and é, got \\x7f"
+    assert str(InputError(str(error))) == str(error) == str(pickle.loads(pickle.dumps(error)))

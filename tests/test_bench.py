@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-import weapons
-from planes import use_jit
+import hitplanes
+from hitplanes import use_jit
 
 for library in ("pygame", "pymunk", "shapely"):
     pytest.importorskip(library)
@@ -72,14 +72,14 @@ class Ready:
         self.given, self.samples = (scene, weapon), samples
 
     def fire(self, at: Any, **aim: Any) -> Any:
-        return [row._replace(samples=row.samples + self.samples) for row in weapons.fire(*self.given, at, **aim)]
+        return [row._replace(samples=row.samples + self.samples) for row in hitplanes.fire(*self.given, at, **aim)]
 
 
 def test_the_prepared_call_is_compared_too(monkeypatch: Any) -> None:
     crowded = replace(TINY, single=(300,), calls=50)
-    monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 0), raising=False)
+    monkeypatch.setattr(hitplanes, "prepare", lambda *given: Ready(*given, 0), raising=False)
     assert next(speed.single(crowded)).sides["ready, numpy"].compared
-    monkeypatch.setattr(weapons, "prepare", lambda *given: Ready(*given, 1))
+    monkeypatch.setattr(hitplanes, "prepare", lambda *given: Ready(*given, 1))
     with pytest.raises(DisagreementError, match="ready, numpy differ"):
         next(speed.single(crowded))
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from test_bitfire import some_scene, some_shots
 
-import weapons.squares
-from planes import Scene, Sprite, use_jit
-from planes.bigrows import BigTiles, big_pattern
-from planes.spans import Spans
-from weapons import Box, Disc, Rounds, Stencil, Weapon, fire, prepare
+from hitplanes import Box, Disc, Rounds, Scene, Sprite, Stencil, Weapon, fire, prepare, use_jit
+from hitplanes.planes.bits.tiles import BigTiles, big_pattern
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.weapons.prepared import position_cache
 
 
 @pytest.fixture(autouse=True)
@@ -93,7 +92,7 @@ def test_patterns_within_bounds(bounds: tuple[int, int, int, int], at: tuple[int
 
 
 def test_tiles_as_integers_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planes.bigrows.TILES_BYTES_MOST", 4 * 64 * 16)
+    monkeypatch.setattr("hitplanes.planes.bits.tiles.TILES_BYTES_MOST", 4 * 64 * 16)
     words = np.arange(9 * 64, dtype=np.uint64)
     tiles = BigTiles(128)
     for begin in range(0, 8 * 64, 64):
@@ -103,7 +102,7 @@ def test_tiles_as_integers_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_masks_that_are_no_longer_used_leave_no_integers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their places in the atlas are those of other masks later."""
-    monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 0)
+    monkeypatch.setattr("hitplanes.planes.bits.tiles.ATLAS_SLACK", 0)
     rng, scene, dropped = np.random.default_rng(3), Scene((60, 60)), 0
     for k in range(30):
         ids = [scene.add(rng.random((9, 9)) < 0.5, rng.uniform(20, 40, 2)) for _ in range(1 + k % 7)]
@@ -119,8 +118,10 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
     scene, rng = Scene((400, 400)), np.random.default_rng(1)
     ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
     made: list[tuple[int, int]] = []
-    real = weapons.squares.Squares._found
-    monkeypatch.setattr(weapons.squares.Squares, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j))
+    real = position_cache.PositionCache._found
+    monkeypatch.setattr(
+        position_cache.PositionCache, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j)
+    )
     ready = prepare(scene, Disc(20))
 
     def shots(count: int) -> None:
@@ -139,7 +140,7 @@ def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> N
     assert made
     made.clear()
     scene.move(ids, rng.uniform(0, 400, (60, 2)))
-    for _ in range(weapons.squares.WALKS_LEAST + 1):
+    for _ in range(position_cache.WALKS_LEAST + 1):
         assert ready.fire((5, 5)) == fire(scene, Disc(20), (5, 5))
     assert made == [(0, 0)]
 
@@ -155,8 +156,8 @@ def test_what_counts_as_all_that_moved(
     scene = Scene((400, 400))
     ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(count)]
     walked: list[int] = []
-    real = weapons.squares.hit_by_one
-    monkeypatch.setattr(weapons.squares, "hit_by_one", lambda *told: walked.append(1) or real(*told))
+    real = position_cache.hit_by_one
+    monkeypatch.setattr(position_cache, "hit_by_one", lambda *told: walked.append(1) or real(*told))
     ready = prepare(scene, Disc(20))
     for k in range(4):
         assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
@@ -205,7 +206,7 @@ def test_shots_that_walked_before_all_moved_are_not_counted() -> None:
     ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(9)]
     ready: Any = prepare(scene, Disc(20))
     for k in range(9):
-        for _ in range(weapons.squares.WALKS_LEAST - 1):
+        for _ in range(position_cache.WALKS_LEAST - 1):
             assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
         assert not k or not any(ready._squares.made.values())
         scene.move(ids, [(6.0 * i, 100 + k) for i in range(9)])

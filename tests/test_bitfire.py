@@ -7,25 +7,35 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_fire import Shot, Volley, expected, told
+from test_fire import Placements, Shot, expected, told
 
-import planes.bigfront
-import planes.bigrows
-import planes.bitrows
-import planes.cells
-import planes.items
-import planes.tiles
-import planes.visible
-import weapons.bitfire
-import weapons.fewfire
-import weapons.firing
-import weapons.pattern
-import weapons.windows
-from planes import History, Scene, Sprite, use_jit
-from planes.arrays import Bools
-from planes.bits import WORD
-from planes.constants import ALL
-from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire, prepare
+from hitplanes import (
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    History,
+    Hits,
+    Point,
+    Polygon,
+    Ring,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Stencil,
+    Weapon,
+    fire,
+    prepare,
+    use_jit,
+)
+from hitplanes.planes.bits import bit_rows, cells, tiles, visible
+from hitplanes.planes.bits.bit_rows import WORD
+from hitplanes.planes.common.checks import Bools
+from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.scene import items as items_module
+from hitplanes.weapons.fire import areas, call
+from hitplanes.weapons.kinds import weapon as weapon_module
 
 STRATEGIES = ("direct", "composed", "auto")
 PICTURE = np.random.default_rng(5).random((30, 90)) < 0.3
@@ -55,8 +65,8 @@ PARTS: dict[str, dict[str, int]] = {
 """Limits that cut a batch, and choose between two ways to do the same."""
 
 OWNERS = (
-    weapons.bitfire, weapons.fewfire, weapons.windows, planes.bigfront, planes.bigrows, planes.bitrows, planes.cells,
-    planes.visible, planes.tiles,
+    areas, areas, weapon_module, tiles, tiles, bit_rows, cells,
+    visible, tiles,
 )  # fmt: skip
 
 
@@ -78,7 +88,7 @@ def cut(patch: pytest.MonkeyPatch, limits: dict[str, int]) -> None:
 def by_runs(scene: Scene | History, weapon: Weapon, at: object, **how: Any) -> Hits:
     """The same shots, counted run by run."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(weapons.firing, "traits_of", lambda own: weapons.bitfire.traits_of(own)._replace(counted=False))
+        patch.setattr(call, "traits_of", lambda own: areas.traits_of(own)._replace(counted=False))
         hits = fire(scene, weapon, at, strategy="direct", prefilter="none", **how)
         assert hits.plan.has_run("verdicts")
         return hits
@@ -166,7 +176,7 @@ def test_the_oracle_says_the_same(kernels: str) -> None:
         if rng.random() < 0.5:
             for shot in shots:
                 shot.accept, shot.exclude = ALL, ()
-        volley = Volley(weapon, shots, seed=3)
+        volley = Placements(weapon, shots, seed=3)
         truth = expected(scene, volley)
         for strategy in STRATEGIES:
             assert told(volley.fired(scene, strategy=strategy)) == truth, f"{weapon} {strategy}"
@@ -202,8 +212,8 @@ def test_changes_between_shots_are_seen(kernels: str, seed: int) -> None:
 
 def test_masks_come_and_go(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tiles of dropped masks are never those of new ones."""
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
-    monkeypatch.setattr(planes.tiles, "ATLAS_SLACK", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(tiles, "ATLAS_SLACK", 0)
     rng = np.random.default_rng(3)
     scene, at = Scene((90, 90)), rng.uniform(0, 90, (40, 2))
     for _ in range(40):
@@ -238,8 +248,8 @@ def test_verdicts_are_those_of_the_moment_of_the_shot(
     kernels: str, weapon: Weapon, strategy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are counted when they are asked for, of the scene and the shots as they were."""
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
-    monkeypatch.setattr(planes.tiles, "ATLAS_SLACK", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(tiles, "ATLAS_SLACK", 0)
     rng = np.random.default_rng(6)
     scene = Scene((150, 150))
     ids = [scene.add(rng.random((20, 20)) < 0.7, rng.uniform(0, 150, 2), layer=i % 3) for i in range(30)]
@@ -308,7 +318,7 @@ def test_points_hit_no_occluder(jit: bool) -> None:
     assert hit() == [0, 4]
 
 
-@pytest.mark.parametrize("radius", [130, weapons.pattern.BESIDE_REACH, weapons.pattern.BESIDE_REACH + 1])
+@pytest.mark.parametrize("radius", [130, weapon_module.BESIDE_REACH, weapon_module.BESIDE_REACH + 1])
 def test_large_discs_hit_the_nearest_pixel_of_what_is_far(radius: int) -> None:
     """Masks of a few pixels each, most of them near the edge of most discs."""
     rng = np.random.default_rng(radius)

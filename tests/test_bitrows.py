@@ -12,30 +12,30 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from planes import Scene, bitrows, bits, cells, nearest, pellets, use_jit, visible
-from planes.arrays import InputError
-from planes.bitrows import Placed
-from planes.bits import PAD, WORD, Seen
-from planes.spans import Spans
-from planes.tiles import STRIDE, TileAtlas, Tiles
-from planes.twins import LOADING_NS, kernels_of
-from weapons import Disc, fire, windows
-from weapons.pattern import Pattern
+from hitplanes import Disc, Scene, Sprite, fire, use_jit
+from hitplanes.planes.bits import bit_rows, cells, front_to_back, visible
+from hitplanes.planes.bits.bit_rows import PAD, WORD, Placed, VisibleTiles
+from hitplanes.planes.bits.tiles import STRIDE, TileAtlas, Tiles
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.weapons.kinds import weapon
+from hitplanes.weapons.kinds.weapon import Pattern
 
 Pixel = tuple[int, int]
 SEEDS = st.integers(0, 2**32)
 
 
-@pytest.fixture(params=["planes.bitrows", "planes.bitrows_jit"])
+@pytest.fixture(params=["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
 def rows(request: pytest.FixtureRequest) -> Any:
-    if request.param.endswith("jit"):
+    if ".jit." in request.param:
         pytest.importorskip("numba")
     return importlib.import_module(request.param)
 
 
-@pytest.fixture(params=["planes.cells", "planes.cells_jit"])
+@pytest.fixture(params=["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
 def listing(request: pytest.FixtureRequest) -> Any:
-    if request.param.endswith("jit"):
+    if ".jit." in request.param:
         pytest.importorskip("numba")
     return importlib.import_module(request.param)
 
@@ -79,8 +79,8 @@ class Case:
         height = -(-max(m.shape[0] for m in masks) // 8) * 8
         packed = np.zeros((len(masks), height), np.uint64)
         for row, mask in zip(packed, masks, strict=True):
-            row[: len(mask)] = bits.packed([mask])[0, : len(mask)]
-        self.seen: Seen = visible._laid_out(np.arange(len(masks)), boxes, packed)
+            row[: len(mask)] = bit_rows.packed([mask])[0, : len(mask)]
+        self.seen: VisibleTiles = visible._laid_out(np.arange(len(masks)), boxes, packed)
         most = rng.choice([3, 12, 40, 150])
         self.patterns = []
         for _ in range(rng.choice([1, 1, 3])):
@@ -89,7 +89,7 @@ class Case:
                 mask = np.eye(rng.randint(100, 300), dtype=np.bool_)[:: rng.choice([-1, 1])]
             self.patterns.append((Spans.from_mask(mask, (0, 0)), rng.randint(-20, 5), rng.randint(-20, 5), mask))
         spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for _, left, top, mask in self.patterns]
-        self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        self.windows = weapon._made(spans, rng.random() < 0.5 and len(spans) == 1)
         count = rng.randint(1, 6)
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)])
         x, y = np.array([[rng.randint(-60, 60) for _ in range(count)] for _ in range(2)])
@@ -143,13 +143,13 @@ NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
 
 @settings(max_examples=120, deadline=None)
 @given(SEEDS, st.sampled_from([64, 200, 2**15]))
-@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
 def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> None:
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    kernels, case = importlib.import_module(f"planes.{name}"), Case(seed)
+    kernels, case = importlib.import_module(name), Case(seed)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bitrows, "WORDS_AT_ONCE", at_once)
+        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         found = kernels.found(case.placed, case.windows, case.seen, case.placement, case.near, NOT_BESIDE)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
     order = sorted(range(len(case.near)), key=lambda i: (case.near[i], case.placement[i]))
@@ -169,7 +169,7 @@ def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> No
 
 
 @settings(max_examples=25, deadline=None)
-@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, nearest.BESIDE_REACH])))
+@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, bit_rows.BESIDE_REACH])))
 def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
     """About its own pixel, of which it holds all that is as near as any of its own."""
     case = Case(seed)
@@ -179,30 +179,30 @@ def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: in
     spans = Spans.from_mask(mask, (-radius, -radius))
     case.patterns, case.windows = (
         [(spans, -radius, -radius, mask)],
-        windows._made([Pattern(spans, None)], rng.random() < 0.5),
+        weapon._made([Pattern(spans, None)], rng.random() < 0.5),
     )
     x, y = case.placed.x, case.placed.y
     case.placed = Placed(np.zeros_like(x), x, y, x, y)
-    beside = nearest.beside_of(case.seen)
-    found = bitrows.found(case.placed, case.windows, case.seen, case.placement, case.near, beside)
+    beside = bit_rows.beside_of(case.seen)
+    found = bit_rows.found(case.placed, case.windows, case.seen, case.placement, case.near, beside)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
     for tile, pixels in enumerate(case.tiles):
         left, top = case.seen.box_xyxy[tile, :2].tolist()
         for row in range(case.seen.height):
             columns = np.array([px - left for px, py in pixels if py == top + row], np.int64)
-            told = np.abs(np.arange(WORD)[:, None] - columns).min(axis=1, initial=nearest.NOWHERE)
+            told = np.abs(np.arange(WORD)[:, None] - columns).min(axis=1, initial=bit_rows.NOWHERE)
             assert beside[tile, :, row].tolist() == told.tolist()
 
 
 @settings(max_examples=80, deadline=None)
 @given(SEEDS, st.sampled_from([1, 64]), st.sampled_from([5, 2**16]))
-@pytest.mark.parametrize("name", ["lookup", "lookup_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.front_to_back", "hitplanes.planes.jit.areas"])
 def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: int, at_once: int) -> None:
     """Items of one or two tiles that may lie on each other; every pixel counted once, and by pellet."""
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-        bitrows_jit = importlib.import_module("planes.bitrows_jit")
-    case, kernels = Case(seed), importlib.import_module(f"planes.{name}")
+        bitrows_jit = importlib.import_module("hitplanes.planes.jit.bit_rows")
+    case, kernels = Case(seed), importlib.import_module(name)
     case.scatter(12)
     each = case.rng.choice([1, 3, 4, 6])
     seen = case.seen._replace(rank=np.arange(len(case.tiles)) // case.rng.choice([1, 2]))
@@ -211,8 +211,8 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
     listed = cells.cells_of(seen.box_xyxy, reach, case.rng.choice([2, 5]))
     placed = case.placed._replace(origin_x=case.placed.origin_x[::each], origin_y=case.placed.origin_y[::each])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pellets, "PAIRS_AT_ONCE", at_once)
-        if name.endswith("jit"):
+        patch.setattr(front_to_back, "PAIRS_AT_ONCE", at_once)
+        if ".jit." in name:
             patch.setattr(bitrows_jit, "ROOM", 0)
             patch.setattr(bitrows_jit, "ROOM_LEAST", room)
         found = kernels.gathered_up(placed, case.windows, seen, listed, each)
@@ -241,15 +241,15 @@ def test_groups_of_pellets_whose_boxes_overlap(seed: int) -> None:
     told = []
     for first, count in zip(begin.tolist(), length.tolist(), strict=True):
         boxes = [columns_and_rows(who) for who in placement[first : first + count].tolist()]
-        meet = any(a[0] & b[0] and a[1] & b[1] for k, a in enumerate(boxes) for b in boxes[:k])
-        told.append(meet or count > pellets.PAIRED)
-    assert pellets._may_overlap(case.placed, case.windows, placement, begin, length).tolist() == told
+        meeting = any(a[0] & b[0] and a[1] & b[1] for k, a in enumerate(boxes) for b in boxes[:k])
+        told.append(meeting or count > front_to_back.PAIRED)
+    assert front_to_back._may_overlap(case.placed, case.windows, placement, begin, length).tolist() == told
 
 
 @pytest.mark.parametrize("last", [False, True])
 def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: bool) -> None:
     """Tiles of one column of 64 rows, of which the first or the last has a pixel, on either side of the disc."""
-    reach = nearest.BESIDE_REACH
+    reach = bit_rows.BESIDE_REACH
     side = np.arange(-reach, reach + 1)
     spans = Spans.from_mask(side[:, None] ** 2 + side**2 <= reach * reach, (-reach, -reach))
     rim = [(dx, math.isqrt(reach * reach - dx * dx)) for dx in range(reach + 1)]
@@ -259,31 +259,31 @@ def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: b
     packed[:, -last] = 1
     seen = visible._laid_out(np.arange(len(rim)), boxes, packed)
     every, zero = np.arange(len(rim)), np.zeros(1, np.int64)
-    made = windows._made([Pattern(spans, None)], False)
-    placed, beside = Placed(*[zero] * 5), nearest.beside_of(seen)
-    found = bitrows.found(placed, made, seen, np.zeros_like(every), every, beside)
+    made = weapon._made([Pattern(spans, None)], False)
+    placed, beside = Placed(*[zero] * 5), bit_rows.beside_of(seen)
+    found = bit_rows.found(placed, made, seen, np.zeros_like(every), every, beside)
     told = list(zip(found.x.tolist(), found.y.tolist(), found.distance2.tolist(), strict=True))
     assert told == [(x, y, x * x + y * y) for x, y in rim]
 
 
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.sampled_from([64, 2**15]))
-@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
 def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> None:
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(f"planes.{name}"), random.Random(seed)
+    kernels, rng = importlib.import_module(name), random.Random(seed)
     masks = [mask_of(rng, rng.randint(1, WORD), rng.randint(1, WORD)) for _ in range(rng.randint(1, 6))]
     words = np.zeros(STRIDE * len(masks) + WORD, np.uint64)
     begin = np.arange(len(masks)) * STRIDE + WORD
     for mask, first in zip(masks, begin.tolist(), strict=True):
-        words[first : first + WORD] = bits.packed([mask])[0]
+        words[first : first + WORD] = bit_rows.packed([mask])[0]
     pairs = sorted((rng.randrange(len(masks)), rng.randrange(len(masks))) for _ in range(rng.randint(0, 9)))
     shift = [(rng.randint(-63, 63), rng.randint(-63, 63)) for _ in pairs]
     of, other = np.array(pairs, np.int64).reshape(-1, 2).T
     right, down = np.array(shift, np.int64).reshape(-1, 2).T
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bitrows, "WORDS_AT_ONCE", at_once)
+        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         seen = kernels.visible(words, WORD, begin, as_read(of.copy(), rng), begin[other] - down, right)
     for number, mask in enumerate(masks):
         left = pixels_of(mask, 0, 0)
@@ -295,12 +295,12 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
 
 @settings(deadline=None)
 @given(SEEDS, st.sampled_from([1, 3, 2**21, 2**40, 2**60]))
-@pytest.mark.parametrize("name", ["bitrows", "bitrows_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
 def test_the_order_of_rows(name: str, seed: int, far: int) -> None:
     """Also where the keys together do not fit one number."""
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(f"planes.{name}"), random.Random(seed)
+    kernels, rng = importlib.import_module(name), random.Random(seed)
     count = rng.choice([0, 1, 2, 9, 60])
     keys = [sorted(rng.randint(0, 3) for _ in range(count))]
     keys += [[rng.randint(-min(far, 9), far) for _ in range(count)] for _ in range(3)]
@@ -315,11 +315,11 @@ def boxes(rng: np.random.Generator, count: int, far: int, side: int) -> np.ndarr
 
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.sampled_from([5, 90, 2**40]), st.integers(0, 7), st.sampled_from([1, 9, 2**20]))
-@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
 def test_no_box_that_meets_is_missing_in_a_cell(name: str, seed: int, far: int, bits: int, most: int) -> None:
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
+    kernels, rng = importlib.import_module(name), np.random.default_rng(seed)
     some, reach = boxes(rng, int(rng.integers(0, 9)), far, 40), boxes(rng, 1, 30, 60)[0]
     x, y = np.concatenate([rng.integers(-far - 50, far + 50, (2, 30)), some[:, :2].T, some[:, 2:].T], axis=1)
     with pytest.MonkeyPatch.context() as patch:
@@ -346,11 +346,11 @@ def test_no_box_that_meets_is_missing_in_a_cell(name: str, seed: int, far: int, 
     st.sampled_from([0, 2**14]),
     st.sampled_from([1, 2**17]),
 )
-@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
 def test_boxes_that_meet(name: str, seed: int, far: int, brute: int, few: int, at_once: int) -> None:
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(f"planes.{name}"), np.random.default_rng(seed)
+    kernels, rng = importlib.import_module(name), np.random.default_rng(seed)
     a, b = (boxes(rng, int(rng.integers(0, 12)), far, 60) for _ in range(2))
     if rng.random() < 0.2 and len(a):
         a[0, 2] = a[0, 0] - 1  # empty
@@ -409,14 +409,14 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
         and (box[k, :2] <= box[tile, 2:]).all() and (box[k, 2:] >= box[tile, :2]).all()
     ]  # fmt: skip
     bounds = rng.choice([None, (-30, -20, 100, 90), (0, 0, 0, 0), (500, 500, 501, 501)])
-    seen = visible.seen_of(tiles, box, bounds, which, of, front)
+    seen = visible.visible_tiles_of(tiles, box, bounds, which, of, front)
     truth = []
     for tile in which.tolist():
         left = each[tile].difference(*(each[k] for k in range(tile) if blocks[k]))
         if bounds:
             left = {(x, y) for x, y in left if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
         truth.append((int(tiles.rank[tile]), left))
-    cropped = visible.cropped(seen.rank, seen.box_xyxy, bits.rows_of(seen.words, seen.height, seen.begin))
+    cropped = visible.cropped(seen.rank, seen.box_xyxy, bit_rows.rows_of(seen.words, seen.height, seen.begin))
     for one, kept in ((seen, truth), (cropped, [(rank, left) for rank, left in truth if left])):
         told = zip(one.rank.tolist(), one.begin.tolist(), *one.box_xyxy[:, :2].T.tolist(), strict=True)
         assert [(rank, pixels_in(one.words, b, x, y, one.height)) for rank, b, x, y in told] == kept
@@ -426,12 +426,12 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
         assert own == [min(xs), min(ys), max(xs), max(ys)]
 
 
-@pytest.mark.parametrize("name", ["planes.cropping", "planes.cropping_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.visible", "hitplanes.planes.jit.bit_rows"])
 @given(st.integers(0, 2**32))
 @settings(max_examples=30, deadline=None)
 def test_rows_are_cropped_to_their_pixels(name: str, seed: int) -> None:
     """Few pixels, many or none, also in the first and last row and column."""
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
     kernels, rng = importlib.import_module(name), random.Random(seed)
     height = 8 * rng.randint(1, 8)
@@ -458,8 +458,8 @@ def test_rows_are_cropped_to_their_pixels(name: str, seed: int) -> None:
 
 def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None:
     """All, some or none of the masks are new ones, in any order; tiles that were handed out stay; memory follows."""
-    monkeypatch.setattr("planes.tiles.ATLAS_SLACK", 4)
-    monkeypatch.setattr("planes.tiles.PACKED_AT_ONCE", 3)
+    monkeypatch.setattr("hitplanes.planes.bits.tiles.ATLAS_SLACK", 4)
+    monkeypatch.setattr("hitplanes.planes.bits.tiles.PACKED_AT_ONCE", 3)
     rng, atlas, made, number = random.Random(1), TileAtlas(), [], [0, 0, 0]
     old, kept = atlas.tiles([].__getitem__, np.zeros(0, np.int64), -1), atlas.words
     for forms in range(120):
@@ -489,14 +489,14 @@ def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:
     """All 64 shifts of a pattern that was placed often, one call or many."""
     mask = np.ones((5, 9), np.bool_)
     pattern, other = (Pattern(Spans.from_mask(mask, (x, 0)), None) for x in (0, 3))
-    few = windows.windows_of([pattern], windows.OFTEN - 3)
-    assert few.shifted == 0 and windows.windows_of([pattern], 2) is few
-    often = windows.windows_of([pattern], 2)
-    assert often.shifted > 0 and windows.windows_of([pattern], 1) is often
-    assert windows.windows_of([pattern], 1).shifted and not windows.windows_of([pattern], 0).shifted
-    assert windows.windows_of([pattern, other], 10**6).shifted == 0
-    assert windows.windows_of([other], windows.OFTEN).shifted == 0
-    assert windows.fits([pattern, other]) and windows.fits([])
+    few = weapon.pattern_bits_of([pattern], weapon.OFTEN - 3)
+    assert few.shifted == 0 and weapon.pattern_bits_of([pattern], 2) is few
+    often = weapon.pattern_bits_of([pattern], 2)
+    assert often.shifted > 0 and weapon.pattern_bits_of([pattern], 1) is often
+    assert weapon.pattern_bits_of([pattern], 1).shifted and not weapon.pattern_bits_of([pattern], 0).shifted
+    assert weapon.pattern_bits_of([pattern, other], 10**6).shifted == 0
+    assert weapon.pattern_bits_of([other], weapon.OFTEN).shifted == 0
+    assert weapon.fits([pattern, other]) and weapon.fits([])
 
 
 @settings(deadline=None)
@@ -505,7 +505,7 @@ def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = rng.random(rng.integers(0, [20, 150])) < rng.choice([0, 0.02, 0.5, 1])
     spans = Spans.from_mask(mask, tuple(rng.integers(-200, 200, 2).tolist()))
-    words, (left, top, *_) = windows.columns_of(spans), spans.box_xyxy or (0, 0)
+    words, (left, top, *_) = weapon.columns_of(spans), spans.box_xyxy or (0, 0)
     told = {
         (left - WORD + 1 + WORD * column + bit, top - WORD + row)
         for column, row in zip(*(each.tolist() for each in words.nonzero()), strict=True)
@@ -518,43 +518,44 @@ def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
 # Which kernels
 
 
-def test_kernels_are_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_are_chosen() -> None:
     pytest.importorskip("numba")
-    twin = importlib.import_module("planes.bitrows_jit")
+    twin = importlib.import_module("hitplanes.planes.jit.bit_rows")
+    assert kernels_of(bit_rows) is bit_rows
     try:
-        use_jit(None)
-        assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS) is bitrows
-        assert kernels_of(bitrows, LOADING_NS * 2) is kernels_of(bitrows) is twin
-        use_jit(None)
-        monkeypatch.setattr("weapons.bitfire.SHOT_NS", 2 * LOADING_NS)
-        fire(Scene((50, 40)), Disc(3), [(9, 9)] * 65)
-        assert kernels_of(bitrows) is twin
-        for on, expected in ((True, twin), (False, bitrows)):
+        for on, expected in ((True, twin), (False, bit_rows), (True, twin), (None, bit_rows)):
             use_jit(on)
-            assert kernels_of(bitrows) is kernels_of(bitrows, LOADING_NS * 2) is expected
+            assert kernels_of(bit_rows) is expected
     finally:
         use_jit(None)
 
 
+def test_no_batch_changes_the_kernels() -> None:
+    """Nor one of a billion pairs of shots and items."""
+    scene, sprite = Scene(), Sprite.box(1, 1)
+    for x in range(2000):
+        scene.add(sprite, (9 * x, 0))
+    assert kernels_of(bit_rows) is bit_rows
+    assert len(fire(scene, Disc(1), np.full((500_000, 2), 1e6))) == 0
+    assert kernels_of(bit_rows) is bit_rows
+
+
 def test_without_numba_there_is_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planes.twins.find_spec", lambda name: None)
+    monkeypatch.setattr("hitplanes.planes.common.backend.find_spec", lambda name: None)
     try:
-        use_jit(None)
-        assert kernels_of(bitrows, 10 * LOADING_NS) is bitrows
-        use_jit(False)
         with pytest.raises(InputError, match=r"^jit: expected numba, .* got no such module"):
             use_jit(True)
-        assert kernels_of(bitrows, 10 * LOADING_NS) is bitrows
+        assert kernels_of(bit_rows) is bit_rows
     finally:
         use_jit(None)
 
 
 @pytest.mark.parametrize("apart", [2**15, 2**16, 2**31, 2**32, 2**40])
-@pytest.mark.parametrize("name", ["cells", "cells_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.cells", "hitplanes.planes.jit.bit_rows"])
 def test_boxes_far_apart_do_not_meet(name: str, apart: int) -> None:
-    if name.endswith("jit"):
+    if ".jit." in name:
         pytest.importorskip("numba")
-    row, box = importlib.import_module(f"planes.{name}").met_boxes(
+    row, box = importlib.import_module(name).met_boxes(
         np.array([[0, 0, 9, 9], [apart, 0, apart + 9, 9]]), np.array([[5, 5, 6, 6], [5, apart, 6, apart]])
     )
     assert (row.tolist(), box.tolist()) == ([0], [0])

@@ -7,14 +7,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
-from planes import Scene, fit
-from planes.arrays import Bools, InputError
-from planes.bounding import KINDS, Kind, bounding, fitted, moved
-from planes.constants import CORNERS, PLACE
-from planes.parts import Parts
-from planes.sprite import Sprite, Variant, form_of, frame_pivot, variant_of
-from planes.volumes import Aabbs, Circles, Polygons, Volumes
+from hitplanes import Scene
+from hitplanes.planes.common.checks import Bools, InputError
+from hitplanes.planes.common.limits import CORNERS, PLACE
+from hitplanes.planes.scene.sprite import Sprite, Variant, frame_pivot, transform_of, variant_of
+from hitplanes.planes.volumes import fit
+from hitplanes.planes.volumes.fit import KINDS, Kind, bounding, fitted, moved
+from hitplanes.planes.volumes.volumes import Aabbs, Circles, Parts, Polygons, Volumes
 
 Number = int | Fraction
 Point = tuple[Number, Number]
@@ -78,14 +80,15 @@ def covered(square: list[Point], rings: list[list[Point]]) -> bool:
     return not left
 
 
-def squares(mask: Bools, one: int) -> Iterator[list[Point]]:
+def squares(mask: Bools, one: int, corner: tuple[int, int] = (0, 0)) -> Iterator[list[Point]]:
     """Pixel squares that have a neighbour missing: a convex part, or a union with none of them open, holds the rest.
 
-    In units of which an even number make a pixel.
+    In units of which an even number make a pixel; pixel [0, 0] lies at `corner`, px.
     """
     around = np.pad(mask, 1)
     inner = around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
-    for y, x in np.argwhere(mask & ~inner).tolist():
+    for row, column in np.argwhere(mask & ~inner).tolist():
+        x, y = column + corner[0], row + corner[1]
         low, high = (x * one - one // 2, y * one - one // 2), (x * one + one // 2, y * one + one // 2)
         yield [low, (high[0], low[1]), high, (low[0], high[1])]
 
@@ -105,19 +108,19 @@ def rings_of(volume: Volumes) -> tuple[list[list[Point]], int]:
     return [points[first:last] for first, last in itertools.pairwise(starts)], one
 
 
-def holds(volume: Volumes, mask: Bools) -> bool:
-    """Whether the one row of a volume contains the pixel squares of a mask."""
+def holds(volume: Volumes, mask: Bools, corner: tuple[int, int] = (0, 0)) -> bool:
+    """Whether the one row of a volume contains the pixel squares of a mask whose pixel [0, 0] lies at `corner`."""
     assert len(volume) == 1
     if isinstance(volume, Circles):
         (x, y, r), one = whole([*volume.center[0].tolist(), float(volume.radius[0])])
-        return all((p - x) ** 2 + (q - y) ** 2 <= r * r for square in squares(mask, one) for p, q in square)
+        return all((p - x) ** 2 + (q - y) ** 2 <= r * r for square in squares(mask, one, corner) for p, q in square)
     rings, one = rings_of(volume)
-    return all(covered(square, rings) for square in squares(mask, one))
+    return all(covered(square, rings) for square in squares(mask, one, corner))
 
 
 def variant(sprite: Sprite, pose: tuple[str, tuple[float, float], float], frame: int = 0) -> Variant:
     flip, scale, angle = pose
-    return variant_of(sprite, form_of(sprite, frame, flip, scale, angle))
+    return variant_of(sprite, transform_of(sprite, frame, flip, scale, angle))
 
 
 def check(sprite: Sprite, pose: tuple[str, tuple[float, float], float]) -> None:
@@ -314,7 +317,7 @@ def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
     bounds = volumes.bounds()
     for row, item in enumerate(ids):
         seen, (x, y) = scene.mask(item)
-        assert holds(volumes.take([row]).translated((-x, -y)), seen)
+        assert holds(volumes.take([row]), seen, (x, y))
         side = max(seen.shape)
         assert (bounds.min[row] > (x - side, y - side)).all()
         assert (bounds.max[row] < (x + 2 * side, y + 2 * side)).all()
@@ -343,6 +346,79 @@ def test_boxes_of_objects_are_those_of_their_masks() -> None:
         mask, (x, y) = scene.mask(item)
         assert boxes.bounds().min[row].tolist() == [x - 0.5, y - 0.5]
         assert boxes.bounds().max[row].tolist() == [x + mask.shape[1] - 0.5, y + mask.shape[0] - 0.5]
+
+
+pixels = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
+    lambda shape: st.lists(st.booleans(), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]).map(
+        lambda bits: np.array([*bits[:-1], True]).reshape(shape)
+    )
+)
+flips = st.sampled_from(["none", "x", "y", "xy"])
+scales = st.one_of(st.just((1.0, 1.0)), st.tuples(*2 * [st.floats(0.3, 3)]))
+turns = st.one_of(
+    st.integers(-4, 4).map(lambda k: 90.0 * k), st.integers(-9, 9).map(lambda k: 45.0 * k), st.floats(-400, 400)
+)
+far = st.builds(
+    lambda sign, power, offset: sign * max(2.0**power - abs(offset) / 256, 0.0),
+    st.sampled_from([-1, 1]), st.sampled_from([0, 30, 36, 37, 38, 39, 40]), st.integers(-3000, 3000),
+)  # fmt: skip
+SLOPING = np.array([[0, 0, 0, 0, 1, 1, 1, 0], [1, 0, 0, 0, 0, 0, 0, 0]], np.bool_)
+ACROSS, DOWN = np.meshgrid(np.arange(-9, 10), np.arange(-9, 10))
+OVAL = (0.01 * ACROSS + 0.23 * DOWN) ** 2 + (0.22 * DOWN - 0.18 * ACROSS) ** 2 < 1
+FLIPPED = np.array([[1, 0, 1], [0, 1, 0], [0, 1, 0]], np.bool_)
+
+
+@settings(max_examples=100, deadline=None)
+@pytest.mark.parametrize("kind", EVERY, ids=str)
+@given(pixels, flips, scales, turns, st.tuples(far, far))
+@example(FLIPPED, "y", (1.0, 1.0), 0.0, (0.0, 0.0))
+@example(FLIPPED, "xy", (1.0, 1.0), 90.0, (2.0**37, 0.0))
+@example(FLIPPED, "none", (1.0, 1.0), 0.0, (2.0**40, -(2.0**40)))
+@example(SLOPING, "none", (1.0, 1.0), 0.0, (-(2.0**40), -(2.0**39)))
+@example(OVAL, "none", (1.0, 1.0), 0.0, (2.0**40, 2.0**40))
+@example(FLIPPED, "none", (1.7, 0.6), 33.0, (2.0**40, -(2.0**38)))
+@example(np.array([[0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 0, 1]], np.bool_), "none", (0.5, 2.0), 23.0, (-1.0, -1.0))
+def test_volumes_hold_every_pixel_square_wherever_the_object_is(
+    kind: Kind, mask: Bools, flip: str, scale: tuple[float, float], angle: float, xy: tuple[float, float]
+) -> None:
+    """Up to the limit of positions, where float64 holds no more than 1/4096 px."""
+    scene = Scene()
+    item = scene.add(mask, xy, flip=flip, scale=scale, angle=angle)
+    seen, corner = scene.mask(item)
+    if not seen.any():
+        return
+    volume = scene.volumes([item], f"{kind.k} boxes" if kind.name == "boxes" else kind.name)
+    assert holds(volume, seen, corner)
+    low, high = volume.bounds().min[0] - corner, volume.bounds().max[0] - corner
+    size = max(*mask.shape, 3) * max(*scale, 1)  # a mask that is scaled down may lose all pixels but one
+    assert (low > -1.5 * size - 3).all()
+    assert (high < 2.5 * size + 3).all()
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=str)
+def test_volumes_of_shapes_hold_every_pixel_square_far_away(kind: Kind) -> None:
+    """They are fitted to the turned mask: nothing but the shift grows them."""
+    shapes = [Sprite.circle(7.3), Sprite.box(19, 2.5), Sprite.polygon([(0, 0), (9, 1), (3, 8)])]
+    places = [(2.0**40, 2.0**40), (-(2.0**38) + 0.3, 5.0), (2.0**37, -(2.0**40) + 11.7)]
+    scene = Scene()
+    for shape, xy, angle in itertools.product(shapes, places, (0, 12.5, 33, 70)):
+        item = scene.add(shape, xy, angle=angle)
+        seen, corner = scene.mask(item)
+        volume = scene.volumes([item], f"{kind.k} boxes" if kind.name == "boxes" else kind.name)
+        assert holds(volume, seen, corner), (shape.source, xy, angle)
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=str)
+def test_a_volume_far_away_does_not_depend_on_the_others(kind: Kind) -> None:
+    scene = Scene()
+    places = [(0.0, 3.0), (2.0**38, 5.5), (7.0, -(2.0**40)), (2.0**40, 2.0**40)]
+    ids = [scene.add(FLIPPED, xy, angle=31.0) for xy in places]
+    name = f"{kind.k} boxes" if kind.name == "boxes" else kind.name
+    together = scene.volumes(ids, name).bounds()
+    for row, item in enumerate(ids):
+        alone = scene.volumes([item], name).bounds()
+        assert together.min[row].tolist() == alone.min[0].tolist()
+        assert together.max[row].tolist() == alone.max[0].tolist()
 
 
 @pytest.mark.parametrize("position", [1e6, 3e7 + 0.3, 1e9, 2.0**36])

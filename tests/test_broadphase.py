@@ -10,12 +10,12 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from planes import InputError
-from planes.arrays import Floats, Ints
-from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
-from planes.constants import GRID_FRESH
-from planes.spans import meets, pieces
-from planes.volumes import Aabbs, Circles
+from hitplanes import InputError
+from hitplanes.planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
+from hitplanes.planes.common.checks import Floats, Ints
+from hitplanes.planes.common.limits import GRID_FRESH
+from hitplanes.planes.grid.spans import meets, pieces
+from hitplanes.planes.volumes.volumes import Aabbs, Circles
 
 Maker = Callable[[Floats], BroadPhase]
 MAKERS: dict[str, tuple[Maker, tuple[int, ...]]] = {
@@ -433,7 +433,9 @@ def test_answers_do_not_depend_on_the_pieces(make: Maker, d: int, monkeypatch: p
     structure.insert(rows[:20])
     due = structure.query(queries), structure.pairs(), np.sort(structure.work(queries).tested[1])
     for module in ("boxes", "grids", "quadtree", "bvh"):
-        monkeypatch.setattr(f"planes.{module}.CHUNK_{'PAIRS' if module == 'boxes' else 'SAMPLES'}", 37)
+        monkeypatch.setattr(
+            f"hitplanes.planes.broadphase.{module}.CHUNK_{'PAIRS' if module == 'boxes' else 'SAMPLES'}", 37
+        )
     got = structure.query(queries), structure.pairs(), np.sort(structure.work(queries).tested[1])
     assert all(np.array_equal(a, b) for a, b in zip(got, due, strict=True))
 
@@ -726,9 +728,9 @@ class ChangingIn3D(Changing):
 @pytest.fixture
 def few_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """A dozen boxes make several trees of several levels, and settle in a grid."""
-    monkeypatch.setattr("planes.bvh.BVH_SMALL", 4)
-    monkeypatch.setattr("planes.bvh.BVH_LEAF", 2)
-    monkeypatch.setattr("planes.grids.GRID_FRESH", 6)
+    monkeypatch.setattr("hitplanes.planes.broadphase.bvh.BVH_SMALL", 4)
+    monkeypatch.setattr("hitplanes.planes.broadphase.bvh.BVH_LEAF", 2)
+    monkeypatch.setattr("hitplanes.planes.broadphase.grids.GRID_FRESH", 6)
 
 
 @pytest.mark.usefixtures("few_are_many")

@@ -14,19 +14,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-import planes.items
-import weapons.bitfire
-import weapons.runfire
-from planes import InputError, Scene, Sprite
-from planes.arrays import Bools
-from planes.broadphase import Grid
-from planes.constants import INDEX_SLACK
-from planes.index import STRUCTURES, Index
-from planes.spans import meets
-from weapons import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Spread, Stencil, Weapon, costs, fire
-from weapons.arsenal import Plain, pattern_of
-from weapons.candidates import Candidates, prefilter_of
-from weapons.plan import Stage
+from hitplanes import (
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    Hits,
+    InputError,
+    Point,
+    Ring,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Stencil,
+    Weapon,
+    fire,
+)
+from hitplanes.planes.broadphase import Grid
+from hitplanes.planes.broadphase.boxes import Index
+from hitplanes.planes.common.checks import Bools
+from hitplanes.planes.common.limits import INDEX_SLACK, STRUCTURES
+from hitplanes.planes.grid.spans import meets
+from hitplanes.planes.scene import items
+from hitplanes.weapons.fire import areas, strategy
+from hitplanes.weapons.fire.plan import Stage
+from hitplanes.weapons.fire.prefilter import Candidates, prefilter_of
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
 
 ROOT = Path(__file__).parents[1]
 VOLUMES = ("circle", "oriented box", "1 boxes", "4 boxes", "polygon", "swept")
@@ -153,8 +167,8 @@ def test_candidates_are_fewer_with_tighter_volumes() -> None:
 
 
 @pytest.mark.parametrize("name", VOLUMES)
-@pytest.mark.parametrize("weapon", [w for w in WEAPONS if isinstance(w, Plain)], ids=lambda w: type(w).__name__)
-def test_a_pattern_lies_in_its_volume(weapon: Plain, name: str) -> None:
+@pytest.mark.parametrize("weapon", [w for w in WEAPONS if isinstance(w, AreaWeapon)], ids=lambda w: type(w).__name__)
+def test_a_pattern_lies_in_its_volume(weapon: AreaWeapon, name: str) -> None:
     """A one-pixel object at each pixel of the pattern is a candidate, wherever in the world."""
     for angle in (0, 30, 45, 131):
         c, s = (round(f(math.radians(angle)) * 2**30) for f in (math.cos, math.sin))
@@ -238,10 +252,10 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
     """As long as no shot alone pays for it none is made; then what was lost adds up."""
-    monkeypatch.setattr(costs, "BOX_PAIR_NS", 400.0)
+    monkeypatch.setattr(strategy, "BOX_PAIR_NS", 400.0)
     scene = crowd(7, 600, 900)
-    lost = 400.0 * len(scene.items.stack()) - costs.BVH_PLACEMENT_NS - costs.BVH_CALL_NS
-    due = math.floor(len(scene.items.stack()) * costs.BVH_BUILT_NS / lost) + 1
+    lost = 400.0 * len(scene.items.stack()) - strategy.BVH_PLACEMENT_NS - strategy.BVH_CALL_NS
+    due = math.floor(len(scene.items.stack()) * strategy.BVH_BUILT_NS / lost) + 1
     assert due > 2
     made = []
     for _ in range(due + 2):
@@ -270,17 +284,23 @@ def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
         assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
 
 
-UNUSED = ("planes.fit", "planes.volumes", "planes.overlap", "planes.bounding", "planes.boxes", "planes.broadphase")
+UNUSED = (
+    "hitplanes.planes.volumes.fit",
+    "hitplanes.planes.volumes.volumes",
+    "hitplanes.planes.volumes.overlap",
+    "hitplanes.planes.broadphase.grids",
+)
 LOADED = f"""
 import sys
-from planes import Scene
-from weapons import Beam, Disc, costs, fire
+from hitplanes import Beam, Disc, Scene, fire
+from hitplanes.weapons.fire import strategy as costs
 scene = Scene((99, 99))
 ids = [scene.add([[True]], (i, i)) for i in range(40)]
 fire(scene, Disc(3), [(9, 9)] * 20, strategy="direct")
 fire(scene, Beam(9, 1), (9, 9)).why_not()
-import weapons.cli, weapons.facts, weapons.picture
-weapons.picture.picture_of_report(weapons.facts.report_of(scene, [fire(scene, Disc(3), (9, 9))]), scene)
+import hitplanes.weapons.cli.command
+from hitplanes import picture_of_report, report_of
+picture_of_report(report_of(scene, [fire(scene, Disc(3), (9, 9))]), scene)
 print([name for name in {UNUSED} if name in sys.modules])
 fire(scene, Disc(3), (9, 9), prefilter="box", broadphase="bvh", strategy="direct")
 fire(scene, Disc(3), (9, 9), prefilter="circle", strategy="direct")
@@ -299,9 +319,9 @@ def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:
     for broadphase in BROADPHASES:
         scene = crowd(11, 300, 300)
         truth = fire(scene, Disc(4), at, prefilter="none", strategy="direct")
-        large = scene.add(np.ones((1500, 1500), np.bool_), (0, 0))
+        large = scene.add(np.ones((1500, 1500), np.bool_), (-9999, 0), scale=2)
         scene.items.stack()
-        scene.remove(large)
+        scene.set(large, scale=1 / 64)
         assert scene.items.atlas.wasteful  # the first who fires lays the masks out anew
         with ThreadPoolExecutor(8) as pool:
             futures = [
@@ -339,7 +359,7 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("remembered", [0, 5, 10**6])
 def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", remembered)
+    monkeypatch.setattr(items, "JOURNAL_ROWS", remembered)
     rng = np.random.default_rng(8)
     scene = Scene()
     index = scene.index(structure)
@@ -404,8 +424,8 @@ def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch
     scene = Scene()
     for i in range(300):
         scene.add(np.ones((9, 9), np.bool_), (i % 3, i // 3 % 3))
-    monkeypatch.setattr(weapons.runfire, "CHUNK_PAIRS", 6000)
-    monkeypatch.setattr(weapons.bitfire, "CHUNK_PAIRS", 6000)
+    monkeypatch.setattr(areas, "CHUNK_PAIRS", 6000)
+    monkeypatch.setattr(areas, "CHUNK_PAIRS", 6000)
     most = []
     monkeypatch.setattr(
         Candidates, "meeting", lambda self, *a, meeting=Candidates.meeting: most.append(p := meeting(self, *a)) or p

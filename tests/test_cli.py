@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -13,11 +14,13 @@ from pathlib import Path
 import cv2
 import jsonschema
 import pytest
+from test_record import lines_of, write_record
 
-from planes import load_scene
-from weapons import Disc, Rifle, ShotRecord, Spread, starter
-from weapons.cli import main
-from weapons.record import hash_of
+from hitplanes import Disc, Rifle, ShotRecord, Spread, load_scene
+from hitplanes.weapons.cli import starter
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.replay.record import hash_of
+from hitplanes.weapons.replay.stream import Progress
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
@@ -29,14 +32,14 @@ def test_report_writes_picture_and_facts(tmp_path: Path, capsys: pytest.CaptureF
     picture = cv2.imread(str(png))
     assert picture.shape[1] > 1000 and picture.std() > 20
     report = json.loads(facts.read_text())
-    assert [shot["weapon"] for shot in report["shots"]][:2] == ["pistol", "shotgun"]
+    assert [shot["weapon"] for shot in report["shots"]][:2] == ["point", "shotgun"]
     assert "bullseye 1 px" in capsys.readouterr().out
     assert sorted(p.name for p in tmp_path.iterdir()) == ["r.json", "r.png"]
 
 
 def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     png, facts = tmp_path / "r.png", tmp_path / "r.json"
-    words = ["report", str(GALLERY), "--weapon", "laser", "--at", "126,167", "--aim", "1", "--seed", "4"]
+    words = ["report", str(GALLERY), "--weapon", "beam", "--at", "126,167", "--aim", "1", "--seed", "4"]
     assert main([*words, "-o", str(png), "--json", str(facts)]) == 0
     (shot,) = json.loads(facts.read_text())["shots"]
     assert shot["aim"] == 1 and shot["seed"] == 4
@@ -55,7 +58,7 @@ def test_a_line_of_sight_from_the_command_line(tmp_path: Path, capsys: pytest.Ca
 
 def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> None:
     facts = tmp_path / "r.json"
-    words = ["report", str(GALLERY), "--weapon", "pistol", "--at=-5,3", "-o", str(tmp_path / "r.png")]
+    words = ["report", str(GALLERY), "--weapon", "point", "--at=-5,3", "-o", str(tmp_path / "r.png")]
     assert main([*words, "--json", str(facts)]) == 0
     (shot,) = json.loads(facts.read_text())["shots"]
     assert shot["at_xy"] == [-5, 3] and shot["verdicts"]["outside"] == 1
@@ -65,17 +68,17 @@ def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> N
     ("words", "told"),
     [
         (["report", "nowhere"], "nowhere/scene.json: cannot read it"),
-        (["report", str(GALLERY), "--weapon", "lazer", "--at", "1,2"], "did you mean 'laser'?"),
-        (["report", str(GALLERY), "--weapon", "laser"], "--at: expected X,Y"),
+        (["report", str(GALLERY), "--weapon", "bean", "--at", "1,2"], "did you mean 'beam'?"),
+        (["report", str(GALLERY), "--weapon", "beam"], "--at: expected X,Y"),
         (
-            ["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--toward", "a,b"],
+            ["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--toward", "a,b"],
             "--toward: expected two numbers",
         ),
-        (["report", str(GALLERY), "--weapon", "laser", "--at", "1;2"], "--at: expected two numbers X,Y, got '1;2'"),
-        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,nan"], "at[1]: expected a finite number"),
-        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),
-        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
-        (["report", str(GALLERY), "--weapon", "laser", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1;2"], "--at: expected two numbers X,Y, got '1;2'"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,nan"], "at[1]: expected a finite number"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
         (["report", str(GALLERY), "--at", "1,2"], "--at: expected only together with --weapon"),
         (["report", str(GALLERY), "-o", "/no/such/folder/r.png"], "cannot write /no/such/folder/r.png"),
         (["report", str(GALLERY), "-o", "/"], "output: cannot write /: expected the name of a file"),
@@ -112,14 +115,14 @@ def test_an_interrupt_is_one_line_and_leaves_the_old_report(
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("weapons.cli.picture_of_report", interrupted)
+    monkeypatch.setattr("hitplanes.weapons.cli.command.picture_of_report", interrupted)
     capsys.readouterr()
     assert main(["report", str(GALLERY), "-o", str(png)]) == 130
     assert capsys.readouterr().err == "hitplanes: interrupted\n"
     assert png.read_bytes() == before and list(tmp_path.iterdir()) == [png]
 
 
-RUN = [sys.executable, "-W", "error", "-m", "weapons"]
+RUN = [sys.executable, "-W", "error", "-m", "hitplanes"]
 
 
 @pytest.mark.parametrize("word", ["report", "fire", "new", "compare", "replay", "demo"])
@@ -205,7 +208,7 @@ def test_new_makes_a_scene_that_reports_hits_occluded_and_missed(
     schema = json.loads((Path("my range") / "scene.schema.json").read_text())
     jsonschema.validate(json.loads((Path("my range") / "scene.json").read_text()), schema)
     assert cv2.imread("report.png").std() > 20
-    Path("shots.jsonl").write_text('{"weapon": "pistol", "at": [88, 60]}\n')
+    Path("shots.jsonl").write_text('{"weapon": "point", "at": [88, 60]}\n')
     assert main(["fire", "my range", "shots.jsonl"]) == 0
     assert capsys.readouterr().out.endswith("1 shots, 1 hit something, in hits.jsonl\n")
 
@@ -285,14 +288,14 @@ def test_an_object_without_a_pixel_is_noted(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_a_closed_output_is_no_traceback(tmp_path: Path) -> None:
-    run = f"exec {shlex.quote(sys.executable)} -m weapons new {shlex.quote(str(tmp_path / 'range'))} >&-"
+    run = f"exec {shlex.quote(sys.executable)} -m hitplanes new {shlex.quote(str(tmp_path / 'range'))} >&-"
     done = subprocess.run(["sh", "-c", run], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "range" / "scene.json").exists()
 
 
 def test_a_value_that_begins_with_a_minus_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["report", str(GALLERY), "--weapon", "pistol", "--at", "-5,3"])
+        main(["report", str(GALLERY), "--weapon", "point", "--at", "-5,3"])
     assert "one that begins with a minus is written --at=-5,3" in capsys.readouterr().err
 
 
@@ -313,7 +316,7 @@ def test_many_shots_of_a_file_are_told_as_a_batch(tmp_path: Path, capsys: pytest
     assert main(["new", str(tmp_path / "range")]) == 0
     path = tmp_path / "range" / "scene.json"
     data = json.loads(path.read_text())
-    data["shots"] = [{"weapon": "pistol", "at": [70 + i, 60]} for i in range(30)]
+    data["shots"] = [{"weapon": "point", "at": [70 + i, 60]} for i in range(30)]
     path.write_text(json.dumps(data))
     capsys.readouterr()
     assert main(["report", str(tmp_path / "range"), "-o", str(tmp_path / "r.png"), "--plan"]) == 0
@@ -344,11 +347,11 @@ def test_replay_says_that_all_is_the_same(match: Path, capsys: pytest.CaptureFix
 
 
 def test_replay_tells_the_first_that_differs(match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = [json.loads(line) for line in match.read_text().splitlines()]
+    lines = lines_of(match)
     lines[2]["result"]["stops"][0].update(reason=0, item=-1, distance=400)
     lines[2]["result"]["rows"].append({**lines[1]["result"]["rows"][0], "object": 15})
     lines[2]["hash"] = hash_of(lines[2]["result"])
-    match.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    write_record(match, lines)
     assert main(["replay", str(GALLERY), str(match)]) == 1
     first, second = capsys.readouterr().out.splitlines()
     assert first == f"{match} line 3, shot 1: object 15 'can 5': is gone"
@@ -360,16 +363,27 @@ def test_replay_tells_the_first_that_differs(match: Path, tmp_path: Path, capsys
     assert re.fullmatch(rf"({match} line 2, shot 0: .*\n)+", told) and "scene: its content hash is" in told
 
 
+def test_replay_tells_of_a_record_without_an_end(match: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = match.read_bytes().splitlines(keepends=True)
+    for kept in (1, 3, 4):
+        match.write_bytes(b"".join(lines[:kept]))
+        assert main(["replay", str(GALLERY), str(match)]) == 0
+        told = f"note: {match} has no end: it was not closed, as after a crash, and may lack shots"
+        assert capsys.readouterr() == (f"all shots do the same again\n{told}\n", "")
+
+
 def test_replay_names_what_is_no_record(match: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = match.read_bytes().splitlines(keepends=True)
-    empty, cut, other = tmp_path / "empty.jsonl", tmp_path / "cut.jsonl", tmp_path / "other.jsonl"
+    empty, cut, other, lost = (tmp_path / f"{name}.jsonl" for name in ("empty", "cut", "other", "lost"))
     empty.touch()
+    lost.write_bytes(b"".join([*lines[:2], *lines[3:]]))
     cut.write_bytes(b"".join(lines[:2]) + lines[2][:80])
     other.write_bytes(b'{"format": "hitplanes-hits/1"}\n')
     for scene, path, told in (
         (GALLERY, empty, f"{empty} line 1: expected a whole line of a record, got an empty file"),
         (GALLERY, cut, f"{cut} line 3: expected a whole line of a record, got one that is cut off, as by a crash"),
-        (GALLERY, other, f"{other} line 1: format: expected 'hitplanes-shots/1', got 'hitplanes-hits/1'"),
+        (GALLERY, other, f"{other} line 1: format: expected 'hitplanes-shots/2', got 'hitplanes-hits/1'"),
+        (GALLERY, lost, f"{lost} line 3: chain: expected '"),
         (GALLERY, tmp_path, f"{tmp_path}: cannot read it: Is a directory"),
         (GALLERY, tmp_path / "none", f"{tmp_path / 'none'}: cannot read it: No such file"),
         (tmp_path, match, f"{tmp_path / 'scene.json'}: cannot read it"),
@@ -384,7 +398,7 @@ def test_examples_of_fire_and_replay_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("fixtures").symlink_to(ROOT / "fixtures")
-    Path("shots.jsonl").write_text('{"weapon": "pistol", "at": [62, 86]}\n' * 3)
+    Path("shots.jsonl").write_text('{"weapon": "point", "at": [62, 86]}\n' * 3)
     ran = 0
     for word in ("fire", "replay"):
         with pytest.raises(SystemExit):
@@ -394,3 +408,145 @@ def test_examples_of_fire_and_replay_run(
                 assert main(shlex.split(line)[1:]) == 0, line
                 ran += 1
     assert ran == 3
+
+
+# Streams, places and interrupts
+
+
+COMMANDS: dict[str, tuple[int, list[str]]] = {
+    "fire": (0, ["fire", str(GALLERY), "shots.jsonl", "-o", "{}.jsonl", "--plan"]),
+    "fire, a bad line": (2, ["fire", str(GALLERY), "bad.jsonl", "-o", "{}.jsonl"]),
+    "no such scene": (2, ["report", "nowhere", "-o", "{}.png"]),
+    "no such word": (2, ["rapport"]),
+    "compare, the same": (0, ["compare", "a.json", "a.json"]),
+    "compare, other": (1, ["compare", "a.json", "b.json"]),
+    "help": (0, ["fire", "--help"]),
+    "version": (0, ["--version"]),
+}
+STREAMS = ("read", "closed", "full", "gone")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Logs and reports to try the command on."""
+    folder = tmp_path_factory.mktemp("place")
+    good = '{"weapon": "point", "at": [62, 86]}\n' * 3
+    (folder / "shots.jsonl").write_text(good)
+    (folder / "bad.jsonl").write_text(good + "no\n")
+    for name, at in (("a", "62,86"), ("b", "1,1")):
+        words = ["report", str(GALLERY), "--weapon", "point", "--at", at, "--json", str(folder / f"{name}.json")]
+        assert main([*words, "-o", str(folder / "r.png")]) == 0
+    return folder
+
+
+def started(words: list[str], place: Path, out: str, err: str, unbuffered: bool) -> subprocess.Popen[str]:
+    """The command, its outputs read, closed, on a full device, or into a pipe that no one reads."""
+    reader, gone = os.pipe()
+    os.close(reader)
+    full = os.open("/dev/full", os.O_WRONLY)
+    ends = {"read": subprocess.PIPE, "closed": subprocess.PIPE, "full": full, "gone": gone}
+    shut = " ".join(f"{number}>&-" for number, end in ((1, out), (2, err)) if end == "closed")
+    line = f"exec {shlex.join([*RUN, *words])} {shut}"
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1" if unbuffered else ""}
+    run = subprocess.Popen(["sh", "-c", line], cwd=place, stdout=ends[out], stderr=ends[err], text=True, env=env)
+    os.close(gone)
+    os.close(full)
+    return run
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_exit_codes_hold_whatever_becomes_of_the_outputs(name: str, place: Path) -> None:
+    code, words = COMMANDS[name]
+    runs = {}
+    for out, err in itertools.product(STREAMS, STREAMS):
+        mine = [word.format(f"{out} {err}") for word in words]
+        runs[out, err] = started(mine, place, out, err, unbuffered=err == "full")
+    for (out, err), run in runs.items():
+        printed, told = run.communicate()
+        expected = 2 if out == "full" and code < 2 else code
+        assert run.returncode == expected, (out, err, told)
+        assert (told or "").count("\n") == (1 if expected == 2 and err == "read" else 0), (out, err, told)
+        if name == "fire":
+            assert (place / f"{out} {err}.jsonl").read_bytes() == (place / "read read.jsonl").read_bytes()
+            assert out != "read" or printed.startswith("3 shots, 3 hit something")
+
+
+def test_no_file_takes_the_place_of_a_closed_output(tmp_path: Path) -> None:
+    streams = "from hitplanes.weapons.cli.command import open_streams; open_streams()"
+    code = f"import os; {streams}; print(os.open('x', os.O_CREAT))"
+    code += "; os.write(1, b'1'); os.write(2, b'2'); os._exit(os.open('x', 0) > 4)"
+    line = shlex.join([sys.executable, "-c", code])
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for shut in ("1>&-", "2>&-", "1>&- 2>&-"):
+        run = subprocess.run(["sh", "-c", f"exec {line} {shut}"], cwd=tmp_path, env=env, check=False)
+        assert run.returncode == 0 and not (tmp_path / "x").read_bytes()
+
+
+def test_progress_without_a_stream_is_silent() -> None:
+    progress = Progress(None)
+    progress.begin(9, 0, 0)
+    progress.say("going on")
+    progress.show(1, 1)
+    progress.step("rays", 1, 2)
+    progress.clear()
+
+
+@pytest.mark.parametrize(
+    "words", [["report", str(GALLERY)], ["report", "gallery"], ["fire", str(GALLERY), "s"], ["new", "x"]]
+)
+def test_a_folder_that_is_gone_is_one_line(words: list[str], tmp_path: Path) -> None:
+    line = f"cd gone && rmdir ../gone && exec {shlex.join([*RUN, *words])}"
+    (tmp_path / "gone").mkdir()
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    run = subprocess.run(["sh", "-c", line], cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert run.returncode == 2 and run.stderr.startswith("hitplanes: ") and run.stderr.count("\n") == 1
+
+
+INTERRUPTED = """
+import os, signal, sys, time
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(1)
+except KeyboardInterrupt:
+    raise ImportError("as some modules make of it") from None
+sys.exit(7)
+"""
+
+
+@pytest.mark.parametrize("name", ["numpy", "argparse", "difflib"])
+def test_an_interrupt_while_modules_are_loaded_is_one_line(name: str, tmp_path: Path) -> None:
+    (tmp_path / f"{name}.py").write_text(INTERRUPTED)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    words = [*RUN, "rapport"] if name != "difflib" else [*RUN, "compare", "a", "b"]
+    run = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (130, "hitplanes: interrupted\n")
+
+
+def test_an_interrupt_that_is_ignored_stays_ignored(tmp_path: Path) -> None:
+    (tmp_path / "numpy.py").write_text(INTERRUPTED)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    line = f"trap '' INT; exec {shlex.join([*RUN, 'rapport'])}"
+    run = subprocess.run(["sh", "-c", line], cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert run.returncode == 7
+
+
+def test_an_interrupt_while_words_are_read_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hitplanes.weapons.cli.command.parser", interrupted)
+    assert main(["new", "x"]) == 130
+    assert capsys.readouterr().err == "hitplanes: interrupted\n"
+
+
+def test_what_the_system_refuses_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(_: object) -> None:
+        raise PermissionError(13, "Permission denied", "some\nplace")
+
+    monkeypatch.setattr("hitplanes.weapons.cli.command.load_scene", refused)
+    assert main(["report", "x"]) == 2
+    assert capsys.readouterr().err == "hitplanes: some\\nplace: Permission denied\n"

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planes import InputError, Scene
-from weapons import FixedStep, Projectile, fire
+from hitplanes import FixedStep, InputError, Projectile, Scene, fire
 
 SECOND = 10**9
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes import compose
-from planes.arrays import InputError
-from planes.compose import CodePlane, label_plane, plane_fits
-from planes.items import HITTABLE, OCCLUDER, ROLES, Role
-from planes.scene import Scene
+from hitplanes.planes.bits import label_plane as compose
+from hitplanes.planes.bits.label_plane import LabelPlane, label_plane, plane_fits
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.scene.items import HITTABLE, OCCLUDER, ROLES, Role
+from hitplanes.planes.scene.scene import Scene
 
 BOUNDS = (-6, 2, 17, 16)
 SIZE = (24, 15)
@@ -35,12 +35,12 @@ def brute_codes(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.nda
         mask, (left, top) = scene.mask(item)
         covered[item] = {(int(x) + left, int(y) + top) for y, x in np.argwhere(mask)}
     x, y, x_max, y_max = box
-    codes = np.zeros((y_max - y + 1, x_max - x + 1), np.int64)
-    for row, column in np.ndindex(codes.shape):
+    labels = np.zeros((y_max - y + 1, x_max - x + 1), np.int64)
+    for row, column in np.ndindex(labels.shape):
         here = [item for item in order if (column + x, row + y) in covered[item]]
         if here:
-            codes[row, column] = 2 * (here[0] + 1) + (len(here) > 1)
-    return codes
+            labels[row, column] = 2 * (here[0] + 1) + (len(here) > 1)
+    return labels
 
 
 def random_scene(rng: np.random.Generator, count: int) -> Scene:
@@ -91,12 +91,12 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
 def test_the_code_plane_follows_every_change(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, count)
-    plane = CodePlane(BOUNDS)
+    plane = LabelPlane(BOUNDS)
     for _ in range(8):
         assert np.array_equal(plane.read(scene.items), brute_codes(scene))
         for _ in range(rng.integers(0, 4)):
             change(scene, rng)
-    assert np.array_equal(plane.read(scene.items), CodePlane(BOUNDS).read(scene.items))
+    assert np.array_equal(plane.read(scene.items), LabelPlane(BOUNDS).read(scene.items))
 
 
 def test_a_small_plane_by_hand() -> None:
@@ -105,17 +105,17 @@ def test_a_small_plane_by_hand() -> None:
     scene.add([[1, 1]], (1.5, 0), role="occluder")
     scene.add([[1], [1]], (3, 0.5), layer=-1)
     scene.add([[1, 1, 1, 1]], (1.5, 1), role="hud")
-    assert CodePlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 5, 6], [0, 0, 0, 6]]
+    assert LabelPlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 5, 6], [0, 0, 0, 6]]
     scene.set(2, layer=1)
     scene.move(2, (2, 0.5))
-    assert CodePlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 7, 0], [0, 0, 6, 0]]
+    assert LabelPlane((0, 0, 3, 1)).read(scene.items).tolist() == [[2, 5, 7, 0], [0, 0, 6, 0]]
 
 
 def test_only_what_changed_is_redrawn() -> None:
     scene = Scene((100, 100))
     for x in range(5):
         scene.add(np.ones((4, 6), np.bool_), (10 * x + 2.5, 11.5))
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     assert plane.cost(scene.items) == 10_000
     plane.read(scene.items)
@@ -149,20 +149,20 @@ def test_only_what_changed_is_redrawn() -> None:
 def test_pixels_outside_the_dirty_boxes_are_not_touched() -> None:
     scene = Scene((20, 20))
     scene.add(np.ones((2, 2), np.bool_), (5.5, 5.5))
-    plane = CodePlane((0, 0, 19, 19))
-    codes = plane.read(scene.items)
-    codes[15, 15] = 999
+    plane = LabelPlane((0, 0, 19, 19))
+    labels = plane.read(scene.items)
+    labels[15, 15] = 999
     scene.move(0, (6.5, 5.5))
-    assert plane.read(scene.items) is codes
-    assert codes[15, 15] == 999
-    assert (codes[5:7, 5] == 0).all()
-    assert (codes[5:7, 6:8] == 2).all()
+    assert plane.read(scene.items) is labels
+    assert labels[15, 15] == 999
+    assert (labels[5:7, 5] == 0).all()
+    assert (labels[5:7, 6:8] == 2).all()
 
 
 def test_more_dirt_than_plane_is_a_whole_plane() -> None:
     scene = Scene((6, 6))
     scene.add(np.ones((5, 5), np.bool_), (2, 2))
-    plane = CodePlane((0, 0, 5, 5))
+    plane = LabelPlane((0, 0, 5, 5))
     plane.read(scene.items)
     scene.move(0, (3, 3))
     assert plane.cost(scene.items) == 36
@@ -172,9 +172,9 @@ def test_more_dirt_than_plane_is_a_whole_plane() -> None:
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planes.items.JOURNAL_ROWS", 3)
+    monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 3)
     scene = random_scene(np.random.default_rng(1), 6)
-    plane = CodePlane(BOUNDS)
+    plane = LabelPlane(BOUNDS)
     plane.read(scene.items)
     for x in range(5):
         scene.move(1, (x, 5))
@@ -186,9 +186,9 @@ def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeyp
 
 def test_masks_that_are_laid_out_anew_are_read_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many forms that nothing uses any more; a stack that was handed out keeps its masks."""
-    monkeypatch.setattr("planes.items.ATLAS_SLACK_BYTES", 100)
+    monkeypatch.setattr("hitplanes.planes.scene.items.ATLAS_SLACK_BYTES", 100)
     scene = random_scene(np.random.default_rng(2), 5)
-    plane = CodePlane(BOUNDS)
+    plane = LabelPlane(BOUNDS)
     old = scene.items.stack()
     before = [old.mask(place).copy() for place in range(len(old))]
     atlases = set()
@@ -216,13 +216,13 @@ def test_equal_masks_are_stored_once() -> None:
 def test_codes_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compose, "ITEMS_UINT16", 6)
     scene = random_scene(np.random.default_rng(3), 6)
-    plane = CodePlane(BOUNDS)
+    plane = LabelPlane(BOUNDS)
     assert plane.read(scene.items).dtype == np.uint16
     add_one(scene, np.random.default_rng(4))
     assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
-    codes = plane.read(scene.items)
-    assert codes.dtype == np.uint32
-    assert np.array_equal(codes, brute_codes(scene))
+    labels = plane.read(scene.items)
+    assert labels.dtype == np.uint32
+    assert np.array_equal(labels, brute_codes(scene))
     scene.move(2, (3, 3))
     assert plane.cost(scene.items) < SIZE[0] * SIZE[1]
     assert np.array_equal(plane.read(scene.items), brute_codes(scene))
@@ -236,10 +236,10 @@ def test_the_last_id_of_sixteen_bits(count: int) -> None:
     last = scene.add([[1, 1]], (0.5, 0))
     assert last == count - 1
     scene.set(last, layer=1)
-    plane = CodePlane((0, 0, 3, 0))
-    codes = plane.read(scene.items)
-    assert codes.dtype == (np.uint16 if count == 32_767 else np.uint32)
-    assert codes.tolist() == [[2 * count, 2 * count, 0, 0]]
+    plane = LabelPlane((0, 0, 3, 0))
+    labels = plane.read(scene.items)
+    assert labels.dtype == (np.uint16 if count == 32_767 else np.uint32)
+    assert labels.tolist() == [[2 * count, 2 * count, 0, 0]]
 
 
 def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
@@ -247,8 +247,8 @@ def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
     scene.items.skip_to(32_765)
     for _ in range(2):
         scene.add([[1]], (0, 0))
-    codes = CodePlane((0, 0, 1, 0)).read(scene.items)
-    assert (codes.dtype, codes.tolist()) == (np.uint16, [[65_535, 0]])
+    labels = LabelPlane((0, 0, 1, 0)).read(scene.items)
+    assert (labels.dtype, labels.tolist()) == (np.uint16, [[65_535, 0]])
 
 
 # The label plane, and limits
@@ -291,24 +291,24 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
     assert plane_fits(box) is fits
     scene = Scene(size, box[:2])
     if fits:
-        assert scene.code_plane() is scene.code_plane() is not None
+        assert scene.label_plane() is scene.label_plane() is not None
         return
-    assert scene.code_plane() is None
+    assert scene.label_plane() is None
     message = f"bounds: expected a plane of sides up to 65535 px .*got {size[0]} x {size[1]}"
-    for make in (lambda: CodePlane(box), lambda: label_plane(scene.items.stack(), box), scene.planes):
+    for make in (lambda: LabelPlane(box), lambda: label_plane(scene.items.stack(), box), scene.planes):
         with pytest.raises(InputError, match=message):
             make()
 
 
 def test_a_world_without_bounds_has_no_code_plane() -> None:
-    assert Scene().code_plane() is None
+    assert Scene().label_plane() is None
 
 
 def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:
     """Each change is looked at once, and a plane that lags behind by its own size is given up."""
     scene = Scene((100, 100))
     item = scene.add(np.ones((10, 10), np.bool_), (20, 20))
-    plane = CodePlane((0, 0, 99, 99))
+    plane = LabelPlane((0, 0, 99, 99))
     plane.read(scene.items)
     costs = []
     for step in range(60):
@@ -316,14 +316,14 @@ def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:
         costs.append(plane.cost(scene.items))
         assert plane.cost(scene.items) == costs[-1]
     assert costs[:3] == [200, 400, 600] and costs[-1] == 10_000
-    assert plane.codes is None
+    assert plane.labels is None
     assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99)))
 
 
 def test_a_plane_that_is_being_drawn_is_not_asked_what_it_lacks() -> None:
     scene = Scene((30, 20))
     item = scene.add(np.ones((5, 5), np.bool_), (9, 9))
-    plane = CodePlane((0, 0, 29, 19))
+    plane = LabelPlane((0, 0, 29, 19))
     plane.read(scene.items)
     scene.move(item, (3, 3))
     with ThreadPoolExecutor(1) as pool:

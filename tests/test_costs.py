@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from test_fire import square
 
-from planes import History, InputError, Scene, load_scene
-from planes.items import COLUMNS
-from weapons import Disc, Projectile, Rifle, fire
-from weapons.schemas import schemas
+from hitplanes import Disc, History, InputError, Projectile, Rifle, Scene, fire, load_scene
+from hitplanes.planes.scene.items import COLUMNS
+from hitplanes.weapons.cli.schemas import schemas
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"
 SCHEMA = schemas()["scene"]

@@ -10,14 +10,15 @@ import cv2
 import numpy as np
 import pytest
 
-from planes import InputError
-from planes.arrays import Image
-from planes.boxes import BroadPhase, BruteForce, Work
-from planes.image import read_png
-from planes.spans import meets
-from weapons import animation, demo
-from weapons.cli import main
-from weapons.demo import KINDS, demo_frames, moments, write_demo
+from hitplanes import InputError
+from hitplanes.planes.broadphase.boxes import BroadPhase, BruteForce, Work
+from hitplanes.planes.common.checks import Image
+from hitplanes.planes.files.png import read_png
+from hitplanes.planes.grid.spans import meets
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.lab import demo
+from hitplanes.weapons.lab import demo as animation
+from hitplanes.weapons.lab.demo import KINDS, demo_frames, moments, write_demo
 
 EACH = pytest.mark.parametrize("kind", KINDS)
 
@@ -149,7 +150,7 @@ def test_the_bar_has_a_part_for_what_is_found_for_boxes_and_for_nodes(kind: str)
     ends = [round(demo.BAR * count / 300) for count in (0, now.found.sum(), now.tests, now.tests + now.nodes)]
     for color, first, last in zip((demo.FOUND, demo.TESTED, demo.VISITED), ends, ends[1:], strict=False):
         assert (bar[first:last] == color).all()
-    assert ends[3] > ends[2] > 0 and (bar[ends[3]] == demo.GROUND).all()
+    assert ends[3] > ends[2] > 0 and (bar[ends[3]] == demo.PAGE_GROUND).all()
 
 
 @pytest.mark.skipif(not animation.can_write_gif(), reason="this OpenCV writes no GIF")
@@ -224,7 +225,7 @@ def test_a_bad_output_is_one_line(
 def test_the_command_says_where_it_is(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("weapons.demo.write_demo", partial(write_demo, frames=1))
+    monkeypatch.setattr("hitplanes.weapons.lab.demo.write_demo", partial(write_demo, frames=1))
     assert main(["demo", kind, "-o", str(tmp_path / "x")]) == 0
     name = {"bvh": "BVH"}.get(kind, kind)
     assert capsys.readouterr().out == f"a {name} in motion is in {tmp_path / 'x'}\n"
@@ -242,5 +243,5 @@ def test_a_folder_that_is_there_may_have_a_dot_in_its_name(tmp_path: Path) -> No
 
 
 def test_an_unknown_structure_is_named() -> None:
-    with pytest.raises(InputError, match="kind: expected one of quadtree, grid, bvh, got 'octree'"):
+    with pytest.raises(InputError, match="kind: expected one of 'quadtree', 'grid', 'bvh', got 'octree'"):
         next(moments("octree"))

@@ -14,12 +14,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes import Scene, Sprite, load_scene
-from weapons import Disc, Laser, Pistol, Point, Rifle, Rounds, Spread, Weapon, arsenal_of, fire
-from weapons.differences import decisive, differences
-from weapons.facts import report_of
-from weapons.jsondiff import same
-from weapons.orders import fire_order, orders_of
+from hitplanes import (
+    Disc,
+    Laser,
+    Pistol,
+    Point,
+    Rifle,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Weapon,
+    arsenal_of,
+    fire,
+    load_scene,
+)
+from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.report.differences import decisive, differences
+from hitplanes.weapons.report.phrases import same
+from hitplanes.weapons.report.report import report_of
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 REPORTS = 6
@@ -309,3 +322,20 @@ def test_of_rays_what_has_no_words_is_told_beside_what_has() -> None:
     other["shots"][0]["rays"] = [*one["shots"][0]["rays"], "torn"]
     other["shots"][0]["seed"] = 7
     assert "shot 0 (rifle at 190, 104): rays: 2 entries, was 1" in differences(one, other)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.tuples(*[st.text("ab\n\x7f\x9b\u2028\u202e\u2066\u061c\ud800", min_size=1, max_size=5)] * 4))
+def test_lines_can_be_printed_whatever_things_are_called(names: tuple[str, ...]) -> None:
+    was = told(game(), Rounds(Spread(Disc(3), count=6, radius=20), count=3), seed=5, exclude=[1])
+    now = copy.deepcopy(was)
+    for report, (thing, key) in zip((was, now), (names[:2], names[2:]), strict=True):
+        report["scene"]["name"] = thing
+        report["weapons"][thing] = {key: thing}
+        report["shots"][0][key] = {thing: key}
+        report["shots"][0]["verdicts"][thing] = key
+        for part in ("rows", "why_not", "blockers"):
+            for entry in report["shots"][0][part]:
+                entry["name"] = entry[key] = thing
+    del now["shots"][0]["rows"][0]
+    assert all(line.isprintable() for line in differences(was, now))

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import planes.exact
-from planes import InputError
-from planes.constants import CHUNK_ROWS
-from planes.exact import circles_sign, orient2d, orient3d, point_segment_sign, segment_segment_sign
+from hitplanes import InputError
+from hitplanes.planes.common.limits import CHUNK_ROWS
+from hitplanes.planes.volumes import exact as exact_module
+from hitplanes.planes.volumes.exact import circles_sign, orient2d, orient3d, point_segment_sign, segment_segment_sign
 
 F = Fraction
 Arrays = list[npt.NDArray[np.float64]]
@@ -241,7 +241,7 @@ def test_ordinary_rows_cost_no_integers(monkeypatch: pytest.MonkeyPatch) -> None
     def none(*_: object) -> None:
         raise AssertionError("an exact stage")
 
-    monkeypatch.setattr(planes.exact, "_exact", none)
+    monkeypatch.setattr(exact_module, "_exact", none)
     rng = np.random.default_rng(4)
     for predicate in CASES:
         predicate(*(rng.uniform(0, 2000, v.shape) for v in touching(rng, predicate, 100_000, 1.0)))

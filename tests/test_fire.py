@@ -17,11 +17,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes import ALL, InputError, Scene, Sprite
-from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Weapon, fire
-from weapons.arsenal import Plain
-from weapons.draws import disc_offsets
-from weapons.volley import Shots, checked_shots
+from hitplanes import (
+    ALL,
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    Hits,
+    InputError,
+    Point,
+    Polygon,
+    Ring,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Stencil,
+    Weapon,
+    fire,
+)
+from hitplanes.weapons.kinds.areas import AreaWeapon
+from hitplanes.weapons.kinds.placements import Shots, checked_shots, disc_offsets
 
 Pixel = tuple[int, int]
 Bounds = tuple[int, int, int, int]
@@ -70,7 +86,7 @@ direction_of = lru_cache(maxsize=None)(oracle_raster.unit)
 
 
 @lru_cache(maxsize=64)
-def pattern_of(plain: Plain, c: int, s: int) -> list[tuple[Pixel, int]]:
+def pattern_of(plain: AreaWeapon, c: int, s: int) -> list[tuple[Pixel, int]]:
     """Pixels of a plain weapon about its origin, and their weights."""
     spans = plain.spans(c, s)
     runs = zip(spans.y.tolist(), spans.x_first.tolist(), spans.x_last.tolist(), strict=True)
@@ -78,13 +94,13 @@ def pattern_of(plain: Plain, c: int, s: int) -> list[tuple[Pixel, int]]:
     return [((x, y), weight_of(x * x + y * y, plain.falloff, plain.reach_256)) for x, y in pixels]
 
 
-def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, Plain]:
+def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, AreaWeapon]:
     """The burst, the spread and the plain weapon in a weapon."""
     burst = weapon if isinstance(weapon, Rounds) else None
     inner = burst.weapon if burst else weapon
     spread = inner if isinstance(inner, Spread) else None
     plain = spread.pellet if spread else inner
-    assert isinstance(plain, Plain)
+    assert isinstance(plain, AreaWeapon)
     return burst, spread, plain
 
 
@@ -128,7 +144,7 @@ class Shot:
 
 
 @dataclass
-class Volley:
+class Placements:
     """A weapon and a batch of shots; all of them have an aim, or all a target."""
 
     weapon: Weapon
@@ -142,7 +158,7 @@ class Volley:
 
     def alone(self, scene: Scene, which: int, **options: Any) -> Hits:
         """Fire one of the shots alone, under its number."""
-        one = Volley(self.weapon, [self.shots[which]], self.seed)
+        one = Placements(self.weapon, [self.shots[which]], self.seed)
         return fire(scene, self.weapon, one.shots[0].at, seed=self.seed, **one._each((0, 0)), **options)
 
     def _each(self, shift: Pixel) -> dict[str, Any]:
@@ -159,7 +175,7 @@ class Volley:
 
 
 def expected(
-    scene: Scene, volley: Volley, items: Sequence[oracle_stack.Item] | None = None
+    scene: Scene, volley: Placements, items: Sequence[oracle_stack.Item] | None = None
 ) -> tuple[list[Row], list[dict[str, int]]]:
     """All rows of a batch and the verdict counts of each shot, by the oracle; `items` instead of the scene's own."""
     items, pierce = items_of(scene) if items is None else items, parts_of(volley.weapon)[2].pierce
@@ -198,7 +214,7 @@ class Battle:
 
     size_wh: tuple[int, int] | None
     origin_xy: Pixel
-    volley: Volley
+    volley: Placements
     objects: list[tuple[Sprite, tuple[float, float], dict[str, Any]]] = field(default_factory=list)
 
     def scene(self, shift: Pixel = (0, 0)) -> Scene:
@@ -241,7 +257,7 @@ def some_pose(rng: random.Random, frames: int) -> dict[str, Any]:
     return pose
 
 
-def some_plain(rng: random.Random) -> Plain:
+def some_plain(rng: random.Random) -> AreaWeapon:
     common: dict[str, Any] = {"pierce": rng.random() < 0.4, "falloff": rng.choice([None, "linear", "smooth"])}
 
     def length(high: int) -> float:
@@ -269,7 +285,7 @@ def some_rings(rng: random.Random) -> tuple[list[tuple[float, float]], list[list
 
 def some_weapon(rng: random.Random) -> Weapon:
     """Any weapon: plain, a spread, or a burst of one of them."""
-    weapon: Plain | Spread = some_plain(rng)
+    weapon: AreaWeapon | Spread = some_plain(rng)
     if rng.random() < 0.35:
         weapon = Spread(weapon, rng.randint(1, 5), rng.randint(0, 12) / 4)
     if rng.random() < 0.35:
@@ -283,7 +299,7 @@ def some_place(rng: random.Random, origin_xy: Pixel) -> tuple[float, float]:
     return origin_xy[0] + rng.randint(-512, 256 * 26) / 256, origin_xy[1] + rng.randint(-512, 256 * 20) / 256
 
 
-def some_volley(rng: random.Random, weapon: Weapon, places: list[tuple[float, float]], items: int) -> Volley:
+def some_volley(rng: random.Random, weapon: Weapon, places: list[tuple[float, float]], items: int) -> Placements:
     """Up to 3 shots about some places, each with its own aim, filter and number."""
     shots, aimed = [], rng.random() < 0.5
     for number in range(rng.randint(2, 3)):
@@ -299,7 +315,7 @@ def some_volley(rng: random.Random, weapon: Weapon, places: list[tuple[float, fl
             dx, dy = rng.choice([-1, 1]) * rng.randint(1, 2000) / 256, rng.randint(-9, 9)
             shot.toward = (shot.at[0] + dx, shot.at[1] + dy)
         shots.append(shot)
-    return Volley(weapon, shots, rng.choice([0, 7, 2**64 - 1]))
+    return Placements(weapon, shots, rng.choice([0, 7, 2**64 - 1]))
 
 
 def some_battle(seed: int) -> Battle:
@@ -412,7 +428,7 @@ def test_a_world_moved_object_by_object(seed: int) -> None:
 def test_the_order_of_a_batch_changes_no_shot(seed: int) -> None:
     battle = some_battle(seed)
     scene, volley = battle.scene(), battle.volley
-    backward = Volley(volley.weapon, volley.shots[::-1] * 2, volley.seed)
+    backward = Placements(volley.weapon, volley.shots[::-1] * 2, volley.seed)
     forward, twice = volley.fired(scene), backward.fired(scene)
     for i in range(len(backward.shots)):
         which = len(volley.shots) - 1 - i % len(volley.shots)
@@ -451,9 +467,9 @@ def test_seeds_stay_with_their_shots_in_the_parts_of_a_batch(
     weapon, seeds = Spread(Disc(1, falloff=falloff), count=5, radius=20), np.arange(40, dtype=np.uint64)
     whole = fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy)
     assert whole and whole.fired.sum() == 1000  # verdicts are counted
-    monkeypatch.setattr("weapons.runfire.CHUNK_SAMPLES", 150)
-    monkeypatch.setattr("weapons.bitfire.PLACEMENTS_AT_ONCE", 35)
-    monkeypatch.setattr("weapons.bitfire.CHUNK_PAIRS", 35)
+    monkeypatch.setattr("hitplanes.weapons.fire.areas.CHUNK_SAMPLES", 150)
+    monkeypatch.setattr("hitplanes.weapons.fire.areas.PLACEMENTS_AT_ONCE", 35)
+    monkeypatch.setattr("hitplanes.weapons.fire.areas.CHUNK_PAIRS", 35)
     assert fire(scene, weapon, [(30, 30)] * 40, seed=seeds, shot=3, strategy=strategy) == whole
 
 

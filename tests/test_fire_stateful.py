@@ -14,19 +14,15 @@ import oracle_stack
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
-from test_fire import Volley, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
+from test_fire import Placements, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
 
-import planes.bitrows
-import planes.cells
-import planes.items
-import weapons.bitfire
-import weapons.resolve
-import weapons.runfire
-import weapons.windows
-from planes import ALL, InputError, Role, Scene, Sprite, load_scene
-from planes.bits import WORD
-from planes.compose import CodePlane
-from weapons import Disc, Hits, Point, fire
+from hitplanes import ALL, Disc, Hits, InputError, Point, Role, Scene, Sprite, fire, load_scene
+from hitplanes.planes.bits import bit_rows, cells
+from hitplanes.planes.bits.bit_rows import WORD
+from hitplanes.planes.bits.label_plane import LabelPlane
+from hitplanes.planes.scene import items as items_module
+from hitplanes.weapons.fire import areas, spans
+from hitplanes.weapons.kinds import weapon
 
 SPRITES = [
     *(some_sprite(random.Random(seed)) for seed in range(12)),
@@ -71,12 +67,12 @@ class Model:
 
 def codes_of(items: Sequence[oracle_stack.Item]) -> np.ndarray:
     """The code plane, one pixel at a time: twice the number of the front item, and 1 more if one lies behind it."""
-    codes = np.zeros(SIZE_WH[::-1], np.int64)
+    labels = np.zeros(SIZE_WH[::-1], np.int64)
     order = oracle_stack.front_to_back(items)
-    for (y, x), _ in np.ndenumerate(codes):
+    for (y, x), _ in np.ndenumerate(labels):
         here = [item for item in order if (x + ORIGIN_XY[0], y + ORIGIN_XY[1]) in item.pixels]
-        codes[y, x] = 2 * (here[0].id + 1) + (len(here) > 1) if here else 0
-    return codes
+        labels[y, x] = 2 * (here[0].id + 1) + (len(here) > 1) if here else 0
+    return labels
 
 
 def stale_calls(hits: Hits) -> list[Any]:
@@ -178,7 +174,7 @@ class ChangingScene(RuleBasedStateMachine):
     def _items(self) -> list[oracle_stack.Item]:
         return [item for n, model in sorted(self.models.items()) if (item := model.item(n)) is not None]
 
-    def _compare(self, scene: Scene, volley: Volley) -> Hits:
+    def _compare(self, scene: Scene, volley: Placements) -> Hits:
         truth = expected(scene, volley, self._items())
         hits = volley.fired(scene, strategy="direct")
         assert told(hits) == truth
@@ -192,7 +188,7 @@ class ChangingScene(RuleBasedStateMachine):
     @rule()
     def planes_are_up_to_date(self) -> None:
         items = self._items()
-        plane = self.scene.code_plane()
+        plane = self.scene.label_plane()
         assert (plane is None) == (self.scene.bounds is None)
         if plane is None:
             return
@@ -265,14 +261,14 @@ def crowd(count: int = 12) -> tuple[Scene, random.Random]:
 def redrawn(scene: Scene) -> np.ndarray:
     """Codes of a plane that was never read before."""
     assert scene.bounds is not None
-    return np.array(CodePlane(scene.bounds).read(scene.items))
+    return np.array(LabelPlane(scene.bounds).read(scene.items))
 
 
 @pytest.mark.parametrize("rows", [0, 1, 3, 7])
 def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", rows)
+    monkeypatch.setattr(items_module, "JOURNAL_ROWS", rows)
     scene, rng = crowd()
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     whole = plane.read(scene.items).size
     forgotten = caught_up = 0
@@ -280,8 +276,8 @@ def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypa
         changes = rng.randint(1, 5)
         for _ in range(changes):
             scene.move(rng.randrange(12), (rng.randint(0, 39), rng.randint(0, 29)))
-        codes = plane.read(scene.items)
-        np.testing.assert_array_equal(codes, redrawn(scene))
+        labels = plane.read(scene.items)
+        np.testing.assert_array_equal(labels, redrawn(scene))
         forgotten += changes > rows and plane.redrawn == whole
         caught_up += plane.redrawn < whole
         assert changes <= rows or plane.redrawn == whole
@@ -290,9 +286,9 @@ def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypa
 
 
 def test_one_change_of_more_than_the_journal_remembers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes.items, "JOURNAL_ROWS", 3)
+    monkeypatch.setattr(items_module, "JOURNAL_ROWS", 3)
     scene, _ = crowd()
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     plane.read(scene.items)
     scene.move(range(12), (5, 5))
@@ -305,7 +301,7 @@ def test_one_change_of_more_than_the_journal_remembers(monkeypatch: pytest.Monke
 def test_only_what_changed_is_drawn_anew() -> None:
     scene = Scene((100, 100))
     ids = [scene.add(square(5), (10 * i, 10 * i)) for i in range(9)]
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     plane.read(scene.items)
     assert plane.redrawn == 100 * 100
@@ -324,7 +320,7 @@ def test_only_what_changed_is_drawn_anew() -> None:
 
 def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows stay right over many compactions of the atlas, and a stack that was handed out keeps its masks."""
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
     scene, rng = crowd()
     atlases, largest = {id(scene.items.atlas): scene.items.atlas}, 0
     for _ in range(40):
@@ -337,7 +333,7 @@ def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) 
             np.testing.assert_array_equal(before.mask(place), mask)
         atlas = scene.items.atlas
         atlases[id(atlas)] = atlas
-        in_use = {variant.key: variant.mask.size for variant in scene.items.variants}
+        in_use = {variant.uid: variant.mask.size for variant in scene.items.variants}
         assert atlas.live == sum(in_use.values())
         assert atlas.used <= 2 * atlas.live
         largest = max(largest, atlas.used)
@@ -345,7 +341,7 @@ def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
     scene = Scene((9, 9))
     for _ in range(20):
         a, b = scene.add(SPRITES[-2], (4, 4)), scene.add(square(4), (3, 3))
@@ -358,7 +354,7 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.fixture(scope="module")
-def in_whole_parts() -> list[tuple[Volley, Scene, str, Hits]]:
+def in_whole_parts() -> list[tuple[Placements, Scene, str, Hits]]:
     """Volleys, what they are fired at, how, and what they hit."""
     battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 4))]
     ways = [(v, s, how) for v, s in battles for how in (("direct", "composed") if s.bounds else ("direct",))]
@@ -367,17 +363,17 @@ def in_whole_parts() -> list[tuple[Volley, Scene, str, Hits]]:
 
 @pytest.mark.parametrize("samples, pairs", [(1, 1), (7, 10), (40, 3), (2**18, 1), (3, 2**21)])
 def test_the_size_of_the_parts_changes_no_row(
-    in_whole_parts: list[tuple[Volley, Scene, str, Hits]], samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch
+    in_whole_parts: list[tuple[Placements, Scene, str, Hits]], samples: int, pairs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(weapons.runfire, "CHUNK_SAMPLES", samples)
-    monkeypatch.setattr(weapons.runfire, "CHUNK_PAIRS", pairs)
-    monkeypatch.setattr(weapons.bitfire, "CHUNK_PAIRS", pairs)
-    monkeypatch.setattr(weapons.bitfire, "PLACEMENTS_AT_ONCE", samples)
-    monkeypatch.setattr(planes.bitrows, "WORDS_AT_ONCE", max(samples, WORD))
-    monkeypatch.setattr(planes.cells, "PAIRS_AT_ONCE", pairs)
-    monkeypatch.setattr(weapons.windows, "PATTERNS_BYTES_MOST", 10 * samples)
-    monkeypatch.setattr(weapons.windows, "TABLE_BYTES_MOST", 10 * pairs)
-    monkeypatch.setattr(weapons.resolve, "CHUNK_SAMPLES", samples)
+    monkeypatch.setattr(areas, "CHUNK_SAMPLES", samples)
+    monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(areas, "PLACEMENTS_AT_ONCE", samples)
+    monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", max(samples, WORD))
+    monkeypatch.setattr(cells, "PAIRS_AT_ONCE", pairs)
+    monkeypatch.setattr(weapon, "PATTERNS_BYTES_MOST", 10 * samples)
+    monkeypatch.setattr(weapon, "TABLE_BYTES_MOST", 10 * pairs)
+    monkeypatch.setattr(spans, "CHUNK_SAMPLES", samples)
     for number, (volley, scene, how, whole) in enumerate(in_whole_parts):
         assert volley.fired(scene, strategy=how) == whole, f"{number=} {how}"
     assert sum(len(whole) for *_, whole in in_whole_parts) > 100

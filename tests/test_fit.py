@@ -9,15 +9,16 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from planes import cover, fit, outline
-from planes.arrays import Bools, Floats, InputError, Ints
-from planes.constants import BOXES_MAX, MASK_SIDE_MAX
-from planes.parts import BoxSets
-from planes.spans import Spans
-from planes.sprite import Sprite
-from planes.volumes import Aabbs, Capsules, Circles
+from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints
+from hitplanes.planes.common.limits import BOXES_MAX, MASK_SIDE_MAX
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.scene.sprite import Sprite
+from hitplanes.planes.volumes import fit, outline
+from hitplanes.planes.volumes import outline as cover
+from hitplanes.planes.volumes.volumes import Aabbs, BoxSets, Capsules, Circles
 
 Point = tuple[Fraction, Fraction]
+Place = tuple[int, int]
 HALF = Fraction(1, 2)
 
 
@@ -62,16 +63,16 @@ def random_masks(count: int, side: int, seed: int) -> Iterator[Bools]:
         yield random_mask(rng, side)
 
 
-def corners_of(mask: Bools) -> list[Point]:
+def corners_of(mask: Bools, at: Place = (0, 0)) -> list[Point]:
     """Corners of the squares at both ends of each row: a convex set that holds them holds the row.
 
-    So it holds a row between two others with the same ends, which is left out.
+    So it holds a row between two others with the same ends, which is left out. Pixel [0, 0] lies at `at`.
     """
     ends = [(int(x[0]), int(x[-1])) if len(x := np.flatnonzero(row)) else None for row in mask]
     found = set()
     for y, here in enumerate(ends):
         if here and not (0 < y < len(ends) - 1 and ends[y - 1] == here == ends[y + 1]):
-            found |= {(x, y + dy) for x in (here[0] - HALF, here[1] + HALF) for dy in (-HALF, HALF)}
+            found |= {(at[0] + x, at[1] + y + dy) for x in (here[0] - HALF, here[1] + HALF) for dy in (-HALF, HALF)}
     return sorted(found)
 
 
@@ -83,18 +84,18 @@ def exact(points: Floats) -> list[Point]:
     return [(Fraction(x), Fraction(y)) for x, y in points.tolist()]
 
 
-def holds_circle(circle: Circles, mask: Bools) -> bool:
+def holds_circle(circle: Circles, mask: Bools, at: Place = (0, 0)) -> bool:
     x, y = map(Fraction, circle.center[0].tolist())
     square = Fraction(circle.radius[0]) ** 2
-    return all((p - x) ** 2 + (q - y) ** 2 <= square for p, q in corners_of(mask))
+    return all((p - x) ** 2 + (q - y) ** 2 <= square for p, q in corners_of(mask, at))
 
 
-def holds_capsule(capsule: Capsules, mask: Bools) -> bool:
+def holds_capsule(capsule: Capsules, mask: Bools, at: Place = (0, 0)) -> bool:
     """Each corner is as near to the axis, or to an end of it, as the radius."""
     (a,), (b,), square = exact(capsule.a_xy), exact(capsule.b_xy), Fraction(capsule.radius[0]) ** 2
     d = b[0] - a[0], b[1] - a[1]
     length2 = d[0] ** 2 + d[1] ** 2
-    for p, q in corners_of(mask):
+    for p, q in corners_of(mask, at):
         along = (p - a[0]) * d[0] + (q - a[1]) * d[1]
         share = min(max(along / length2, Fraction(0)), Fraction(1)) if length2 else Fraction(0)
         if (p - a[0] - share * d[0]) ** 2 + (q - a[1] - share * d[1]) ** 2 > square:
@@ -102,14 +103,14 @@ def holds_capsule(capsule: Capsules, mask: Bools) -> bool:
     return True
 
 
-def check_convex(points: Floats, mask: Bools) -> None:
+def check_convex(points: Floats, mask: Bools, at: Place = (0, 0)) -> None:
     ring = exact(points)
     n = len(ring)
     for i in range(n):
         assert turn(ring[i], ring[(i + 1) % n], ring[(i + 2) % n]) > 0, "not strictly convex, or turning the other way"
     turned = sum(ring[i][1] <= 0 < ring[(i + 1) % n][1] for i in range(n))
     assert turned <= 1, "more than one turn"
-    corners = corners_of(mask)
+    corners = corners_of(mask, at)
     for i in range(n):
         assert all(turn(ring[i], ring[(i + 1) % n], p) >= 0 for p in corners), "a pixel square sticks out"
 
@@ -235,6 +236,24 @@ def test_random_masks_lie_in_their_volumes(seed: int) -> None:
 def test_many_random_masks_lie_in_their_volumes(seed: int) -> None:
     for i, mask in enumerate(random_masks(300, 30, seed)):
         check_all(mask, [i])
+
+
+@pytest.mark.parametrize("at", [(2**40, 2**40), (-(2**38) - 3, 7), (5, -(2**40))], ids=str)
+def test_far_pixels_lie_in_their_volumes(at: Place) -> None:
+    """As far as positions may be, where float64 holds no more than 1/4096 px."""
+    rng = np.random.default_rng(11)
+    for mask in [*NAMED.values(), *random_masks(40, 14, 8)]:
+        spans = Spans.from_mask(mask, at)
+        found = fit.box(spans)
+        assert [*found.min[0], *found.max[0]] == [
+            f(p[k] for p in corners_of(mask, at)) for f in (min, max) for k in (0, 1)
+        ]
+        assert holds_circle(fit.least_circle(spans), mask, at)
+        pivot = np.clip(np.array(at) + rng.normal(0, 20, 2), -(2.0**40), 2.0**40)
+        assert holds_circle(fit.pivot_circle(spans, pivot), mask, at)
+        assert holds_capsule(fit.capsule(spans), mask, at)
+        for ring in (fit.hull(spans), fit.oriented_box(spans), fit.convex(spans, int(rng.integers(4, 9)))):
+            check_convex(ring.points, mask, at)
 
 
 def test_the_box_is_exact() -> None:
@@ -563,14 +582,21 @@ FITS = {
 
 
 @pytest.mark.parametrize("name", FITS)
-def test_what_is_no_mask_is_refused(name: str) -> None:
-    for mask in (np.zeros((3, 4), bool), np.zeros((0, 5), bool), np.zeros((0, 0), bool)):
-        with pytest.raises(InputError, match="mask: expected a pixel or more, got none"):
+def test_what_is_no_mask_is_refused_by_the_name_of_the_argument(name: str) -> None:
+    field = "mask" if name in ("boxes", "concave") else "pixels"
+    for mask, told in (
+        (np.zeros((3, 4), bool), ": expected a pixel or more, got none"),
+        (np.zeros((0, 5), bool), ": expected a pixel or more, got none"),
+        (np.zeros((0, 0), bool), ": expected a pixel or more, got none"),
+        (np.ones((1, MASK_SIDE_MAX + 1), bool), ": expected sides up to 32768 px"),
+        ([[2, 3]], "[0][0]: expected 0 or 1"),
+        (np.ones((2, 2)), ": expected booleans"),
+        (np.ones((2, 2, 2), bool), ": expected shape"),
+        ([[1, 2], [3]], ": expected an array"),
+        (np.ma.masked_all((2, 2), bool), "[0][0]: expected a value, got a masked one"),
+    ):
+        with pytest.raises(InputError, match=f"^{re.escape(field + told)}"):
             FITS[name](mask)
-    with pytest.raises(InputError, match="mask: expected sides up to 32768 px"):
-        FITS[name](np.ones((1, MASK_SIDE_MAX + 1), bool))
-    with pytest.raises(InputError, match=r"mask\[0\]\[0\]: expected 0 or 1"):
-        FITS[name]([[2, 3]])
 
 
 @pytest.mark.parametrize("name", FITS)

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import Role, Scene, load_scene
-from planes.image import read_png
-from planes.overlap import contains_point
-from planes.sampling import Verdict
-from weapons import Hits, arsenal_of, fire
-from weapons.arsenal import KINDS, ray_parts_of
-from weapons.cli import main
-from weapons.orders import fire_order, orders_of
-from weapons.rayhits import RayHits, Reason
+from hitplanes import Hits, Role, Scene, arsenal_of, fire, load_scene
+from hitplanes.planes.bits.span_walk import Verdict
+from hitplanes.planes.files.png import read_png
+from hitplanes.planes.volumes.overlap import contains_point
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.kinds.areas import KINDS, ray_parts_of
+from hitplanes.weapons.rays.contacts import Reason
+from hitplanes.weapons.rays.ray_hits import RayHits
+from hitplanes.weapons.replay.shot_log import fire_order, orders_of
 
 ROOT = Path(__file__).parents[1]
 FIXTURES = ROOT / "fixtures"
@@ -114,25 +114,25 @@ OUTCOMES: dict[str, list[tuple[str, str, list[str], list[str]]]] = {
     ],
     "targets": [
         ("needler", "hit", ["bull", "inner ring", "outer ring", "board"], []),
-        ("pistol", "filtered", [], []),
+        ("point", "filtered", [], []),
         ("shotgun", "empty hit", ["gear"], []),
-        ("pistol", "hit", ["coin"], []),
-        ("laser", "empty hit", ["invader", "arrow"], []),
+        ("point", "hit", ["coin"], []),
+        ("beam", "empty hit", ["invader", "arrow"], []),
         ("blast", "empty hit filtered", ["star", "invader", "arrow"], []),
         ("burst", "empty hit", ["fish", "comb"], []),
     ],
     "empty": [
-        ("pistol", "empty", [], []),
+        ("point", "empty", [], []),
         ("blast", "empty", [], []),
         ("star", "empty", [], []),
-        ("laser", "empty outside", [], []),
+        ("beam", "empty outside", [], []),
         ("shotgun", "empty outside", [], []),
         ("burst", "empty outside", [], []),
-        ("pistol", "outside", [], []),
+        ("point", "outside", [], []),
     ],
     "crowd": [
-        ("pistol", "hit", ["thing of visitor 144"], []),
-        ("pistol", "hit", ["visitor 71"], []),
+        ("point", "hit", ["thing of visitor 144"], []),
+        ("point", "hit", ["visitor 71"], []),
         ("lance", "hit", ["steward 240", *(f"visitor {n}" for n in (212, 211, 184, 183, 155))], []),
         ("paint", "empty hit occluded", [f"visitor {n}" for n in (234, 206, 235, 236)], ["barrier 2"]),
         ("flash", "hit", ["visitor 195", "thing of visitor 194",
@@ -150,9 +150,9 @@ OUTCOMES: dict[str, list[tuple[str, str, list[str], list[str]]]] = {
         ("sonar", "outside", [], []),
     ],
     "far": [
-        ("pistol", "hit", ["probe"], []),
-        ("pistol", "empty", [], []),
-        ("laser", "empty hit", ["rocket", "planet"], []),
+        ("point", "hit", ["probe"], []),
+        ("point", "empty", [], []),
+        ("beam", "empty hit", ["rocket", "planet"], []),
         ("plasma", "empty hit", ["satellite"], []),
         ("nova", "empty hit occluded", ["rocket"], ["asteroid", "station"]),
         ("scan", "empty occluded filtered", [], ["station"]),

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from planes import fronttoback
-from planes.bitrows import Placed
-from planes.fronttoback import Pile
-from planes.spans import Spans
-from planes.tiles import TileAtlas
-from planes.twins import kernels_of
-from weapons import windows
-from weapons.pattern import Pattern
+from hitplanes.planes.bits import front_to_back
+from hitplanes.planes.bits.bit_rows import Placed
+from hitplanes.planes.bits.front_to_back import OrderedTiles
+from hitplanes.planes.bits.tiles import TileAtlas
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.weapons.kinds import weapon
+from hitplanes.weapons.kinds.weapon import Pattern
 
 Pixel = tuple[int, int]
 
@@ -61,7 +61,7 @@ class Case:
             np.array(self.categories, np.int64),
             np.array(self.owner, np.int64),
         )
-        self.pile = Pile(
+        self.ordered = OrderedTiles(
             tiles.rank, tiles.boxes(boxes.reshape(-1, 4)), tiles.begin, tiles.words,
             *(column[tiles.rank] if len(column) else column for column in told),
         )  # fmt: skip
@@ -78,7 +78,7 @@ class Case:
             line = np.eye(rng.randint(100, 200), dtype=np.bool_)[:: rng.choice([-1, 1])]
             self.patterns = [(line, -rng.randint(0, 100), -rng.randint(0, 100))]
         spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for mask, left, top in self.patterns]
-        self.windows = windows._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        self.windows = weapon._made(spans, rng.random() < 0.5 and len(spans) == 1)
         count = 0 if rng.random() < 0.05 else rng.choice([1, 2, 5])
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)], np.int64)
         x, y = np.array([[rng.randint(-spread, spread) for _ in range(count)] for _ in range(2)], np.int64)
@@ -129,8 +129,8 @@ class Case:
             for item, pixels in self.hits(who):
                 nearest = min(((x - ox) ** 2 + (y - oy) ** 2, y, x) for x, y in pixels)
                 tiles = [
-                    k for k, (x0, y0, x1, y1) in enumerate(self.pile.box_xyxy.tolist())
-                    if self.pile.rank[k] == item and any(x0 <= x <= x1 and y0 <= y <= y1 for x, y in pixels)
+                    k for k, (x0, y0, x1, y1) in enumerate(self.ordered.box_xyxy.tolist())
+                    if self.ordered.rank[k] == item and any(x0 <= x <= x1 and y0 <= y <= y1 for x, y in pixels)
                 ]  # fmt: skip
                 rows.append((who, *nearest, item, min(tiles), len(pixels)))
         return [(who, tile, count, d2, x, y) for who, d2, y, x, _, tile, count in sorted(rows)]
@@ -140,19 +140,19 @@ class Case:
 @given(st.integers(0, 2**32), st.sampled_from([64, 2**15]), st.sampled_from([0, 2**14]))
 def judged(seed: int, at_once: int, crowd: int) -> None:
     case = Case(seed)
-    kernels = kernels_of(fronttoback)
+    kernels = kernels_of(front_to_back)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fronttoback, "WORDS_AT_ONCE", at_once)
-        patch.setattr(fronttoback, "FRONTS_AT_ONCE", crowd)
+        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
+        patch.setattr(front_to_back, "FRONTS_AT_ONCE", crowd)
         found = kernels.front_to_back(
-            case.placed, case.windows, case.pile, case.accept, case.exclude, case.pierce, case.bounds
+            case.placed, case.windows, case.ordered, case.accept, case.exclude, case.pierce, case.bounds
         )
     assert all(column.dtype == np.int64 for column in found)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
 
 
 def test_each_pixel_ends_at_the_first_item_that_the_shot_accepts(jit: bool) -> None:
-    if jit and find_spec("planes.fronttoback_jit") is None:
+    if jit and find_spec("hitplanes.planes.jit.areas") is None:
         pytest.skip("no compiled twin")
     judged()
 
@@ -161,13 +161,15 @@ def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
     """A tile of 64 x 64 px is hit at its corners wherever it lies among the cells, which begin with another tile."""
     tiles = TileAtlas().tiles(([np.ones((64, 64), np.bool_)] * 2).__getitem__, np.arange(2), 1)
     every, none = np.full(2, 1), np.zeros(0, np.bool_)
-    dot = windows._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)], False)
+    dot = weapon._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)], False)
     for offset in range(64):
         corner = np.array([(-64, -128), (offset, offset)])
         boxes = np.concatenate([corner, corner + 63], axis=1)
-        pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, none, every, every)
+        ordered = OrderedTiles(tiles.rank, boxes, tiles.begin, tiles.words, none, every, every)
         x, y = offset + np.array([(0, 0, 63, 63, 64, -1), (0, 63, 0, 63, 0, 0)])
-        found = kernels_of(fronttoback).front_to_back(Placed(0 * x, x, y, x, y), dot, pile, None, None, False, None)
+        found = kernels_of(front_to_back).front_to_back(
+            Placed(0 * x, x, y, x, y), dot, ordered, None, None, False, None
+        )
         assert found.placement.tolist() == [0, 1, 2, 3] and found.seen.tolist() == [1] * 4
 
 
@@ -182,11 +184,11 @@ def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: boo
         masks = [tall, *[np.ones((1, 1), np.bool_)] * len(corners)]
         tiles = TileAtlas().tiles(masks.__getitem__, np.arange(len(masks)), 1)
         boxes = np.array([(9, 0, 9, 19), *[(x, y, x, y) for x, y in corners]])
-        pile = Pile(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
-        found = kernels_of(fronttoback).front_to_back(
+        ordered = OrderedTiles(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
+        found = kernels_of(front_to_back).front_to_back(
             Placed(zero, zero, zero, zero, zero),
-            windows._made([Pattern(spans, None)], False),
-            pile,
+            weapon._made([Pattern(spans, None)], False),
+            ordered,
             None,
             None,
             False,

@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 from oracle_png import CHANNELS, GREY, KINDS, PALETTE, RGB, SIGNATURE, chunk, chunks_of, joined, png, rgba
 
-from planes import InputError, load_scene, read_png
-from weapons import arsenal_of
-from weapons.orders import orders_of
+from hitplanes import InputError, arsenal_of, load_scene, read_png
+from hitplanes.weapons.replay.shot_log import orders_of
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"

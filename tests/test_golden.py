@@ -15,15 +15,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import weapons.goldcheck
-import weapons.goldstale  # noqa: F401 (a run inside of this process must find numpy's modules loaded)
-from planes import InputError, Scene, Sprite, read_png
-from planes.image import write_png
-from weapons import Disc, Hits, fire
-from weapons.goldcheck import Call, Outcome, safe_name, settle
-from weapons.goldfile import golden_of, pixels_unlike, unlike
-from weapons.goldpage import FOLDER, PAGE, claimed, note_files, replace_page
-from weapons.goldshow import RED, scene_of
+from hitplanes import Disc, Hits, InputError, Scene, Sprite, fire, read_png
+from hitplanes.planes.files.png import write_png
+from hitplanes.weapons.golden.check import (
+    FOLDER,
+    PAGE,
+    RED,
+    Call,
+    Outcome,
+    claimed,
+    note_files,
+    replace_page,
+    safe_name,
+    scene_of,
+    settle,
+)
+from hitplanes.weapons.golden.file import golden_of, pixels_unlike, unlike
 
 ROOT = Path(__file__).parents[1]
 
@@ -479,3 +486,26 @@ def test_what_was_expected_is_drawn_on_what_was_there(golden: Callable[..., Outc
     picture = read_png(tmp_path / FOLDER / outcome.failure["folder"] / "hits.png")
     wide = (picture.shape[1] - 2 * 16 - 2 * 12) // 3
     assert len(np.unique(picture[44:400, 16 : 16 + wide].reshape(-1, 4), axis=0)) > 8, "more than an empty ground"
+
+
+COMMANDS = "".join(map(chr, (0x1B, 0x7F, *range(0x80, 0xA0), 0x61C, 0x200E, 0x200F, *range(0x2028, 0x202F)))) + (
+    "".join(map(chr, range(0x2066, 0x206A)))
+)
+"""What a terminal or a page obeys: control characters, line breaks, marks of the direction of writing."""
+
+
+def test_no_name_speaks_to_the_terminal_or_the_page(tmp_path: Path) -> None:
+    node = f"t/test_a.py::test_{COMMANDS}"
+    for name, mask, update in ((f"can {COMMANDS}", CAN, True), (f"can{COMMANDS}", without(CAN, 0, 0), False)):
+        scene = Scene((16, 16), name=name)
+        scene.add(mask, (8, 8), name=name)
+        base = tmp_path / f"goldens{COMMANDS}" / "test_x"
+        one = Call(node, node, None, base, tmp_path, tmp_path, update)
+        plane = {f"heat{COMMANDS}": np.full((2, 2), int(update))}
+        outcome = settle(one, fire(scene, Disc(4), (8, 8)), plane)
+    assert outcome.kind == "failed" and r"\x7f" in outcome.message and r"\u202e" in outcome.message
+    assert not set(COMMANDS) & set(outcome.message)
+    assert replace_page(tmp_path / FOLDER, [outcome.failure, outcome.failure])
+    page = (tmp_path / FOLDER / PAGE).read_text(encoding="utf-8")
+    assert not set(COMMANDS) & set(page)
+    assert all(told in page for told in (r"plane heat\x1b", r"test_\x1b", r"goldens\x1b", r"can\u001b\x7f"))

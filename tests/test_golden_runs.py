@@ -14,19 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-import weapons.goldcheck
-import weapons.goldstale
-from planes import Scene
-from planes.arrays import Image
-from weapons.goldpage import FOLDER, PAGE
+from hitplanes import Scene
+from hitplanes.planes.common.checks import Image
+from hitplanes.weapons.golden import file
+from hitplanes.weapons.golden.check import FOLDER, PAGE
 
 ROOT = Path(__file__).parents[1]
 
 LEVEL = """
 import json
 from pathlib import Path
-from planes import Scene
-from weapons import Disc, fire
+from hitplanes import Disc, Scene, fire
 
 def blast(x=6):
     pixels = json.loads(Path(__file__).with_name("level.json").read_text())
@@ -87,7 +85,7 @@ def accepted() -> dict[str, bytes]:
 @pytest.fixture
 def game(untouched: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, accepted: dict[str, bytes]) -> pytest.Pytester:
     """A game with goldens of its tests, and small pictures."""
-    monkeypatch.setattr(weapons.goldfile, "picture_of_report", tiny)
+    monkeypatch.setattr(file, "picture_of_report", tiny)
     if not accepted:
         assert untouched.runpytest_inprocess("--hits-update").ret == 0
         accepted |= {name: data for name, (_, data) in goldens(untouched).items()}
@@ -191,7 +189,7 @@ def test_a_wrong_call_is_an_error(game: pytest.Pytester, body: str, told: str) -
     (game.path / "test_new.py").write_text(f"from level import blast\ndef test_a(hits_golden):\n    {body}\n")
     result = game.runpytest_inprocess("test_new.py", "--hits-update")
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines([f"E * planes.arrays.InputError: {told}*"])
+    result.stdout.fnmatch_lines([f"E * hitplanes.planes.common.checks.InputError: {told}*"])
 
 
 def test_the_page_is_that_of_the_last_run_that_used_the_fixture(game: pytest.Pytester) -> None:
@@ -388,5 +386,5 @@ def test_a_run_that_does_not_use_it_pays_nothing(pytester: pytest.Pytester, monk
     for words in ([], ["-p", "no:hitplanes"]):
         assert pytester.runpytest_subprocess(*words).ret == 0
         loaded.append(set(json.loads((pytester.path / "modules.json").read_text())))
-    assert loaded[0] - loaded[1] == {"weapons", "weapons.golden"}
-    assert not {name for name in loaded[0] if name.split(".")[0] in ("numpy", "cv2", "planes")}
+    assert loaded[0] - loaded[1] == {"hitplanes.weapons.golden", "hitplanes.weapons", "hitplanes"}
+    assert not {name for name in loaded[0] if name.split(".")[0] in ("numpy", "cv2")}

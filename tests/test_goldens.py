@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from planes import Scene, load_scene
-from weapons import arsenal_of
-from weapons.golden import HitsGolden
-from weapons.orders import fire_order, orders_of
-from weapons.rayhits import Reason
-from weapons.record import ShotRecord, replay
+from hitplanes import Scene, arsenal_of, load_scene
+from hitplanes.weapons.golden.__init__ import HitsGolden
+from hitplanes.weapons.rays.contacts import Reason
+from hitplanes.weapons.replay.record import ShotRecord, replay
+from hitplanes.weapons.replay.shot_log import fire_order, orders_of
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"
 SCENES = sorted(path.parent.name for path in FIXTURES.glob("*/scene.json"))
@@ -54,7 +53,7 @@ def test_weapons_of_rays_do_what_they_did(request: pytest.FixtureRequest) -> Non
 
 def test_the_record_has_every_weapon_way_and_end() -> None:
     scene = load_scene(FIXTURES / "corridor")
-    lines = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()[1:]]
+    lines = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()[1:-1]]
     fired = [(weapon.to_json(), list(at)) for weapon in arsenal_of(scene).values() for at, _ in WAYS]
     assert [(line["weapon"], line["at"]) for line in lines] == fired
     reasons = {stop["reason"] for line in lines for stop in line["result"]["stops"]}

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planes import grid256, snapping
-from planes.arrays import InputError
-from planes.constants import POSITION_MAX
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.limits import POSITION_MAX
+from hitplanes.planes.grid import fixed_point
 
-SNAPPING = [snapping, *([importlib.import_module("planes.snapping_jit")] if find_spec("numba") else [])]
+SNAPPING = [fixed_point, *([importlib.import_module("hitplanes.planes.jit.scene")] if find_spec("numba") else [])]
 
 MANY = settings(max_examples=300, deadline=None)
 FEW = settings(max_examples=100, deadline=None)
@@ -44,12 +44,12 @@ vectors = st.tuples(components, components).filter(lambda v: v != (0, 0))
 
 
 def unit(degrees: float) -> tuple[int, int]:
-    c, s = grid256.unit(degrees)
+    c, s = fixed_point.unit(degrees)
     return int(c), int(s)
 
 
 def unit_toward(dx: int, dy: int) -> tuple[int, int]:
-    c, s = grid256.unit_toward(dx, dy)
+    c, s = fixed_point.unit_toward(dx, dy)
     return int(c), int(s)
 
 
@@ -61,13 +61,13 @@ def unit_toward(dx: int, dy: int) -> tuple[int, int]:
     [(0, 0), (1, 0), (2, 1), (3, 2), (5, 2), (7, 4), (-1, 0), (-3, -2), (-5, -2), (513, 256), (515, 258)],
 )
 def test_snap_rounds_ties_to_even(n_512ths: int, expected: int) -> None:
-    assert int(grid256.snap(n_512ths / 512)) == expected
+    assert int(fixed_point.snap(n_512ths / 512)) == expected
 
 
 @MANY
 @given(st.lists(positions, min_size=1, max_size=20))
 def test_snap_is_the_rounding_of_256_v(values: list[float]) -> None:
-    snapped = grid256.snap(np.array(values))
+    snapped = fixed_point.snap(np.array(values))
     assert snapped.dtype == np.int64
     assert snapped.tolist() == [oracle.rounded(Fraction(v) * 256) for v in values]
 
@@ -75,14 +75,14 @@ def test_snap_is_the_rounding_of_256_v(values: list[float]) -> None:
 @MANY
 @given(positions)
 def test_snap_is_odd(value: float) -> None:
-    assert int(grid256.snap(-value)) == -int(grid256.snap(value))
+    assert int(fixed_point.snap(-value)) == -int(fixed_point.snap(value))
 
 
 @MANY
 @given(st.integers(-(2**28), 2**28), st.sampled_from([1, -1, 10**9, -(10**9), 2**39]))
 def test_snap_moves_with_the_world(v_256: int, shift_px: int) -> None:
     # on the grid the shifted float is exact, so the shift must come through exactly
-    assert int(grid256.snap(v_256 / 256 + shift_px)) == v_256 + 256 * shift_px
+    assert int(fixed_point.snap(v_256 / 256 + shift_px)) == v_256 + 256 * shift_px
 
 
 LAID: list[Callable[[list[float]], np.ndarray[Any, Any]]] = [
@@ -121,7 +121,7 @@ def test_positions_out_of_range_are_not_snapped(bad: float) -> None:
 def test_snap_keeps_the_shape_and_the_input() -> None:
     values = np.array([[0.5, 1.25, -2.0], [3.001, -3.001, 1e9]])
     before = values.copy()
-    assert grid256.snap(values).shape == (2, 3)
+    assert fixed_point.snap(values).shape == (2, 3)
     assert np.array_equal(values, before)
 
 
@@ -130,13 +130,13 @@ def test_snap_keeps_the_shape_and_the_input() -> None:
     [(0, 0), (127, 0), (128, 1), (129, 1), (-127, 0), (-128, 0), (-129, -1), (256, 1), (-384, -1), (-385, -2)],
 )
 def test_pixel_boundaries_go_right_and_down(v_256: int, expected: int) -> None:
-    assert int(grid256.pixel(np.int64(v_256))) == expected
+    assert int(fixed_point.pixel(np.int64(v_256))) == expected
 
 
 @FEW
 @given(st.lists(st.integers(-(2**48), 2**48), min_size=1, max_size=20))
 def test_pixel_holds_the_position(values: list[int]) -> None:
-    for v, p in zip(values, grid256.pixel(np.array(values)).tolist(), strict=True):
+    for v, p in zip(values, fixed_point.pixel(np.array(values)).tolist(), strict=True):
         assert 256 * p - 128 <= v < 256 * p + 128
 
 
@@ -154,7 +154,7 @@ divisors = st.one_of(st.integers(1, 12), st.sampled_from([2, 256, 2**30]), st.in
 def test_rounded_div_is_half_to_even(rows: list[tuple[int, int]]) -> None:
     a, b = np.array(rows, dtype=np.int64).T
     expected = [oracle.rounded(Fraction(n, d)) for n, d in rows]
-    assert grid256.rounded_div(a, b).tolist() == expected
+    assert fixed_point.rounded_div(a, b).tolist() == expected
 
 
 roots = st.integers(0, 3037000499)  # the largest whole number whose square is an int64
@@ -164,15 +164,15 @@ roots = st.integers(0, 3037000499)  # the largest whole number whose square is a
 @given(st.lists(st.one_of(st.integers(0, 2**63 - 1), st.integers(0, 100), roots.map(lambda r: r * r)), min_size=1))
 @example([2**63 - 1, 3037000499**2, 3037000499**2 - 1, 2**62, 2**62 - 1, 2**52 + 1, 2**53 + 1, 0])
 def test_isqrt_is_the_floor_of_the_root(values: list[int]) -> None:
-    assert grid256.isqrt(np.array(values, dtype=np.int64)).tolist() == [math.isqrt(v) for v in values]
+    assert fixed_point.isqrt(np.array(values, dtype=np.int64)).tolist() == [math.isqrt(v) for v in values]
 
 
 @FEW
 @given(st.lists(st.integers(1, 3037000499), min_size=1))
 def test_isqrt_steps_at_squares(rs: list[int]) -> None:
     squares = np.array(rs, dtype=np.int64) ** 2
-    assert grid256.isqrt(squares).tolist() == rs
-    assert grid256.isqrt(squares - 1).tolist() == [r - 1 for r in rs]
+    assert fixed_point.isqrt(squares).tolist() == rs
+    assert fixed_point.isqrt(squares - 1).tolist() == [r - 1 for r in rs]
 
 
 # directions
@@ -226,7 +226,7 @@ def test_unit_is_correctly_rounded_all_round(jit: bool) -> None:
     degrees = np.concatenate(
         [np.arange(-1080, 1081) / 3.0, np.array(TIES), np.random.default_rng(5).uniform(-400, 400, 4000)]
     )
-    c, s = grid256.unit(degrees)
+    c, s = fixed_point.unit(degrees)
     assert c.dtype == s.dtype == np.int64
     assert list(zip(c.tolist(), s.tolist(), strict=True)) == [oracle.unit(d) for d in degrees.tolist()]
 
@@ -286,7 +286,7 @@ def test_unit_has_length_one(degrees: float) -> None:
 
 def test_unit_rises_and_falls_with_the_angle() -> None:
     # cones of growing angle must not lose pixels, so neither number may step back
-    c, s = grid256.unit(np.linspace(0.0, 180.0, 20001))
+    c, s = fixed_point.unit(np.linspace(0.0, 180.0, 20001))
     assert (np.diff(c) <= 0).all()
     assert (np.diff(s[:10001]) >= 0).all()
     assert (np.diff(s[10000:]) <= 0).all()
@@ -295,7 +295,7 @@ def test_unit_rises_and_falls_with_the_angle() -> None:
 def test_unit_of_a_batch_is_that_of_each_row() -> None:
     degrees = np.array([[0.1, 400.25, -1e17], [45.0, 1e-300, 359.999]])
     before = degrees.copy()
-    c, s = grid256.unit(degrees)
+    c, s = fixed_point.unit(degrees)
     assert c.shape == s.shape == (2, 3)
     assert list(zip(c.ravel().tolist(), s.ravel().tolist(), strict=True)) == [unit(d) for d in degrees.ravel().tolist()]
     assert np.array_equal(degrees, before)
@@ -334,9 +334,9 @@ def nearly_tied(k: int) -> list[tuple[int, int]]:
 @example(2**29)
 def test_unit_toward_is_correctly_rounded_next_to_ties(k: int) -> None:
     vectors = nearly_tied(k)
-    c, s = grid256.unit_toward(*np.array(vectors, dtype=np.int64).T)
+    c, s = fixed_point.unit_toward(*np.array(vectors, dtype=np.int64).T)
     assert list(zip(c.tolist(), s.tolist(), strict=True)) == [oracle.unit_toward(*v) for v in vectors]
-    c, s = grid256.unit_toward(*np.array(vectors, dtype=np.int64).T[::-1])
+    c, s = fixed_point.unit_toward(*np.array(vectors, dtype=np.int64).T[::-1])
     assert list(zip(s.tolist(), c.tolist(), strict=True)) == [oracle.unit_toward(*v) for v in vectors]
 
 
@@ -366,7 +366,7 @@ def test_unit_toward_agrees_with_unit(eighth: int) -> None:
 
 def test_unit_toward_of_a_batch_is_that_of_each_row() -> None:
     dx, dy = np.random.default_rng(6).integers(-(2**29), 2**29, (2, 200))
-    c, s = grid256.unit_toward(dx, dy)
+    c, s = fixed_point.unit_toward(dx, dy)
     assert c.dtype == s.dtype == np.int64
     rows = list(zip(dx.tolist(), dy.tolist(), strict=True))
     assert list(zip(c.tolist(), s.tolist(), strict=True)) == [oracle.unit_toward(*row) for row in rows]
@@ -374,9 +374,9 @@ def test_unit_toward_of_a_batch_is_that_of_each_row() -> None:
 
 def test_unit_toward_refuses_no_direction() -> None:
     with pytest.raises(InputError):
-        grid256.unit_toward(0, 0)
+        fixed_point.unit_toward(0, 0)
     with pytest.raises(InputError):
-        grid256.unit_toward(np.array([1, 0]), np.array([0, 0]))
+        fixed_point.unit_toward(np.array([1, 0]), np.array([0, 0]))
 
 
 # turns
@@ -391,7 +391,7 @@ def test_unit_toward_refuses_no_direction() -> None:
 @example(math.nextafter(-45.0, -90.0))
 @example(-5e-324)
 def test_quarter_turns_split_the_angle(degrees: float) -> None:
-    k, c, s = (int(v) for v in grid256.quarter_turns(degrees))
+    k, c, s = (int(v) for v in fixed_point.quarter_turns(degrees))
     assert (k, c, s) == oracle.quarter_turns(degrees)
     for _ in range(k):
         c, s = -s, c
@@ -408,7 +408,7 @@ def test_turned_rounds_once(points: list[tuple[int, int]], degrees: float) -> No
     c, s = oracle.unit(degrees)
     given_points = np.array(points, dtype=np.int64)
     before = given_points.copy()
-    result = grid256.turned(given_points, c, s)
+    result = fixed_point.turned(given_points, c, s)
     assert result.shape == (len(points), 2)
     assert [tuple(row) for row in result.tolist()] == [oracle.turned(p, c, s) for p in points]
     assert np.array_equal(given_points, before)
@@ -420,13 +420,13 @@ def test_turned_by_quarter_turns_is_exact(points: list[tuple[int, int]], quarter
     expected = points
     for _ in range(quarters):
         expected = [(-y, x) for x, y in expected]
-    c, s = grid256.unit(90.0 * quarters)
-    assert [tuple(row) for row in grid256.turned(np.array(points), c, s).tolist()] == expected
+    c, s = fixed_point.unit(90.0 * quarters)
+    assert [tuple(row) for row in fixed_point.turned(np.array(points), c, s).tolist()] == expected
 
 
 @FEW
 @given(st.lists(points_256, min_size=1, max_size=8), any_angle)
 def test_turned_mirrors(points: list[tuple[int, int]], degrees: float) -> None:
     c, s = oracle.unit(degrees)
-    there = grid256.turned(np.array(points), c, s) * [1, -1]
-    assert np.array_equal(there, grid256.turned(np.array(points) * [1, -1], c, -s))
+    there = fixed_point.turned(np.array(points), c, s) * [1, -1]
+    assert np.array_equal(there, fixed_point.turned(np.array(points) * [1, -1], c, -s))

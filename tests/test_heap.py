@@ -8,8 +8,7 @@ import pytest
 BLOCKS = """
 import ctypes
 import numpy as np
-from planes import Scene
-from weapons import Disc, fire
+from hitplanes import Disc, Scene, fire
 
 class Told(ctypes.Structure):
     _fields_ = [(name, ctypes.c_size_t) for name in "arena ordblks smblks blocks mapped a b c d e".split()]

@@ -20,14 +20,28 @@ from hypothesis.stateful import initialize, precondition, rule, run_state_machin
 from test_fire import some_volley, some_weapon, square
 from test_fire_stateful import ORIGIN_XY, QUIET, SIZE_WH, ChangingScene, Model, places
 
-import planes.history
-import planes.items
-from planes import History, InputError, PastScene, Scene, Sprite, load_scene
-from planes.grid256 import snap
-from planes.items import COLUMNS
-from planes.render import draw_view
-from planes.volumes import Circles
-from weapons import Beam, Disc, Point, Rounds, Spread, fire, picture_of_report, report_of
+from hitplanes import (
+    Beam,
+    Disc,
+    History,
+    InputError,
+    PastScene,
+    Point,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    fire,
+    load_scene,
+    picture_of_report,
+    report_of,
+)
+from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.scene import history as history_module
+from hitplanes.planes.scene import items as items_module
+from hitplanes.planes.scene.items import COLUMNS
+from hitplanes.planes.scene.render import draw_view
+from hitplanes.planes.volumes.volumes import Circles
 
 ROOT = Path(__file__).parents[1]
 WEAPONS = (Point(), Disc(9), Disc(30, pierce=True, falloff="linear"), Beam(60, 3), Rounds(Spread(Disc(2), 5, 9), 2))
@@ -295,12 +309,40 @@ def test_new_columns_are_taken_along(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [history.at(t).items.velocity_256[2].tolist() for t in (0, 1)] == [[0, 0], [3, -4]]  # type: ignore[attr-defined]
 
 
+# What was removed since
+
+
+def test_what_was_removed_is_there_as_long_as_a_tick_shows_it() -> None:
+    scene, sprite = Scene((40, 40)), Sprite.from_mask(np.ones((9, 9), np.bool_))
+    known, history = weakref.ref(sprite), History(scene, ticks=3, interpolate=True)
+    scene.add(square(3), (30, 30))
+    item = scene.add(sprite, (9, 9), angle=20)
+    del sprite
+    history.record()
+    scene.set(item, angle=60)
+    history.record()
+    before = masks(history.at(0)), masks(history.at(0.5)), masks(history.at(1))
+    scene.remove(item)
+    history.record()
+    for past, shown in zip((0, 0.5, 1), before, strict=True):
+        history.at(2)  # what was made for the tick before goes
+        assert masks(history.at(past)) == shown
+        assert fire(history.at(past), Point(), (9, 9)).object.tolist() == [item]
+        assert known() is not None and history.at(past).name_of(item) == "hittable 1"
+    assert not fire(history.at(2), Point(), (9, 9)) and not fire(history.at(1.5), Point(), (30, 9))
+    history.record()
+    assert history.at(3).ids().tolist() == [0] and known() is not None
+    history.record()
+    gc.collect()
+    assert known() is None
+
+
 # Masks laid out anew
 
 
 @pytest.mark.parametrize("fired", [False, True])
 def test_masks_that_are_laid_out_anew(fired: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
     scene, truth = yard(), {}
     history, rng, atlases = History(scene), random.Random(2), {}
     for _ in range(30):
@@ -325,7 +367,7 @@ def test_masks_that_are_laid_out_anew(fired: bool, monkeypatch: pytest.MonkeyPat
 
 def test_a_scene_that_is_only_recorded_does_not_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Firing throws out masks that are no longer in use; a server that fires at the past alone never does that."""
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
     scene = yard()
     history = History(scene, ticks=3)
     for turn in range(50):
@@ -338,24 +380,24 @@ def test_recording_waits_for_a_thread_that_lays_masks_out(monkeypatch: pytest.Mo
     """Another thread fires at the scene, which begins to lay its masks out anew: half of that is not recorded."""
     scene = yard()
     scene.set(range(40), angle=list(range(40)))
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", -scene.items.atlas.used - 1)
-    half, go_on, lay_out = threading.Event(), threading.Event(), planes.items.Items._compact
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", -scene.items.atlas.used - 1)
+    half, go_on, lay_out = threading.Event(), threading.Event(), items_module.Items._compact
 
-    def slowly(items: planes.items.Items) -> None:
+    def slowly(items: items_module.Items) -> None:
         whole = items.atlas
-        items.atlas = planes.items.MaskAtlas()
+        items.atlas = items_module.MaskAtlas()
         half.set()
         go_on.wait(10)
         items.atlas = whole
         lay_out(items)
 
-    monkeypatch.setattr(planes.items.Items, "_compact", slowly)
+    monkeypatch.setattr(items_module.Items, "_compact", slowly)
     history = History(scene)
     first = threading.Thread(target=scene.items.stack)
     second = threading.Thread(target=history.record)
     first.start()
     assert half.wait(10)
-    monkeypatch.setattr(planes.items, "ATLAS_SLACK_BYTES", 2**20)
+    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 2**20)
     second.start()
     second.join(0.05)
     go_on.set()
@@ -433,8 +475,8 @@ def test_caches_are_there_for_the_next_shot() -> None:
     scene.move(0, (50, 50))
     history.record()
     past = history.at(0)
-    plane = past.code_plane()
-    assert plane is not None and plane.codes is not None and past.index("grid").boxes is not None
+    plane = past.label_plane()
+    assert plane is not None and plane.labels is not None and past.index("grid").boxes is not None
     for weapon in weapons:
         hits = fire(past, weapon, at, strategy="composed")
         assert hits == fire(past, weapon, at, strategy="direct", prefilter="none")
@@ -451,8 +493,8 @@ def test_a_few_shots_make_no_plane_and_no_index() -> None:
     for falloff, whole in ((None, "composition"), ("linear", "code plane")):
         for _ in range(3):
             hits = fire(past, Disc(3, falloff=falloff), (30, 30))
-        plane = past.code_plane()
-        assert plane is not None and plane.codes is None
+        plane = past.label_plane()
+        assert plane is not None and plane.labels is None
         assert past.index("bvh").boxes is None
         assert {whole, "broad phase", "volumes"} <= {stage.name for stage in hits.plan.left_out}
 
@@ -472,7 +514,7 @@ def test_volumes_of_masks_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None
     history.record()
     scene.move(1, (33, 33))
     history.record()
-    monkeypatch.setattr("planes.bounding.bounding", lambda *_: pytest.fail("a volume was made again"))
+    monkeypatch.setattr("hitplanes.planes.volumes.fit.bounding", lambda *_: pytest.fail("a volume was made again"))
     for tick in (0, 1):
         circles = history.at(tick).volumes([1], "circle")
         assert isinstance(circles, Circles)
@@ -622,11 +664,11 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     history.record()
     before, made = history.at(0).items, []
     flat = before.atlas.flat
-    variant_of = planes.history.variant_of
+    variant_of = history_module.variant_of
     monkeypatch.setattr(
-        planes.history, "variant_of", lambda sprite, form: made.append(form) or variant_of(sprite, form)
+        history_module, "variant_of", lambda sprite, form: made.append(form) or variant_of(sprite, form)
     )
-    monkeypatch.setattr(planes.items, "variant_of", lambda *_: pytest.fail("a mask was made"))
+    monkeypatch.setattr(items_module, "variant_of", lambda *_: pytest.fail("a mask was made"))
     past = history.at(0.5).items
     assert len(made) == 1
     assert [i for i in range(40) if past.variants[i] is not before.variants[i]] == [4]

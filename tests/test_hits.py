@@ -14,11 +14,29 @@ from typing import Any
 import numpy as np
 import oracle_stack
 import pytest
-from test_fire import Battle, Shot, Volley, expected, items_of, parts_of, rounds_of, some_battle, square, told
+from test_fire import Battle, Placements, Shot, expected, items_of, parts_of, rounds_of, some_battle, square, told
 
-from planes import ALL, InputError, Scene
-from weapons import Beam, Box, Cone, Disc, Hits, Point, Polygon, Ring, Rounds, Spread, Stencil, Verdict, fire
-from weapons.arsenal import Plain
+from hitplanes import (
+    ALL,
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    Hits,
+    InputError,
+    Laser,
+    Point,
+    Polygon,
+    Ring,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Stencil,
+    Verdict,
+    fire,
+)
+from hitplanes.weapons.kinds.areas import AreaWeapon
 
 SEEDS = range(0, 600, 6)
 MARGIN_SEEDS = range(0, 600, 12)
@@ -42,7 +60,7 @@ def wide(seed: int) -> tuple[Battle, Scene, Hits]:
     return battle, scene, battle.volley.fired(scene)
 
 
-def samples_of(volley: Volley, shot: Shot) -> list[tuple[int, int, int, int]]:
+def samples_of(volley: Placements, shot: Shot) -> list[tuple[int, int, int, int]]:
     """Samples of one shot as (round, pellet, y, x), in that order."""
     every = rounds_of(volley.weapon, shot.at, shot.aim, shot.toward, volley.seed, shot.number)
     return sorted(
@@ -118,6 +136,20 @@ def test_bodies_add_up(seed: int) -> None:
         for name in ("samples", "pixels", "weight"):
             assert getattr(body, name) == sum(getattr(row, name) for row in rows)
         assert body.objects == tuple(dict.fromkeys(row.object for row in rows))
+
+
+def test_owners_are_one_level_deep() -> None:
+    """A wheel is a part of its car, and none of the driver whose part the car is."""
+    scene = Scene()
+    driver = scene.add(Sprite.box(3, 3), (0, 0))
+    car = scene.add(Sprite.box(3, 3), (0, 9), owner=driver)
+    wheel = scene.add(Sprite.box(3, 3), (0, 18), owner=car)
+    for weapon in (Box(3, 60), Laser(60)):
+        shot: dict[str, Any] = {"at": (0, -5), "aim": 90} if isinstance(weapon, Laser) else {"at": (0, 0)}
+        bodies = [(body.owner, body.objects) for body in fire(scene, weapon, **shot).by_owner()]
+        assert bodies == [(driver, (driver, car)), (car, (wheel,))]
+        for owner, left in ((driver, [wheel]), (car, [driver, car])):
+            assert fire(scene, weapon, **shot, exclude=[owner]).object.tolist() == left
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -333,7 +365,7 @@ def test_why_not_tells_each_reason() -> None:
     ]
 
 
-def hit_at_shifts(volley: Volley, scene: Scene, which: int) -> dict[tuple[int, int], set[int]]:
+def hit_at_shifts(volley: Placements, scene: Scene, which: int) -> dict[tuple[int, int], set[int]]:
     """Objects hit when one shot is fired elsewhere, for all whole-pixel shifts of up to 8 px."""
     shot = volley.shots[which]
     shifts = [(dx, dy) for dx in range(-8, 9) for dy in range(-8, 9) if dx * dx + dy * dy <= 64]
@@ -341,7 +373,7 @@ def hit_at_shifts(volley: Volley, scene: Scene, which: int) -> dict[tuple[int, i
     for dx, dy in shifts:
         target = None if shot.toward is None else (shot.toward[0] + dx, shot.toward[1] + dy)
         moved.append(Shot((shot.at[0] + dx, shot.at[1] + dy), shot.aim, target, shot.accept, shot.exclude, shot.number))
-    hits = Volley(volley.weapon, moved, volley.seed).fired(scene)
+    hits = Placements(volley.weapon, moved, volley.seed).fired(scene)
     return {shift: {row.object for row in hits.of(i)} for i, shift in enumerate(shifts)}
 
 
@@ -441,7 +473,7 @@ def test_the_ends_of_the_world(x: int, y: int, bounded: bool) -> None:
         scene.add(square(3), (left, top))
         scene.add(square(2), (left, top), role="occluder", layer=1, categories=3)
         scene.add(square(1), (left, top))
-        volley = Volley(Rounds(Spread(Disc(2, falloff="linear"), 3, 2), 2, (0.5, 0)), [Shot((left, top))] * 2)
+        volley = Placements(Rounds(Spread(Disc(2, falloff="linear"), 3, 2), 2, (0.5, 0)), [Shot((left, top))] * 2)
         hits = volley.fired(scene)
         assert told(hits) == expected(scene, volley)
         rows = [(*row[:7], (row.first_xy[0] - left, row.first_xy[1] - top), row.distance2) for row in hits]
@@ -459,7 +491,7 @@ def test_far_apart_in_one_batch() -> None:
     ids = [scene.add(square(1), end) for end in ends]
     hits = fire(scene, Spread(Disc(1), 2, 1), ends)
     assert hits.object.tolist() == ids
-    assert told(hits) == expected(scene, Volley(hits.weapon, [Shot(end, number=i) for i, end in enumerate(ends)]))
+    assert told(hits) == expected(scene, Placements(hits.weapon, [Shot(end, number=i) for i, end in enumerate(ends)]))
 
 
 @pytest.mark.parametrize("weapon", [Point(), Beam(5, 1), Spread(Disc(2), 3, 2), Rounds(Beam(3, 1), 2, (1, 0), 5.0)])
@@ -522,12 +554,12 @@ def test_direct_makes_no_plane() -> None:
     scene = Scene((50, 40))
     scene.add(square(5), (3, 3))
     ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
-    plane = scene.code_plane()
-    assert plane is not None and plane.codes is None
+    plane = scene.label_plane()
+    assert plane is not None and plane.labels is None
     assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "samples", "rows"]
     assert left_out["composition"] == "direct: asked for"
     ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="direct"))
-    assert plane.codes is None
+    assert plane.labels is None
     assert list(ran) == [*BEGIN, "weights", "verdicts", "outside", "pre-filter", "samples", "walk", "rows"]
     assert left_out["code plane"] == "direct: asked for"
 
@@ -701,7 +733,7 @@ def test_bad_weapons(make: Any) -> None:
         make()
 
 
-@pytest.mark.parametrize("weapon", [None, "laser", Disc, {"kind": "point"}, Plain()])
+@pytest.mark.parametrize("weapon", [None, "laser", Disc, {"kind": "point"}, AreaWeapon()])
 def test_what_is_no_weapon_is_refused(weapon: Any) -> None:
     with pytest.raises(InputError, match="weapon: expected a weapon, got"):
         fire(Scene(), weapon, (0, 0))

@@ -1,5 +1,8 @@
 """PNG files in and out: every kind of PNG gives the right RGBA, a bad one an error, and a write is whole or nothing."""
 
+import errno
+import os
+import stat
 import struct
 import zlib
 from collections.abc import Callable
@@ -10,8 +13,11 @@ import cv2
 import numpy as np
 import pytest
 
-from planes.arrays import InputError
-from planes.image import read_png, write_png, write_text
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.files.png import read_png, write_png, write_text
+from hitplanes.planes.scene.scene import Scene
+from hitplanes.weapons.golden.check import claimed
+from hitplanes.weapons.replay.stream import Part
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 GREY, RGB, PALETTE, GREY_ALPHA, RGBA = 0, 2, 3, 4, 6
@@ -295,3 +301,108 @@ def test_what_is_no_image_is_not_written(
 def test_a_path_may_be_a_text(tmp_path: Path) -> None:
     write_png(str(tmp_path / "a.png"), np.full((1, 2, 3), 7, np.uint8))
     assert read_png(tmp_path / "a.png")[:, :, :3].tolist() == [[[7] * 3] * 2]
+
+
+def saved(folder: Path) -> None:
+    scene = Scene((40, 30))
+    scene.add(np.full((20, 20, 4), 255, np.uint8), (5, 5))
+    scene.save(folder / "level")
+
+
+def part_finished(folder: Path) -> None:
+    with Part(folder / "hits.jsonl", b'{"format": "x"}\n') as part:
+        part.cut()
+        part.write([b'{"shot":0'])
+        part.finish()
+
+
+PLACED: dict[str, tuple[Callable[[Path], object], list[str]]] = {
+    "text": (lambda folder: write_text(folder / "a.txt", "12345"), ["a.txt"]),
+    "PNG": (lambda folder: write_png(folder / "a.png", np.ones((2, 2, 3), np.uint8)), ["a.png"]),
+    "scene": (saved, ["sprite.png", "scene.json"]),
+    "part of a log": (part_finished, ["hits.jsonl"]),
+    "failures": (lambda folder: claimed(folder / "failures"), ["failures"]),
+}
+
+
+def recorded(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
+    """What is brought to the disk and renamed from here on: what, the inode, and its size then."""
+    told: list[tuple[str, str, int]] = []
+    fsync, replace = os.fsync, os.replace
+
+    def noted_fsync(file: int) -> None:
+        told.append(("fsync", str(os.fstat(file).st_ino), os.fstat(file).st_size))
+        fsync(file)
+
+    def noted_replace(old: Path, new: Path) -> None:
+        replace(old, new)
+        told.append(("replace", str(new), Path(new).stat().st_size))
+
+    monkeypatch.setattr("os.fsync", noted_fsync)
+    monkeypatch.setattr("os.replace", noted_replace)
+    monkeypatch.setattr("os.rename", lambda *_: pytest.fail("renamed without a word to the disk"))
+    return told
+
+
+@pytest.mark.parametrize("kind", PLACED)
+def test_the_bytes_are_on_the_disk_before_the_name_and_the_name_when_it_returns(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, names = PLACED[kind]
+    told = recorded(monkeypatch)
+    write(tmp_path)
+    places = [i for i, (what, _, _) in enumerate(told) if what == "replace"]
+    assert [Path(told[i][1]).name for i in places] == names
+    for i in places:
+        path = Path(told[i][1])
+        assert told[i + 1][:2] == ("fsync", str(path.parent.stat().st_ino))
+        if path.is_file():
+            assert ("fsync", str(path.stat().st_ino), path.stat().st_size) in told[:i]
+        else:
+            synced = {inode for what, inode, size in told[:i] if what == "fsync" and size}
+            assert {str(file.stat().st_ino) for file in (path, *path.iterdir())} <= synced
+
+
+@pytest.mark.parametrize("code", [errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EIO])
+def test_a_folder_that_cannot_be_synced_is_no_error_but_a_broken_disk_is(
+    code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fsync = os.fsync
+
+    def refused(file: int) -> None:
+        if stat.S_ISDIR(os.fstat(file).st_mode):
+            raise OSError(code, os.strerror(code))
+        fsync(file)
+
+    monkeypatch.setattr("os.fsync", refused)
+    if code == errno.EIO:
+        with pytest.raises(InputError, match=r"cannot write .*a.txt: Input/output error"):
+            write_text(tmp_path / "a.txt", "new")
+    else:
+        write_text(tmp_path / "a.txt", "new")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.txt", "new")]
+
+
+def test_a_file_that_cannot_be_synced_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_text(tmp_path / "a.txt", "old")
+
+    def refused(file: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("os.fsync", refused)
+    with pytest.raises(InputError, match=r"cannot write .*a.txt: No space left on device"):
+        write_text(tmp_path / "a.txt", "new")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.txt", "old")]
+
+
+def test_a_folder_that_may_be_written_and_not_read_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = os.open
+
+    def refused(path: Path, flags: int, mode: int = 0o777) -> int:
+        if Path(path).is_dir():
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return opened(path, flags, mode)
+
+    monkeypatch.setattr("os.open", refused)
+    write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").read_text() == "new"

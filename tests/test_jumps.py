@@ -15,11 +15,25 @@ from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Shot, some_battle, some_place, some_target
 from test_rays import check_columns
 
-import weapons.jumping
-import weapons.rayfire
-from planes import ALL, History, InputError, Scene, jumps
-from planes.twins import kernels_of
-from weapons import Hits, Laser, Pistol, RayHits, Rifle, Rounds, Spread, Sweep, Weapon, fire
+from hitplanes import (
+    ALL,
+    History,
+    Hits,
+    InputError,
+    Laser,
+    Pistol,
+    RayHits,
+    Rifle,
+    Rounds,
+    Scene,
+    Spread,
+    Sweep,
+    Weapon,
+    fire,
+)
+from hitplanes.planes.bits import distance_field
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.weapons.rays import first_hit, ray_call
 
 worlds = st.randoms(use_true_random=False)
 FAR = 2**20 - 400
@@ -28,7 +42,7 @@ FAR = 2**20 - 400
 @pytest.fixture
 def kernels(jit: bool) -> ModuleType:
     """The kernels, and their compiled twins."""
-    return kernels_of(jumps)
+    return kernels_of(distance_field)
 
 
 def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -47,18 +61,21 @@ def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
 @given(rng=worlds)
 def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: random.Random) -> None:
     plane = some_plane(rng)
-    found = kernels.clearance_of(plane)
-    assert found.dtype == np.uint8 and found.shape == tuple(n + 2 * jumps.PAD for n in plane.shape)
-    taken = [(y + jumps.PAD, x + jumps.PAD) for y, x in zip(*map(np.ndarray.tolist, np.nonzero(plane)), strict=True)]
+    found = kernels.distances_of(plane)
+    assert found.dtype == np.uint8 and found.shape == tuple(n + 2 * distance_field.PAD for n in plane.shape)
+    taken = [
+        (y + distance_field.PAD, x + distance_field.PAD)
+        for y, x in zip(*map(np.ndarray.tolist, np.nonzero(plane)), strict=True)
+    ]
     for (y, x), distance in np.ndenumerate(found):
-        assert distance == min((abs(y - v) + abs(x - u) for v, u in taken), default=jumps.FAR)
+        assert distance == min((abs(y - v) + abs(x - u) for v, u in taken), default=distance_field.FAR)
 
 
 def test_the_clearance_ends_at_what_a_byte_holds(kernels: ModuleType) -> None:
     plane = np.zeros((2, 700), np.bool_)
     plane[1, 650] = True
-    row = kernels.clearance_of(plane)[jumps.PAD].tolist()
-    assert row == [min(abs(x - jumps.PAD - 650) + 1, jumps.FAR) for x in range(704)]
+    row = kernels.distances_of(plane)[distance_field.PAD].tolist()
+    assert row == [min(abs(x - distance_field.PAD - 650) + 1, distance_field.FAR) for x in range(704)]
 
 
 def some_ray(rng: random.Random, h: int, w: int) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -79,10 +96,10 @@ def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: Module
     rays = [some_ray(rng, *plane.shape) for _ in range(rng.choice([1, 7, 80]))]
     start, step = (np.array(column) for column in zip(*rays, strict=True))
     note(f"{plane.astype(int).tolist()} {rays}")
-    clearance = kernels.clearance_of(plane)
-    entry, cell, several = kernels.first_taken(clearance, start + 256 * jumps.PAD, step)
+    distances = kernels.distances_of(plane)
+    entry, cell, several = kernels.first_taken(distances, start + 256 * distance_field.PAD, step)
     for k, (at, by) in enumerate(rays):
-        if entry[k] == jumps.UNDECIDED:
+        if entry[k] == distance_field.UNDECIDED:
             assert by == (0, 0)
             continue
         cells, _ = oracle_rays.thin_times(at, (at[0] + by[0], at[1] + by[1]))
@@ -91,28 +108,30 @@ def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: Module
             for (x, y), (time, _) in cells.items()
             if 0 <= x < plane.shape[1] and 0 <= y < plane.shape[0] and plane[y, x]
         }
-        assert entry[k] == min(met.values(), default=jumps.NOTHING)
+        assert entry[k] == min(met.values(), default=distance_field.NOTHING)
         first = [(x, y) for (x, y), time in met.items() if time == entry[k]]
-        y, x = divmod(int(cell[k]), clearance.shape[1])
-        assert not first or several[k] or first == [(x - jumps.PAD, y - jumps.PAD)]
+        y, x = divmod(int(cell[k]), distances.shape[1])
+        assert not first or several[k] or first == [(x - distance_field.PAD, y - distance_field.PAD)]
 
 
 def test_rays_from_anywhere_read_nothing_beyond_the_plane(kernels: ModuleType) -> None:
     """Also those that begin or end as far off as a position may be, or are too long to be followed."""
     plane = np.zeros((5, 7), np.bool_)
     plane[2, 3] = True
-    clearance = kernels.clearance_of(plane)
+    distances = kernels.distances_of(plane)
     rng = np.random.default_rng(1)
     start = rng.integers(-(2**48), 2**48, (2000, 2))
     step = rng.integers(-(2**29), 2**29, (2000, 2))
-    assert (kernels.first_taken(clearance, start, step)[0] == jumps.NOTHING).all()
+    assert (kernels.first_taken(distances, start, step)[0] == distance_field.NOTHING).all()
     ends = np.array([[2**23, 77], [-(2**23), 2**23 - 5], [2**29, 2**29], [2**35, 1]] * 2)
-    middle = np.array([(3 + jumps.PAD) * 256, (2 + jumps.PAD) * 256])
+    middle = np.array([(3 + distance_field.PAD) * 256, (2 + distance_field.PAD) * 256])
     for sign in (1, -1):
-        entry, cell, _ = kernels.first_taken(clearance, middle - sign * ends, 2 * sign * ends)
-        decided = entry != jumps.UNDECIDED
-        alone = [kernels.first_taken(clearance, middle - sign * end[None], 2 * sign * end[None]) for end in ends[:4]]
-        assert [int(one[0][0]) for one in alone][:2] == entry[:2].tolist() and alone[3][0][0] == jumps.UNDECIDED
+        entry, cell, _ = kernels.first_taken(distances, middle - sign * ends, 2 * sign * ends)
+        decided = entry != distance_field.UNDECIDED
+        alone = [kernels.first_taken(distances, middle - sign * end[None], 2 * sign * end[None]) for end in ends[:4]]
+        assert [int(one[0][0]) for one in alone][:2] == entry[:2].tolist() and alone[3][0][
+            0
+        ] == distance_field.UNDECIDED
         assert decided.tolist() == [True, True, False, False] * 2 and (cell[decided] == 4 * 11 + 5).all()
 
 
@@ -189,7 +208,7 @@ def test_what_comes_first_at_a_corner(
     kernels: ModuleType, name: str, turn: int, start: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nobody walks: what is taken at once is told from the planes."""
-    monkeypatch.setattr(weapons.rayfire, "trace", lambda *_: pytest.fail("walked"))
+    monkeypatch.setattr(ray_call, "trace", lambda *_: pytest.fail("walked"))
     bodies, _ = CORNERS[name]
     sx, sy = 1 - 2 * (turn & 1), 1 - (turn & 2)
     turned = [replace(b, pixels=frozenset((sx * x, sy * y) for x, y in b.pixels)) for b in bodies]
@@ -236,8 +255,8 @@ def test_shots_of_several_rays_in_parts(weapon: Weapon, monkeypatch: pytest.Monk
     rng = np.random.default_rng(5)
     scene, at = some_scene(rng), rng.uniform(0, 100, (70, 2))
     whole = fire(scene, weapon, at, aim=30, strategy="composed")
-    monkeypatch.setattr(weapons.rayfire, "CHUNK_ROWS", 64)
-    monkeypatch.setattr(weapons.jumping, "RAYS_AT_ONCE", 7)
+    monkeypatch.setattr(ray_call, "CHUNK_ROWS", 64)
+    monkeypatch.setattr(first_hit, "RAYS_AT_ONCE", 7)
     for strategy in ("composed", "direct"):
         hits = fire(scene, weapon, at, aim=30, strategy=strategy)
         assert hits == whole and len(hits.stop) == hits.rays > len(hits) > 35  # type: ignore[attr-defined]
@@ -354,12 +373,12 @@ def test_few_are_left_to_walk() -> None:
 def test_how_many_are_followed_together_changes_nothing(few: int) -> None:
     rng = np.random.default_rng(few)
     plane = rng.random((60, 90)) < 0.01
-    clearance = jumps.clearance_of(plane)
+    distances = distance_field.distances_of(plane)
     start, step = rng.integers(-20 * 256, 110 * 256, (300, 2)), rng.integers(-100 * 256, 100 * 256, (300, 2))
     start[:100] &= -128
     step[:100] &= -128
-    truth = jumps.first_taken(clearance, start, step)
+    truth = distance_field.first_taken(distances, start, step)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jumps, "FEW", few)
-        found = jumps.first_taken(clearance, start, step)
+        patch.setattr(distance_field, "FEW", few)
+        found = distance_field.first_taken(distances, start, step)
     assert all(np.array_equal(a, b) for a, b in zip(found, truth, strict=True))

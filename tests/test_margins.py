@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes import Scene, Sprite
-from weapons import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Spread, Stencil, Weapon, fire
-from weapons.margins import Margin
+from hitplanes import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Scene, Spread, Sprite, Stencil, Weapon, fire
+from hitplanes.weapons.explain.samples import Margin
 
 WEAPONS = (
     Point(), Disc(2), Disc(3.5, pierce=True), Ring(2, 4), Box(4, 3), Cone(7, 50), Beam(8, 2), Stencil(["#.#", ".#."]),

@@ -201,13 +201,12 @@ def test_normals_come_of_the_mask_or_of_the_side() -> None:
 def test_a_budget_ends_in_the_middle() -> None:
     wall = drawn("..aaaaa..", "a", 3, cost=2)
     found = shot((0, 0), (8, 0), wall, budget_256=5 * PX)
-    assert (found.stop.reason, px(found, found.stop.time), found.stop.item) == ("budget", 4.0, None)
+    assert (found.stop.reason, px(found, found.stop.time), found.stop.item) == ("budget", 4.0, 3)
     one = only(found)
     assert (one.cells, one.exit_xy, px(found, one.exit), one.material) == ([(2, 0), (3, 0), (4, 0)], (4, 0), 4.0, 2.5)
     slanted = shot((0, 0), (8, 0.25), wall, budget_256=5 * PX)
     assert only(slanted).material == 2.5 and slanted.stop.reason == "budget"
-    none = shot((0, 0), (8, 0), wall, budget_256=0)
-    assert (px(none, none.stop.time), only(none).cells, only(none).material) == (1.5, [(2, 0)], 0.0)
+    assert found.stop.cell_xy == (4, 0)
 
 
 def test_a_budget_ends_also_in_the_last_cell() -> None:
@@ -215,28 +214,35 @@ def test_a_budget_ends_also_in_the_last_cell() -> None:
     found = shot((0, 0), (4.25, 0), wall, budget_256=5 * PX // 2)
     assert (found.stop.reason, px(found, found.stop.time), found.walked) == ("budget", 4.0, 5)
     assert (only(found).cells[-1], px(found, only(found).exit)) == ((4, 0), 4.0)
-    assert shot((0, 0), (4, 0), wall, budget_256=5 * PX // 2).stop.reason == "range"
+    assert shot((0, 0), (4, 0), wall, budget_256=5 * PX // 2).stop.reason == "budget"
+    assert shot((0, 0), (4, 0), wall, budget_256=5 * PX // 2 + 1).stop.reason == "range"
 
 
-def test_what_is_just_enough_is_enough() -> None:
-    """All is spent on the first: the ray flies on, meets the second, and goes no deeper."""
+def test_what_is_just_enough_is_used_up() -> None:
+    """All is spent on the first: the ray ends where it leaves it."""
     a, b = drawn("..aaa..bb.", "a", 0), drawn("..aaa..bb.", "b", 1)
     found = shot((0, 0), (9, 0), a, b, budget_256=3 * PX)
     assert [(one.object, one.cells, one.material) for one in found.passes] == [
         (0, [(2, 0), (3, 0), (4, 0)], 3.0),
-        (1, [(7, 0)], 0.0),
     ]
-    assert (found.stop.reason, px(found, found.stop.time), found.walked) == ("budget", 6.5, 8)
-    assert shot((0, 0), (6, 0), a, b, budget_256=3 * PX).stop.reason == "range"
-    assert [one.object for one in shot((0, 0), (9, 0), a, b, budget_256=3 * PX - 1).passes] == [0]
+    assert (found.stop.reason, px(found, found.stop.time), found.walked) == ("budget", 4.5, 5)
+    assert (found.stop.item, found.stop.cell_xy) == (0, (4, 0))
+    for budget, objects in ((-1, [0]), (1, [0, 1])):
+        assert [p.object for p in shot((0, 0), (9, 0), a, b, budget_256=3 * PX + budget).passes] == objects
+
+
+def test_a_budget_of_nothing_is_used_up_at_the_muzzle() -> None:
+    free = drawn(".aaaa.", "a", 0, cost=0)
+    for begin in ((0, 0), (2, 0)):
+        found = shot(begin, (5, 0), free, budget_256=0)
+        assert (found.stop.reason, found.stop.time, found.passes, found.walked) == ("budget", 0, [], 0)
+        assert (found.stop.item, found.stop.cell_xy) == (None, begin)
 
 
 def test_two_objects_in_one_place_cost_both() -> None:
     a, b = drawn(".aaaa.", "a", 0, cost=1), drawn(".aaaa.", "a", 1, cost=3)
     found = shot((0, 0), (5, 0), a, b, budget_256=6 * PX)
     assert (px(found, found.stop.time), [one.material for one in found.passes]) == (2.0, [1.5, 1.5])
-    free = drawn(".aaaa.", "a", 0, cost=0)
-    assert shot((0, 0), (5, 0), free, budget_256=0).stop.reason == "range"
 
 
 def test_the_first_hit_and_the_second() -> None:

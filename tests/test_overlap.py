@@ -9,13 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-import planes.axes
-import planes.overlap
-from planes import InputError
-from planes.exact import orient2d
-from planes.overlap import TABLE, contains_point, overlap, separating_axis
-from planes.parts import BoxSets, ConcavePolygons, Parts
-from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
+from hitplanes import InputError
+from hitplanes.planes.volumes import overlap as overlap_module
+from hitplanes.planes.volumes.exact import orient2d
+from hitplanes.planes.volumes.overlap import TABLE, contains_point, overlap, separating_axis
+from hitplanes.planes.volumes.volumes import (
+    Aabbs,
+    BoxSets,
+    Capsules,
+    Circles,
+    ConcavePolygons,
+    Obbs,
+    Parts,
+    Polygons,
+    Volumes,
+)
 
 L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -226,10 +234,10 @@ def test_closed_forms_agree_with_points_and_a_radius(one: str, two: str) -> None
     a, b = ordinary(one, 2000, rng), ordinary(two, 2000, rng)
     rows = np.arange(2000)
     first, second = a.core(), b.core()
-    general = planes.overlap._near(first, second, rows, False)
+    general = overlap_module._near(first, second, rows, False)
     for hull, other in ((first, second), (second, first)):
         if (hull.counts > 2).any():
-            general |= planes.overlap._holds(hull, other, rows, False)
+            general |= overlap_module._holds(hull, other, rows, False)
     assert (overlap(a, b) == general).all()
 
 
@@ -356,7 +364,7 @@ def test_floats_are_never_sure_of_what_is_not_so(grown: bool, scale: float, monk
         b = Circles(place + out, np.sqrt((out * out).sum(axis=1)))
     a, b = a.scaled(scale), b.scaled(scale)
     found = [overlap(a, b), overlap(b, a), overlap(a, b, conservative=True)]
-    monkeypatch.setattr(planes.overlap, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
+    monkeypatch.setattr(overlap_module, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
     truth = overlap(a, b)
     assert 0.3 < truth.mean() < 0.9
     assert (found[0] == truth).all() and (found[1] == truth).all() and found[2][truth].all()
@@ -371,8 +379,8 @@ def test_a_row_that_found_its_axis_leaves_the_batch(monkeypatch: pytest.MonkeyPa
         rows += len(points[0])
         return orient2d(*points)
 
-    monkeypatch.setattr(planes.overlap, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
-    monkeypatch.setattr(planes.axes, "orient2d", counted)
+    monkeypatch.setattr(overlap_module, "hulls_sign", lambda one, two, rows: np.zeros(len(rows), np.int8))
+    monkeypatch.setattr(overlap_module, "orient2d", counted)
     a = Obbs.from_corners(np.tile(CORNERS * 1.0, (1000, 1, 1)))
     slanted = np.array([[0, -3], [3, 0], [0, 3], [-3, 0]]) + 3.5
     b = Obbs.from_corners(np.tile(slanted, (1000, 1, 1)))

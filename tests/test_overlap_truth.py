@@ -16,9 +16,8 @@ import pytest
 import touching
 from oracle_volumes import KINDS, PAIRS
 
-from planes.overlap import contains_point, overlap, separating_axis
-from planes.parts import BoxSets, ConcavePolygons
-from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
+from hitplanes.planes.volumes.overlap import contains_point, overlap, separating_axis
+from hitplanes.planes.volumes.volumes import Aabbs, BoxSets, Capsules, Circles, ConcavePolygons, Obbs, Polygons, Volumes
 
 SPACE_PAIRS = [("circle", "circle"), ("circle", "aabb"), ("aabb", "aabb")]
 ALL_PAIRS = [*((*pair, 2) for pair in PAIRS), *((*pair, 3) for pair in SPACE_PAIRS)]
@@ -114,7 +113,7 @@ def shape(kind: str, rows: touching.Rows, i: int) -> Shape:
 
 def wrong_of_many(kind_a: str, kind_b: str, dim: int, count: int, seed: int) -> list[Any]:
     a, b = touching.pairs(np.random.default_rng(seed), kind_a, kind_b, count, dim)
-    truth = touching.meet(kind_a, a, kind_b, b)
+    truth = touching.find_contacts(kind_a, a, kind_b, b)
     one, two = volume(kind_a, a), volume(kind_b, b)
     bad = (overlap(one, two) != truth) | (truth & ~overlap(one, two, conservative=True))
     return [(shape(kind_a, a, i), shape(kind_b, b, i)) for i in np.flatnonzero(bad)[:9]]
@@ -138,7 +137,7 @@ def test_truth_by_arrays_is_the_slow_truth_and_its_pairs_are_hard(kind_a: str, k
     a, b = touching.pairs(np.random.default_rng(2), kind_a, kind_b, 1500, dim)
     rows = [(shape(kind_a, a, i), shape(kind_b, b, i)) for i in range(1500)]
     truth = [exact.meets(kind_a, p, kind_b, q) for p, q in rows]
-    assert touching.meet(kind_a, a, kind_b, b).tolist() == truth
+    assert touching.find_contacts(kind_a, a, kind_b, b).tolist() == truth
     assert 0.4 < np.mean(truth) < 0.7
     ordinary = [i for i, row in enumerate(rows) if 1e-100 < max(map(abs, exact.leaves(row))) < 1e100]
     floats = [exact.meets_exactly_as(kind_a, kind_b, *rows[i]) for i in ordinary]

@@ -9,16 +9,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_compose import brute_codes, random_scene
 
-from planes import Scene, compose, painting, steps
-from planes.compose import CodePlane, label_plane
+from hitplanes import Scene
+from hitplanes.planes.bits import label_plane as compose
+from hitplanes.planes.bits import label_plane as painting
+from hitplanes.planes.bits import label_plane as steps
+from hitplanes.planes.bits.label_plane import LabelPlane, label_plane
 
 BOX = (-9, 4, 40, 33)
-NAMES = ["planes.painting", "planes.painting_jit"]
+NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.scene"]
 
 
 @pytest.fixture(params=NAMES)
 def kernels(request: pytest.FixtureRequest) -> Any:
-    if request.param.endswith("jit"):
+    if ".jit." in request.param:
         pytest.importorskip("numba")
     return importlib.import_module(request.param)
 
@@ -52,17 +55,17 @@ def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, each: bool,
         patch.setattr(painting, "PAIRS", int(rng.choice([1, 20, 2**18])))
         if each:
             patch.setattr(painting, "GROUPED_AREA", int(rng.choice([0, 100])))
-        codes = np.full(truth.shape, 999, kind)
-        kernels.paint(codes, BOX[0], BOX[1], dirty, painting.places_of(stack), stack.masks)
+        labels = np.full(truth.shape, 999, kind)
+        kernels.paint(labels, BOX[0], BOX[1], dirty, painting.places_of(stack), stack.masks)
     drawn = np.zeros(truth.shape, np.bool_)
     for x, y, x_max, y_max in dirty.tolist():
         drawn[y - BOX[1] : y_max - BOX[1] + 1, x - BOX[0] : x_max - BOX[0] + 1] = True
-    assert np.array_equal(codes, np.where(drawn, truth, 999))
+    assert np.array_equal(labels, np.where(drawn, truth, 999))
 
 
-@pytest.fixture(params=["planes.steps", "planes.steps_jit"])
+@pytest.fixture(params=["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.scene"])
 def stepping(request: pytest.FixtureRequest) -> Any:
-    if request.param.endswith("jit"):
+    if ".jit." in request.param:
         pytest.importorskip("numba")
     return importlib.import_module(request.param)
 
@@ -78,7 +81,7 @@ def test_a_plane_that_follows_steps_is_what_each_pixel_says(
     scene, (x, y, x_max, y_max) = heap(rng, count), BOX
     stack, size = scene.items.stack(), (y_max - y + 1, x_max - x + 1)
     places = painting.places_of(stack)
-    near, codes = stepping.near_of(places, x, y, *size), brute_codes(scene, BOX).astype(kind)
+    near, labels = painting.near_of(places, x, y, *size), brute_codes(scene, BOX).astype(kind)
     monkeypatch.setattr(painting, "GROUPED_AREA", int(rng.choice([0, 2**14])))
     for _ in range(6 if len(stack) else 0):
         rank = rng.permutation(len(stack))[: rng.choice([1, 1, 4])]
@@ -86,13 +89,13 @@ def test_a_plane_that_follows_steps_is_what_each_pixel_says(
         now = old + np.tile(rng.integers(-reach, reach + 1, (len(rank), 2)), 2)
         scene.move(stack.ids[rank], scene.items.position_256[stack.ids[rank]] / 256 + (now - old)[:, :2])
         if len(rank) == 1:
-            pixels = stepping.follow(codes, x, y, int(rank[0]), *now[0].tolist(), places, near, stack.masks)
+            pixels = stepping.follow(labels, x, y, int(rank[0]), *now[0].tolist(), places, near, stack.masks)
         else:
-            pixels = stepping.follow_all(codes, x, y, rank, now, places, near, stack.masks)
-        assert np.array_equal(codes, brute_codes(scene, BOX))
+            pixels = stepping.follow_all(labels, x, y, rank, now, places, near, stack.masks)
+        assert np.array_equal(labels, brute_codes(scene, BOX))
         assert pixels == sum(inside(box).sum() for box in [*old.tolist(), *now.tolist()])
         assert np.array_equal(places, painting.places_of(scene.items.stack()))
-        assert np.array_equal(near, stepping.near_of(places, x, y, *size))
+        assert np.array_equal(near, painting.near_of(places, x, y, *size))
 
 
 def inside(box: list[int]) -> Any:
@@ -105,7 +108,7 @@ def test_planes_follow_many_moves(jit: bool) -> None:
     """One object or many, near and far, once or twice before the plane is read."""
     rng = np.random.default_rng(jit)
     scene = random_scene(rng, 30)
-    plane, ids = CodePlane((-6, 2, 17, 16)), scene.ids()
+    plane, ids = LabelPlane((-6, 2, 17, 16)), scene.ids()
     for _ in range(60):
         for _ in range(rng.integers(1, 3)):
             some = rng.choice(ids, rng.choice([1, 1, 2, 9]), replace=False)
@@ -126,7 +129,7 @@ def test_a_short_step_is_drawn_as_one_box(many: bool, monkeypatch: pytest.Monkey
     scene = Scene((100, 60))
     ids = [scene.add(np.ones((4, 10), np.bool_), (20.5, 10.5))]
     ids += [scene.add(np.ones((4, 10), np.bool_), role="mover")] if many else []
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     wanted: list[tuple[tuple[float, float], list[list[int]]]] = [
         ((22.5, 11.5), [[16, 9, 27, 13]]),  # 60 px, and 80 in two
@@ -139,6 +142,7 @@ def test_a_short_step_is_drawn_as_one_box(many: bool, monkeypatch: pytest.Monkey
         ((97.5, 58.5), [[93, 56, 99, 59]]),
     ]
     plane.read(scene.items)
+    drawn.clear()  # the plane as it is at first
     for (x, y), boxes in wanted:
         scene.move(ids if many else ids[0], (x, y))
         (_, _, before, after), *_ = scene.items.changes(scene.version - 1)  # type: ignore[misc]

@@ -10,15 +10,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import InputError, Scene, Sprite, load_scene
-from planes.render import blend, draw_view
-from weapons import Disc, Laser, Pistol, Projectile, Rifle, Rounds, Spread, Sweep, Weapon, arsenal_of, fire
-from weapons.facts import report_of
-from weapons.marks import MARKS, TINT, glyph
-from weapons.orders import fire_order, orders_of
-from weapons.panel import legend_of
-from weapons.picture import picture_of_report
-from weapons.world import World
+from hitplanes import (
+    Disc,
+    InputError,
+    Laser,
+    Pistol,
+    Projectile,
+    Rifle,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Sweep,
+    Weapon,
+    arsenal_of,
+    fire,
+    load_scene,
+)
+from hitplanes.planes.scene.render import blend, draw_view
+from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.report.canvas import World, legend_of
+from hitplanes.weapons.report.picture import picture_of_report
+from hitplanes.weapons.report.report import report_of
+from hitplanes.weapons.report.symbols import MARKS, TINT, glyph
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 
@@ -150,7 +164,7 @@ def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
         "boxes": lambda: gallery_report(scene, "4 boxes", "grid"),
         "polygons": lambda: gallery_report(scene, "polygon", "bvh"),
         "batch": lambda: report_of(scene, [fire(scene, weapons["shotgun"], [(8 * i, 5 * i) for i in range(60)])]),
-        "out of view": lambda: told(scene, (weapons["blast"], (-300, 100)), (weapons["pistol"], (1e4, 9e4))),
+        "out of view": lambda: told(scene, (weapons["blast"], (-300, 100)), (weapons["point"], (1e4, 9e4))),
     }
     reports["rays"] = lambda: ray_report(scene)
     reports["rays, boxes"] = lambda: ray_report(scene, "4 boxes", "grid")

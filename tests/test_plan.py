@@ -17,32 +17,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-import planes.bitrows
-import planes.clearance
-import planes.compose
-import planes.fronttoback
-import planes.index
-import planes.items
-import planes.render
-import planes.visible
-import weapons.bitfire
-import weapons.ends
-import weapons.firing
-import weapons.firsthits
-import weapons.jumping
-import weapons.narrow
-import weapons.pattern
-import weapons.plan
-import weapons.rayfire
-import weapons.resolve
-import weapons.runfire
-import weapons.tracing
-from planes import History, Scene, Sprite
-from weapons import Box, Disc, Laser, Pistol, Point, Rifle, Weapon, fire, report_of
-from weapons.candidates import Candidates
-from weapons.hits import Hits
-from weapons.pattern import PatternTable
-from weapons.plan import Plan, PlanSum, plan_lines
+from hitplanes import Box, Disc, History, Laser, Pistol, Point, Rifle, Scene, Sprite, Weapon, fire, report_of
+from hitplanes.planes.bits import bit_rows, distance_field, front_to_back, label_plane, visible
+from hitplanes.planes.broadphase import boxes
+from hitplanes.planes.scene import items, render
+from hitplanes.weapons.fire import areas, call, prefilter, spans
+from hitplanes.weapons.fire import plan as plan_module
+from hitplanes.weapons.fire.hits import Hits
+from hitplanes.weapons.fire.plan import Plan, PlanSum, plan_lines
+from hitplanes.weapons.fire.prefilter import Candidates
+from hitplanes.weapons.kinds import weapon as weapon_module
+from hitplanes.weapons.kinds.weapon import PatternTable
+from hitplanes.weapons.rays import contacts, first_hit, ray_call, ray_walk
 
 ROOT = Path(__file__).parent.parent
 LEFT_OUT = runpy.run_path(str(ROOT / "fixtures" / "left_out.py"))
@@ -80,7 +66,7 @@ class Clock:
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.ns, self.patch = 0, patch
-        patch.setattr(weapons.plan, "perf_counter_ns", lambda: self.ns)
+        patch.setattr(plan_module, "perf_counter_ns", lambda: self.ns)
 
     def takes(self, owner: Any, name: str, ns: int) -> None:
         """Let every call of a function take so long."""
@@ -93,13 +79,13 @@ class Clock:
         self.patch.setattr(owner, name, slow)
 
 
-FIRING, RESOLVE, TRACING, RAYFIRE = weapons.firing, weapons.resolve, weapons.tracing, weapons.rayfire
-BITFIRE, RUNFIRE = weapons.bitfire, weapons.runfire
-OF_ALL = [(FIRING, "checked_shots", "shots", 1), (planes.items.Items, "stack_of", "stack", 10)]
+FIRING, RESOLVE, TRACING, RAYFIRE = call, spans, ray_walk, ray_call
+BITFIRE, RUNFIRE = areas, areas
+OF_ALL = [(FIRING, "checked_shots", "shots", 1), (items.Items, "stack_of", "stack", 10)]
 OF_BITS = [
     *OF_ALL,
-    (BITFIRE, "volley_of", "patterns", 200),
-    (BITFIRE, "windows_of", "patterns", 400),
+    (BITFIRE, "placements_for", "patterns", 200),
+    (BITFIRE, "pattern_bits_of", "patterns", 400),
     (BITFIRE, "chosen_form", "plan", 10**3),
     (BITFIRE, "chosen_candidates", "plan", 2 * 10**3),
     (BITFIRE, "leave_out_uncounted", "rows", 4 * 10**3),
@@ -107,19 +93,19 @@ OF_BITS = [
 OF_TILES = [
     *OF_BITS,
     (BITFIRE, "gathered", "samples", 10**4),
-    (planes.items.Items, "tiles", "tiles", 10**5),
+    (items.Items, "tiles", "tiles", 10**5),
     (Candidates, "near", "volumes", 10**6),
     (BITFIRE, "refused", "filter", 10**7),
     (BITFIRE, "in_front", "visible", 10**8),
-    (BITFIRE, "seen_of", "visible", 10**9),
+    (BITFIRE, "visible_tiles_of", "visible", 10**9),
 ]
 OF_PATTERNS = [
     *OF_ALL,
-    (RUNFIRE, "volley_of", "patterns", 200),
+    (RUNFIRE, "placements_for", "patterns", 200),
     (RUNFIRE, "chosen_strategy", "plan", 10**3),
     (RUNFIRE, "chosen_candidates", "plan", 2 * 10**3),
     (RUNFIRE, "leave_out_unused", "plan", 4 * 10**3),
-    (RUNFIRE, "rows_of_met", "rows", 10**4),
+    (RUNFIRE, "rows_of_span_hits", "rows", 10**4),
     (RESOLVE, "_count", "verdicts", 10**5),
     (PatternTable, "weight", "weights", 10**6),
     (RESOLVE, "refused", "filter", 10**7),
@@ -138,11 +124,11 @@ OF_RAYS = [
     (RAYFIRE, "rays_of", "rays", 10**3),
     (TRACING, "_enters", "pre-filter", 10**4),
     (TRACING, "refused", "filter", 10**5),
-    (weapons.narrow, "near_rays", "volumes", 10**6),
-    (TRACING, "meet", "walk", 10**7),
+    (prefilter, "near_rays", "volumes", 10**6),
+    (TRACING, "find_contacts", "walk", 10**7),
     (TRACING, "_started", "walk", 2 * 10**7),
-    (weapons.ends, "_end_at_occluders", "occluders", 10**8),
-    (weapons.ends, "_end_at_hits", "stops", 10**9),
+    (contacts, "_end_at_occluders", "occluders", 10**8),
+    (contacts, "_end_at_hits", "stops", 10**9),
     (RAYFIRE, "stops_of", "stops", 2 * 10**9),
     (RAYFIRE, "passes_of", "passes", 10**10),
     (RAYFIRE, "rows_of_passes", "rows", 10**11),
@@ -154,11 +140,11 @@ OF_JUMPS = [
     (RAYFIRE, "leave_out_absent", "plan", 200),
     (RAYFIRE, "chosen_way", "plan", 400),
     (RAYFIRE, "rays_of", "rays", 10**3),
-    (planes.compose.CodePlane, "read", "code plane", 10**4),
-    (planes.clearance.ClearancePlane, "read", "clearance plane", 10**5),
-    (weapons.jumping, "_first_taken", "jumps", 10**6),
-    (weapons.jumping, "refused", "filter", 10**7),
-    (weapons.firsthits.FirstHits, "rows", "rows", 10**8),
+    (label_plane.LabelPlane, "read", "code plane", 10**4),
+    (distance_field.DistanceField, "read", "clearance plane", 10**5),
+    (first_hit, "_first_taken", "jumps", 10**6),
+    (first_hit, "refused", "filter", 10**7),
+    (first_hit.FirstHits, "rows", "rows", 10**8),
 ]
 BOXES, INDEX = (Candidates, "meeting", "pre-filter", 10**12), (Candidates, "meeting", "broad phase", 10**12)
 CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]] = {
@@ -173,8 +159,8 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         {"strategy": "direct"},
         [
             *OF_BITS,
-            (planes.items.Items, "tiles", "tiles", 10**5),
-            (planes.fronttoback, "front_to_back", "samples", 10**6),
+            (items.Items, "tiles", "tiles", 10**5),
+            (front_to_back, "front_to_back", "samples", 10**6),
             (BITFIRE, "rows_of", "samples", 10**7),
         ],
     ),
@@ -184,8 +170,8 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         [
             *OF_BITS,
             (BITFIRE, "rows_of", "samples", 10**4),
-            (planes.visible.Compositions, "read", "composition", 10**5),
-            (planes.visible.Composition, "cells_for", "pre-filter", 10**6),
+            (visible.VisibleSets, "read", "composition", 10**5),
+            (visible.VisibleSet, "cells_for", "pre-filter", 10**6),
         ],
     ),
     "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
@@ -199,8 +185,8 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         {"strategy": "composed"},
         [
             *OF_PATTERNS,
-            (planes.compose.CodePlane, "read", "code plane", 10**9),
-            (RESOLVE, "read_codes", "read", 10**10),
+            (label_plane.LabelPlane, "read", "code plane", 10**9),
+            (RESOLVE, "read_labels", "read", 10**10),
         ],
     ),
     "rays": (Rifle(60, max_hits=2), {"aim": 30, "prefilter": "circle"}, [*OF_RAYS, BOXES]),
@@ -363,9 +349,9 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
         before[0], whole[0] = now, max(whole[0], most)
 
     monkeypatch.setattr(Plan, "run", measured)
-    monkeypatch.setattr(planes.bitrows, "WORDS_AT_ONCE", WORDS_AT_ONCE)
-    monkeypatch.setattr(planes.bitrows, "PAIRS_AT_ONCE", PAIRS_AT_ONCE)
-    monkeypatch.setattr(planes.fronttoback, "WORDS_AT_ONCE", WORDS_AT_ONCE // 2)
+    monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", WORDS_AT_ONCE)
+    monkeypatch.setattr(bit_rows, "PAIRS_AT_ONCE", PAIRS_AT_ONCE)
+    monkeypatch.setattr(front_to_back, "WORDS_AT_ONCE", WORDS_AT_ONCE // 2)
     tracemalloc.start()
     try:
         hits = fire(scene, weapon, at, accept=["default"], exclude=[5] * len(at), **how)
@@ -425,10 +411,10 @@ class Unread(np.ndarray[Any, Any]):
 
 def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(monkeypatch: pytest.MonkeyPatch) -> None:
     sorted_by: list[int] = []
-    lexsort, stack_of = np.lexsort, planes.items.Items.stack_of
+    lexsort, stack_of = np.lexsort, items.Items.stack_of
     monkeypatch.setattr(np, "lexsort", lambda keys: sorted_by.append(len(keys)) or lexsort(keys))
 
-    def guarded(self: planes.items.Items, *roles: planes.items.Role) -> planes.items.Stack:
+    def guarded(self: items.Items, *roles: items.Role) -> items.Stack:
         sorted_by.clear()
         stack = stack_of(self, *roles)
         assert sorted_by == [1 + stack.has_occluders + stack.layered]
@@ -436,7 +422,7 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
         refusing = {} if filtered else {name: getattr(stack, name).view(Unread) for name in ("categories", "owner")}
         return replace(stack, **columns, **refusing)
 
-    monkeypatch.setattr(planes.items.Items, "stack_of", guarded)
+    monkeypatch.setattr(items.Items, "stack_of", guarded)
     filtered = False
     for hits in mixed().values():
         assert hits and names(hits)[1] >= {"occluders", "layers", "filter"}
@@ -474,10 +460,10 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(owner, name, counted)
 
     for owner, name in (
-        (RESOLVE, "refused"), (BITFIRE, "refused"), (TRACING, "refused"), (weapons.ends, "_end_at_occluders"),
+        (RESOLVE, "refused"), (BITFIRE, "refused"), (TRACING, "refused"), (contacts, "_end_at_occluders"),
         (RESOLVE, "_look_behind"),
-        (weapons.pattern, "falloff_weights"), (planes.compose.CodePlane, "read"), (planes.index.Index, "read"),
-        (Candidates, "near"), (weapons.narrow, "near_rays"), (planes.render, "draw_view"), (PatternTable, "weight"),
+        (weapon_module, "falloff_weights"), (label_plane.LabelPlane, "read"), (boxes.Index, "read"),
+        (Candidates, "near"), (prefilter, "near_rays"), (render, "draw_view"), (PatternTable, "weight"),
         (RAYFIRE, "leave_out_absent"),
     ):  # fmt: skip
         count(owner, name)
@@ -515,7 +501,7 @@ def test_imagery_costs_a_shot_nothing(way: str, monkeypatch: pytest.MonkeyPatch)
     scenes = yard(), yard()
     for role in IMAGERY:
         scenes[1].add(Sprite.from_image(np.full((400, 600, 4), 255, np.uint8)), (30, 30), role=role, layer=9)
-    monkeypatch.setattr(planes.render, "draw_view", lambda *args: pytest.fail("drawn"))
+    monkeypatch.setattr(render, "draw_view", lambda *args: pytest.fail("drawn"))
     weapon, how = (Laser(60), {"aim": 30}) if way == "rays" else (Disc(9), {"strategy": way})
     plain, pictured = (fire(scene, weapon, SHOTS, **how) for scene in scenes)  # type: ignore[arg-type]
     assert plain == pictured and plain and costs(plain) == costs(pictured)
@@ -527,20 +513,20 @@ import sys, numpy.typing, numpy.random
 {}
 before = set(sys.modules)
 {}
-print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("planes", "weapons", "cv2", "numpy")))
+print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("hitplanes", "cv2", "numpy")))
 """
-START = "from planes import Scene; from weapons import Disc, Pistol, fire; scene = Scene((99, 99)); fire"
+START = "from hitplanes import Disc, Pistol, Scene, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "arrays bigfront bigrows bitrows bits cells compose constants cropping forms fronttoback grid256 heap image index"
-    " itemrows items kept labels lookup nearest painting pellets placing pointquery poses rasterise sampling scene"
-    " scenefile schema sines snapping spans sprite stack steps strips tiles turning twins visible"
+    "bits.bit_rows bits.cells bits.front_to_back bits.label_plane bits.span_walk bits.tiles bits.visible"
+    " common.backend common.caches common.checks common.limits common.tables grid.fixed_point grid.rasterize grid.spans"
+    " late scene.items scene.render scene.scene scene.sprite"
 )
 OF_FIRE = (
-    "arsenal bitfire candidates columns costs counting draws explain fewfire firing guns hits pattern plan resolve"
-    " runfire volley weapon windows"
+    "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"
+    " kinds.rays kinds.weapon late"
 )
-OF_A_RAY = "casting ends firsthits flight meetings passes rayexplain rayfire rayhits rays rayways trace tracing"
+OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk"
 
 
 def loaded(before: str, code: str) -> set[str]:
@@ -552,11 +538,17 @@ def loaded(before: str, code: str) -> set[str]:
 
 def test_what_is_loaded_by_importing_and_by_a_shot() -> None:
     """A shot of a pattern loads nothing that is not there by then; none loads cv2, volumes, broad phases, the past."""
-    assert loaded("", "import planes, weapons") == {"planes", "weapons"}
-    started = {f"planes.{name}" for name in OF_SCENES.split()} | {f"weapons.{name}" for name in OF_FIRE.split()}
-    assert loaded("import planes, weapons", START) == started
+    assert loaded("", "import hitplanes") == {"hitplanes"}
+    started = {f"hitplanes.planes.{name}" for name in OF_SCENES.split()}
+    started |= {f"hitplanes.weapons.{name}" for name in OF_FIRE.split()}
+    rooms = {name.rpartition(".")[0] for name in started} - {"hitplanes"}
+    assert loaded("import hitplanes", START) == started | rooms
     assert loaded(START, SHOT.format("Disc(3)")) == set()
-    of_ray = {f"weapons.{name}" for name in OF_A_RAY.split()} | {"planes.jumps", "planes.raycast", "planes.slabs"}
+    of_ray = {f"hitplanes.weapons.{name}" for name in OF_A_RAY.split()} | {
+        "hitplanes.planes.bits.distance_field",
+        "hitplanes.planes.bits.raycast",
+        "hitplanes.weapons.rays",
+    }
     assert loaded(START, SHOT.format("Pistol(3)")) == of_ray
 
 

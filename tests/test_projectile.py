@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from oracle_projectile import Thing, Vector, doubtful, flight, impacts, last_miss
 
-from planes import InputError, Scene
-from weapons import Projectile, RayHits, Reason, fire
+from hitplanes import InputError, Projectile, RayHits, Reason, Scene, fire
 
 SUB = 256
 ONE = np.ones((1, 1), np.bool_)

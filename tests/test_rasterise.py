@@ -13,8 +13,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planes import rasterise
-from planes.spans import Spans
+from hitplanes.planes.grid import rasterize
+from hitplanes.planes.grid.spans import Spans
 
 AGAINST = settings(max_examples=40, deadline=None)
 LAWS = settings(max_examples=30, deadline=None)
@@ -54,19 +54,19 @@ polygons = st.lists(ring_points, min_size=1, max_size=3)
 
 
 def beam(a: Point, b: Point, radius: int) -> Spans:
-    return rasterise.beam(np.array(a), np.array(b), radius)
+    return rasterize.beam(np.array(a), np.array(b), radius)
 
 
 def segment(a: Point, b: Point) -> Spans:
-    return rasterise.segment(np.array(a), np.array(b))
+    return rasterize.segment(np.array(a), np.array(b))
 
 
 def polygon(*rings: list[Point]) -> Spans:
-    return rasterise.polygon([np.array(ring, dtype=np.int64).reshape(-1, 2) for ring in rings])
+    return rasterize.polygon([np.array(ring, dtype=np.int64).reshape(-1, 2) for ring in rings])
 
 
 def cone(reach: int, axis: Point, half_degrees: float) -> Spans:
-    return rasterise.cone(reach, *axis, *oracle.unit(half_degrees))
+    return rasterize.cone(reach, *axis, *oracle.unit(half_degrees))
 
 
 def pixel_set(spans: Spans) -> Pixels:
@@ -108,7 +108,7 @@ def drawn(picture: str) -> Pixels:
 @example(5 * 256)  # 3, 4, 5
 @example(13 * 256)  # 5, 12, 13
 def test_disc(radius: int) -> None:
-    check(rasterise.disc(radius), lambda x, y: oracle.in_disc(x, y, radius))
+    check(rasterize.disc(radius), lambda x, y: oracle.in_disc(x, y, radius))
 
 
 @AGAINST
@@ -119,7 +119,7 @@ def test_disc(radius: int) -> None:
 @example(5 * 256 + 1, 13 * 256 - 1)
 def test_ring(one: int, other: int) -> None:
     inner, outer = sorted((one, other))
-    check(rasterise.ring(inner, outer), lambda x, y: oracle.in_ring(x, y, inner, outer))
+    check(rasterize.ring(inner, outer), lambda x, y: oracle.in_ring(x, y, inner, outer))
 
 
 @AGAINST
@@ -132,7 +132,7 @@ def test_ring(one: int, other: int) -> None:
 @example(5 * 256, 5 * 256, oracle.unit(30.0))
 @example(1, 14 * 256, oracle.unit(90.0))
 def test_ellipse(radius_x: int, radius_y: int, axis: Point) -> None:
-    check(rasterise.ellipse(radius_x, radius_y, *axis), lambda x, y: oracle.in_ellipse(x, y, radius_x, radius_y, *axis))
+    check(rasterize.ellipse(radius_x, radius_y, *axis), lambda x, y: oracle.in_ellipse(x, y, radius_x, radius_y, *axis))
 
 
 @settings(max_examples=67, deadline=None)
@@ -203,19 +203,19 @@ def test_the_two_references_of_a_segment_agree(a: Point, b: Point, dx: int, dy: 
 
 
 PICTURES: dict[str, tuple[Callable[[], Spans], str]] = {
-    "disc of 1 px": (lambda: rasterise.disc(256), ".#. #@# .#."),
-    "disc of 2 px": (lambda: rasterise.disc(512), "..#.. .###. ##@## .###. ..#.."),
-    "ring 1 to 2 px": (lambda: rasterise.ring(256, 512), "..#.. .###. ##o## .###. ..#.."),
+    "disc of 1 px": (lambda: rasterize.disc(256), ".#. #@# .#."),
+    "disc of 2 px": (lambda: rasterize.disc(512), "..#.. .###. ##@## .###. ..#.."),
+    "ring 1 to 2 px": (lambda: rasterize.ring(256, 512), "..#.. .###. ##o## .###. ..#.."),
     "ring of no width": (
-        lambda: rasterise.ring(1280, 1280),
+        lambda: rasterize.ring(1280, 1280),
         """
         .....#.....  ..#.....#..  .#.......#.  ...........  ...........  #....o....#
         ...........  ...........  .#.......#.  ..#.....#..  .....#.....""",
     ),
-    "ellipse 3 x 1 px": (lambda: rasterise.ellipse(768, 256, ONE, 0), "...#... ###@### ...#..."),
-    "flat ellipse": (lambda: rasterise.ellipse(600, 0, ONE, 0), "##@##"),
-    "flat upright ellipse": (lambda: rasterise.ellipse(0, 600, ONE, 0), "# # @ # #"),
-    "flat ellipse, turned": (lambda: rasterise.ellipse(600, 0, *oracle.unit(45.0)), "#.. .@. ..#"),
+    "ellipse 3 x 1 px": (lambda: rasterize.ellipse(768, 256, ONE, 0), "...#... ###@### ...#..."),
+    "flat ellipse": (lambda: rasterize.ellipse(600, 0, ONE, 0), "##@##"),
+    "flat upright ellipse": (lambda: rasterize.ellipse(0, 600, ONE, 0), "# # @ # #"),
+    "flat ellipse, turned": (lambda: rasterize.ellipse(600, 0, *oracle.unit(45.0)), "#.. .@. ..#"),
     "square on centres": (lambda: polygon([(0, 0), (512, 0), (512, 512), (0, 512)]), "@## ### ###"),
     "square on edges": (lambda: polygon([(-128, -128), (384, -128), (384, 384), (-128, 384)]), "@# ##"),
     "square between": (lambda: polygon([(1, 1), (511, 1), (511, 511), (1, 511)]), "o. .#"),
@@ -266,7 +266,7 @@ def test_picture(name: str) -> None:
         ("the same, half a pixel off", lambda: polygon([(128, 128), (2688, 128), (2688, 2688), (128, 2688)]), 100),
         ("diagonal of 20 px", lambda: segment((0, 0), (5120, 5120)), 61),
         ("row of 20 px", lambda: segment((0, 0), (5120, 0)), 21),
-        ("disc of 5 px", lambda: rasterise.disc(1280), 81),
+        ("disc of 5 px", lambda: rasterize.disc(1280), 81),
     ],
 )
 def test_count(name: str, make: Callable[[], Spans], count: int) -> None:
@@ -294,11 +294,11 @@ def plus(p: Point, d: Point) -> Point:
 
 
 FAMILIES: dict[str, Family] = {
-    "disc": Family(lengths, rasterise.disc, lambda p, _: p),
-    "ring": Family(st.tuples(lengths, lengths).map(sorted), lambda p: rasterise.ring(*p), lambda p, _: p),
+    "disc": Family(lengths, rasterize.disc, lambda p, _: p),
+    "ring": Family(st.tuples(lengths, lengths).map(sorted), lambda p: rasterize.ring(*p), lambda p, _: p),
     "ellipse": Family(
         st.tuples(lengths, lengths, directions),
-        lambda p: rasterise.ellipse(p[0], p[1], *p[2]),
+        lambda p: rasterize.ellipse(p[0], p[1], *p[2]),
         lambda p, f: (p[0], p[1], f(p[2])),
     ),
     "polygon": Family(
@@ -335,7 +335,7 @@ MAPS: dict[str, Callable[[Point], Point]] = {
 def test_a_flat_ellipse_all_but_along_an_axis_has_its_middle_alone(radii: tuple[int, int], slope: int) -> None:
     """The next centre on it lies millions of pixels away, where squares overflow."""
     for c, s in ((ONE, slope), (slope, ONE), (-ONE, slope), (slope, -ONE)):
-        assert pixel_set(rasterise.ellipse(*radii, c, s)) == {(0, 0)}
+        assert pixel_set(rasterize.ellipse(*radii, c, s)) == {(0, 0)}
 
 
 @pytest.mark.parametrize("linear", MAPS)
@@ -368,10 +368,10 @@ def test_moves_by_whole_pixels(family: str, far_px: int) -> None:
 def test_inputs_are_left_alone() -> None:
     a, b, ring = np.array([3, 700]), np.array([-900, 5]), np.array([[0, 0], [900, 30], [40, 1000]])
     copies = [v.copy() for v in (a, b, ring)]
-    rasterise.segment(a, b)
-    rasterise.segment(b, a)
-    rasterise.beam(a, b, 200)
-    rasterise.polygon([ring, ring])
+    rasterize.segment(a, b)
+    rasterize.segment(b, a)
+    rasterize.beam(a, b, 200)
+    rasterize.polygon([ring, ring])
     assert all(np.array_equal(v, copy) for v, copy in zip((a, b, ring), copies, strict=True))
 
 
@@ -386,23 +386,23 @@ def is_within(narrow: Spans, wide: Spans) -> bool:
 @given(lengths, lengths)
 def test_a_larger_disc_covers_a_smaller(one: int, other: int) -> None:
     small, large = sorted((one, other))
-    assert is_within(rasterise.disc(small), rasterise.disc(large))
+    assert is_within(rasterize.disc(small), rasterize.disc(large))
 
 
 @LAWS
 @given(st.lists(lengths, min_size=4, max_size=4).map(sorted))
 def test_a_ring_covers_a_ring_within_its_edges(radii: list[int]) -> None:
-    assert is_within(rasterise.ring(radii[1], radii[2]), rasterise.ring(radii[0], radii[2]))
-    assert is_within(rasterise.ring(radii[1], radii[2]), rasterise.ring(radii[1], radii[3]))
-    assert is_within(rasterise.ring(radii[1], radii[2]), rasterise.disc(radii[2]))
+    assert is_within(rasterize.ring(radii[1], radii[2]), rasterize.ring(radii[0], radii[2]))
+    assert is_within(rasterize.ring(radii[1], radii[2]), rasterize.ring(radii[1], radii[3]))
+    assert is_within(rasterize.ring(radii[1], radii[2]), rasterize.disc(radii[2]))
 
 
 @LAWS
 @given(lengths, lengths, lengths, directions)
 def test_a_larger_ellipse_covers_a_smaller(one: int, other: int, across: int, axis: Point) -> None:
     small, large = sorted((one, other))
-    assert is_within(rasterise.ellipse(small, across, *axis), rasterise.ellipse(large, across, *axis))
-    assert is_within(rasterise.ellipse(across, small, *axis), rasterise.ellipse(across, large, *axis))
+    assert is_within(rasterize.ellipse(small, across, *axis), rasterize.ellipse(large, across, *axis))
+    assert is_within(rasterize.ellipse(across, small, *axis), rasterize.ellipse(across, large, *axis))
 
 
 @LAWS
@@ -447,10 +447,10 @@ def test_a_longer_cone_covers_a_shorter_on_exact_axes(one: int, other: int, eigh
 @LAWS
 @given(lengths, directions)
 def test_a_disc_by_other_names(radius: int, axis: Point) -> None:
-    disc = rasterise.disc(radius)
+    disc = rasterize.disc(radius)
     tip = oracle.turned((radius, 0), *axis)
-    assert rasterise.ring(0, radius) == disc
-    assert rasterise.ellipse(radius, radius, *axis) == disc
+    assert rasterize.ring(0, radius) == disc
+    assert rasterize.ellipse(radius, radius, *axis) == disc
     assert beam((0, 0), (0, 0), radius) == disc
     assert cone(radius, axis, 180.0) == disc.union(segment((0, 0), tip))
 
@@ -459,7 +459,7 @@ def test_a_disc_by_other_names(radius: int, axis: Point) -> None:
 @given(lengths, lengths, directions)
 def test_an_ellipse_by_its_other_axis(radius_x: int, radius_y: int, axis: Point) -> None:
     c, s = axis
-    assert rasterise.ellipse(radius_x, radius_y, c, s) == rasterise.ellipse(radius_y, radius_x, -s, c)
+    assert rasterize.ellipse(radius_x, radius_y, c, s) == rasterize.ellipse(radius_y, radius_x, -s, c)
 
 
 @LAWS
@@ -469,7 +469,7 @@ def test_two_half_cones_are_the_disc(reach: int, axis: Point) -> None:
     both = cone(reach, (c, s), 90.0).union(cone(reach, (-c, -s), 90.0))
     tip = oracle.turned((reach, 0), c, s)
     axes = segment((0, 0), tip).union(segment((0, 0), (-tip[0], -tip[1])))
-    assert both == rasterise.disc(reach).union(axes)
+    assert both == rasterize.disc(reach).union(axes)
 
 
 @LAWS
@@ -574,7 +574,7 @@ def test_a_hole_keeps_its_rim(numbers: list[int]) -> None:
 
 def test_a_disc_of_a_million_pixels() -> None:
     for radius in (FAR, FAR - 1):
-        disc = rasterise.disc(radius)
+        disc = rasterize.disc(radius)
         rows = disc.y.tolist()
         assert (rows[0], rows[-1]) == (-(radius // 256), radius // 256)
         assert len(disc) == 2 * (radius // 256) + 1
@@ -587,7 +587,7 @@ def test_a_disc_of_a_million_pixels() -> None:
 
 @pytest.mark.parametrize(("short_by", "width"), [(0, 800_000), (1, 799_999)])
 def test_a_large_disc_with_centres_on_its_edge(short_by: int, width: int) -> None:
-    disc = rasterise.disc(256 * 1_000_000 - short_by)  # 3, 4, 5
+    disc = rasterize.disc(256 * 1_000_000 - short_by)  # 3, 4, 5
     for y in (-600_000, 600_000):
         i = int(np.searchsorted(disc.y, y))
         assert (int(disc.x_first[i]), int(disc.x_last[i])) == (-width, width)
@@ -595,7 +595,7 @@ def test_a_large_disc_with_centres_on_its_edge(short_by: int, width: int) -> Non
 
 def test_a_ring_of_a_million_pixels() -> None:
     inner, outer = FAR - 300, FAR
-    ring = rasterise.ring(inner, outer)
+    ring = rasterize.ring(inner, outer)
     for y in (0, 1, 741_455, 1_000_003, 2**20):
         edge = math.isqrt(max(outer**2 - (256 * y) ** 2, 0)) // 256
         for x in range(max(edge - 4, 0), edge + 3):
@@ -764,7 +764,7 @@ def test_a_long_edge_a_hair_off_a_centre(way: Point, side: int, off_px: int, f: 
 
 
 def test_a_flat_ellipse_of_a_million_pixels() -> None:
-    spans = rasterise.ellipse(FAR, 640, ONE, 0)
+    spans = rasterize.ellipse(FAR, 640, ONE, 0)
     assert (spans.y.min(), spans.y.max()) == (-2, 2)
     for y in range(-3, 4):
         width = math.isqrt(max(640**2 - (256 * y) ** 2, 0)) * FAR // 640 // 256
@@ -774,7 +774,7 @@ def test_a_flat_ellipse_of_a_million_pixels() -> None:
 
 def test_a_long_narrow_cone() -> None:
     axis, half = oracle.unit(0.001), oracle.unit(0.0004)
-    spans = rasterise.cone(FAR, *axis, *half)
+    spans = rasterize.cone(FAR, *axis, *half)
     for x in (0, 1, 10, 1000, 65_537, 2**20 - 1, 2**20):
         middle = round(x * math.radians(0.001))
         for y in range(middle - 12, middle + 13):

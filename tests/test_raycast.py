@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from test_jumps import answer, single, some_ray
 from test_rays import check_columns
 
-import weapons.rayfire
-from planes import Scene, raycast
-from planes.jumps import NOTHING, UNDECIDED
-from planes.stack import Stack
-from planes.twins import in_parts, kernels_of
-from weapons import Pistol, Rifle, Rounds, Spread, Sweep, Weapon, fire, prepare, rayways
+from hitplanes import Pistol, Rifle, Rounds, Scene, Spread, Sweep, Weapon, fire, prepare
+from hitplanes.planes.bits import raycast
+from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
+from hitplanes.planes.common.backend import in_parts, kernels_of
+from hitplanes.planes.scene.items import Stack
+from hitplanes.weapons.rays import first_hit, ray_call
 
 worlds = st.randoms(use_true_random=False)
 Bounds = tuple[int, int, int, int]
@@ -240,9 +240,9 @@ def test_rays_that_are_cast_hit_what_rays_that_walk_hit(kernels: ModuleType, rng
     battle = single(rng, count)
     note(repr(battle))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rayways, "WALK_CALL_NS", 1e12)
+        patch.setattr(first_hit, "WALK_CALL_NS", 1e12)
         cast = answer(battle, "direct")
-        patch.setattr(rayways, "WALK_CALL_NS", -1e12)
+        patch.setattr(first_hit, "WALK_CALL_NS", -1e12)
         assert cast == answer(battle, "direct")
     if not isinstance(cast, str):
         check_columns(cast, battle.walks(), battle.gun.falloff)
@@ -263,8 +263,8 @@ def test_all_weapons_that_end_at_their_first_hit_are_cast(
     for k in range(30):
         scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
     walked = fire(scene, weapon, at, aim=30, prefilter="box")
-    monkeypatch.setattr(rayways, "WALK_CALL_NS", 1e12)
-    monkeypatch.setattr(weapons.rayfire, "trace", lambda *_: pytest.fail("walked"))
+    monkeypatch.setattr(first_hit, "WALK_CALL_NS", 1e12)
+    monkeypatch.setattr(ray_call, "trace", lambda *_: pytest.fail("walked"))
     cast = fire(scene, weapon, at, aim=30, strategy="direct")
     assert cast == walked and len(cast) > 20
     stages = {stage.name for stage in cast.plan.ran}, {stage.name for stage in cast.plan.left_out}

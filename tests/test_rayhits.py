@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Pixel, Shot, some_battle, some_body, some_place, some_target
 from test_rays import bar, harmless, same
 
-from planes import InputError, Scene
-from weapons import (
+from hitplanes import (
     Disc,
+    InputError,
     Laser,
     Pistol,
     Projectile,
@@ -28,14 +28,15 @@ from weapons import (
     Reason,
     Rifle,
     Rounds,
+    Scene,
     Spread,
     Sweep,
     Verdict,
     Weapon,
     fire,
 )
-from weapons.hits import HitRow
-from weapons.tracing import trace
+from hitplanes.weapons.fire.hits import HitRow
+from hitplanes.weapons.rays.ray_walk import trace
 
 FAR = 10**9
 worlds = st.randoms(use_true_random=False)
@@ -73,10 +74,12 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     for options in (*walks, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("weapons.rayfire.trace", lambda *given, calls=calls: calls.append(1) or trace(*given))
-            patch.setattr("weapons.rayfire.RAYS_MOST", chunk)
-            patch.setattr("planes.cells.PAIRS_AT_ONCE", chunk * 8)
-            patch.setattr("weapons.meetings.CHUNK_SAMPLES", chunk)
+            patch.setattr(
+                "hitplanes.weapons.rays.ray_call.trace", lambda *given, calls=calls: calls.append(1) or trace(*given)
+            )
+            patch.setattr("hitplanes.weapons.rays.ray_call.RAYS_MOST", chunk)
+            patch.setattr("hitplanes.planes.bits.cells.PAIRS_AT_ONCE", chunk * 8)
+            patch.setattr("hitplanes.weapons.rays.contacts.CHUNK_SAMPLES", chunk)
             cut = fired(battle, scene=scene, **options)
             assert len(calls) >= -(-len(whole.stop) // chunk)
         same(whole, cut)
@@ -87,7 +90,7 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
 def test_a_start_inside_is_named_by_its_row_in_any_part(
     rays: int, bad: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("weapons.rayfire.RAYS_MOST", rays)
+    monkeypatch.setattr("hitplanes.weapons.rays.ray_call.RAYS_MOST", rays)
     for around in ({}, {"sweep": (30.0, 3)}, {"rounds": (2, (0.0, 0.0), 5.0)}):
         gun = Gun(range=9, inside="error", **around)  # type: ignore[arg-type]
         shots = [Shot((20 if i in bad else 0, 20)) for i in range(6)]
@@ -285,19 +288,28 @@ def squared(a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction], cell: Pi
     return min(of_point(a), of_point(b), *corners)
 
 
-def beyond(pixels: Collection[tuple[int, int]], bounds: tuple[int, int, int, int]) -> bool:
-    """Whether the box around pixels lies wholly out of bounds."""
-    xs, ys = ([p[axis] for p in pixels] for axis in (0, 1))
-    return max(xs) < bounds[0] or min(xs) > bounds[2] or max(ys) < bounds[1] or min(ys) > bounds[3]
+def inside(pixels: Collection[Pixel], bounds: tuple[int, int, int, int] | None) -> set[Pixel]:
+    """Pixels that lie within bounds: those that could be hit."""
+    if bounds is None:
+        return set(pixels)
+    return {(x, y) for x, y in pixels if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
 
 
-@settings(max_examples=40, deadline=None)
+def some_bounds(rng: random.Random, at: tuple[float, float]) -> tuple[int, int, int, int] | None:
+    """None, or such as cut bodies near a place; it may lie out of them."""
+    x, y = round(at[0]), round(at[1])
+    near = x - rng.randint(-2, 9), y - rng.randint(-2, 9)
+    return rng.choice([None, (*near, near[0] + rng.randint(3, 15), near[1] + rng.randint(3, 15))])
+
+
+@settings(max_examples=120, deadline=None)
 @given(worlds)
 def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
     battle = many(rng, 2)
     bodies = battle.bodies[:3]
     bodies += [some_body(rng, len(bodies)).moved(9, 5), some_body(rng, len(bodies)).moved(-9, 2)]
-    battle = replace(battle, bodies=bodies)
+    bounds = rng.choice([battle.bounds, some_bounds(rng, battle.shots[0].at)])
+    battle = replace(battle, bodies=bodies, bounds=bounds)
     note(repr(battle))
     hits = fired(battle)
     radius = round(battle.gun.width * 128) / 256
@@ -314,10 +326,10 @@ def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
         walked = {tuple(xy) for xy in cells.xy[cells.verdict < Verdict.OUTSIDE].tolist()}
         bodies_hit = {int(owner[item]) for item in hit}
         for item in battle.accepted(shot):
-            if item.occluder or not item.pixels or int(owner[item.id]) in bodies_hit or item.pixels & walked:
+            if item.occluder or int(owner[item.id]) in bodies_hit or item.pixels & walked:
                 continue
-            if battle.bounds is None or not beyond(item.pixels, battle.bounds):
-                least = min(squared(a, b, cell) for a, b in segments for cell in item.pixels)  # type: ignore[arg-type]
+            if can_be_hit := inside(item.pixels, bounds):
+                least = min(squared(a, b, cell) for a, b in segments for cell in can_be_hit)  # type: ignore[arg-type]
                 distances[item.id] = max(math.sqrt(least) - radius, 0.0)
         grazed = {item for item, distance in distances.items() if not distance}  # met as the ray ended, or not at all
         miss = hits.nearest_miss(which)
@@ -330,7 +342,8 @@ def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
         assert miss.distance == pytest.approx(nearest, abs=1e-9)
         assert distances[miss.object] == pytest.approx(nearest, abs=1e-9)
         body = battle.bodies[miss.object]
-        assert any(all(abs(p - q) <= 0.5 + 1e-9 for p, q in zip(miss.object_xy, c, strict=True)) for c in body.pixels)
+        nearby = inside(body.pixels, bounds)
+        assert any(all(abs(p - q) <= 0.5 + 1e-9 for p, q in zip(miss.object_xy, c, strict=True)) for c in nearby)
         assert max(math.dist(miss.ray_xy, miss.object_xy) - radius, 0) == pytest.approx(nearest, abs=1e-9)
         rays = list(zip(stops.round.tolist(), stops.pellet.tolist(), strict=True))
         a, b = segments[rays.index((miss.round, miss.pellet))]
@@ -364,6 +377,12 @@ def test_the_nearest_miss_in_a_picture() -> None:
         assert near is not None and near[0] == 1 - two.index(corner) and near.distance == 2.5
     outside = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [bar(13, 14)], (0, 0, 9, 9)))
     assert outside.nearest_miss() is None, "what lies out of bounds is no miss"
+    slanted = Body(frozenset({(9, 5), (10, 3), (11, 1)}))
+    cut = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [slanted], (0, 0, 9, 9)))
+    assert (cut.nearest_miss() or [None] * 4)[3] == 4.5, "a pixel out of bounds cannot be hit"
+    hook = Body(frozenset({(5, 4), (6, 4), (12, 0), (12, 1)}))
+    touched = fired(Battle(Gun("laser", range=20), [Shot((0, 0))], [hook], (0, 0, 9, 9)))
+    assert (touched.nearest_miss() or [None] * 4)[3] == 3.5, "a pixel out of bounds is no pixel that was touched"
     wide = fired(Battle(Gun("laser", range=20, width=4), [Shot((0, 0), accept=1)], [bodies[3]]))
     assert (wide.nearest_miss() or [None] * 4)[3] == 1.5
     assert fired(Battle(Gun(range=20), [Shot((0, 0))], [bodies[0]])).nearest_miss() is None
@@ -382,6 +401,11 @@ WHY: dict[str, tuple[Gun, Shot, list[Body], tuple[Any, ...]]] = {
                             (0, "behind", 4, {1: 1}, 0.0)),
     "behind what took all": (Gun("rifle", range=20, budget=1.5), Shot((0, 0)), [bar(9, 12), bar(5, 6)],
                              (0, "behind", 4, {1: 1}, 0.0)),
+    "behind what took all, just there": (Gun("rifle", range=20, budget=2), Shot((0, 0)), [bar(7, 12), bar(5, 6)],
+                                         (0, "behind", 6, {1: 1}, 0.0)),
+    "no budget": (Gun("rifle", range=20, budget=0), Shot((0, 0)), [bar(0, 2)], (0, "budget", 3, {}, 0.0)),
+    "no budget, beside": (Gun("rifle", range=20, budget=0), Shot((0, 0)), [bar(5, 6, 3, 4)],
+                          (0, "missed", 0, {}, math.hypot(4.5, 2.5))),
     "behind a wall in the same cell": (Gun(range=20), Shot((0, 0)), [bar(5, 5), bar(5, 5, occluder=True)],
                                        (0, "behind", 1, {1: 1}, 0.0)),
     "outside": (Gun(range=20), Shot((0, 0)), [bar(12, 13)], (0, "outside", 2, {}, 0.0)),
@@ -397,6 +421,16 @@ def test_why_an_object_was_not_hit(name: str) -> None:
     assert hits.why_not() == [told]
     if told[1] == "missed":
         assert hits.nearest_miss() is not None
+
+
+def test_what_a_ray_touches_as_its_budget_is_used_up_is_no_miss_and_has_no_margin() -> None:
+    """Beside what took the last px, and a step behind it."""
+    bodies = [bar(2, 4), bar(5, 6), bar(8, 9)]
+    hits = fired(Battle(Gun("rifle", range=20, budget=3), [Shot((0, 0))], bodies))
+    assert {margin.object: margin.distance for margin in hits.margins(0) if not margin.hit} == {1: 0.0, 2: 3.0}
+    miss = hits.nearest_miss(0)
+    assert miss is not None and (miss.object, miss.distance) == (2, 3.0)
+    assert [why[:4] for why in hits.why_not(0)] == [(1, "behind", 2, {0: 1}), (2, "behind", 2, {0: 1})]
 
 
 def test_what_a_projectile_slips_past() -> None:
@@ -454,7 +488,7 @@ def test_walls_that_ended_rays_and_what_lies_behind_them() -> None:
 
 def test_rays_of_every_weapon_through_nothing() -> None:
     guns: list[Weapon] = [
-        Laser(50), Pistol(50, width=4), Rifle(0, budget=0), Projectile(9, 2), Projectile(9, 2, steps=3),
+        Laser(50), Pistol(50, width=4), Rifle(0, budget=1), Projectile(9, 2), Projectile(9, 2, steps=3),
         Sweep(Laser(9), 90, 3), Spread(Laser(9), 3, 3), Rounds(Laser(5), 2, (1, 0)),
     ]  # fmt: skip
     nothing = Scene()
@@ -545,7 +579,7 @@ def test_a_long_thick_ray_tells_all_but_its_cells() -> None:
 
 
 def test_cells_that_are_too_many_are_refused_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("weapons.rayexplain.DETAIL_SAMPLES_MAX", 500)
+    monkeypatch.setattr("hitplanes.weapons.explain.ray_samples.DETAIL_SAMPLES_MAX", 500)
     hits = fired(Battle(Gun("rifle", range=100, width=9, max_hits=1), [Shot((0, 0))], [bar(9, 9), bar(50, 50)]))
     for ask in (hits.samples_at, hits.verdict_counts, lambda: hits.verdicts):
         with pytest.raises(InputError, match=r"samples: expected a shot of at most 500 to tell one by one, got 1221"):

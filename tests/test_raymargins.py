@@ -15,9 +15,8 @@ from oracle_margins import Segment
 from oracle_rays import StartsInside, Walk
 from ray_battles import Battle, Ray
 
-from planes import InputError, Scene, Sprite
-from weapons import Laser, Pistol, Projectile, Rounds, Spread, Sweep, fire, report_of
-from weapons.raymargins import RAYS_MAX
+from hitplanes import InputError, Laser, Pistol, Projectile, Rounds, Scene, Spread, Sprite, Sweep, fire, report_of
+from hitplanes.weapons.explain.ray_margins import RAYS_MAX
 
 NEAR = 1e-6
 """Shifts are tried to this part of a px short of a margin, and as far beyond."""

@@ -7,21 +7,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import Scene, Sprite
-from planes.arrays import Bools, Image
-from weapons import Laser, Pistol, Projectile, Rifle, Rounds, Spread, Sweep, Weapon, fire
-from weapons.cards import shot_card
-from weapons.facts import report_of
-from weapons.inset import CELL, COLUMNS, ROWS, inset_of
-from weapons.overlay import Overlay
-from weapons.panel import NAMED_SIGNS, legend_of
-from weapons.picture import picture_of_report
-from weapons.raymarks import draw_rays
-from weapons.raywords import missed
-from weapons.signs import BADGE, BLUE, CROWDED, MINT, NEAR_MISS, ORANGE, SEVERAL, SIGNS, THROUGH, YELLOW, sign_mark
-from weapons.strokes import Strokes, within
-from weapons.words import apart
-from weapons.world import World
+from hitplanes import Laser, Pistol, Projectile, Rifle, Rounds, Scene, Spread, Sprite, Sweep, Weapon, fire
+from hitplanes.planes.common.checks import Bools, Image
+from hitplanes.weapons.report.canvas import NAMED_SIGNS, World, legend_of
+from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
+from hitplanes.weapons.report.overlay import Overlay, draw_rays
+from hitplanes.weapons.report.phrases import apart, missed
+from hitplanes.weapons.report.picture import picture_of_report
+from hitplanes.weapons.report.report import report_of
+from hitplanes.weapons.report.symbols import (
+    BADGE,
+    BLUE,
+    CROWDED,
+    MINT,
+    NEAR_MISS,
+    ORANGE,
+    SEVERAL,
+    SIGNS,
+    THROUGH,
+    YELLOW,
+    Strokes,
+    sign_mark,
+    within,
+)
 
 FACTOR = 8
 VIEW = (0, 0, 59, 39)
@@ -351,6 +359,10 @@ def test_a_card_tells_the_way_of_one_ray() -> None:
     assert ("not thief", "behind wall") in lines and not any("not bee" in line for line in lines)
     budget = shot_card(told(scene, Rifle(160, budget=30)), 0, scene).lines
     assert ["ended in crate, 89.0 px: budget used up"] in budget
+    just = shot_card(told(scene, Rifle(160, budget=19)), 0, scene).lines
+    assert ["ended in apple, 59.5 px: budget used up"] in just and ("not crate", "behind apple") in just
+    nothing = shot_card(told(scene, Rifle(160, budget=0)), 0, scene).lines
+    assert ["ended after 0.0 px: budget used up"] in nothing and ("not crate", "no budget to begin with") in nothing
     pistol = shot_card(told(scene, Pistol(160)), 0, scene).lines
     assert ["ended at apple, 40.5 px: last hit"] in pistol
     free = shot_card(told(scene, Laser(30), (10, 90)), 0, scene).lines

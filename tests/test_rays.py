@@ -36,10 +36,9 @@ from ray_battles import (
     stop_of,
 )
 
-import weapons.rayfire
-import weapons.tracing
-from planes import InputError, Scene, Sprite
-from weapons import Hits, Laser, Sweep, Verdict, Weapon, fire, trace
+from hitplanes import Hits, InputError, Laser, Scene, Sprite, Sweep, Verdict, Weapon, fire
+from hitplanes.planes.grid import rasterize
+from hitplanes.weapons.rays import ray_call, ray_walk
 
 PASS_COLUMNS = (
     "shot", "round", "pellet", "object", "order", "entry_xy", "exit_xy", "entry", "exit", "entry_px", "exit_px",
@@ -96,9 +95,8 @@ def check_columns(hits: Hits, walks: list[list[tuple[Ray, Walk]]], falloff: str 
     assert rows == truth
     for row, (_, _, walked) in zip(stops, flat, strict=True):
         cells, cell = walked.path.cells, tuple(row["cell_xy"])
-        if row["reason"] == 3:
-            spender = next(one for one in walked.passes if one.object == row["item"])
-            assert cell in spender.cells and cells[cell][1] >= walked.stop.time
+        if row["reason"] == 3 and walked.passes:
+            assert cell in next(one for one in walked.passes if one.object == row["item"]).cells
         if row["reason"] == 0:
             assert cells[cell][1] == max(leave for _, leave in cells.values()), "the far end lies in its cell"
 
@@ -286,9 +284,9 @@ def test_the_size_of_parts_changes_nothing(rng: random.Random, cells_at_once: in
     battle = harmless(some_battle(rng))
     truth = battle.fired()
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(weapons.rayfire, "CHUNK_CELLS", cells_at_once)
-        patched.setattr(weapons.rayfire, "CHUNK_PAIRS", pairs_at_once)
-        patched.setattr(weapons.tracing, "CHUNK_SAMPLES", pairs_at_once)
+        patched.setattr(ray_call, "CHUNK_CELLS", cells_at_once)
+        patched.setattr(ray_call, "CHUNK_PAIRS", pairs_at_once)
+        patched.setattr(ray_walk, "CHUNK_SAMPLES", pairs_at_once)
         same(battle.fired(), truth)
         same(battle.fired(prefilter="none"), truth)
 
@@ -527,6 +525,61 @@ def bar(x0: int, x1: int, y0: int = -1, y1: int = 1, **values: Any) -> Body:
     return Body(frozenset((x, y) for x in range(x0, x1 + 1) for y in range(y0, y1 + 1)), **values)
 
 
+@pytest.mark.parametrize("width", [0, 0.5, 1, 4])
+def test_a_ray_of_no_length_enters_and_leaves_at_once(width: float) -> None:
+    """Also what begins on its border; of a thick one also what it covers on all sides."""
+    bodies = [bar(0, 2), bar(-3, -1)]
+    for inside, struck in (("hit", [0, 1]), ("ignore_until_exit", [])):
+        battle = Battle(Gun(range=0, width=width, inside=inside), [Shot((-0.5, 0.25))], bodies)
+        check(battle)
+        hits = battle.fired()
+        assert sorted(hits.passes.object.tolist()) == struck
+        for column in (hits.passes.entry, hits.passes.exit, hits.passes.exit_px, hits.passes.material):
+            assert column.tolist() == [0.0] * len(struck)
+        assert (hits.stop.reason.tolist(), hits.stop.fraction.tolist(), hits.stop.distance.tolist()) == (
+            [0],
+            [1.0],
+            [0.0],
+        )
+
+
+def test_each_item_is_ignored_until_its_own_first_exit() -> None:
+    """The long one while the short one is already met again; what only touches the short one is met at once."""
+    short = Body(frozenset({(0, 0), (1, 0), (5, 0), (8, 0)}))
+    bodies = [short, bar(0, 3), bar(2, 2), Body(frozenset({(0, 0), (7, 0)}), occluder=True)]
+    battle = Battle(Gun(inside="ignore_until_exit"), [Shot((0, 0), (9, 0))], bodies)
+    check(battle)
+    hits = battle.fired()
+    assert dict(zip(hits.passes.object.tolist(), hits.passes.entry_px.tolist(), strict=True)) == {2: 1.5, 0: 4.5}
+    assert (hits.stop.item.tolist(), hits.stop.distance.tolist()) == ([3], [6.5])
+
+
+@pytest.mark.parametrize("width", [0.5, 1, 1.4, 3, 6.5])
+def test_times_of_a_thick_ray_are_entered_rounded_up_and_left_rounded_down(width: float) -> None:
+    """In parts of its squared length: from when the disc has the centre or the point the square to when neither has."""
+    rounded = 0
+    for end in ((13.25, 5.5), (-7, 9.125), (11, -0.25)):
+        dx, dy = pair(end)
+        full, r = dx * dx + dy * dy, round(128 * width)
+        for x, y in {(round(end[0] * part), round(end[1] * part) + aside) for part in (0.25, 0.5) for aside in (0, 1)}:
+            hits = Battle(Gun(width=width), [Shot((0, 0), end)], [bar(x, x, y, y)]).fired()
+            along, cross = 256 * (x * dx + y * dy), 256 * (x * dy - y * dx)
+            times = []
+            if cross * cross <= r * r * full:
+                root = oracle_rays.root(Fraction(r * r * full - cross * cross))
+                times.append((along - root, along + root))
+            thin = oracle_rays.thin_cells((0, 0), (dx, dy)).get((x, y))
+            times += [(full * thin[0], full * thin[1])] if thin else []
+            assert len(hits.passes) == bool(times)
+            if times:
+                entry = max(min(first for first, _ in times), Fraction(0))
+                leave = min(max(last for _, last in times), Fraction(full))
+                rounded += entry.denominator > 1
+                assert hits.passes.entry.tolist() == [math.ceil(entry) / full]
+                assert hits.passes.exit.tolist() == [math.floor(leave) / full]
+    assert rounded
+
+
 def test_a_rifle_through_three_boards() -> None:
     boards = [bar(x, x + 1) for x in (2, 5, 8)]
     battle = Battle(Gun("rifle", budget=4.5), [Shot((0, 0), (12, 0))], boards)
@@ -585,30 +638,43 @@ def test_the_longest_rays(reach: int, width: float) -> None:
 @pytest.mark.parametrize("width", [1 / 128, 0.25, 0.5, 1, 1.25, 1.75])
 @pytest.mark.parametrize("reach", [20, 150, 2000])
 def test_narrow_rays(reach: int, width: float) -> None:
-    """Thick, but less than a pixel's diagonal: times are those of the oracle, but for a rounding."""
+    """Thick, but less than a pixel's diagonal: the square of a cell may last longer than its centre."""
     for slope, name in ((0.25, "half"), (0.25 + 1 / 256, "a quarter"), (1.5, "about the diagonal"), (-2, "half")):
-        battle = far_battle(reach, slope, width, name)
-        hits, (((_, walked),),) = battle.fired(), battle.walks()
-        unit = 2 / walked.path.length2
-        found = columns(hits.passes, PASS_COLUMNS)
-        assert [row["object"] for row in found] == [one.object for one in walked.passes]
-        for row, one in zip(found, walked.passes, strict=True):
-            for part, time in ((row["entry"], one.entry), (row["exit"], one.exit)):
-                assert abs(Fraction(part) - Fraction(time) / walked.path.scale) <= unit
-            assert abs(row["material"] - one.material) <= 4 * unit * reach
-        assert hits.stop.reason.tolist() == [["range", "occluder", "hits", "budget"].index(walked.stop.reason)]
-        xy = {(x, y) for x, y in hits.samples_at(0).xy.tolist()}
-        assert xy == set(walked.order)
+        check(far_battle(reach, slope, width, name))
 
 
 C_SHAPE = frozenset({(x, y) for x in range(5) for y in (0, 2)} | {(0, 1)})
+CORNERS = [bar(2, 4, -1, 9), bar(1, 1, 2, 2), bar(5, 5, 5, 5), bar(5, 5, 6, 6)]
+"""What a ray through (1.5, 1.5) and (4.5, 5.5) goes through; its neighbours there: two are but touched at a corner."""
+
 PICTURES = {
-    "enough for the first, and no deeper into the second": (
+    "used up behind the first": (
         Gun("rifle", budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(7, 8)],
     ),
-    "enough for the first, and the second touches it": (
-        Gun("rifle", budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(5, 8)],
+    "used up where the second begins": (Gun("rifle", budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(5, 8)]),
+    "used up where a wall begins": (
+        Gun("rifle", budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(5, 8, occluder=True)],
     ),
+    "used up where the last begins": (
+        Gun("rifle", max_hits=2, budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(5, 8)],
+    ),
+    "used up where the range ends": (
+        Gun("rifle", budget=3), Shot((0, 0), (4.5, 0)), [bar(2, 4), bar(5, 6, occluder=True)],
+    ),
+    "used up, and more to come that is free": (
+        Gun("rifle", budget=3), Shot((0, 0), (9, 0)), [bar(2, 4), bar(1, 6, cost=0, layer=1), bar(5, 6, cost=0)],
+    ),
+    "used up at a corner": (Gun("rifle", budget=5), Shot((0, -0.5), (9, 11.5)), CORNERS),
+    "a little left at a corner": (Gun("rifle", budget=5 + 1 / 256), Shot((0, -0.5), (9, 11.5)), CORNERS),
+    "used up where a thick ray leaves": (
+        Gun("rifle", width=4, budget=6), Shot((0, 0), (12, 0)), [bar(3, 3, 0, 0), bar(5, 5, 0, 0), bar(7, 8)],
+    ),
+    "used up in a gap of an object": (
+        Gun("rifle", budget=1), Shot((0, 0), (9, 0)), [Body(frozenset({(2, 0), (4, 0)}))],
+    ),
+    "nothing to spend, at a wall": (Gun("rifle", budget=0), Shot((0, 0), (9, 0)), [bar(0, 1, occluder=True)]),
+    "nothing to spend, and no length": (Gun("rifle", range=0, budget=0), Shot((0, 0)), [bar(0, 1)]),
+    "something to spend, and no length": (Gun("rifle", range=0, budget=1 / 256), Shot((0, 0)), [bar(0, 1)]),
     "used up in the last cell": (Gun("rifle", budget=2.5), Shot((0, 0), (4.25, 0)), [bar(2, 6)]),
     "used up at the end": (Gun("rifle", budget=2.75), Shot((0, 0), (4.25, 0)), [bar(2, 6)]),
     "two in one place, one dearer": (
@@ -670,13 +736,71 @@ def test_pictures(name: str, bounds: tuple[int, int, int, int] | None) -> None:
 @pytest.mark.parametrize("cost", [1, 7])
 @pytest.mark.parametrize("short", [-1, 0, 1])
 def test_a_slanted_budget_is_compared_exactly(times: int, cost: int, short: int) -> None:
-    """5 px through 3 columns, 3 : 4 down: just enough lets the ray meet the second board, and 1/256 px less not."""
+    """5 px through 3 columns, 3 : 4 down: only 1/256 px more than enough lets the ray meet the second board."""
     boards = [bar(2, 4, -1, 20, cost=cost), bar(7, 9, -1, 20)]
     for name in TURNS:
         shot = Shot((0, 0), (9 * times, 12 * times))
         battle = Battle(Gun("rifle", budget=5 * cost - short / 256), [shot], boards)
         (((_, walked),),) = check(turned_world(battle, TURNS[name])) if times < 40 or name == "half" else battle.walks()
-        assert [one.object for one in walked.passes] == ([0] if short > 0 else [0, 1])
+        assert [one.object for one in walked.passes] == ([0] if short >= 0 else [0, 1])
+        if not short:
+            last = walked.passes[0]
+            assert (walked.stop.reason, walked.stop.item, walked.stop.time) == ("budget", 0, last.exit)
+
+
+def test_a_budget_ends_where_an_object_ends() -> None:
+    """Neither a touch at that moment nor what lies beyond is hit; a touch before is."""
+    for budget, objects in ((5, [0, 1]), (5 + 1 / 256, [0, 1, 2, 3])):
+        hits = Battle(Gun("rifle", budget=budget), [Shot((0, -0.5), (9, 11.5))], CORNERS).fired()
+        assert sorted(hits.object.tolist()) == objects
+    hits = Battle(Gun("rifle", budget=5), [Shot((0, -0.5), (9, 11.5))], CORNERS).fired()
+    assert dict(zip(hits.passes.object.tolist(), hits.passes.material.tolist(), strict=True)) == {0: 5.0, 1: 0.0}
+    assert hits.stop.to_rows() == [
+        {
+            "shot": 0, "round": 0, "pellet": 0, "reason": 3, "item": 0, "cell_xy": [4, 5], "fraction": 0.5,
+            "distance": 7.5, "point_xy": [4.5, 5.5], "normal_xy": [0, 0],
+        }
+    ]  # fmt: skip
+    told = {tuple(xy): verdict for xy, verdict in zip(*(v.tolist() for v in hits.samples_at(0)[::3]), strict=True)}
+    assert {xy for xy in ((4, 5), (4, 6), (5, 5), (5, 6)) if told[xy] == Verdict.BEYOND} == {(4, 6), (5, 5), (5, 6)}
+    assert hits.verdicts.sum() == hits.fired[0] == len(told)
+
+
+@pytest.mark.parametrize("cost", [3, 7])
+@pytest.mark.parametrize("step", [(72, 135), (100, 105), (420, 441)])
+def test_a_ray_whose_budget_ends_with_an_object_ends_just_there(step: Pixel, cost: int) -> None:
+    """Floats that are worked out from lengths would end a hair before it."""
+    columns, length = {72: (8, 17), 100: (20, 29), 420: (20, 29)}[step[0]]
+    bodies = [bar(2, 1 + columns, -1, 60, cost=cost), bar(2 + columns, 3 + columns, -1, 60)]
+    battle = Battle(Gun("rifle", budget=cost * length), [Shot((0, 0), step)], bodies)
+    check(battle, samples=False)
+    hits = battle.fired()
+    assert hits.stop.fraction.tolist() == hits.passes.exit.tolist() == [(1.5 + columns) / step[0]]
+    assert [why[:2] for why in hits.why_not(0)] == [(1, "behind")] and hits.nearest_miss(0) is None
+
+
+def test_a_budget_used_up_ends_before_what_else_would_end_the_ray() -> None:
+    for name in ("where a wall begins", "where the last begins", "where the range ends"):
+        gun, shot, bodies = PICTURES[f"used up {name}"]
+        stop = Battle(gun, [shot], bodies).fired().stop
+        assert (stop.reason.tolist(), stop.item.tolist(), stop.point_xy.tolist()) == ([3], [0], [[4.5, 0.0]])
+
+
+def test_every_ray_has_its_own_budget() -> None:
+    for more in ({"sweep": (0, 3)}, {"spread": (3, 0)}, {"rounds": (3, (0, 0), 0)}):
+        gun = Gun("rifle", range=9, budget=3, **more)  # type: ignore[arg-type]
+        hits = Battle(gun, [Shot((0, 0))], [bar(2, 4), bar(7, 8)]).fired()
+        assert hits.stop.distance.tolist() == [4.5] * 3 and set(hits.object.tolist()) == {0}
+
+
+@pytest.mark.parametrize("budget", [0, 0.001])
+def test_a_budget_of_nothing_is_used_up_at_the_muzzle(budget: float) -> None:
+    """Nothing is hit, not even what the ray starts in, at no cost."""
+    bodies = [bar(-1, 1, cost=0), bar(-1, 1, occluder=True)]
+    hits = Battle(Gun("rifle", range=9, budget=budget), [Shot((0.25, 0))], bodies).fired()
+    assert not len(hits) and hits.verdicts.tolist() == [[0, 0, 0, 0, 0, 10]]
+    assert (hits.stop.reason.tolist(), hits.stop.item.tolist()) == ([3], [-1])
+    assert (hits.stop.cell_xy.tolist(), hits.stop.point_xy.tolist()) == ([[0, 0]], [[0.25, 0.0]])
 
 
 def test_a_budget_by_a_hair() -> None:
@@ -719,7 +843,7 @@ def test_roots_of_far_and_wide_rays_are_exact() -> None:
         side = math.isqrt(radius * radius * length2)
         v = [rng.randint(-side, side) for _ in range(20)]
         v += [rng.choice([-1, 1]) * max(side - rng.randint(0, 2 ** rng.randint(0, 40)), 0) for _ in range(20)]
-        found = trace._far_roots(radius, np.array(v), np.full(len(v), length2))
+        found = rasterize._far_roots(radius, np.array(v), np.full(len(v), length2))
         assert found.tolist() == [math.isqrt(radius * radius * length2 - one * one) for one in v]
 
 
@@ -729,7 +853,7 @@ def test_roots_just_below_a_whole_number_are_exact() -> None:
         v, root = rng.randint(2**27, 2**28) << 16, (rng.randint(1, 8) << 31) + 1
         length2, rest = divmod(v * v + root * root - 1, 2**32)
         assert rest == 0
-        assert trace._far_roots(2**16, np.array([v]), np.array([length2])).tolist() == [root - 1]
+        assert rasterize._far_roots(2**16, np.array([v]), np.array([length2])).tolist() == [root - 1]
 
 
 def lattice_rays(rng: random.Random, count: int) -> list[tuple[Pixel, Pixel]]:
@@ -768,7 +892,7 @@ def check_cells(rays: list[tuple[Pixel, Pixel]], shift: Pixel = (0, 0)) -> int:
         leave += [row[3] for row in rows]
         scales.append(scale)
     ends = np.array(rays, np.int64) + 256 * np.array(shift)
-    found = trace.cells(ends[:, 0], ends[:, 1])
+    found = rasterize.cells(ends[:, 0], ends[:, 1])
     truth = (ray, np.array(xy) + np.array(shift), entry, leave, scales)
     for name, column, true in zip(("ray", "xy", "entry", "exit", "scale"), found, truth, strict=True):
         np.testing.assert_array_equal(column, true, err_msg=name)
@@ -819,11 +943,11 @@ def test_cells_of_the_longest_rays() -> None:
 
 def test_cells_of_no_rays() -> None:
     none = np.zeros((0, 2), np.int64)
-    assert [len(column) for column in trace.cells(none, none)] == [0] * 5
+    assert [len(column) for column in rasterize.cells(none, none)] == [0] * 5
 
 
 def test_inputs_are_left_as_they_were() -> None:
     ends = np.array([[[0, 0], [700, -300]], [[128, 128], [128, 128]]], np.int64)
     kept = ends.copy()
-    trace.cells(ends[:, 0], ends[:, 1])
+    rasterize.cells(ends[:, 0], ends[:, 1])
     np.testing.assert_array_equal(ends, kept)

@@ -1,9 +1,8 @@
-"""What the README shows is run as written."""
+"""What the README and the guides show is run as written, and what they link to is there."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import runpy
 import shutil
@@ -13,55 +12,130 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from guides import (
+    GLOSSARY,
+    GUIDES,
+    PAGES,
+    RAYS,
+    README,
+    ROOT,
+    SHOT,
+    SPEED,
+    WORLD,
+    Example,
+    blocks,
+    broken,
+    examples,
+    links,
+    name_of,
+    section,
+    text_of,
+)
 
-from planes import load_scene
-from planes.image import read_png
-from weapons import arsenal_of
-from weapons.arsenal import KINDS
-from weapons.candidates import PREFILTERS
-from weapons.cli import main
-from weapons.costs import BROADPHASES
-from weapons.orders import fire_order, orders_of
+from hitplanes import arsenal_of, load_scene
+from hitplanes.planes.files.png import read_png
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.fire.prefilter import PREFILTERS
+from hitplanes.weapons.fire.strategy import BROADPHASES
+from hitplanes.weapons.kinds.areas import KINDS
+from hitplanes.weapons.replay.shot_log import fire_order, orders_of
 
-ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README_LINES, GUIDE_LINES = 250, 299
 
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+EXAMPLES = [example for guide in GUIDES for example in examples(guide)]
 
 
-def section(heading: str) -> str:
-    return README.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+def named(example: Example) -> str:
+    return f"{name_of(example.guide)}-{example.number}"
 
 
 @pytest.mark.parametrize("heading", ["Run it", "Test it"])
 def test_each_command_is_one_block_of_one_line(heading: str) -> None:
-    (block,) = re.findall(r"```sh\n(.*?)```", section(heading), flags=re.DOTALL)
+    (block,) = blocks(section(README, heading), "sh")
     assert len(block.strip().splitlines()) == 1
 
 
-def test_ten_lines_print_what_is_shown() -> None:
-    code, shown = blocks("python")[0], blocks("text")[0]
-    assert len([line for line in code.splitlines() if line]) <= 10
-    words = [sys.executable, "-W", "error", "-c", code]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT, check=True)
-    assert done.stdout == shown
+@pytest.mark.parametrize("example", examples(README), ids=named)
+def test_examples_of_the_readme_have_ten_lines(example: Example) -> None:
+    assert len([line for line in example.code.splitlines() if line]) <= 10
 
 
-def test_batch_example_runs() -> None:
-    subprocess.run([sys.executable, "-W", "error", "-c", blocks("python")[1]], cwd=ROOT, check=True)
+@pytest.mark.parametrize("guide", GUIDES, ids=name_of)
+def test_a_guide_is_short(guide: Path) -> None:
+    assert len(text_of(guide).splitlines()) <= (README_LINES if guide == README else GUIDE_LINES)
 
 
-def test_report_example_writes_a_picture(tmp_path: Path) -> None:
-    code = blocks("python")[2].replace("fixtures/", f"{ROOT}/fixtures/")
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=tmp_path, env=env, check=True)
-    assert read_png(tmp_path / "flame.png").shape[0] > 500
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_to_files_and_headings(page: Path) -> None:
+    assert broken(page) == []
+
+
+def test_every_guide_can_be_reached_from_the_readme() -> None:
+    linked = {(ROOT / link).resolve() for link in links(text_of(README))}
+    index = ROOT / "planes" / "ABOUT.md"  # the README for package indexes
+    assert set(GUIDES) - {README, index} <= linked
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("guides.ROOT", tmp_path)
+    page = tmp_path / "page.md"
+    (tmp_path / "other.md").write_text("# One `x`, two?\n## Same\n## Same\n```sh\n# no heading\n```\n")
+    page.write_text(
+        "[a](other.md) ![b](none.png) [c](other.md#one-x-two) [d](other.md#same-1) [e](other.md#same-2) [f](#here)\n"
+        "[g](other.md#no-heading) [h](../up.md) `[i](code)` [j](https://example.org) [k](#deep)\n### Deep\n"
+        "```text\n[l](inside)\n```\n"
+    )
+    assert broken(page) == ["none.png", "other.md#same-2", "#here", "other.md#no-heading", "../up.md"]
+
+
+def test_an_example_is_shown_with_the_text_that_follows_at_once(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```python\na\n```\n\n```text\nb\n```\n\n```python\nc\n```\n\nso:\n\n```text\nd\n```\n")
+    assert examples(page) == [Example(page, 0, "a\n", "b\n"), Example(page, 1, "c\n", "")]
+
+
+@pytest.mark.parametrize("example", [one for one in EXAMPLES if "hits_golden" not in one.code], ids=named)
+def test_an_example_prints_what_is_shown(example: Example, tmp_path: Path) -> None:
+    """In a folder of its own; what prints nothing has no text after it."""
+    words = [sys.executable, "-W", "error", "-c", example.code.replace("fixtures/", f"{ROOT}/fixtures/")]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.stdout, done.stderr, done.returncode) == (example.shown, "", 0)
+    for name in re.findall(r"write_png\(\"(.*?)\"", example.code):
+        picture = read_png(tmp_path / name)
+        assert picture.shape[0] > 500 and picture.std() > 10
+
+
+WITHOUT_PICTURES = [
+    example
+    for guide in (README, RAYS, SPEED)
+    for example in examples(guide)
+    if "hits_golden" not in example.code and "_png" not in example.code
+]
+
+
+@pytest.mark.parametrize("example", WITHOUT_PICTURES, ids=named)
+def test_deciding_hits_needs_no_opencv(example: Example, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", f"import sys\nsys.modules['cv2'] = None\n{example.code}"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.stdout, done.stderr) == (example.shown, "")
+
+
+@pytest.mark.parametrize("example", [one for one in EXAMPLES if "hits_golden" in one.code], ids=named)
+def test_a_golden_example_is_accepted_and_holds(example: Example, pytester: pytest.Pytester) -> None:
+    (pytester.path / "test_blast.py").write_text(example.code)
+    shutil.copytree(ROOT / "fixtures" / "gallery", pytester.path / "level1")
+    runs = [pytester.runpytest_inprocess("-q", "-p", "no:cacheprovider", *more) for more in ([], ["--hits-update"], [])]
+    assert [int(done.ret) for done in runs] == [1, 0, 0]
+
+
+def test_speeds_of_the_readme_are_rows_of_the_whole_table() -> None:
+    told, whole = section(README, "How fast it is"), section(SPEED, "How fast is it?")
+    rows = [line for line in told.splitlines() if line.startswith("|")]
+    assert len(rows) > 5 and set(rows) <= set(whole.splitlines())
 
 
 def test_log_example_answers_what_is_shown(tmp_path: Path) -> None:
-    shot, answer = (block for block in blocks("text") if block.startswith('{"'))
+    shot, answer = blocks(section(SHOT, "A log of shots"), "text")
     (tmp_path / "shots.jsonl").write_text(shot)
     assert (
         main(
@@ -77,10 +151,9 @@ def test_golden_example_is_written_accepted_and_says_what_changed(
 ) -> None:
     """A user's golden test, in a folder of its own."""
     tmp_path = pytester.path
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setenv("COLUMNS", "200")
-    (code,) = (block for block in blocks("python") if "hits_golden" in block)
-    (told,) = re.findall(r"```text\n(.*?)```", section("A golden test of your own game"), flags=re.DOTALL)
+    text = section(SHOT, "A golden test of your own game")
+    (code,), (told,) = blocks(text, "python"), blocks(text, "text")
     (tmp_path / "test_blast.py").write_text(code)
     shutil.copytree(ROOT / "fixtures" / "gallery", tmp_path / "level1")
 
@@ -102,42 +175,46 @@ def test_golden_example_is_written_accepted_and_says_what_changed(
 
 
 def test_every_fixture_is_named() -> None:
-    told = section("Where things are")
+    told = section(README, "Where things are")
     for path in (ROOT / "fixtures").glob("*/scene.json"):
         assert f"`{path.parent.name}`" in told
 
 
 def test_scene_example_loads_and_hits(tmp_path: Path) -> None:
-    (tmp_path / "scene.json").write_text(blocks("json")[0])
+    (tmp_path / "scene.json").write_text(blocks(section(WORLD, "The scene folder"), "json")[0])
     scene = load_scene(tmp_path)
     (order,) = orders_of(scene, arsenal_of(scene))
     assert [scene.name_of(row.object) for row in fire_order(scene, order)] == ["duck"]
 
 
-def test_every_weapon_and_scene_key_is_told() -> None:
-    told = section("The scene folder")
+def test_every_weapon_and_its_fields_are_told() -> None:
+    told = section(SHOT, "The weapons")
     for kind, weapon in KINDS.items():
         assert f"`{kind}`" in told
         for field in fields(weapon):
             assert f"`{field.name}`" in told, f"{kind}: {field.name}"
 
 
-def test_pictures_are_there() -> None:
-    names = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert len(names) == 5
-    assert all((ROOT / name).stat().st_size < 420_000 for name in names)
+def test_every_key_of_an_object_and_of_a_shot_is_told() -> None:
+    told = section(WORLD, "The scene folder")
+    schema = json.loads((ROOT / "weapons" / "schemas" / "scene.json").read_text())["$defs"]
+    sources = (set(one["properties"]) for one in schema["object"]["anyOf"])
+    keys = set(schema["shot"]["properties"]).union(*sources) - {"name"}
+    assert len(keys) > 20 and {key for key in keys if f"`{key}`" not in told} == set()
 
 
-@pytest.mark.parametrize(
-    "heading", ["Volumes and broad phases", "Rays and projectiles", "Rewind, and a record of what was fired"]
-)
-def test_an_example_prints_what_is_shown(heading: str, tmp_path: Path) -> None:
-    told = section(heading)
-    code, shown = (re.findall(rf"```{word}\n(.*?)```", told, flags=re.DOTALL)[0] for word in ("python", "text"))
-    words = [sys.executable, "-W", "error", "-c", code.replace("fixtures/", f"{ROOT}/fixtures/")]
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=env, check=True)
-    assert done.stdout == shown
+PICTURES = ("gallery", "corridor", "rewind", "volumes", "study/kinds/areas")
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_are_shown(name: str) -> None:
+    path = ROOT / "fixtures" / f"{name}.png"
+    assert path in {(guide.parent / link).resolve() for guide in GUIDES for link in links(text_of(guide))}
+
+
+def test_pictures_are_small() -> None:
+    shown = {(guide.parent / link).resolve() for guide in GUIDES for link in links(text_of(guide))}
+    assert all(path.stat().st_size < 420_000 for path in shown if path.suffix == ".png")
 
 
 def test_volumes_are_as_false_as_the_table_tells() -> None:
@@ -152,14 +229,13 @@ def test_volumes_are_as_false_as_the_table_tells() -> None:
         wrong = bench["false_area"](volume, int(mask.sum())), bench["false_hits"](volume, mask, of_disc)
         rows.append([name, f"{bench['numbers_of'](volume):,}", *(f"{100 * share:.0f} %" for share in wrong)])
     rows.append([bench["PIXELS"], f"{mask.size:,}", "0 %", "0 %"])
-    table = [
-        line.strip("| ").split(" | ") for line in section("Volumes and broad phases").split("--- |\n")[1].splitlines()
-    ]
+    told = section(WORLD, "Volumes and broad phases").split("--- |\n")[1]
+    table = [line.strip("| ").split(" | ") for line in told.splitlines()]
     assert [row[:4] for row in table[: len(rows)]] == rows and table[0][4] == "1.0"
 
 
 def test_volumes_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = section("Volumes and broad phases")
+    told = section(WORLD, "Volumes and broad phases")
     report, demo = re.findall(r"^- `hitplanes (.*?)`", told, flags=re.MULTILINE)
     monkeypatch.chdir(ROOT)
     assert main([*report.split(), "-o", str(tmp_path / "report.png")]) == 0
@@ -171,11 +247,11 @@ def test_a_plan_is_printed_as_it_is_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But for the times."""
-    told = section("What a shot costs")
+    told = section(SPEED, "What a shot costs")
     (command,) = re.findall(r"`hitplanes (report .*?)`", told)
     monkeypatch.chdir(ROOT)
     assert main([*command.split(), "-o", str(tmp_path / "report.png")]) == 0
-    texts = capsys.readouterr().out, re.findall(r"```text\n(.*?)```", told, flags=re.DOTALL)[0]
+    texts = capsys.readouterr().out, blocks(told, "text")[0]
     printed, shown = (re.sub(r" +", " ", re.sub(r"[\d,]+\.\d us", "us", text)) for text in texts)
     assert printed == shown
 
@@ -186,9 +262,9 @@ def test_what_a_scene_pays_for_is_as_the_table_tells() -> None:
     chosen = [0, *(rows[0].index(name) for name in left_out["SHORT"])]
     some = [[row[i] for i in chosen] for row in rows]
     some = [row for row in some if set(row[1:]) - {"-", ""}]
-    assert left_out["markdown"](some) in section("What a shot costs")
+    assert left_out["markdown"](some) in section(SPEED, "What a shot costs")
 
 
 def test_glossary_names_every_verdict() -> None:
-    counts = json.loads(blocks("text")[0].splitlines()[-1].replace("'", '"'))
-    assert all(verdict in section("Glossary") for verdict in counts)
+    counts = json.loads(examples(README)[0].shown.splitlines()[-1].replace("'", '"'))
+    assert all(verdict in text_of(GLOSSARY) for verdict in counts)

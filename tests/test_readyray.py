@@ -15,11 +15,26 @@ from ray_battles import some_battle
 from test_jumps import single
 from test_ready import changed, crowd, same
 
-from planes import InputError, Scene, use_jit
-from planes.grid256 import unit
-from planes.twins import kernels_of
-from weapons import Hits, Laser, Pistol, RayHits, Ready, Rifle, Rounds, Spread, Weapon, castone, fire, prepare
-from weapons.readyray import OneRay, ReadyRay, direction
+from hitplanes import (
+    Hits,
+    InputError,
+    Laser,
+    Pistol,
+    RayHits,
+    Ready,
+    Rifle,
+    Rounds,
+    Scene,
+    Spread,
+    Weapon,
+    fire,
+    prepare,
+    use_jit,
+)
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.grid.fixed_point import unit
+from hitplanes.weapons.prepared import prepared_ray
+from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
 
 worlds = st.randoms(use_true_random=False)
 AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
@@ -28,7 +43,7 @@ AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
 @pytest.fixture
 def kernels(jit: bool) -> ModuleType:
     """What rays are cast by, and its compiled twin."""
-    return kernels_of(castone)
+    return kernels_of(prepared_ray)
 
 
 def both(
@@ -90,13 +105,13 @@ def test_rays_jump_once_a_scene_stood_still_for_long_enough(monkeypatch: pytest.
     try:
         ready = prepare(scene, Pistol(200))
         cast = [0]
-        truly = castone.raycast.first_touched
+        truly = prepared_ray.raycast.first_touched
 
         def counted(*args: Any) -> Any:
             cast[0] += 1
             return truly(*args)
 
-        monkeypatch.setattr(castone.raycast, "first_touched", counted)
+        monkeypatch.setattr(prepared_ray.raycast, "first_touched", counted)
         for _ in range(2):
             cast[0] = 0
             for k in range(80):
@@ -117,7 +132,7 @@ def test_a_ray_along_a_surface_does_not_jump_pixel_by_pixel(monkeypatch: pytest.
         fire(scene, Pistol(3900), (30, 42.25), strategy="composed")  # the plane is there
         looks = [0]
         monkeypatch.setattr(
-            castone.raycast, "first_touched", lambda *_, f=castone.raycast.first_touched: count(looks, f(*_))
+            prepared_ray.raycast, "first_touched", lambda *_, f=prepared_ray.raycast.first_touched: count(looks, f(*_))
         )
         hits = prepare(scene, Pistol(3900)).fire((30, 42.25))
         assert hits == fire(scene, Pistol(3900), (30, 42.25), prefilter="box") and len(hits) == 1 == looks[0]

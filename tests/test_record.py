@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import gc
+import hashlib
 import json
 import os
 import random
+import re
 import resource
 import subprocess
 import sys
+import threading
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from planes import History, InputError, Scene, load_scene
-from weapons import (
+from hitplanes import (
     Beam,
     Box,
     Cone,
     Disc,
+    History,
+    InputError,
     Laser,
     Pistol,
     Point,
@@ -30,17 +38,20 @@ from weapons import (
     Rifle,
     Ring,
     Rounds,
+    Scene,
     ShotRecord,
     Spread,
+    Sprite,
     Stencil,
     Sweep,
     Weapon,
     fire,
-    record,
+    load_scene,
     replay,
 )
-from weapons.arsenal import KINDS
-from weapons.record import hash_of
+from hitplanes.weapons.kinds.areas import KINDS
+from hitplanes.weapons.replay import record
+from hitplanes.weapons.replay.record import hash_of
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
@@ -88,7 +99,38 @@ def owners(n: int, most: int) -> list[list[int]]:
 
 
 def lines_of(path: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in path.read_bytes().splitlines()]
+    """The header and the shots, without their chain."""
+    lines = [json.loads(line) for line in path.read_bytes().splitlines()]
+    return [{key: value for key, value in line.items() if key != "chain"} for line in lines if "end" not in line]
+
+
+def write_sealed(path: Path, lines: Iterable[bytes]) -> None:
+    """JSON objects as a record has them: each ends with the hash of all bytes before it."""
+    so_far = hashlib.sha256()
+    with path.open("wb") as file:
+        for line in lines:
+            text = line.rstrip()[:-1]
+            so_far.update(text)
+            seal = f',"chain":"{so_far.hexdigest()[:16]}"}}\n'.encode()
+            so_far.update(seal)
+            file.write(text + seal)
+
+
+def write_record(path: Path, entries: list[dict[str, Any]]) -> None:
+    """A record as someone would forge it, with its chain and its end."""
+    write_sealed(path, (json.dumps(entry).encode() for entry in [*entries, {"end": len(entries) - 1}]))
+
+
+def write_first_format(path: Path) -> None:
+    """Turn a record into one of the first format: no chain, no end."""
+    entries = lines_of(path)
+    entries[0]["format"] = "hitplanes-shots/1"
+    path.write_text("".join(json.dumps(entry, separators=(",", ":")) + "\n" for entry in entries))
+
+
+def says_no_end(path: Path) -> Any:
+    told = f"{path} has no end: it was not closed, as after a crash, and may lack shots"
+    return pytest.warns(UserWarning, match=f"^{re.escape(told)}$")
 
 
 @pytest.fixture
@@ -146,8 +188,11 @@ def test_no_shots_are_no_lines(path: Path) -> None:
 def test_a_line_can_be_read_while_the_file_is_open(path: Path) -> None:
     record = ShotRecord(path)
     record.fire(scene, Point(), (62, 86))
-    assert len(lines_of(path)) == 2 and replay(path, scene) is None
+    assert len(lines_of(path)) == 2
+    with says_no_end(path):
+        assert replay(path, scene) is None
     record.close()
+    assert replay(path, scene) is None
 
 
 def moving() -> tuple[Scene, History]:
@@ -224,7 +269,7 @@ def changed(path: Path, number: int, change: Callable[[Result], object]) -> None
     entries = lines_of(path)
     change(entries[number]["result"])
     entries[number]["hash"] = hash_of(entries[number]["result"])
-    path.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    write_record(path, entries)
 
 
 def told(path: Path, weapon: Weapon, change: Callable[[Result], object], **aim: Any) -> list[str]:
@@ -302,6 +347,11 @@ HAND: dict[str, tuple[Weapon, Callable[[Result], object], list[str]]] = {
         lambda r: r["stops"][1].update(reason=2),
         [f"ray of round 1: stopped by its budget in {DUCK} at 58.5 px, was by {DUCK} at 58.5 px"],
     ),
+    "a budget of nothing": (
+        Rifle(400, budget=0),
+        lambda r: r["stops"][0].update(reason=3, item=8, distance=58.5),
+        [f"ray: stopped by its budget at 0.0 px, was by its budget in {DUCK} at 58.5 px"],
+    ),
     "a reason that is none": (
         Laser(90),
         lambda r: r["stops"][0].update(reason=9, item=2.5),
@@ -359,10 +409,10 @@ def match(path: Path) -> Path:
 
 
 def rewritten(path: Path, number: int, change: Callable[[dict[str, Any]], object]) -> None:
-    """Change one line, the first is 1; its result keeps its hash."""
+    """Change one line, the first is 1; its result keeps its hash, and the record a chain."""
     entries = lines_of(path)
     change(entries[number - 1])
-    path.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    write_record(path, entries)
 
 
 DAMAGE: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
@@ -446,10 +496,16 @@ LINES: dict[str, tuple[Callable[[bytes], bytes], str]] = {
 
 @pytest.mark.parametrize("name", LINES)
 def test_a_line_that_is_no_shot_is_named(name: str, match: Path) -> None:
+    """By what it is in the first format, by the chain in the present one."""
     change, error = LINES[name]
     lines = match.read_bytes().splitlines(keepends=True)
-    lines[2] = change(lines[2])
+    match.write_bytes(b"".join([*lines[:2], change(lines[2]), *lines[3:]]))
+    with pytest.raises(InputError, match=r"match.jsonl line 3: chain: expected '[0-9a-f]{16}', got ('|nothing)"):
+        replay(match, scene)
     match.write_bytes(b"".join(lines))
+    write_first_format(match)
+    lines = match.read_bytes().splitlines(keepends=True)
+    match.write_bytes(b"".join([*lines[:2], change(lines[2]), *lines[3:]]))
     if name == "no UTF-8":
         found = replay(match, scene)
         assert found is not None and found.line == 3
@@ -465,20 +521,25 @@ def test_a_line_cut_off_by_a_crash_is_told_and_those_before_it_replay(kept: int,
     with pytest.raises(InputError, match="line 6: expected a whole line of a record, got one that is cut off, as by a"):
         replay(match, scene)
     match.write_bytes(b"".join(lines[:5]))
-    assert replay(match, scene) is None
+    with says_no_end(match):
+        assert replay(match, scene) is None
 
 
 def test_headers_that_are_none(match: Path) -> None:
     header, *lines = match.read_bytes().splitlines(keepends=True)
+    first = b'{"format":"hitplanes-shots/1"'
     for other, error in {
         b"": "expected a whole line of a record, got an empty file",
         header.rstrip(): "expected a whole line of a record, got one that is cut off",
-        header.replace(b"shots/1", b"shots/2"): "format: expected 'hitplanes-shots/1', got 'hitplanes-shots/2'",
-        b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/1', got 'hitplanes-hits/1'",
-        b'{"format":"hitplanes-shots/1"}\n': "version: expected a value, got nothing",
-        header.replace(b"{", b'{"rows":1,'): "key: expected one of 'format', 'version', got 'rows'",
+        header.replace(b"shots/2", b"shots/3"): "format: expected 'hitplanes-shots/2', got 'hitplanes-shots/3'",
+        header.replace(b"shots/2", b"shots/1"): "key: expected one of 'format', 'version', got 'chain'",
+        header.replace(b'"0.', b'"1.'): "chain: expected '[0-9a-f]{16}', got '[0-9a-f]{16}': the line was changed",
+        b'{"format":"hitplanes-shots/2","version":"1"}\n': "chain: expected '[0-9a-f]{16}', got nothing",
+        b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/2', got 'hitplanes-hits/1'",
+        first + b"}\n": "version: expected a value, got nothing",
+        first + b',"version":"1","rows":1}\n': "key: expected one of 'format', 'version', got 'rows'",
         b"\x89PNG\r\n\x1a\n": "expected JSON in UTF-8",
-        lines[0]: "format: expected 'hitplanes-shots/1', got None",
+        lines[0]: "format: expected 'hitplanes-shots/2', got None",
         b"[]\n": "header: expected an object",
     }.items():
         match.write_bytes(other + b"".join(lines) if other.endswith(b"\n") else other)
@@ -489,6 +550,7 @@ def test_headers_that_are_none(match: Path) -> None:
 def test_endless_files_are_read_no_further_than_a_line(match: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record, "TEXT_BYTES_MAX", 5000)
     assert replay(match, scene) is None
+    match.write_bytes(b"".join(match.read_bytes().splitlines(keepends=True)[:-1]))
     os.truncate(match, 2**26)  # zeros
     tracemalloc.start()
     with pytest.raises(InputError, match="line 9: expected at most 5000 bytes, got more"):
@@ -499,8 +561,12 @@ def test_endless_files_are_read_no_further_than_a_line(match: Path, monkeypatch:
         replay("/dev/zero", scene)
 
 
-def test_whatever_is_damaged_it_ends_in_words(match: Path) -> None:
+@pytest.mark.parametrize("first_format", [False, True])
+def test_whatever_is_damaged_it_ends_in_words(first_format: bool, match: Path) -> None:
+    """The first format lets some of it through, the chain nothing."""
     rng = random.Random(3)
+    if first_format:
+        write_first_format(match)
     good = match.read_bytes()
     for _ in range(200):
         data = bytearray(good)
@@ -522,7 +588,184 @@ def test_whatever_is_damaged_it_ends_in_words(match: Path) -> None:
         except InputError as error:
             assert str(match) in str(error) and "\n" not in str(error)
         else:
-            assert found is None or found.told
+            assert data == good or (first_format and (found is None or found.told))
+
+
+# The chain
+
+
+def small_record(path: Path) -> History:
+    """A record of two calls at three ticks, one of them a batch, and the history that they were fired at."""
+    world = Scene((40, 40))
+    box = world.add(np.ones((5, 5), bool), (20, 20))
+    history = History(world)
+    for tick in range(3):
+        world.move(box, (20 + tick, 20))
+        history.record(tick)
+    with ShotRecord(path) as made:
+        made.fire(history, Point(), [(22, 20), (1, 1)], tick=[2, 0])
+        made.fire(history, Pistol(30), (4, 20), tick=1)
+    return history
+
+
+def test_each_line_ends_with_the_hash_of_all_bytes_before(path: Path) -> None:
+    small_record(path)
+    data = path.read_bytes()
+    found = list(re.finditer(rb',"chain":"(.{16})"}\n', data))
+    assert [one[1].decode() for one in found] == [hashlib.sha256(data[: one.start()]).hexdigest()[:16] for one in found]
+    assert len(found) == 5 and data.splitlines()[-1].startswith(b'{"end":3,"chain":')
+
+
+def test_each_byte_that_was_changed_is_seen_in_its_line(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even if the shots do the same again: here they do what the record says."""
+    history = small_record(path)
+    data = path.read_bytes()
+    monkeypatch.setattr(record, "_results", lambda path, at, group: [entry.data["result"] for entry in group])
+    with path.open("r+b", buffering=0) as file:
+        for at, byte in enumerate(data):
+            for other in {byte ^ 1 << at % 8, b"0 1\n2-3."[at // 8 % 8]} - {byte}:
+                file.seek(at)
+                file.write(bytes([other]))
+                with pytest.raises(InputError, match=f"match.jsonl line {1 + data[:at].count(10)}: "):
+                    replay(path, history)
+            file.seek(at)
+            file.write(bytes([byte]))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    order=st.one_of(
+        st.permutations(range(5)),
+        st.lists(st.integers(0, 4), min_size=1, max_size=7),
+        st.builds(lambda n, more: [*range(n), *more], st.integers(0, 5), st.lists(st.integers(0, 4), max_size=3)),
+    ).filter(bool)
+)
+def test_lines_that_are_lost_doubled_or_moved_are_seen_where_they_are(order: list[int], tmp_path: Path) -> None:
+    """The first line that does not follow the one before it; a record that only ends too early has no end."""
+    path = tmp_path / "match.jsonl"
+    path.unlink(missing_ok=True)
+    history = small_record(path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[i] for i in order))
+    right = next((i for i, line in enumerate(order) if i >= len(lines) or line != i), len(order))
+    if order == [*range(5)]:
+        assert replay(path, history) is None
+    elif right == len(order):
+        with says_no_end(path):
+            assert replay(path, history) is None
+    else:
+        with pytest.raises(InputError, match=f"match.jsonl line {right + 1}: "):
+            replay(path, history)
+
+
+def test_a_break_of_the_chain_tells_what_was_expected_and_what_came(path: Path) -> None:
+    """The line that came has the chain of the file that it was written to."""
+    history = small_record(path)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([*lines[:2], *lines[3:]]))
+    text, came = lines[3][:-29], lines[3][-19:-3].decode()
+    expected = hashlib.sha256(b"".join([*lines[:2], text])).hexdigest()[:16]
+    told = (
+        f"line 3: chain: expected '{expected}', got '{came}': the line was changed, or does not follow the one before"
+    )
+    with pytest.raises(InputError, match=re.escape(told)):
+        replay(path, history)
+
+
+@pytest.mark.parametrize(
+    ("end", "told"),
+    [
+        ({"end": 2}, "line 5: end: expected 3, the number of shots, got 2"),
+        ({"end": True}, "line 5: end: expected a whole number from 0 to"),
+        ({"end": 3, "seed": 1}, "line 5: key: expected one of 'end', got 'seed'"),
+    ],
+)
+def test_an_end_that_does_not_count_the_shots_is_named(end: dict[str, Any], told: str, path: Path) -> None:
+    history = small_record(path)
+    write_sealed(path, (json.dumps(entry).encode() for entry in [*lines_of(path), end]))
+    with pytest.raises(InputError, match=f"match.jsonl {told}"):
+        replay(path, history)
+
+
+def test_nothing_comes_behind_the_end(path: Path) -> None:
+    history = small_record(path)
+    entries = lines_of(path)
+    write_sealed(path, (json.dumps(entry).encode() for entry in [*entries, {"end": 3}, entries[3]]))
+    with pytest.raises(
+        InputError, match=r"match.jsonl line 6: expected nothing behind the end of a record, got a line"
+    ):
+        replay(path, history)
+
+
+def test_a_scene_that_changed_is_told_of_a_record_without_an_end(path: Path) -> None:
+    world = load_scene(GALLERY)
+    made = ShotRecord(path)
+    made.fire(world, Point(), (5, 5))
+    world.move(8, (99, 99))
+    with says_no_end(path):
+        found = replay(path, world)
+    assert found is not None and found.told[1] == SAME
+    made.close()
+
+
+def test_an_older_record_without_a_chain_replays(path: Path) -> None:
+    with ShotRecord(path) as made:
+        made.fire(scene, RIFLE, [(100, 167), (100, 90)], aim=1)
+    write_first_format(path)
+    assert (
+        path.read_bytes().startswith(b'{"format":"hitplanes-shots/1","version":"') and b"chain" not in path.read_bytes()
+    )
+    assert replay(path, scene) is None
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:2]))
+    assert replay(path, scene) is None
+    path.write_bytes(b"".join([*lines, b'{"end":2}\n']))
+    with pytest.raises(InputError, match=r"match.jsonl line 4: key: expected one of 'scene', .*got 'end'"):
+        replay(path, scene)
+
+
+class Interrupted:
+    """A file of which one write is interrupted, after some bytes."""
+
+    def __init__(self, file: Any, taken: int) -> None:
+        self._file, self._taken, self._rung = file, taken, False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def write(self, data: memoryview) -> int:
+        if self._rung:
+            return int(self._file.write(data))
+        self._rung = True
+        self._file.write(data[: self._taken])
+        raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("taken", [0, 1, 500, 10**6])
+def test_an_interrupt_leaves_all_lines_of_a_call_or_none(taken: int, path: Path) -> None:
+    with ShotRecord(path) as made:
+        made.fire(scene, Point(), places(2))
+        made._file = Interrupted(made._file, taken)  # type: ignore[assignment]
+        with pytest.raises(KeyboardInterrupt):
+            made.fire(scene, Point(), places(3), shot=[5, 6, 7])
+        made.fire(scene, Point(), places(2), shot=[8, 9])
+    assert [entry["shot"] for entry in lines_of(path)[1:]] == [0, 1, 8, 9]
+    assert replay(path, scene) is None
+
+
+def test_threads_may_fire_into_one_record(path: Path) -> None:
+    with ShotRecord(path) as made:
+
+        def fire_some(first: int) -> None:
+            for number in range(first, first + 30):
+                made.fire(scene, Point(), places(2), shot=[number, number])
+
+        threads = [threading.Thread(target=fire_some, args=(1000 * i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert len(lines_of(path)) == 241 and replay(path, scene) is None
 
 
 # Files
@@ -546,7 +789,7 @@ def test_a_file_that_is_there_is_never_written_over(match: Path, tmp_path: Path)
         (tmp_path / "link.jsonl", "link.jsonl: expected the name of a file"),
         (tmp_path, "expected the name of a file"),
         (tmp_path / "no" / "such.jsonl", "no folder"),
-        (tmp_path / "a\0b", "null byte|expected the name"),
+        (tmp_path / "a\0b", "record: expected a path, got .*zero byte"),
         (None, "record: expected a path, got None"),
     ):
         with pytest.raises(InputError, match=error):
@@ -575,30 +818,61 @@ def test_a_record_that_is_closed_fires_no_more(path: Path) -> None:
 
 FULL = """
 import resource, sys
-from planes import InputError, load_scene
-from weapons import Point, ShotRecord
+from pathlib import Path
+from hitplanes import InputError, Point, ShotRecord, load_scene
 scene = load_scene("fixtures/gallery")
-resource.setrlimit(resource.RLIMIT_FSIZE, (5001, 5001))
-with ShotRecord(sys.argv[1]) as record:
+path, room = Path(sys.argv[1]), int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+with ShotRecord(path) as record:
     for n in range(99):
         try:
             record.fire(scene, Point(), [(62, 86)] * 2, shot=[2 * n, 2 * n + 1])
         except InputError as error:
             print(n, error)
             break
-    print(record._size)
+    print(path.stat().st_size)
 """
 
 
-def test_a_full_disk_is_told_and_leaves_whole_lines(path: Path) -> None:
+def on_a_full_disk(path: Path, room: int) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-    words = [sys.executable, "-W", "error", "-c", FULL, str(path)]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True, env=environment)
+    words = [sys.executable, "-W", "error", "-c", FULL, str(path), str(room)]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, env=environment)
+
+
+def test_a_full_disk_is_told_and_leaves_whole_lines(path: Path) -> None:
+    done = on_a_full_disk(path, 5101)
+    assert done.returncode == 0
     (n, error), size = done.stdout.splitlines()[0].split(" ", 1), done.stdout.splitlines()[1]
     assert error == f"record: cannot write {path}: File too large"
-    assert path.stat().st_size == int(size) < 5001
+    end = path.read_bytes().splitlines(keepends=True)[-1]
+    assert path.stat().st_size == int(size) + len(end) < 5101
     assert [entry["shot"] for entry in lines_of(path)[1:]] == list(range(2 * int(n)))
     assert int(n) > 3 and replay(path, scene) is None
+
+
+def test_a_disk_too_full_for_the_end_is_told(path: Path) -> None:
+    size = int(on_a_full_disk(path, 5101).stdout.splitlines()[1])
+    path.unlink()
+    done = on_a_full_disk(path, size + 9)
+    assert done.returncode == 1
+    assert done.stderr.endswith(
+        f"hitplanes.planes.common.checks.InputError: record: cannot write {path}: File too large\n"
+    )
+    assert path.stat().st_size == size
+    with says_no_end(path):
+        assert replay(path, scene) is None
+
+
+def test_an_error_of_the_game_is_not_hidden_by_one_of_the_end(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise InputError("full")
+
+    with pytest.raises(KeyError), ShotRecord(path) as made:
+        monkeypatch.setattr(made, "_write", full)
+        raise KeyError
+    with pytest.raises(InputError, match="full"), ShotRecord(path.with_name("other.jsonl")) as made:
+        monkeypatch.setattr(made, "_write", full)
 
 
 def test_a_write_in_pieces_is_whole(path: Path) -> None:
@@ -619,7 +893,9 @@ def test_a_write_in_pieces_is_whole(path: Path) -> None:
     record.fire(scene, Disc(9), places(3))
     file.write(record._file.taken)  # type: ignore[attr-defined]
     file.close()
-    assert len(lines_of(path)) == 4 and replay(path, scene) is None
+    assert len(lines_of(path)) == 4
+    with says_no_end(path):
+        assert replay(path, scene) is None
 
 
 # Long records
@@ -678,16 +954,22 @@ def long_record(path: Path, lines: int) -> Scene:
     world.add(np.ones((5, 5), bool), (20, 20))
     with ShotRecord(path) as made:
         made.fire(world, Pistol(30), (4, 20))
-    header, line = path.read_bytes().splitlines(keepends=True)
-    with path.open("wb") as file:
-        file.write(header)
-        for _ in range(lines // 100):
-            file.write(line * 100)
+    header, line = (json.dumps(entry).encode() for entry in lines_of(path))
+    write_sealed(path, chain([header], repeat(line, lines), [b'{"end":%d}' % lines]))
     return world
 
 
 def test_a_record_is_read_in_a_stream(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python keeps up to 2000 freed tuples of a size, until it collects garbage: they are not counted."""
+    results = record._results
+
+    def collected(*group: Any) -> Any:
+        gc.collect()
+        return results(*group)
+
     monkeypatch.setattr(record, "AT_ONCE", 10)
+    monkeypatch.setattr(record, "_results", collected)
+    gc.freeze()  # so little is left that each collection is fast
     peaks = []
     for lines in (100, 500):
         path.unlink(missing_ok=True)
@@ -696,6 +978,7 @@ def test_a_record_is_read_in_a_stream(path: Path, monkeypatch: pytest.MonkeyPatc
         assert replay(path, world) is None
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
+    gc.unfreeze()
     assert peaks[1] < 2 * peaks[0]
 
 
@@ -706,3 +989,19 @@ def test_a_long_record_takes_little_memory(path: Path) -> None:
     assert replay(path, world) is None
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert path.stat().st_size > 50 * 2**20 and grown < 40 * 2**10
+
+
+def test_a_difference_can_be_printed_whatever_things_are_called(tmp_path: Path) -> None:
+    name = "a\x7f\x9b\u2028\u202e\u2066"
+    world = Scene((40, 30))
+    world.add(Sprite.circle(4), (10, 10), name=name)
+    path = tmp_path / "match.jsonl"
+    with ShotRecord(path) as written:
+        written.fire(world, Pistol(30), (0, 10), aim=0)
+    lines = lines_of(path)
+    lines[1]["result"]["stops"][0][name] = 5  # what is no column is told by its name
+    lines[1]["hash"] = hash_of(lines[1]["result"])
+    write_record(path, lines)
+    found = replay(path, world)
+    assert found is not None and r"\x7f" in "".join(found.told)
+    assert all(line.isprintable() for line in found.told)

@@ -10,20 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import InputError, Scene, Sprite, load_scene
-from weapons import Beam, Disc, Laser, Point, Spread, arsenal_of, fire
-from weapons import Box as WeaponBox
-from weapons.cards import shot_card
-from weapons.differences import differences
-from weapons.facts import SHOTS_MAX, report_of
-from weapons.heat import heat_of
-from weapons.inset import CELL, COLUMNS, ROWS, inset_of
-from weapons.marks import HEAT, MARKS
-from weapons.overlay import BADGE, LETTER, ROW, Overlay
-from weapons.panel import plain
-from weapons.picture import picture_of_report
-from weapons.words import fragile
-from weapons.world import World, heat_step
+from hitplanes import Beam, Disc, InputError, Laser, Point, Scene, Spread, Sprite, arsenal_of, fire, load_scene
+from hitplanes import Box as WeaponBox
+from hitplanes.weapons.report.canvas import World, heat_step, plain
+from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
+from hitplanes.weapons.report.differences import differences
+from hitplanes.weapons.report.overlay import LETTER, ROW, SHOT_BADGE, Overlay
+from hitplanes.weapons.report.phrases import fragile
+from hitplanes.weapons.report.picture import picture_of_report
+from hitplanes.weapons.report.report import SHOTS_MAX, heat_of, report_of
+from hitplanes.weapons.report.symbols import HEAT, MARKS
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 
@@ -129,7 +125,7 @@ def test_runs_of_heat_end_with_their_row() -> None:
 
 
 def test_large_views_share_cells(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("weapons.heat.CELLS_MAX", 100)
+    monkeypatch.setattr("hitplanes.weapons.report.report.CELLS_MAX", 100)
     scene = street()
     fired = [fire(scene, Disc(9), [(20, 20), (22, 20)])]
     heat = heat_of(fired, (0, 0, 58, 38))
@@ -191,8 +187,8 @@ def overlaid(scene: Scene, report: dict[str, Any], factor: int) -> Overlay:
     overlay.names(report["shots"], scene)
     overlay.links(report["shots"], {row["object"] for shot in report["shots"] for row in shot["rows"]})
     for text in overlay.texts:  # what a label takes: its words at their widest
-        wide = BADGE if text.bold else (LETTER * len(text.text) + 8) // 2
-        tall = BADGE if text.bold else ROW // 2
+        wide = SHOT_BADGE if text.bold else (LETTER * len(text.text) + 8) // 2
+        tall = SHOT_BADGE if text.bold else ROW // 2
         middle = text.x + 4 * len(text.text) if text.bold else text.x
         left, top = middle - wide, text.y - 5 - tall + text.bold
         assert not before[top + 1 : top + 2 * tall, left + 1 : left + 2 * wide - 1].any(), text.text
@@ -359,7 +355,7 @@ def test_numbers_of_many_shots_on_one_pixel_do_not_pile_up() -> None:
     at = [(text.x + 4 * len(text.text), text.y) for text in overlaid(scene, report, 4).texts if text.text.isdigit()]
     assert len(at) == SHOTS_MAX
     apart = [max(abs(a[0] - b[0]), abs(a[1] - b[1])) for i, a in enumerate(at) for b in at[:i]]
-    assert min(apart) >= 2 * BADGE
+    assert min(apart) >= 2 * SHOT_BADGE
 
 
 def test_margins_are_told_and_fragile_ones_marked() -> None:

@@ -14,11 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_fire import square
 
-from planes import History, InputError, Scene, Sprite
-from weapons import (
+from hitplanes import (
     Beam,
     Disc,
+    History,
     Hits,
+    InputError,
     Laser,
     Pistol,
     Point,
@@ -26,14 +27,16 @@ from weapons import (
     RayHits,
     Rifle,
     Rounds,
+    Scene,
     ShotRecord,
     Spread,
+    Sprite,
     Sweep,
     Weapon,
     fire,
     replay,
 )
-from weapons.hits import HitRow
+from hitplanes.weapons.fire.hits import HitRow
 
 PATTERNS: list[Weapon] = [
     Point(),
@@ -244,7 +247,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
     scene, history = moving(4)
     before = scene.version, scene.content_hash()
     monkeypatch.setattr(scene, "index", lambda structure: pytest.fail("an index of the present"))
-    monkeypatch.setattr(scene, "code_plane", lambda: pytest.fail("a plane of the present"))
+    monkeypatch.setattr(scene, "label_plane", lambda: pytest.fail("a plane of the present"))
     monkeypatch.setattr(scene.items, "stack", lambda: pytest.fail("a stack of the present"))
     for weapon in (*PATTERNS, *RAYS):
         for strategy in ("auto", "direct"):
@@ -258,7 +261,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
             )
     fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, broadphase="bvh")
     fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, strategy="composed")
-    assert scene._code_plane is None and scene._indexes == {}
+    assert scene._label_plane is None and scene._indexes == {}
     monkeypatch.undo()
     assert before == (scene.version, scene.content_hash())
 

@@ -9,8 +9,8 @@ import numpy as np
 import oracle_volumes as exact
 import pytest
 
-from planes import InputError
-from planes.rings import convex_parts, hull
+from hitplanes import InputError
+from hitplanes.planes.volumes.polygons import convex_parts, hull
 
 Ring = list[tuple[float, float]]
 

@@ -1,21 +1,27 @@
 """The scene: what is placed, how it is changed, all or nothing, and what it gives out."""
 
+import gc
 import itertools
+import math
+import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes.arrays import InputError
-from planes.constants import ALL
-from planes.items import Role
-from planes.loading import load_scene
-from planes.scene import Planes, Scene
-from planes.sprite import Sprite
-from weapons import Point, fire
+from hitplanes import Disc, Laser, Point, fire
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.files.scene_folder import load_scene
+from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.scene import Planes, Scene
+from hitplanes.planes.scene.sprite import Sprite
 
 DOT = np.ones((1, 1), np.bool_)
 BLOCK = np.ones((2, 3), np.bool_)
@@ -67,6 +73,100 @@ def test_ids_count_up_and_are_never_used_again() -> None:
     assert (len(scene), scene.ids().tolist(), scene.add(DOT)) == (0, [], 5)
 
 
+@pytest.fixture
+def lean(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No slack, no caches that scenes share, and no garbage collector: what is held is what must be."""
+    monkeypatch.setattr("hitplanes.planes.scene.items.ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 64)
+    monkeypatch.setattr("hitplanes.planes.bits.tiles.ATLAS_SLACK", 8)
+    monkeypatch.setattr("hitplanes.planes.broadphase.boxes.INDEX_SLACK", 8)
+    for cache in ("hitplanes.planes.scene.sprite._kept", "hitplanes.planes.volumes.fit._fitted"):
+        monkeypatch.setattr(cache, LruCache(1, lambda _: 2))
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+    tracemalloc.stop()
+
+
+BLAST, RAY = Disc(3), Laser(300)
+
+
+def fire_some(scene: Scene) -> None:
+    for strategy in ("direct", "composed"):
+        fire(scene, BLAST, [(9, 9), (50, 50)], strategy=strategy, prefilter="circle", broadphase="grid")
+    fire(scene, BLAST, [(9, 9)] * 20)
+    fire(scene, RAY, (0, 9), aim=0)
+
+
+@pytest.mark.parametrize("every", [0, 4])
+@pytest.mark.parametrize("at_once", [1, 25])
+@pytest.mark.usefixtures("lean")
+def test_of_an_object_that_was_removed_little_is_kept(every: int, at_once: int) -> None:
+    """As a server does for days: each has a mask of its own, of 4 kB; shots are fired at some of them, or at none."""
+    scene = Scene((120, 120))
+    stays = scene.add(DOT, (9, 9), name="stays")
+
+    def live(lives: int) -> None:
+        for life in range(lives // at_once):
+            ids = [scene.add(np.ones((64, 64), np.bool_), (50 + i, 50)) for i in range(at_once)]
+            scene.set(ids[0], flip="x")
+            if every and life % every == 0:
+                fire_some(scene)
+            scene.remove(ids)
+        if every:
+            fire_some(scene)
+
+    live(100)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    live(500)
+    gc.collect()  # numpy has cycles of its own
+    held = tracemalloc.get_traced_memory()[0] - before
+    assert held < 400 * 500 + 2**17, f"{held / 500:.0f} bytes for each"
+    assert scene.ids().tolist() == [stays] and scene.name_of(500) == "hittable 500"
+    assert fire(scene, Point(), (9, 9)).object.tolist() == [stays]
+
+
+@pytest.mark.usefixtures("lean")
+def test_a_sprite_goes_with_the_last_object_that_has_it() -> None:
+    scene, sprite = Scene((40, 40)), Sprite.from_mask(np.ones((20, 20), np.bool_))
+    known, ids = ref(sprite), [scene.add(sprite, (9, 9), angle=angle) for angle in (0, 30, 60)]
+    masks = [ref(scene.items.variants[item]) for item in ids]
+    del sprite
+    fire_some(scene)
+    scene.remove(ids[:2])
+    assert known() is not None and fire(scene, Point(), (9, 9)).object.tolist() == ids[2:]
+    scene.remove(ids[2])
+    assert known() is None and not any(mask() for mask in masks[:2])
+    assert scene.items.atlas.used == 0
+
+
+@pytest.mark.usefixtures("lean")
+def test_masks_that_were_removed_go_before_anybody_fires_again() -> None:
+    scene = Scene()
+    scene.add(np.ones((20, 20), np.bool_))
+    fire(scene, Point(), (0, 0), strategy="direct")
+    masks = ref(scene.items.stack().masks)
+    scene.remove(0)
+    assert masks() is None
+
+
+def test_a_journal_is_no_longer_than_what_it_is_worth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With few objects it costs less to begin anew than to follow many changes."""
+    monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_FEW", 5)
+    scene = three()
+    start = scene.version
+    for x in range(17):
+        scene.move(0, (x, 0))
+    assert len(scene.items.changed_boxes(start)) == 34  # 5 changes, and 4 for each of 3
+    scene.move(0, (7, 0))
+    assert scene.items.changed_boxes(start) is None
+    scene.remove([0, 1])
+    assert scene.items.changed_boxes(scene.version - 1) is not None
+    assert len(scene.items._journal) == 8
+
+
 def test_more_objects_than_the_first_columns_hold() -> None:
     scene = Scene()
     for number in range(100):
@@ -103,6 +203,22 @@ def test_positions_are_rounded_half_to_even_and_then_to_the_pixel() -> None:
     for x, expected in ((0.5, 1), (0.5 - 1 / 512, 1), (0.5 - 3 / 512, 0), (-0.5, 0), (-0.5 - 1 / 256, -1), (2.25, 2)):
         assert pixels(scene, scene.add(DOT, (x, 0))) == {(expected, 0)}
     assert pixels(scene, scene.add(DOT, (10**9 + 0.5, -(10**9)))) == {(10**9 + 1, -(10**9))}
+
+
+@pytest.mark.parametrize("angle", [0, 90, 180, -90])
+@pytest.mark.parametrize("side", [1, 2, 3, 4])
+def test_a_pivot_on_a_half_pixel_lies_half_a_pixel_right_of_and_below_a_whole_position(side: int, angle: float) -> None:
+    """Pixel (0, 0) goes to the pixel that holds the position less the pivot, which by default is the middle."""
+    scene = Scene()
+    mask = np.ones((side, side), np.bool_)
+    for x in (-3, 10, 10.25, 10.5, 10.75):
+        item = scene.add(mask, (x, 0), angle=angle)
+        left, top = (math.floor(v - (side - 1) / 2 + 0.5) for v in (x, 0))
+        assert pixels(scene, item) == {(left + i, top + j) for i in range(side) for j in range(side)}
+        if x == round(x):
+            assert sum(column for column, _ in pixels(scene, item)) / side**2 == x + (side % 2 == 0) / 2
+    held = scene.add(Sprite.from_mask(mask, pivot_xy=(0.5, 1.5)), (10, 10))
+    assert pixels(scene, held) == {(10 + i, 9 + j) for i in range(side) for j in range(side)}
 
 
 def test_an_object_that_cannot_be_added_leaves_no_trace() -> None:
@@ -309,7 +425,7 @@ def test_find_suggests_a_name() -> None:
         scene.find("duck")
     scene.remove(1)
     assert scene.find("duck") == 2
-    with pytest.raises(InputError, match="id: expected a whole number from 0 to 2"):
+    with pytest.raises(InputError, match="item: expected a whole number from 0 to 2"):
         scene.name_of(3)
 
 
@@ -544,7 +660,7 @@ def test_the_journal_tells_where_deciding_items_were_and_are() -> None:
 
 
 def test_a_journal_that_is_too_long_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planes.items.JOURNAL_ROWS", 4)
+    monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 4)
     scene = three()
     start = scene.version
     for x in range(4):
@@ -659,8 +775,8 @@ def test_a_whole_float_beyond_int64_is_refused() -> None:
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda s: s.mask([]), "id: expected a whole number"),
-        (lambda s: s.mask("x"), "id: expected a whole number"),
+        (lambda s: s.mask([]), "item: expected a whole number"),
+        (lambda s: s.mask("x"), "item: expected a whole number"),
         (lambda s: s.add(np.ones((2, 2), np.bool_), name=np.ones(3)), "name: expected a text"),
         (lambda s: s.add("frog.png"), "sprite: expected a Sprite, .* got str"),
         (lambda s: s.find(np.ones(3)), "name: expected one of"),

@@ -2,21 +2,23 @@
 
 import json
 import math
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from planes import scenefile
-from planes.arrays import InputError
-from planes.image import read_png, write_png
-from planes.items import Items, Role
-from planes.loading import load_scene
-from planes.scene import Scene
-from planes.scenefile import read_scene
-from planes.schema import Mask
-from planes.sprite import Sprite
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.tables import Mask
+from hitplanes.planes.files import scene_folder
+from hitplanes.planes.files.png import read_png, write_png
+from hitplanes.planes.files.scene_folder import load_scene, read_scene
+from hitplanes.planes.scene.items import Items, Role
+from hitplanes.planes.scene.scene import Scene
+from hitplanes.planes.scene.sprite import Sprite
 
 FORMAT = "hitplanes-scene/1"
 GALLERY = Path(__file__).parent.parent / "fixtures" / "gallery"
@@ -296,6 +298,68 @@ def test_an_object_without_a_name_is_called_by_its_number(tmp_path: Path) -> Non
         Scene(name="")
 
 
+PARTS = st.sampled_from(["a", "b.c", "con", "Nul .x", "com1", "..", ".", "C:", "d\\e", "\0", "", "x" * 99, "y" * 97])
+NOT_INSIDE = (
+    "con.png",
+    "C:x.png",
+    "a\\b.png",
+    "../x.png",
+    "/x.png",
+    "sub/aux.tar.png",
+    "x\0.png",
+    "",
+    5,
+    None,
+    "x" * 201,
+)
+
+
+@given(
+    st.lists(PARTS, min_size=1, max_size=4), st.sampled_from(["", "/", "-2", "x"]), st.sampled_from(["", ".png", "."])
+)
+@example(["x" * 99, "y" * 97], "/", "")
+@example(["x" * 99, "y" * 97], "x", "")
+def test_an_image_is_refused_or_can_be_loaded_again(parts: list[str], mark: str, ending: str) -> None:
+    """Two sprites of one name, so that one is written under another."""
+    name = mark.join(parts) + ending
+    try:
+        sprites = [Sprite.from_image(SHEET, source={"image": name}), Sprite.from_image(KEYED, source={"image": name})]
+    except InputError as error:
+        assert str(error).startswith("source.image: expected")
+        return
+    scene = Scene()
+    for sprite in sprites:
+        scene.add(sprite)
+    with tempfile.TemporaryDirectory() as folder:
+        reloaded(scene, Path(folder))
+
+
+@pytest.mark.parametrize("name", NOT_INSIDE, ids=repr)
+def test_an_image_that_could_not_be_loaded_is_refused_before_anything_is_written(name: Any, tmp_path: Path) -> None:
+    for make in (
+        lambda: Sprite.from_image(SHEET, source={"image": name}),
+        lambda: Sprite.from_mask(np.ones((70, 70), bool), source={"image": name}),
+    ):
+        with pytest.raises(InputError, match=r"^source\.image: expected a (path inside the scene's folder|text of)"):
+            make()
+    scene, sprite = Scene(), Sprite.from_image(SHEET)
+    scene.add(Sprite.from_image(KEYED))
+    scene.add(sprite)
+    assert sprite.source is not None
+    sprite.source["image"] = name
+    with pytest.raises(InputError, match=r"^object 1: source\.image: expected a"):
+        scene.save(tmp_path / "saved")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_a_source_says_of_alpha_does_not_change_a_mask(tmp_path: Path) -> None:
+    """A threshold that the image was not cut by; and one of a mask, whose pixels are opaque."""
+    scene = Scene()
+    scene.add(Sprite.from_image(SHEET, alpha_threshold=40, source={"alpha_threshold": 999}))
+    scene.add(Sprite.from_mask(np.ones((70, 70), bool), source={"alpha_threshold": 255}))
+    reloaded(scene, tmp_path)
+
+
 def test_frames_that_make_a_wide_sheet_are_kept(tmp_path: Path) -> None:
     """Side by side they would be wider than an image may be."""
     scene = Scene()
@@ -374,7 +438,7 @@ def test_each_image_is_looked_at_once(tmp_path: Path, monkeypatch: pytest.Monkey
         looked.append(path.name)
         return read_png(path)
 
-    monkeypatch.setattr(scenefile, "read_png", counted)
+    monkeypatch.setattr(scene_folder, "read_png", counted)
     scene.save(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     assert len(looked) == len(set(looked)) > 20
@@ -389,7 +453,7 @@ def test_an_interrupted_save_leaves_the_old_scene(tmp_path: Path, monkeypatch: p
     def fail(path: Path, text: str) -> None:
         raise InputError("output: cannot write")
 
-    monkeypatch.setattr(scenefile, "write_text", fail)
+    monkeypatch.setattr(scene_folder, "write_text", fail)
     with pytest.raises(InputError, match="output"):
         scene.save(folder)
     assert load_scene(folder).content_hash() == before

@@ -12,12 +12,11 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from planes import InputError, load_scene
-from planes.scenefile import SCENE
-from planes.schema import (
+from hitplanes import InputError, arsenal_of, fire, load_scene, report_of, weapon_from_json
+from hitplanes.planes.common.tables import (
     Const,
     Either,
     Flag,
@@ -37,10 +36,10 @@ from planes.schema import (
     Word,
     json_of,
 )
-from weapons import arsenal_of, fire, report_of, weapon_from_json
-from weapons.arsenal import KINDS
-from weapons.orders import SHOT, fire_order, orders_of
-from weapons.schemas import REPORT, read_report, schemas, write_schemas
+from hitplanes.planes.files.scene_folder import SCENE
+from hitplanes.weapons.cli.schemas import FOLDER, REPORT, read_report, schemas, write_schemas
+from hitplanes.weapons.kinds.areas import KINDS
+from hitplanes.weapons.replay.shot_log import SHOT, fire_order, orders_of
 
 ROOT = Path(__file__).parents[1]
 SCENES = sorted(path.parent.name for path in (ROOT / "fixtures").glob("*/scene.json"))
@@ -107,7 +106,7 @@ def schema_of(part: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("part", PARTS)
-@settings(max_examples=67)
+@settings(max_examples=67, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(value=values)
 def test_a_part_checks_what_its_schema_tells(part: str, value: Any) -> None:
     schema = schema_of(part)
@@ -163,8 +162,11 @@ def test_shipped_schemas_are_made_of_the_tables(tmp_path: Path) -> None:
     write_schemas(tmp_path)
     shipped = ROOT / "weapons" / "schemas"
     assert {p.name for p in shipped.iterdir()} == {p.name for p in tmp_path.iterdir()}
+    assert {p.name for p in FOLDER.glob("*.json")} == {p.name for p in tmp_path.iterdir()}, "where it writes by default"
     for path in tmp_path.iterdir():
-        assert path.read_text() == (shipped / path.name).read_text(), f"run python -m weapons.schemas: {path.name}"
+        assert path.read_text() == (shipped / path.name).read_text(), (
+            f"run python -m hitplanes.weapons.cli.schemas: {path.name}"
+        )
         jsonschema.Draft202012Validator.check_schema(json.loads(path.read_text()))
 
 
@@ -261,7 +263,7 @@ def test_what_the_schema_of_a_report_refuses_is_refused() -> None:
     weapons = arsenal_of(scene)
     fired = [
         fire(scene, weapons["blast"], (390, 110), accept=["target"]),
-        fire(scene, weapons["pistol"], [(62, 86)] * 30),
+        fire(scene, weapons["point"], [(62, 86)] * 30),
     ]
     rng = random.Random(4)
     for report in (report_of(scene, fired[:1]), report_of(scene, fired[1:])):
@@ -287,7 +289,7 @@ def test_what_the_schema_of_a_scene_refuses_is_refused(tmp_path: Path) -> None:
 
 def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
     scene = load_scene(ROOT / "fixtures" / "gallery")
-    report = report_of(scene, [fire(scene, arsenal_of(scene)["pistol"], (62, 86))])
+    report = report_of(scene, [fire(scene, arsenal_of(scene)["point"], (62, 86))])
     path = tmp_path / "r.json"
     path.write_text(json.dumps(report))
     assert read_report(path) == report
@@ -300,7 +302,7 @@ def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
         path.write_text(json.dumps({**report, key: value}))
         with pytest.raises(InputError, match=message):
             read_report(path)
-    batch = report_of(scene, [fire(scene, arsenal_of(scene)["pistol"], [(62, 86)] * 30)])
+    batch = report_of(scene, [fire(scene, arsenal_of(scene)["point"], [(62, 86)] * 30)])
     batch["batch"]["heat"]["counts"]["hit"][0][3] = 0
     path.write_text(json.dumps(batch))
     with pytest.raises(InputError, match="batch: heat: counts: hit: expected counts from 1, got 0"):

@@ -9,16 +9,31 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import InputError, Scene, Sprite, load_scene
-from weapons import Beam, Disc, Laser, Pistol, Point, Projectile, Rifle, Spread, Sweep, Weapon, fire
-from weapons.cli import main
-from weapons.differences import differences
-from weapons.facts import SHOTS_MAX, report_of
-from weapons.marks import LET_THROUGH, MARKS, PASSED_OVER, SKETCH
-from weapons.picture import picture_of_report
-from weapons.schemas import REPORT
-from weapons.sieve import CELLS_MAX, PATTERNS_MAX
-from weapons.world import factor_of
+from hitplanes import (
+    Beam,
+    Disc,
+    InputError,
+    Laser,
+    Pistol,
+    Point,
+    Projectile,
+    Rifle,
+    Scene,
+    Spread,
+    Sprite,
+    Sweep,
+    Weapon,
+    fire,
+    load_scene,
+)
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.cli.schemas import REPORT
+from hitplanes.weapons.report.canvas import factor_of
+from hitplanes.weapons.report.differences import differences
+from hitplanes.weapons.report.picture import picture_of_report
+from hitplanes.weapons.report.prefilter_trace import CELLS_MAX, PATTERNS_MAX
+from hitplanes.weapons.report.report import SHOTS_MAX, report_of
+from hitplanes.weapons.report.symbols import LET_THROUGH, MARKS, PASSED_OVER, SKETCH
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 WAYS = [
@@ -41,8 +56,8 @@ def report(scene: Scene, weapon: Weapon, at: Any, **how: Any) -> dict[str, Any]:
 
 
 def colors(picture: np.ndarray) -> set[tuple[int, ...]]:
-    codes = np.unique(picture.reshape(-1, 3).astype(np.int32) @ (1 << 16, 1 << 8, 1))  # rows are slow to sort
-    return {(code >> 16, code >> 8 & 255, code & 255) for code in codes.tolist()}
+    labels = np.unique(picture.reshape(-1, 3).astype(np.int32) @ (1 << 16, 1 << 8, 1))  # rows are slow to sort
+    return {(code >> 16, code >> 8 & 255, code & 255) for code in labels.tolist()}
 
 
 @pytest.mark.parametrize(("prefilter", "broadphase"), WAYS)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes.spans import Spans, begins
+from hitplanes.planes.grid.spans import Spans, begins
 
 LAWS = settings(max_examples=200, deadline=None)
 

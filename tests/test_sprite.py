@@ -1,10 +1,17 @@
 """Images and shapes to placed masks, against a reference that asks one pixel at a time, and the laws of placement."""
 
+import copy
+import dataclasses
 import importlib
 import itertools
 import math
+import os
+import pickle
 import random
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,14 +21,25 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from planes import sprite as module
-from planes import turning
-from planes.arrays import InputError
-from planes.constants import VARIANT_BYTES
-from planes.forms import Form
-from planes.kept import Kept
-from planes.scene import Scene
-from planes.sprite import Sprite, Variant, as_sprite, form_of, picture_of, rows_of, variant_of
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.limits import VARIANT_BYTES
+from hitplanes.planes.scene import sprite as module
+from hitplanes.planes.scene import sprite as turning
+from hitplanes.planes.scene.scene import Scene
+from hitplanes.planes.scene.sprite import (
+    Sprite,
+    Transform,
+    Variant,
+    as_sprite,
+    picture_of,
+    rows_of,
+    transform_of,
+    variant_of,
+)
+from hitplanes.planes.volumes.fit import KINDS, Kind, bounding
+
+ROOT = Path(__file__).parent.parent
 
 AGAINST = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 LAWS = settings(max_examples=54, deadline=None)
@@ -70,8 +88,8 @@ def placed(sprite: Sprite, position: tuple[int, int], **pose: Any) -> Pixels:
 
 def posed(
     sprite: Sprite, flip: str = "none", scale: tuple[float, float] = (1, 1), angle: float = 0.0, frame: int = 0
-) -> Form:
-    return form_of(sprite, frame, flip, scale, angle)
+) -> Transform:
+    return transform_of(sprite, frame, flip, scale, angle)
 
 
 def turn_of(flip: str, scale: tuple[float, float], angle: float) -> oracle.Turn:
@@ -105,7 +123,7 @@ def test_placed_mask_is_the_reference(
     assert placed(sprite_of(mask, pivot), position, flip=flip, scale=scale, angle=angle) == expected
 
 
-@pytest.mark.parametrize("name", ["planes.turning", "planes.turning_jit"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.scene.sprite", "hitplanes.planes.jit.scene"])
 @LAWS
 @given(masks(), st.integers(0, 2**32))
 def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(name: str, mask: np.ndarray, seed: int) -> None:
@@ -117,7 +135,7 @@ def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(name: str,
     unit, step = (rng.randint(1, 6), rng.randint(1, 6)), (rng.randint(-9, 9), rng.randint(-9, 9))
     first = rng.randint(-9, unit[0] * w + 9), rng.randint(-9, unit[1] * h + 9)
     given = mask, (width, height), first, step, unit
-    found, held = importlib.import_module(name).inverse_mapped(*given)
+    found, held = importlib.import_module(name).resample(*given)
     for j, i in itertools.product(range(height), range(width)):
         place = first[0] + i * step[0] + j * step[1], first[1] + j * step[0] - i * step[1]
         x, y = ({p // u, -(-p // u) - 1} for p, u in zip(place, unit, strict=True))
@@ -126,7 +144,7 @@ def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(name: str,
         assert held[j, i] == any(mask[square] for square in inside)
         assert (divmod(int(found[j, i]), w) in inside) if inside else found[j, i] == -1
         assert not inside or held[j, i] == mask.reshape(-1)[found[j, i]]
-    assert np.array_equal(found, turning.inverse_mapped(*given)[0])
+    assert np.array_equal(found, turning.resample(*given)[0])
     box, area = importlib.import_module(name).sides_of(held)
     places = np.argwhere(held)
     assert area == len(places)
@@ -178,8 +196,8 @@ def test_four_quarter_turns_are_the_identity(
 ) -> None:
     """One quarter turn more turns the variant and its pivot by the array; four of them give it back."""
     sprite = sprite_of(mask, pivot)
-    base = form_of(sprite, 0, flip, scale, angle)
-    forms = [Form(0, flip, base.scale_x, base.scale_y, (base.quarter + k) % 4, base.c, base.s) for k in range(5)]
+    base = transform_of(sprite, 0, flip, scale, angle)
+    forms = [Transform(0, flip, base.scale_x, base.scale_y, (base.quarter + k) % 4, base.c, base.s) for k in range(5)]
     made = [variant_of(sprite, form) for form in forms]
     assert (made[4].pivot_x, made[4].pivot_y) == (made[0].pivot_x, made[0].pivot_y)
     assert np.array_equal(made[4].mask, made[0].mask)
@@ -203,8 +221,9 @@ def test_whole_turns_change_nothing(angle: float) -> None:
 def test_a_mirrored_sprite_turns_into_the_mirror_image(
     mask: np.ndarray, flip: str, scale: tuple[float, float], angle: float
 ) -> None:
-    """At odd multiples of 45 degrees, which belong to one of two quarters, only where both lie on the same grid."""
-    assume(angle % 90 != 45 or (mask.shape[0] == mask.shape[1] and scale[0] == scale[1]))
+    """Along a diagonal, which belongs to one of two quarters, only where both lie on the same grid."""
+    across, down = oracle_raster.unit(angle)
+    assume(abs(across) != abs(down) or (mask.shape[0] == mask.shape[1] and scale[0] == scale[1]))
     sprite = sprite_of(mask)
     one = variant_of(sprite, posed(sprite, flip=flip, scale=scale, angle=angle))
     other = variant_of(sprite, posed(sprite, flip=FLIPPED_X[flip], scale=scale, angle=-angle))
@@ -231,7 +250,7 @@ def test_variants_are_cropped_counted_and_read_only() -> None:
     mask = np.zeros((7, 9), np.bool_)
     mask[2:5, 3:8] = [[1, 0, 1, 1, 0], [0, 0, 0, 0, 1], [1, 1, 0, 0, 0]]
     sprite = as_sprite(mask)
-    variant = variant_of(sprite, Form())
+    variant = variant_of(sprite, Transform())
     assert np.array_equal(variant.mask, mask[2:5, 3:8])
     assert (variant.pivot_x, variant.pivot_y, variant.area) == (256, 256, 6)
     assert not variant.mask.flags.writeable
@@ -239,7 +258,7 @@ def test_variants_are_cropped_counted_and_read_only() -> None:
 
 def test_an_empty_mask_stays_empty() -> None:
     sprite = as_sprite(np.zeros((4, 4), np.bool_))
-    for form in (Form(), posed(sprite, angle=30), posed(sprite, scale=(3, 2), angle=91)):
+    for form in (Transform(), posed(sprite, angle=30), posed(sprite, scale=(3, 2), angle=91)):
         variant = variant_of(sprite, form)
         assert (variant.mask.shape, variant.area) == ((0, 0), 0)
 
@@ -266,7 +285,11 @@ def test_what_is_drawn_is_what_is_tested(
 def test_a_plain_image_is_drawn_as_it_is() -> None:
     image = np.arange(3 * 4 * 4, dtype=np.uint8).reshape(3, 4, 4) * 5
     sprite = Sprite.from_image(image)
-    for form, expected in ((Form(), image), (Form(flip="x"), image[:, ::-1]), (Form(quarter=1), np.rot90(image, -1))):
+    for form, expected in (
+        (Transform(), image),
+        (Transform(flip="x"), image[:, ::-1]),
+        (Transform(quarter=1), np.rot90(image, -1)),
+    ):
         assert np.array_equal(picture_of(sprite, form, WHITE)[0], expected)
 
 
@@ -275,8 +298,8 @@ def test_bare_masks_and_shapes_are_drawn_in_one_colour(
     own: tuple[int, int, int] | None, used: tuple[int, int, int]
 ) -> None:
     for sprite in (Sprite.from_mask([[True, False], [True, True]], color=own), Sprite.circle(3, color=own)):
-        variant = variant_of(sprite, Form())
-        image, pivot_x, pivot_y = picture_of(sprite, Form(), (1, 2, 3))
+        variant = variant_of(sprite, Transform())
+        image, pivot_x, pivot_y = picture_of(sprite, Transform(), (1, 2, 3))
         assert np.array_equal(image[:, :, 3] == 255, variant.mask)
         assert (pivot_x, pivot_y) == (variant.pivot_x, variant.pivot_y)
         assert {tuple(p) for p in image[variant.mask].tolist()} == {(*used, 255)}
@@ -400,14 +423,14 @@ def test_a_colour_key_is_transparent_in_mask_and_picture() -> None:
     image[1, 0] = (255, 0, 254)
     sprite = Sprite.from_image(image, color_key=(255, 0, 255))
     assert rows_of(sprite.frames[0].mask) == ["#.#", "##."]
-    assert np.array_equal(picture_of(sprite, Form(), WHITE)[0][:, :, 3] > 0, sprite.frames[0].mask)
+    assert np.array_equal(picture_of(sprite, Transform(), WHITE)[0][:, :, 3] > 0, sprite.frames[0].mask)
 
 
 def test_an_image_without_alpha_is_all_mask() -> None:
     image = np.arange(5 * 3 * 3, dtype=np.uint8).reshape(5, 3, 3)
     sprite = as_sprite(image)
     assert sprite.frames[0].mask.all()
-    assert np.array_equal(picture_of(sprite, Form(), WHITE)[0][:, :, :3], image)
+    assert np.array_equal(picture_of(sprite, Transform(), WHITE)[0][:, :, :3], image)
 
 
 def _kinds(array: np.ndarray) -> Iterator[tuple[str, Any]]:
@@ -487,14 +510,14 @@ def test_a_sprite_keeps_what_it_was_given() -> None:
         (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 1, 1], [3, 0, 2, 1]]), r"rects_xywh\[1\]: .*4 x 3"),
         (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 0, 1]]), r"rects_xywh\[0\]:"),
         (lambda: Sprite.from_image(PICTURE, rects_xywh=[[0, 0, 1, 1]], grid_wh=(1, 1)), "frames: .*got both"),
-        (lambda: Sprite.polygon([(0, 0), (1, 1)]), "polygon: expected 3 points or more, got 2"),
-        (lambda: Sprite.polygon([(0, 0), (1, 1), (2, math.inf)]), r"polygon\[2\]\[1\]: expected a finite number"),
-        (lambda: Sprite.polygon([(0, 0, 0)] * 3), r"polygon: expected shape \(any, 2\), got \(3, 3\)"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1)]), "points_xy: expected 3 points or more, got 2"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1), (2, math.inf)]), r"points_xy\[2\]\[1\]: expected a finite number"),
+        (lambda: Sprite.polygon([(0, 0, 0)] * 3), r"points_xy: expected shape \(any, 2\), got \(3, 3\)"),
         (lambda: Sprite.polygon([(0, 0), (1, 1), (2, 0)], [[(0, 0)]]), r"holes\[0\]: expected 3 points"),
-        (lambda: Sprite.polygon([(0, 0), (1, 1), (2**16, 0)]), r"polygon\[2\]\[0\]: expected a number within"),
-        (lambda: Sprite.circle(-1), "circle: expected a number from 0 to 32768, got -1"),
-        (lambda: Sprite.circle("3"), "circle: expected numbers"),  # type: ignore[arg-type]
-        (lambda: Sprite.box(1, -1), r"box_wh\[1\]: expected a number from 0"),
+        (lambda: Sprite.polygon([(0, 0), (1, 1), (2**16, 0)]), r"points_xy\[2\]\[0\]: expected a number within"),
+        (lambda: Sprite.circle(-1), "radius: expected a number from 0 to 32768, got -1"),
+        (lambda: Sprite.circle("3"), "radius: expected numbers"),  # type: ignore[arg-type]
+        (lambda: Sprite.box(1, -1), "height: expected a number from 0"),
         (lambda: posed(as_sprite(MASK), flip="left"), "flip: expected one of 'none', 'x', 'y', 'xy', got 'left'"),
         (lambda: posed(as_sprite(MASK), frame=1), "frame: .*from 0 to 0, got 1"),
         (lambda: posed(Sprite.circle(1), frame=1), "frame: .*from 0 to 0, got 1"),
@@ -518,11 +541,38 @@ def test_a_pose_that_makes_a_mask_too_large_is_refused() -> None:
 @pytest.mark.parametrize("sprite", [Sprite.box(60, 1), Sprite.circle(30)], ids=["box", "ellipse"])
 def test_a_thin_shape_that_turns_into_a_large_mask_is_refused(sprite: Sprite, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lying flat it is 60 x 1; turned by 45 degrees its mask is 43 x 43."""
-    monkeypatch.setattr("planes.forms.MASK_AREA_MAX", 600)
+    monkeypatch.setattr("hitplanes.planes.scene.sprite.MASK_AREA_MAX", 600)
     flat = (1.0, 1 / 64)
     assert variant_of(sprite, posed(sprite, scale=flat)).area > 0
     with pytest.raises(InputError, match="scale: expected a mask"):
         variant_of(sprite, posed(sprite, scale=flat, angle=45))
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: Sprite.circle(20000), "circle"),
+        (lambda: Sprite.box(30000, 30000), "box_wh"),
+        (lambda: Sprite.polygon([(-20000, 0), (20000, 0), (0, 9)]), "polygon"),
+    ],
+)
+@pytest.mark.parametrize("pose", [{}, {"angle": 90}, {"angle": 30, "flip": "x"}])
+def test_a_shape_that_is_too_large_is_named_by_its_source(
+    make: Callable[[], Sprite], field: str, pose: dict[str, Any]
+) -> None:
+    """One that a small scale makes fit is not refused."""
+    sprite = make()
+    with pytest.raises(InputError, match=f"^{field}: expected a mask of sides up to"):
+        Scene().add(sprite, **pose)
+    with pytest.raises(InputError, match=r"^scale: expected a mask of sides up to"):
+        Scene().add(sprite, scale=2, **pose)
+    assert len(Scene().ids()) == 0 == Scene().add(sprite, scale=1 / 64, **pose)
+
+
+@pytest.mark.parametrize("make", [lambda: Sprite.box(30000, 2000), lambda: as_sprite(np.ones((2000, 30000), bool))])
+def test_a_turn_that_makes_a_mask_too_large_is_named(make: Callable[[], Sprite]) -> None:
+    with pytest.raises(InputError, match=r"^angle: expected a mask of sides up to"):
+        Scene().add(make(), angle=45)
 
 
 # The cache
@@ -536,17 +586,130 @@ def test_variants_are_made_once() -> None:
 
 
 def test_the_cache_is_bounded_and_forgets_the_longest_unused(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = Kept(20_000, module._kept.size)
+    kept = LruCache(20_000, module._kept.size)
     monkeypatch.setattr(module, "_kept", kept)
     sprite = as_sprite(np.ones((20, 20), np.bool_))
-    first = variant_of(sprite, Form())
+    first = variant_of(sprite, Transform())
     for angle in range(1, 90):
         variant_of(sprite, posed(sprite, angle=angle))
-        assert variant_of(sprite, Form()) is first  # used all the time, so it stays
+        assert variant_of(sprite, Transform()) is first  # used all the time, so it stays
         held = sum(v.mask.nbytes + VARIANT_BYTES for v in kept.values.values())
         assert kept.bytes == held <= 20_000
     assert len(kept.values) > 3
     assert posed(sprite, angle=1) not in {form for _, form in kept.values}
     large = as_sprite(np.ones((200, 200), np.bool_))
-    assert variant_of(large, Form()).area == 40_000  # one that is larger than the cache is made all the same
+    assert variant_of(large, Transform()).area == 40_000  # one that is larger than the cache is made all the same
     assert kept.bytes == 40_000 + VARIANT_BYTES
+
+
+# Copies, and sprites of other processes
+
+SOURCES: dict[str, Callable[[], Sprite]] = {
+    "alpha": lambda: Sprite.from_image(PICTURE, alpha_threshold=3),
+    "colour key": lambda: Sprite.from_image(PICTURE, color_key=(9, 0, 1), pivot_xy=(0.5, 2)),
+    "grid": lambda: Sprite.from_image(SHEET, grid_wh=(3, 2)),
+    "rectangles": lambda: Sprite.from_image(SHEET, rects_xywh=[[0, 0, 3, 4], [1, 1, 5, 3]]),
+    "mask": lambda: Sprite.from_mask(MASK, pivot_xy=(1, -2), color=(1, 2, 3)),
+    "circle": lambda: Sprite.circle(4.3, color=(3, 2, 1)),
+    "box": lambda: Sprite.box(7, 2.5),
+    "polygon": lambda: Sprite.polygon([(-5, -4), (6, 0), (-5, 4)], [[(-3, -1), (0, 0), (-3, 1)]]),
+}
+COPIES: dict[str, Callable[[Sprite], Sprite]] = {
+    **{
+        f"pickle {number}": lambda sprite, number=number: pickle.loads(pickle.dumps(sprite, number))
+        for number in range(pickle.HIGHEST_PROTOCOL + 1)
+    },
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "replace": dataclasses.replace,
+}
+
+
+def answers(sprite: Sprite, form: Transform) -> list[Any]:
+    """All that a sprite tells of a form: mask, picture, volumes."""
+    variant = variant_of(sprite, form)
+    image, *pivot = picture_of(sprite, form, WHITE)
+    volumes = [bounding(Kind(name, 3), [sprite], [variant]).bounds() for name in KINDS if variant.area]
+    return [
+        variant.mask.tolist(), variant.area, variant.pivot_x, variant.pivot_y, image.tolist(), pivot,
+        *((box.min.tolist(), box.max.tolist()) for box in volumes), sprite.frame_count, sprite.source, sprite.color,
+    ]  # fmt: skip
+
+
+@LAWS
+@given(
+    st.sampled_from(sorted(SOURCES)),
+    st.sampled_from(sorted(SOURCES)),
+    st.sampled_from(sorted(COPIES)),
+    st.integers(0, 3),
+    st.sampled_from(FLIPS),
+    scales,
+    angles,
+)
+def test_a_copy_answers_as_the_sprite_that_it_came_from(
+    source: str, other: str, copied: str, frame: int, flip: str, scale: tuple[float, float], angle: float
+) -> None:
+    """Also one from another process, which may have counted its sprites up to a number that one has here."""
+    foreign, here = SOURCES[source](), SOURCES[other]()
+    form = posed(foreign, flip, scale, angle, frame % foreign.frame_count)
+    expected = answers(foreign, form)
+    own = answers(here, form._replace(frame=0)), answers(here, Transform())
+    object.__setattr__(foreign, "uid", here.uid)
+    again = COPIES[copied](foreign)
+    assert answers(again, form) == expected
+    assert (answers(here, form._replace(frame=0)), answers(here, Transform())) == own
+    assert not any(one.mask.flags.writeable for one in again.frames)
+    assert not any(one.image.flags.writeable for one in again.frames if one.image is not None)
+
+
+def test_a_copy_with_another_pivot_is_held_there() -> None:
+    sprite = Sprite.from_mask(MASK)
+    assert variant_of(sprite, Transform()).pivot_x == 384
+    assert variant_of(dataclasses.replace(sprite, pivot_256=(0, 0)), Transform()).pivot_x == 0
+
+
+FOREIGN = """
+import base64, pickle
+from hitplanes import Sprite
+print(base64.b64encode(pickle.dumps([Sprite.circle(20), Sprite.box(9, 9)])).decode())
+"""
+LOCAL = """
+import base64, pickle
+import numpy as np
+from hitplanes import Scene, Sprite
+scene = Scene()
+for _ in range(3):
+    scene.add(Sprite.from_mask(np.ones((1, 1), bool)))
+both = [scene.add(sprite) for sprite in pickle.loads(base64.b64decode(pickled))]
+print(*(int(scene.mask(item)[0].sum()) for item in both))
+"""
+FORKED = """
+import os, pickle
+from hitplanes import Scene, Sprite
+Sprite.circle(1)
+ends = []
+for radius in (3, 30):
+    read, write = os.pipe()
+    if not os.fork():
+        os.write(write, pickle.dumps(Sprite.circle(radius)))
+        os._exit(0)
+    ends.append(read)
+scene = Scene()
+for end in ends:
+    print(int(scene.mask(scene.add(pickle.loads(os.read(end, 65536))))[0].sum()))
+"""
+
+
+def ran(code: str) -> str:
+    run = [sys.executable, "-c", code]
+    return subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
+
+
+def test_a_sprite_of_another_process_is_hit_where_it_is() -> None:
+    """That process counted its sprites from 0, and so did this one."""
+    assert ran(f"pickled = {ran(FOREIGN).strip()!r}\n{LOCAL}").split() == ["1257", "81"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_sprites_of_two_forked_processes_are_two() -> None:
+    assert ran(FORKED).split() == ["29", "2821"]

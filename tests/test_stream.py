@@ -24,16 +24,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from planes import InputError, Scene, load_scene
-from weapons import RayHits, Reason, arsenal_of, shotlog, stream
-from weapons.cli import main
-from weapons.orders import fire_order, order_from_json
-from weapons.progress import Progress
-from weapons.shotlog import LINE_MAX
+from hitplanes import InputError, RayHits, Reason, Scene, arsenal_of, load_scene
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.replay import shot_log, stream
+from hitplanes.weapons.replay.shot_log import LINE_MAX, fire_order, order_from_json
+from hitplanes.weapons.replay.stream import Progress
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
-COMMAND = [sys.executable, "-W", "error", "-m", "weapons", "fire"]
+COMMAND = [sys.executable, "-W", "error", "-m", "hitplanes", "fire"]
 
 scene = load_scene(GALLERY)
 arsenal = arsenal_of(scene)
@@ -99,7 +98,8 @@ def test_a_line_answers_what_its_shot_answers_alone(shots: list[dict[str, Any]],
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stream, "LINES_FIRST", chunk)
         answers = answers_of(b"".join(map(line_of, shots)), tmp_path)
-    assert [{k: v for k, v in a.items() if k != "of"} for a in answers] == [alone(s, i) for i, s in enumerate(shots)]
+    told = [{k: v for k, v in a.items() if k not in ("of", "crc")} for a in answers]
+    assert told == [alone(s, i) for i, s in enumerate(shots)]
     assert [a["of"] for a in answers] == [f"{zlib.crc32(json.dumps(s).encode()):08x}" for s in shots]
 
 
@@ -127,29 +127,29 @@ def test_usual_lines_are_read_together_and_an_unusual_one_only_with_its_neighbou
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     read: list[int] = []
-    one_by_one = shotlog.ShotReader._one_by_one
+    one_by_one = shot_log.ShotReader._one_by_one
 
     def counted(self: Any, bodies: list[bytes], first: int) -> Any:
         read.append(len(bodies))
         return one_by_one(self, bodies, first)
 
-    monkeypatch.setattr(shotlog.ShotReader, "_one_by_one", counted)
-    shots: list[Any] = [{"weapon": "pistol", "at": [i, i], "accept": ["target"], "exclude": [3]} for i in range(256)]
-    reader = shotlog.ShotReader(scene, arsenal, "log")
+    monkeypatch.setattr(shot_log.ShotReader, "_one_by_one", counted)
+    shots: list[Any] = [{"weapon": "point", "at": [i, i], "accept": ["target"], "exclude": [3]} for i in range(256)]
+    reader = shot_log.ShotReader(scene, arsenal, "log")
     bodies = [json.dumps(shot).encode() for shot in shots]
     assert reader.read(bodies, 0)[0].number.tolist() == list(range(256)) and not read
     bodies[77] += b" "
     salvo, error = reader.read(bodies, 0)
-    assert salvo.number.tolist() == list(range(256)) and error is None and sum(read) == shotlog.FEW
+    assert salvo.number.tolist() == list(range(256)) and error is None and sum(read) == shot_log.FEW
 
 
 def test_the_first_line_tells_what_was_fired_at_and_names_objects(tmp_path: Path) -> None:
     log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
-    lines = [b'{"weapon": "pistol", "at": [62, 86]}', b'{"weapon": "pistol", "at": [162, 172]}']
+    lines = [b'{"weapon": "point", "at": [62, 86]}', b'{"weapon": "point", "at": [162, 172]}']
     log.write_bytes(b"\r\n".join(lines))
     done = run(log, output)
     header, first, second = map(json.loads, output.read_bytes().splitlines())
-    assert header["format"] == "hitplanes-hits/1" and header["scene"] == scene.content_hash()
+    assert header["format"] == "hitplanes-hits/2" and header["scene"] == scene.content_hash()
     assert header["verdicts"] == ["empty", "hit", "occluded", "filtered", "outside"]
     row = dict(zip(header["columns"], first["rows"][0], strict=True))
     assert header["objects"][str(row["object"])] == "bullseye" and (row["x"], row["y"]) == (62, 86)
@@ -160,7 +160,7 @@ def test_the_first_line_tells_what_was_fired_at_and_names_objects(tmp_path: Path
 
 def test_chunks_follow_the_time_that_they_take(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr("weapons.stream.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("hitplanes.weapons.replay.stream.time.monotonic", lambda: now[0])
     taken = []
     for chunk in stream._chunks(io.BytesIO(GOOD * 100_000)):
         taken.append(len(chunk))
@@ -203,7 +203,7 @@ def armed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def mixed(n: int, seed: int = 0) -> list[dict[str, Any]]:
     """Shots of rays and of patterns, of any arguments."""
     rng = random.Random(seed)
-    names = [name for name in [*RAYS, "pistol", "blast", "shotgun"] if name != "careful"]
+    names = [name for name in [*RAYS, "point", "blast", "shotgun"] if name != "careful"]
     shots: list[dict[str, Any]] = []
     for _ in range(n):
         at = [round(rng.uniform(60, 420), 2), round(rng.uniform(60, 230), 2)]
@@ -264,7 +264,7 @@ def test_lines_of_rays_answer_what_their_shots_answer_alone(chunk: int, armed: P
         else:
             expected["verdicts"] = list(hits.verdict_counts().values())
             kinds["patterns"] += 1
-        assert answer == expected and list(answer) == list(expected)
+        assert len(answer.pop("crc")) == 8 and answer == expected and list(answer) == list(expected)
     assert min(kinds.values()) > 10 and done.hit == sum(bool(answer["rows"]) for answer in answers)
 
 
@@ -317,7 +317,7 @@ def test_a_damaged_answer_of_rays_is_answered_again(name: str, armed: Path, tmp_
 
 
 def test_every_answer_is_known_when_it_is_read_again(armed: Path, tmp_path: Path) -> None:
-    """Tiny and huge numbers have an exponent."""
+    """Whatever numbers it has, as those of a far place."""
     scene = Scene()
     scene.add(np.ones((3, 3), bool), (10**9, -(10**9)))
     scene.weapons |= RAYS
@@ -325,11 +325,10 @@ def test_every_answer_is_known_when_it_is_read_again(armed: Path, tmp_path: Path
     log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
     log.write_bytes(b"".join(map(line_of, shots)))
     stream.fire_log(scene, log, output, Progress(io.StringIO()))
-    assert all(stream.ANSWER.fullmatch(line) for line in output.read_bytes().splitlines(keepends=True)[1:])
-    for number in ("1e-05", "-2.5e+30", "-0.0", "12"):
-        assert stream.ANSWER.fullmatch(
-            b'{"shot":0,"of":"00000000","rows":[],"passes":[[%b,1]],"stops":[]}\n' % number.encode()
-        )
+    whole = output.read_bytes()
+    output.rename(output.with_name("hits.jsonl.part"))
+    assert stream.fire_log(scene, log, output, Progress(io.StringIO())).resumed == len(shots)
+    assert output.read_bytes() == whole
 
 
 def test_a_ray_that_starts_where_it_may_not_is_named_with_its_line(
@@ -337,8 +336,8 @@ def test_a_ray_that_starts_where_it_may_not_is_named_with_its_line(
 ) -> None:
     log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
     good, bad = ({"weapon": "careful", "at": at} for at in ([5, 5], [160, 172]))
-    sight = {"weapon": "sight", "at": [5, 5]}
-    for line, told in ((bad, "at[0]: expected a start outside of every item"), (sight, "toward: expected a point")):
+    context = {"weapon": "sight", "at": [5, 5]}
+    for line, told in ((bad, "at[0]: expected a start outside of every item"), (context, "toward: expected a point")):
         log.write_bytes(line_of(good) * 5 + line_of(line) + line_of(good) * 5)
         assert main(["fire", str(armed), str(log), "-o", str(output)]) == 2
         error = capsys.readouterr().err
@@ -350,42 +349,42 @@ def test_a_ray_that_starts_where_it_may_not_is_named_with_its_line(
 
 # Bad lines
 
-GOOD = b'{"weapon": "pistol", "at": [62, 86]}\n'
+GOOD = b'{"weapon": "point", "at": [62, 86]}\n'
 BAD = {
-    b'{"weapon": "pistol", "at": [62, NaN]}': "at[1]: expected a finite number, got nan",
-    b'{"weapon": "pistol", "at": [62, 1e999]}': "at[1]: expected a finite number, got inf",
-    b'{"weapon": "pistol", "at": [62, 1e40]}': "at[1]: expected a number within",
-    b'{"weapon": "pistol", "at": [true, false]}': "at: expected numbers, got [True, False]",
-    b'{"weapon": "pistol", "at": [62]}': "at: expected shape (2,), got (1,)",
-    b'{"weapon": "pistol", "at": "ab"}': "at: expected numbers",
-    b'{"weapon": "pistol"}': "at: expected two numbers, got nothing",
-    b'{"weapon": "pistil", "at": [62, 86]}': "did you mean 'pistol'?",
-    b'{"weapon": ["pistol"], "at": [62, 86]}': "weapon: expected a text",
-    b'{"weapon": "pistol", "at": [62, 86], "sede": 1}': "key: expected one of 'weapon', 'at', 'aim', 'toward'",
-    b'{"weapon": "pistol", "at": [62, 86], "at": [1, 2]}': "key: expected each key once, got 'at' again",
-    b'{"weapon": "pistol", "at": [62, 86], "aim": NaN}': "aim: expected a finite number, got nan",
-    b'{"weapon": "pistol", "at": [62, 86], "aim": 1, "toward": [1, 2]}': "aim: expected aim or toward, got both",
-    b'{"weapon": "pistol", "at": [62, 86], "toward": [62, 86]}': "toward[0]: expected a point other than",
-    b'{"weapon": "pistol", "at": [62, 86], "toward": [62, NaN]}': "toward[1]: expected a finite number, got nan",
-    b'{"weapon": "pistol", "at": [62, 86], "seed": 18446744073709551616}': "seed: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "seed": -1}': "seed: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "seed": true}': "seed: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "shot": 9223372036854775808}': "shot: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "shot": null}': "shot: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "accept": null}': "accept: expected a list, got None",
-    b'{"weapon": "pistol", "at": [62, 86], "accept": ["target", "target"]}': "accept: expected distinct names",
-    b'{"weapon": "pistol", "at": [62, 86], "accept": ["tarket"]}': "did you mean 'target'?",
-    b'{"weapon": "pistol", "at": [62, 86], "exclude": [true]}': "exclude[0]: expected a whole number",
-    b'{"weapon": "pistol", "at": [62, 86], "exclude": ["dukc 1"]}': "did you mean 'duck 1'?",
-    b'{"weapon": "pistol", "at": [62, 86], "exclude": [99]}': "exclude[0]: owner: expected a whole number from 0 to",
-    b'{"weapon": "pistol", "at": [62, 86]} {}': "expected JSON: Extra data at column 38",
-    b'{"weapon": "pistol", "at": [62, 86]': "expected JSON: Expecting ',' delimiter at column",
-    b'[{"weapon": "pistol", "at": [62, 86]}]': "shot: expected an object",
+    b'{"weapon": "point", "at": [62, NaN]}': "at[1]: expected a finite number, got nan",
+    b'{"weapon": "point", "at": [62, 1e999]}': "at[1]: expected a finite number, got inf",
+    b'{"weapon": "point", "at": [62, 1e40]}': "at[1]: expected a number within",
+    b'{"weapon": "point", "at": [true, false]}': "at: expected numbers, got [True, False]",
+    b'{"weapon": "point", "at": [62]}': "at: expected shape (2,), got (1,)",
+    b'{"weapon": "point", "at": "ab"}': "at: expected numbers",
+    b'{"weapon": "point"}': "at: expected two numbers, got nothing",
+    b'{"weapon": "poimt", "at": [62, 86]}': "did you mean 'point'?",
+    b'{"weapon": ["point"], "at": [62, 86]}': "weapon: expected a text",
+    b'{"weapon": "point", "at": [62, 86], "sede": 1}': "key: expected one of 'weapon', 'at', 'aim', 'toward'",
+    b'{"weapon": "point", "at": [62, 86], "at": [1, 2]}': "key: expected each key once, got 'at' again",
+    b'{"weapon": "point", "at": [62, 86], "aim": NaN}': "aim: expected a finite number, got nan",
+    b'{"weapon": "point", "at": [62, 86], "aim": 1, "toward": [1, 2]}': "aim: expected aim or toward, got both",
+    b'{"weapon": "point", "at": [62, 86], "toward": [62, 86]}': "toward[0]: expected a point other than",
+    b'{"weapon": "point", "at": [62, 86], "toward": [62, NaN]}': "toward[1]: expected a finite number, got nan",
+    b'{"weapon": "point", "at": [62, 86], "seed": 18446744073709551616}': "seed: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "seed": -1}': "seed: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "seed": true}': "seed: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "shot": 9223372036854775808}': "shot: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "shot": null}': "shot: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "accept": null}': "accept: expected a list, got None",
+    b'{"weapon": "point", "at": [62, 86], "accept": ["target", "target"]}': "accept: expected distinct names",
+    b'{"weapon": "point", "at": [62, 86], "accept": ["tarket"]}': "did you mean 'target'?",
+    b'{"weapon": "point", "at": [62, 86], "exclude": [true]}': "exclude[0]: expected a whole number",
+    b'{"weapon": "point", "at": [62, 86], "exclude": ["dukc 1"]}': "did you mean 'duck 1'?",
+    b'{"weapon": "point", "at": [62, 86], "exclude": [99]}': "exclude[0]: owner: expected a whole number from 0 to",
+    b'{"weapon": "point", "at": [62, 86]} {}': "expected JSON: Extra data at column 37",
+    b'{"weapon": "point", "at": [62, 86]': "expected JSON: Expecting ',' delimiter at column",
+    b'[{"weapon": "point", "at": [62, 86]}]': "shot: expected an object",
     b'"\xff"': "expected JSON in UTF-8: 'utf-8' codec can't decode byte 0xff",
     b"[" * 100_000: "expected JSON in UTF-8: maximum recursion depth",
     b"1" * 5000: "expected JSON in UTF-8: Exceeds the limit",
-    b'{"weapon": "pistol", "at": [62, 86'
-    + b" " * (LINE_MAX - 35)
+    b'{"weapon": "point", "at": [62, 86'
+    + b" " * (LINE_MAX - 34)
     + b"]}": f"expected at most {LINE_MAX} bytes, got more",
     b"": "expected a shot, got an empty line",
     b"  \r": "expected a shot, got an empty line",
@@ -416,7 +415,7 @@ def test_a_bad_line_is_named_and_the_answers_before_it_are_kept(
 
 def test_a_shot_that_cannot_be_fired_is_named_in_any_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "LINES_FIRST", 4)
-    bad = line_of({"weapon": "pistol", "at": [62, 86], "toward": [62, 86]})
+    bad = line_of({"weapon": "point", "at": [62, 86], "toward": [62, 86]})
     with pytest.raises(InputError, match=r"shots.jsonl line 8: toward\[0\]: expected a point other than"):
         answers_of(GOOD * 7 + bad + GOOD, tmp_path)
 
@@ -491,6 +490,56 @@ def test_a_damaged_answer_and_what_follows_it_are_answered_again(damage: str, be
     assert run(log, again).resumed == 0 and again.read_bytes() == output.read_bytes()
 
 
+def damaged_line(part: bytes, log: Path, output: Path, capsys: pytest.CaptureFixture[str]) -> int | None:
+    """Go on with a part, to the bytes of a whole run; the line that is told to be damaged."""
+    whole, path = output.read_bytes(), output.with_name("hits.jsonl.part")
+    output.unlink()
+    path.write_bytes(part)
+    assert main(["fire", str(GALLERY), str(log), "-o", str(output)]) == 0
+    assert output.read_bytes() == whole
+    told = capsys.readouterr().err
+    found = re.match(rf"hitplanes: {path} line (\d+) is damaged: it and what follows are answered again\n", told)
+    kept = int(found[1]) - 2 if found else part.count(b"\n") - 1
+    rest = told[found.end() :] if found else told
+    assert rest == (f"hitplanes: {path} answers {kept} shots: going on after them\n" if kept else "")
+    return int(found[1]) if found else None
+
+
+def test_each_byte_of_an_answer_that_was_changed_is_seen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All but the last byte, without which the last line is one that is cut off."""
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(GOOD + line_of({"weapon": "blast", "at": [100, 167]}) + GOOD)
+    run(log, output)
+    whole = output.read_bytes()
+    for at in range(whole.index(b"\n") + 1, len(whole)):
+        part = whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :]
+        line = 1 + whole[:at].count(b"\n") if at < len(whole) - 1 else None
+        assert damaged_line(part, log, output, capsys) == line, part
+
+
+def test_answers_that_were_lost_doubled_or_swapped_are_seen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Even where all lines of the log are the same."""
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(GOOD * 5)
+    run(log, output)
+    lines = output.read_bytes().splitlines(keepends=True)
+    for i in range(1, 5):
+        lost, doubled = [*lines[:i], *lines[i + 1 :]], [*lines[: i + 1], *lines[i:]]
+        swapped = [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]]
+        for part, line in ((lost, i + 1), (doubled, i + 2), (swapped, i + 1)):
+            assert damaged_line(b"".join(part), log, output, capsys) == line
+
+
+def test_crc_is_that_of_all_bytes_before_it(tmp_path: Path) -> None:
+    log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
+    log.write_bytes(GOOD * 3)
+    run(log, output)
+    whole = output.read_bytes()
+    for match in re.finditer(rb',"crc":"(.{8})"}\n', whole):
+        assert match[1].decode() == f"{zlib.crc32(whole[: match.start()]):08x}"
+    assert whole.count(b',"crc":"') == 3
+
+
 def test_a_line_changed_or_taken_out_of_the_log_is_refused(begun: tuple[Path, Path, Path]) -> None:
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
@@ -554,12 +603,23 @@ def test_a_part_of_another_version_is_refused(begun: tuple[Path, Path, Path], mo
         run(log, output)
 
 
+def test_a_part_of_an_older_format_is_refused(begun: tuple[Path, Path, Path]) -> None:
+    _, log, output = begun
+    part = output.with_name("hits.jsonl.part")
+    before = part.read_bytes().replace(b"hitplanes-hits/2", b"hitplanes-hits/1", 1)
+    part.write_bytes(before)
+    told = 'hits.jsonl.part: expected format "hitplanes-hits/2", got "hitplanes-hits/1": remove it to start anew'
+    with pytest.raises(InputError, match=told):
+        run(log, output)
+    assert part.read_bytes() == before
+
+
 @pytest.mark.parametrize("content", [b"my notes\n", b'{"format": "x"}\n', b"\0" * 5000, b"[1]\n"])
 def test_a_file_that_is_no_part_is_left_alone(content: bytes, begun: tuple[Path, Path, Path]) -> None:
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
     part.write_bytes(content)
-    with pytest.raises(InputError, match="expected a part of hitplanes-hits/1, got something else"):
+    with pytest.raises(InputError, match="expected a part of hitplanes-hits/2, got something else"):
         run(log, output)
     assert part.read_bytes() == content
 
@@ -614,7 +674,7 @@ def test_a_full_disk_is_one_line_and_the_part_goes_on_later(tmp_path: Path) -> N
     words = [*COMMAND, str(GALLERY), str(log), "-o", str(output)]
 
     def small() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100_001, 100_001))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (120_001, 120_001))
 
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # cut short, a .pyc would spoil the runs after this
     full = subprocess.run(
@@ -622,10 +682,10 @@ def test_a_full_disk_is_one_line_and_the_part_goes_on_later(tmp_path: Path) -> N
     )
     assert full.returncode == 2
     assert full.stderr == f"hitplanes: output: cannot write {output}.part: File too large\n"
-    assert (tmp_path / "hits.jsonl.part").stat().st_size == 100_001 and not output.exists()
+    assert (tmp_path / "hits.jsonl.part").stat().st_size == 120_001 and not output.exists()
     assert run(log, output).resumed > 1000
     lines = output.read_bytes().splitlines()
-    assert len(lines) == 3001 and len({line.split(b'"of"')[1] for line in lines[1:]}) == 1
+    assert len(lines) == 3001 and len({line.split(b'"of"')[1].split(b'"crc"')[0] for line in lines[1:]}) == 1
 
 
 def test_two_processes_do_not_write_one_part(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -649,7 +709,7 @@ def test_a_part_that_was_renamed_meanwhile_is_not_written_to(
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
     before = part.read_bytes()
-    monkeypatch.setattr("weapons.part.fcntl.flock", lambda file, how: part.rename(output))
+    monkeypatch.setattr("hitplanes.weapons.replay.stream.fcntl.flock", lambda file, how: part.rename(output))
     with pytest.raises(InputError, match="another process is writing it"):
         run(log, output)
     assert output.read_bytes() == before
@@ -670,7 +730,7 @@ def long_log(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
     """A log that takes a second or so, and what it answers when nothing interrupts it."""
     folder = tmp_path_factory.mktemp("long")
     log, output = folder / "shots.jsonl", folder / "hits.jsonl"
-    names = ["pistol", "blast", "shotgun", "blast"]
+    names = ["point", "blast", "shotgun", "blast"]
     shots = ({"weapon": names[i % 4], "at": [i * 7 % 480, i * 3 % 270], "seed": i} for i in range(16_000))
     log.write_bytes(b"".join(map(line_of, shots)))
     run(log, output)
@@ -735,7 +795,7 @@ class Terminal(io.StringIO):
 
 def test_progress_is_drawn_a_few_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("weapons.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("hitplanes.weapons.replay.stream.time.monotonic", lambda: now[0])
     monkeypatch.setenv("COLUMNS", "60")
     terminal, plain = Terminal(), io.StringIO()
     for out in (terminal, plain):
@@ -774,7 +834,7 @@ def test_no_one_has_to_read_what_is_said(tmp_path: Path) -> None:
 
 def test_the_plan_is_added_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "shots.jsonl"
-    shots: list[Any] = [{"weapon": "pistol", "at": [62, 86]}, {"weapon": "blast", "at": [62, 86]}] * 3
+    shots: list[Any] = [{"weapon": "point", "at": [62, 86]}, {"weapon": "blast", "at": [62, 86]}] * 3
     log.write_bytes(b"".join(map(line_of, shots)))
     assert main(["fire", str(GALLERY), str(log), "-o", str(tmp_path / "hits.jsonl"), "--plan"]) == 0
     out = capsys.readouterr().out

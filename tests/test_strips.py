@@ -7,17 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planes.grid256 import unit
-from planes.spans import Spans
-from planes.strips import NO_STRIPS, meets_strip, strip_of, strips_of
-from weapons import Beam, Box, Disc
-from weapons.arsenal import Plain, pattern_of
-from weapons.pattern import Pattern
+from hitplanes import Beam, Box, Disc
+from hitplanes.planes.grid.fixed_point import unit
+from hitplanes.planes.grid.spans import NO_STRIPS, Spans, meets_strip, strip_of, strips_of
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
+from hitplanes.weapons.kinds.weapon import Pattern
 
 SEEDS = st.integers(0, 2**32)
 
 
-def along(weapon: Plain, aim: float) -> Pattern:
+def along(weapon: AreaWeapon, aim: float) -> Pattern:
     c, s = unit(np.array(aim))
     return pattern_of(weapon, int(c), int(s))
 
@@ -62,7 +61,7 @@ def test_the_strip_of_a_beam_is_as_wide_as_the_beam(aim: int) -> None:
 
 
 def test_strips_are_there_where_they_tell_more_than_boxes() -> None:
-    def made(weapon: Plain, aims: list[float]) -> int:
+    def made(weapon: AreaWeapon, aims: list[float]) -> int:
         patterns = [along(weapon, aim) for aim in aims]
         boxes = np.array([pattern.spans.box_xyxy for pattern in patterns])
         return len(strips_of([pattern.strip for pattern in patterns], boxes))

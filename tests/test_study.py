@@ -8,30 +8,37 @@ import itertools
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from test_bounding import holds
 
-from planes import Scene, Sprite
-from planes.arrays import InputError
-from weapons import study as study_module
-from weapons import volumestudy
-from weapons.cli import main
-from weapons.copies import copied, enlarged
-from weapons.decisions import Decisions, Method, Question, errors_of
-from weapons.discs import Discs, areas_question, discs_at
-from weapons.folders import cleared
-from weapons.kinds import kind_of, kinds_scene
-from weapons.planestudy import plane_curves
-from weapons.shapetruth import Round, Straight, discs_on_shapes, placed_rings
-from weapons.stability import summary
-from weapons.study import Effort, run_study
-from weapons.studyfiles import FILES
-from weapons.studywords import bound, csv_of, front, markdown, places, setting_text, verdict
-from weapons.tally import load_study
-from weapons.timing import Cost, measured
-from weapons.volumestudy import volume_curves
+from hitplanes import Scene, Sprite
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.files.scene_folder import cleared
+from hitplanes.planes.volumes import fit
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.lab.stability.stability import load_study, summary
+from hitplanes.weapons.lab.study import area_questions
+from hitplanes.weapons.lab.study import study as study_module
+from hitplanes.weapons.lab.study.area_questions import kind_of, kinds_scene, plane_curves, volume_curves
+from hitplanes.weapons.lab.study.methods import Cost, Decisions, Method, Question, copied, enlarged, errors_of, measured
+from hitplanes.weapons.lab.study.peers import Discs, areas_question, discs_at
+from hitplanes.weapons.lab.study.study import (
+    FILES,
+    Effort,
+    bound,
+    csv_of,
+    front,
+    markdown,
+    places,
+    run_study,
+    setting_text,
+    verdict,
+)
+from hitplanes.weapons.lab.study.truth import Round, Straight, discs_on_shapes, placed_rings
 
 ROOT = Path(__file__).parents[1]
 TIMES = ("us_per_shot", "runs", "setup_ms", "kept_bytes", "run_bytes")
@@ -173,12 +180,31 @@ def test_a_plane_at_full_scale_is_the_truth_where_masks_are() -> None:
             assert found.missed == 0 or curve.name in ("circle about the pivot", "box, re-boxed"), curve.name
 
 
+FITS = {
+    "circle": fit.least_circle, "oriented box": fit.oriented_box, "boxes": partial(fit.boxes, k=3), "hull": fit.hull,
+    "polygon": partial(fit.convex, n=5), "concave": partial(area_questions._concave, tolerance=1.0),
+    "triangles": partial(area_questions._triangles, tolerance=0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_volumes_fitted_to_masks_hold_their_pixel_squares_where_the_objects_are(name: str) -> None:
+    scene, rng = Scene(), np.random.default_rng(4)
+    for place in (5.25, -1000003.5, 2.0**31, -(2.0**40)):
+        for _ in range(12):
+            mask = rng.random(rng.integers(2, 9, 2)) < 0.5
+            mask[0, 0] = True
+            scene.add(mask, (place, place / 3), angle=float(rng.integers(360)))
+    for item, volume in enumerate(area_questions._fit(FITS[name])(scene)):
+        assert holds(volume, *scene.mask(item)), item
+
+
 def test_the_share_of_a_volume_is_that_of_the_pixels_of_a_disc_or_of_a_lattice_of_them() -> None:
     for radius, every in ((3, 1), (17, 1), (23, 2), (48, 4)):
         side = np.arange(-radius, radius + 1, 1)
         x, y = (grid.ravel() for grid in np.meshgrid(side, side))
         inside = (x * x + y * y <= radius * radius) & (x % every == 0) & (y % every == 0)
-        found = volumestudy._looked_at(float(radius)).tolist()
+        found = area_questions._looked_at(float(radius)).tolist()
         assert sorted(found) == sorted(np.stack([x, y], axis=1)[inside].tolist()) and found[0] == [0, 0]
     scene = Scene()
     scene.add(Sprite.circle(300.5), (0.3, 0.2))
@@ -271,9 +297,9 @@ def test_placed_rings_turn_clockwise_on_the_screen() -> None:
 
 
 def test_truth_shares_no_code_with_what_it_judges() -> None:
-    for name in ("shapetruth", "pixeltruth"):
-        text = (ROOT / "weapons" / f"{name}.py").read_text()
-        assert "from planes" not in text and "from weapons" not in text and "import planes" not in text
+    for name in ("truth",):
+        text = (ROOT / "weapons" / "lab" / "study" / f"{name}.py").read_text()
+        assert "hitplanes" not in text
 
 
 def test_kinds_of_the_built_in_scene_are_their_names() -> None:
@@ -349,7 +375,7 @@ def test_front_has_none_that_is_slower_and_as_wrong() -> None:
 
 def test_a_diagram_has_a_floor_where_a_method_is_never_wrong() -> None:
     pytest.importorskip("matplotlib")
-    from weapons.diagram import work_precision
+    from hitplanes.weapons.lab.study.figures import work_precision
 
     def texts(error: float) -> list[str]:
         (question,) = told_study(fast=[point(0.2, 1, 4)], other=[point(error, 3, 8)])["questions"]
@@ -370,6 +396,8 @@ def test_words_of_a_study() -> None:
     assert "| circle | 1 (1 us) | 1 (0.02 wrong) | round |" in told and "1 MB" in told and "| 12 B |" in told
     assert "| bounding box, oriented | 2 (1.5 us) | 3 (0.3 wrong) | nothing; nearest: round, 0.3 |" in told
     assert "Not complete" not in told and "Not complete" in markdown({**study, "complete": False}, 0.05)
+    hostile = {**study, "scene": {**study["scene"], "name": "a\n\x7f\u202e"}}
+    assert markdown(hostile, 0.05).splitlines()[0] == r"# Error against run time: a\n\x7f\u202e"
     assert [setting_text(s) for s in (0.125, 2.0, 0.3, "grid", None)] == ["1/8", "2", "0.3", "grid", ""]
     assert "7 discs in one call" in told and "walk   5.0 us     12  so" in told
     assert csv_of(study).splitlines()[1].startswith("areas,circle,,300,1,0,0.02,,,1,1,1,3,1.0,999999,12")
@@ -450,8 +478,8 @@ def test_a_second_interrupt_leaves_the_tables(tmp_path: Path, monkeypatch: pytes
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("weapons.diagram.work_precision", interrupted)
-    monkeypatch.setattr("weapons.studyfiles.run_study", kept_of_another)
+    monkeypatch.setattr("hitplanes.weapons.lab.study.figures.work_precision", interrupted)
+    monkeypatch.setattr("hitplanes.weapons.lab.study.study.run_study", kept_of_another)
     assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 130
     assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["study.csv", "study.json", "study.md"]
     assert ".png" not in (tmp_path / "study" / "study.md").read_text()
@@ -467,7 +495,7 @@ def kept_of_another(*arguments: object) -> None:
 def test_without_matplotlib_the_diagrams_are_left_out_with_a_word(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
-    monkeypatch.setattr("weapons.studyfiles.find_spec", lambda name: None)
+    monkeypatch.setattr("hitplanes.weapons.lab.study.study.find_spec", lambda name: None)
     monkeypatch.setattr(study_module, "measured", run_once)
     monkeypatch.setattr(Effort, "quick", classmethod(lambda cls: FEWEST))
     assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 0
@@ -522,7 +550,7 @@ def test_the_chapter_is_what_its_studies_say(monkeypatch: pytest.MonkeyPatch) ->
 
     assert (ROOT / "fixtures" / "study" / "README.md").read_text(encoding="utf-8") == chapter.chapter()
     told = "\n".join(summary(load_study(ROOT / "fixtures" / "study" / "stability" / "stability.json")))
-    assert f"```text\n{told}\n```" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"```text\n{told}\n```" in (ROOT / "fixtures" / "README.md").read_text(encoding="utf-8")
     for name in chapter.SCENES:
         folder = ROOT / "fixtures" / "study" / name
         study = study_in(folder)

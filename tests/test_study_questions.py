@@ -12,15 +12,24 @@ from oracle_projectile import flight as oracle_flight
 from oracle_projectile import impacts as oracle_impacts
 from oracle_rays import thin_cells
 
-from planes import InputError, Scene, Sprite, load_scene
-from weapons import Pistol, Projectile, fire
-from weapons.decisions import Curve, Decisions, Errors, Method, Question, errors_of
-from weapons.moverstudy import movers_question
-from weapons.pixeltruth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
-from weapons.raypeers import Segments, peer_curves
-from weapons.raystudy import rays_question
-from weapons.spreadstudy import spread_question
-from weapons.targets import ahead, drawn_places, only_hittable, size_of, targets_of, velocities_of
+from hitplanes import InputError, Pistol, Projectile, Scene, Sprite, fire, load_scene
+from hitplanes.weapons.lab.study.methods import (
+    Curve,
+    Decisions,
+    Errors,
+    Method,
+    Question,
+    ahead,
+    drawn_places,
+    errors_of,
+    only_hittable,
+    size_of,
+    targets_of,
+    velocities_of,
+)
+from hitplanes.weapons.lab.study.peers import Segments, peer_curves
+from hitplanes.weapons.lab.study.ray_questions import movers_question, rays_question, spread_question
+from hitplanes.weapons.lab.study.truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
 ROOT = Path(__file__).parent.parent
 PEERS = ("pymunk", "shapely", "pygame")
@@ -169,9 +178,9 @@ def test_truth_tells_who_starts_inside() -> None:
     assert touching(points, 400, target).all() and not touching(points + 600, 400, target).any()
 
 
-@pytest.mark.parametrize("name", ["shapetruth", "pixeltruth"])
+@pytest.mark.parametrize("name", ["truth"])
 def test_truth_shares_nothing_with_what_it_judges(name: str) -> None:
-    tree = ast.parse((ROOT / "weapons" / f"{name}.py").read_text())
+    tree = ast.parse((ROOT / "weapons/lab/study" / f"{name}.py").read_text())
     modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     modules |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     standard = {module for module in modules if module.split(".")[0] in sys.stdlib_module_names}

@@ -8,10 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import History, InputError, Scene, Sprite
-from weapons import Disc, Laser, Pistol, Weapon, fire, picture_of_report, report_of, thennow
-from weapons.schemas import REPORT
-from weapons.world import OUTLINES
+from hitplanes import (
+    Disc,
+    History,
+    InputError,
+    Laser,
+    Pistol,
+    Scene,
+    Sprite,
+    Weapon,
+    fire,
+    picture_of_report,
+    report_of,
+)
+from hitplanes.weapons.cli.schemas import REPORT
+from hitplanes.weapons.report import report as thennow
+from hitplanes.weapons.report.canvas import OUTLINES
 
 
 def lane() -> tuple[Scene, History]:

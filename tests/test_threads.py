@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from test_bitfire import some_scene, some_shots
 
-from planes import InputError, twins, use_jit, use_threads
-from weapons import Disc, Point, Rounds, Spread, Stencil, Weapon, fire
+from hitplanes import Disc, InputError, Point, Rounds, Spread, Stencil, Weapon, fire, use_jit, use_threads
+from hitplanes.planes.common import backend
 
 WEAPONS: list[Weapon] = [
     Point(), Disc(40), Disc(9, pierce=True), Stencil(["#.#", "..#"]), Rounds(Disc(5), 3, (3, 2)),
@@ -30,16 +30,16 @@ def as_before() -> Iterator[None]:
 def test_rows_hang_on_no_number_of_threads(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor on the room that there is for them at first."""
     pytest.importorskip("numba")
-    from planes import bitrows_jit, fronttoback_jit, lookup_jit
+    from hitplanes.planes.jit import areas, bit_rows
 
     rng = np.random.default_rng(threads)
-    monkeypatch.setattr(lookup_jit, "PART_NS", 1.0)
-    monkeypatch.setattr(fronttoback_jit, "PART_NS", 1.0)
-    monkeypatch.setattr(bitrows_jit, "ROOM", 0)
-    monkeypatch.setattr(bitrows_jit, "ROOM_LEAST", 1)
+    monkeypatch.setattr(areas, "PART_NS", 1.0)
+    monkeypatch.setattr(areas, "PART_NS", 1.0)
+    monkeypatch.setattr(bit_rows, "ROOM", 0)
+    monkeypatch.setattr(bit_rows, "ROOM_LEAST", 1)
     used: set[str] = set()
-    inner = bitrows_jit._filled
-    monkeypatch.setattr(bitrows_jit, "_filled", lambda *work: used.add(threading.current_thread().name) or inner(*work))
+    inner = bit_rows._filled
+    monkeypatch.setattr(bit_rows, "_filled", lambda *work: used.add(threading.current_thread().name) or inner(*work))
     rows = 0
     for _ in range(6):
         scene = some_scene(rng, count=40)
@@ -57,12 +57,12 @@ def test_rows_hang_on_no_number_of_threads(threads: int, monkeypatch: pytest.Mon
 
 def test_parts_come_in_order_and_each_is_worth_its_thread() -> None:
     use_threads(4)
-    assert twins.in_parts(10, 1, lambda first, last: (first, last)) == [(0, 2), (2, 5), (5, 7), (7, 10)]
-    assert twins.in_parts(10, 4, lambda first, last: (first, last)) == [(0, 5), (5, 10)]
-    assert twins.in_parts(10, 5.5, lambda first, last: (first, last)) == [(0, 10)]
-    assert twins.in_parts(0, 1, lambda first, last: (first, last)) == [(0, 0)]
+    assert backend.in_parts(10, 1, lambda first, last: (first, last)) == [(0, 2), (2, 5), (5, 7), (7, 10)]
+    assert backend.in_parts(10, 4, lambda first, last: (first, last)) == [(0, 5), (5, 10)]
+    assert backend.in_parts(10, 5.5, lambda first, last: (first, last)) == [(0, 10)]
+    assert backend.in_parts(0, 1, lambda first, last: (first, last)) == [(0, 0)]
     use_threads(1)
-    assert twins.in_parts(10, 1, lambda first, last: threading.current_thread()) == [threading.current_thread()]
+    assert backend.in_parts(10, 1, lambda first, last: threading.current_thread()) == [threading.current_thread()]
 
 
 @pytest.mark.parametrize("bad", [0, 1])
@@ -74,8 +74,8 @@ def test_an_error_in_a_part_is_that_of_the_call(bad: int) -> None:
 
     use_threads(2)
     with pytest.raises(ValueError, match=f"part {bad}"):
-        twins.in_parts(2, 1, work)
-    assert twins.in_parts(2, 1, lambda first, last: first) == [0, 1]
+        backend.in_parts(2, 1, work)
+    assert backend.in_parts(2, 1, lambda first, last: first) == [0, 1]
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, True, "2", 10**9])
@@ -88,8 +88,8 @@ def test_threads_are_a_number(count: object) -> None:
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_a_forked_process_makes_its_own_threads() -> None:
     use_threads(2)
-    assert twins.in_parts(2, 1, lambda first, last: first) == [0, 1]
+    assert backend.in_parts(2, 1, lambda first, last: first) == [0, 1]
     child = os.fork()
     if not child:
-        os._exit(0 if twins.in_parts(2, 1, lambda first, last: first) == [0, 1] else 1)
+        os._exit(0 if backend.in_parts(2, 1, lambda first, last: first) == [0, 1] else 1)
     assert os.waitpid(child, 0)[1] == 0

@@ -16,11 +16,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import planes.exact
-import planes.triangles
-from planes import InputError
-from planes.constants import CHUNK_ROWS
-from planes.triangles import Mesh, meeting_faces, triangles_meet
+from hitplanes import InputError
+from hitplanes.planes.broadphase import triangles
+from hitplanes.planes.broadphase.triangles import Mesh, meeting_faces, triangles_meet
+from hitplanes.planes.common.limits import CHUNK_ROWS
+from hitplanes.planes.volumes import exact
 
 ROOT = Path(__file__).parent.parent
 TINY = 5e-324
@@ -352,7 +352,7 @@ def test_ordinary_rows_cost_no_integers(monkeypatch: pytest.MonkeyPatch) -> None
     def none(*_: object) -> None:
         raise AssertionError("an exact stage")
 
-    monkeypatch.setattr(planes.exact, "_exact", none)
+    monkeypatch.setattr(exact, "_exact", none)
     assert (triangles_meet(a, b) == found).all()
     assert (triangles_meet(a, b, conservative=True) == found).all()
     other = b.copy()
@@ -370,13 +370,13 @@ def test_decided_rows_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[str, int]] = []
 
     def spied(name: str, place: int) -> None:
-        true = getattr(planes.triangles, name)
+        true = getattr(triangles, name)
 
         def counted(*args: Any) -> Any:
             seen.append((name, np.shape(args[place])[-1]))
             return true(*args)
 
-        monkeypatch.setattr(planes.triangles, name, counted)
+        monkeypatch.setattr(triangles, name, counted)
 
     for name, place in (("_sides", 1), ("_intervals_meet", 3), ("_special", 2)):
         spied(name, place)
@@ -444,7 +444,7 @@ def brute(a: Mesh, b: Mesh) -> Any:
 @pytest.mark.parametrize("pieces", [None, 7])
 def test_meeting_faces_are_those_of_brute_force(monkeypatch: pytest.MonkeyPatch, pieces: int | None) -> None:
     if pieces:
-        monkeypatch.setattr(planes.triangles, "CHUNK_SAMPLES", pieces)
+        monkeypatch.setattr(triangles, "CHUNK_SAMPLES", pieces)
     for seed, reach in ((1, 3), (2, 40)):
         a, b = heap(15, seed, reach), heap(20, seed + 10, reach)
         found = meeting_faces(a, b)
@@ -484,9 +484,8 @@ def test_a_mesh_keeps_what_it_was_made_of() -> None:
 def test_a_shot_loads_no_triangles() -> None:
     code = """
 import sys
-from planes import load_scene
-from weapons import Disc, fire
+from hitplanes import Disc, fire, load_scene
 assert fire(load_scene("fixtures/targets"), Disc(300), at=(200, 100))
-assert "planes.scene" in sys.modules and "planes.triangles" not in sys.modules
+assert "hitplanes.planes.scene.scene" in sys.modules and "hitplanes.planes.broadphase.triangles" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

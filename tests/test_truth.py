@@ -14,9 +14,9 @@ import oracle_projectile
 import oracle_raster
 import oracle_volumes
 import pytest
-from test_layout import imported
+from test_layout import imports
 
-from weapons import truth
+from hitplanes.weapons.lab.stability import truth
 
 DOWN = math.nextafter(5.0, 4)
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
@@ -86,7 +86,7 @@ def test_known_cases(judge: Callable[..., bool], row: tuple[Any, ...], meet: boo
 
 
 def test_it_imports_nothing_of_what_it_judges() -> None:
-    names = {name.split(".")[0] for name in imported(Path(truth.__file__).read_text(encoding="utf-8"))}
+    names = {found.module.split(".")[0] for found in imports(Path(truth.__file__).read_text(encoding="utf-8"), "")}
     assert names == {"__future__", "collections", "itertools", "typing"}
 
 
@@ -110,9 +110,9 @@ PLANAR: list[tuple[str, str, Callable[..., bool]]] = [
 def test_it_agrees_with_another_truth(one: str, other: str, judge: Callable[..., bool]) -> None:
     count = 0
     for family, a, b in adversarial.cases(one, other, 480, seed=5):
-        meet = oracle_volumes.meets(one, a, other, b)
-        assert judge(a, b) == meet, (family, a, b)
-        count += meet
+        meeting = oracle_volumes.meets(one, a, other, b)
+        assert judge(a, b) == meeting, (family, a, b)
+        count += meeting
     assert 100 < count < 400
 
 

@@ -10,14 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from planes import Scene, Sprite, load_scene, read_png
-from weapons import Disc, Laser, Point, Spread, arsenal_of, fire, report_of
-from weapons.cli import main
-from weapons.differences import differences
-from weapons.marks import MARKS
-from weapons.schemas import read_report
-from weapons.versus import AROUND, compared_pixels, picture_of_difference
-from weapons.world import factor_of
+from hitplanes import Disc, Laser, Point, Scene, Spread, Sprite, arsenal_of, fire, load_scene, read_png, report_of
+from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.cli.schemas import read_report
+from hitplanes.weapons.report.canvas import factor_of
+from hitplanes.weapons.report.differences import differences
+from hitplanes.weapons.report.picture import AROUND, compared_pixels, picture_of_difference
+from hitplanes.weapons.report.symbols import MARKS
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import planes.cells
-from planes import Scene, use_jit, visible
-from planes.constants import ALL
-from planes.twins import kernels_of
-from planes.visible import WITHOUT_MOST, Composition, View
-from weapons import Beam, Disc, fire
+from hitplanes import Beam, Disc, Scene, fire, use_jit
+from hitplanes.planes.bits import cells as cells_module
+from hitplanes.planes.bits import visible
+from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.limits import ALL
 
 CORNERS = [(0, 0), (-(10**9), 10**9), (10**12, -(10**12))]
 
@@ -31,19 +31,19 @@ def crowd(count: int = 60, corner: tuple[int, int] = (0, 0)) -> Scene:
 def composed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
     """The views of what is composed during a test."""
     made: list[View] = []
-    begin = Composition.__init__
+    begin = VisibleSet.__init__
 
-    def noted(self: Composition, *given: Any) -> None:
+    def noted(self: VisibleSet, *given: Any) -> None:
         made.append(given[-1])
         begin(self, *given)
 
-    monkeypatch.setattr(Composition, "__init__", noted)
+    monkeypatch.setattr(VisibleSet, "__init__", noted)
     yield made
 
 
 def test_more_views_in_turn_than_are_kept_lose_anew_before_each_is_composed_again(composed: list[View]) -> None:
     scene = crowd(300)
-    known = scene.compositions()
+    known = scene.visible_sets()
     views = [View(False, 1 << k, ()) for k in range(visible.VIEWS_MOST + 1)]
     lost, cost, rounds = 1.0, 10.0, 200
     for _ in range(rounds):
@@ -74,20 +74,20 @@ def test_few_placements_do_without_lists(jit: bool, corner: tuple[int, int]) -> 
 
 
 def test_many_placements_are_worth_lists_and_those_that_are_there_cost_nothing() -> None:
-    composition = Composition(*what(crowd()))
+    visible_set = VisibleSet(*what(crowd()))
     small, large = np.array([-3, -3, 3, 3]), np.array([-40, -40, 40, 40])
-    cells, made = composition.cells_for(small, WITHOUT_MOST + 1)
-    assert made == cells.nbytes > 0 and composition.cells_for(small, 1) == (cells, 0)
-    everything, made = composition.cells_for(large, WITHOUT_MOST)
-    assert made == 0 and everything.listed.tolist() == list(range(len(composition.seen.rank)))
-    assert composition.cells_for(large, 1)[1] > 0
+    cells, made = visible_set.cells_for(small, WITHOUT_MOST + 1)
+    assert made == cells.nbytes > 0 and visible_set.cells_for(small, 1) == (cells, 0)
+    everything, made = visible_set.cells_for(large, WITHOUT_MOST)
+    assert made == 0 and everything.listed.tolist() == list(range(len(visible_set.seen.rank)))
+    assert visible_set.cells_for(large, 1)[1] > 0
 
 
 def test_pairs_of_placements_and_tiles_that_are_compared_are_not_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    composition = Composition(*what(crowd()))
-    monkeypatch.setattr(visible, "PAIRS_MOST", 2 * len(composition.seen.rank))
+    visible_set = VisibleSet(*what(crowd()))
+    monkeypatch.setattr(visible, "PAIRS_MOST", 2 * len(visible_set.seen.rank))
     reach = np.array([-3, -3, 3, 3])
-    assert composition.cells_for(reach, 2)[1] == 0 and composition.cells_for(reach, 3)[1] > 0
+    assert visible_set.cells_for(reach, 2)[1] == 0 and visible_set.cells_for(reach, 3)[1] > 0
 
 
 def what(scene: Scene) -> Any:
@@ -95,8 +95,8 @@ def what(scene: Scene) -> Any:
 
 
 def test_nothing_can_be_seen_of_no_objects() -> None:
-    composition = Composition(*what(Scene()))
-    cells, made = composition.cells_for(np.array([-3, -3, 3, 3]), 1)
+    visible_set = VisibleSet(*what(Scene()))
+    cells, made = visible_set.cells_for(np.array([-3, -3, 3, 3]), 1)
     assert made == 0 and not len(cells.listed)
 
 
@@ -109,8 +109,8 @@ def test_distances_along_rows_are_counted_where_they_are_made() -> None:
     finally:
         use_jit(None)
     first, second = (next(stage.bytes_made for stage in ran if stage.name == "samples") for ran in told)
-    composition = scene.compositions().kept(View(False, ALL, ()), scene.version)
-    assert composition is not None and first - second == composition.beside.nbytes > 0
+    visible_set = scene.visible_sets().kept(View(False, ALL, ()), scene.version)
+    assert visible_set is not None and first - second == visible_set.beside.nbytes > 0
 
 
 @pytest.mark.parametrize("size", [(1, 1), (250, 1), (1, 250), (70, 250)])
@@ -122,12 +122,12 @@ def test_one_cell_with_all_is_wherever_a_pattern_meets_anything(
     for x in (0, size[0] - 1):
         for y in (0, size[1] - 1):
             scene.add([[True]], (corner[0] + x, corner[1] + y))
-    composition = Composition(*what(scene))
-    left, top = composition.seen.box_xyxy.T[:2]
+    visible_set = VisibleSet(*what(scene))
+    left, top = visible_set.seen.box_xyxy.T[:2]
     reach = np.array([-2, -30, 40, 5])
-    cells, _ = composition.cells_for(reach, 1)
+    cells, _ = visible_set.cells_for(reach, 1)
     x, y = np.meshgrid(
         [left.min() - reach[2], left.max() - reach[0]], [top.min() - reach[3], top.max() - reach[1]], indexing="ij"
     )
-    place, _ = kernels_of(planes.cells).listed_at(cells, x.reshape(-1), y.reshape(-1))
+    place, _ = kernels_of(cells_module).listed_at(cells, x.reshape(-1), y.reshape(-1))
     assert np.bincount(place, minlength=4).tolist() == [len(left)] * 4

@@ -8,10 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planes import InputError
-from planes.exact import orient2d
-from planes.parts import BoxSets, ConcavePolygons, Parts
-from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons, Volumes
+from hitplanes import InputError
+from hitplanes.planes.volumes.exact import orient2d
+from hitplanes.planes.volumes.volumes import (
+    Aabbs,
+    BoxSets,
+    Capsules,
+    Circles,
+    ConcavePolygons,
+    Obbs,
+    Parts,
+    Polygons,
+    Volumes,
+)
 
 F = Fraction
 L_SHAPE = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Rows", "meet", "pairs"]
+__all__ = ["Rows", "find_contacts", "pairs"]
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Rng = np.random.Generator
@@ -146,7 +146,7 @@ def crossed(a: Array, b: Array, c: Array, d: Array) -> Array:
     return ((sides < 0) & (others < 0)).astype(bool)
 
 
-def meet(kind_a: str, a: Rows, kind_b: str, b: Rows) -> Array:
+def find_contacts(kind_a: str, a: Rows, kind_b: str, b: Rows) -> Array:
     """Whether rows share a point: circles, boxes and capsules, but no box with a capsule."""
     (p, ra), (q, rb) = a, b
     p, ra, q, rb = whole_numbers(p, ra, q, rb)

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planes.arrays import Floats, Ints
-from planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, Quadtree
+from hitplanes.planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, Quadtree
+from hitplanes.planes.common.checks import Floats, Ints
 
 try:
     import shapely

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from turns import least
 
-from planes.exact import circles_sign, orient2d, orient3d, point_segment_sign, segment_segment_sign
+from hitplanes.planes.volumes.exact import circles_sign, orient2d, orient3d, point_segment_sign, segment_segment_sign
 
 ROWS = 1_000_000
 

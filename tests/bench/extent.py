@@ -19,8 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planes import Scene, Sprite
-from weapons import Beam, Disc, Hits, Laser, Pistol, Projectile, Weapon, fire
+from hitplanes import Beam, Disc, Hits, Laser, Pistol, Projectile, Scene, Sprite, Weapon, fire
 
 SHOTS, RANGE = 1000, 1000
 WORLDS = [

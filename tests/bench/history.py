@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planes import History, Scene, Sprite, sprite
-from planes.items import COLUMNS
-from weapons import Disc, fire
+from hitplanes import Disc, History, Scene, Sprite, fire
+from hitplanes.planes.scene import sprite
+from hitplanes.planes.scene.items import COLUMNS
 
 WORLD = (1920, 1080)
 TICKS = 8

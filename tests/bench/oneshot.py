@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from planes import Scene, use_jit
-from planes.arrays import Bools
-from planes.grid256 import unit
-from weapons import Beam, Disc, Point, Stencil, Weapon, prepare
-from weapons.arsenal import Plain, pattern_of
+from hitplanes import Beam, Disc, Point, Scene, Stencil, Weapon, prepare, use_jit
+from hitplanes.planes.common.checks import Bools
+from hitplanes.planes.grid.fixed_point import unit
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame
@@ -60,7 +59,7 @@ def peer_mask(mask: Bools) -> Any:
     return pygame.mask.from_surface(pygame.image.frombuffer(rgba.tobytes(), mask.shape[::-1], "RGBA"), 127)
 
 
-def rendered(weapon: Plain, degrees: float) -> tuple[Any, int, int]:
+def rendered(weapon: AreaWeapon, degrees: float) -> tuple[Any, int, int]:
     """A pattern's mask, and where its first corner is from the shot's pixel."""
     c, s = (int(v) for v in unit(degrees))
     mask, (x, y) = pattern_of(weapon, c, s).spans.to_mask()

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from turns import least
 
-from planes.overlap import overlap
-from planes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons
+from hitplanes.planes.volumes.overlap import overlap
+from hitplanes.planes.volumes.volumes import Aabbs, Capsules, Circles, Obbs, Polygons
 
 ROWS = 200_000
 TOWARD = np.array([0.6, 0.8])
@@ -203,8 +203,8 @@ def main() -> None:
                 ratios.append(times[1] / times[0])
                 first = first or [overlap(a, b).mean() * 100, *times]
             shown = " ".join(f"{r:7.2f}" for r in ratios)
-            meet, floats, exacts, quick = first
-            head = f"{one + ' ' + two:20} {name:7} {meet:4.0f}% {floats:9.1f} {exacts:9.1f}"
+            find_contacts, floats, exacts, quick = first
+            head = f"{one + ' ' + two:20} {name:7} {find_contacts:4.0f}% {floats:9.1f} {exacts:9.1f}"
             print(f"{head} {'':20} {shown}  {quick / floats:12.2f}", flush=True)
 
 

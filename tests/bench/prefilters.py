@@ -10,8 +10,7 @@ import time
 
 import numpy as np
 
-from planes import Scene, Sprite
-from weapons import Beam, Cone, Disc, Point, Ring, Spread, Weapon, fire
+from hitplanes import Beam, Cone, Disc, Point, Ring, Scene, Spread, Sprite, Weapon, fire
 
 WEAPONS: dict[str, Weapon] = {
     "point": Point(),

@@ -18,8 +18,8 @@ import numpy as np
 import pymunk
 from turns import least
 
-from planes import Role, Scene, Sprite, use_jit
-from weapons import Laser, Pistol, RayHits, Rifle, Weapon, fire, rayways, tracing
+from hitplanes import Laser, Pistol, RayHits, Rifle, Role, Scene, Sprite, Weapon, fire, use_jit
+from hitplanes.weapons.rays import first_hit, ray_walk
 
 LENGTH, BATCH, SINGLE = 1000, 10_000, 100
 WORLD = (1920, 1080)
@@ -99,12 +99,12 @@ def queries(space: pymunk.Space, shots: Shots, radius: float, everything: bool) 
 @contextmanager
 def one_stretch() -> Iterator[None]:
     """Follow rays to their full length at once."""
-    edges = tracing._edges
-    tracing._edges = lambda *_: [-np.inf, np.inf]
+    edges = ray_walk._edges
+    ray_walk._edges = lambda *_: [-np.inf, np.inf]
     try:
         yield
     finally:
-        tracing._edges = edges
+        ray_walk._edges = edges
 
 
 def in_one_stretch(scene: Scene, weapon: Weapon, shots: Shots) -> RayHits:
@@ -177,12 +177,12 @@ WAYS = {"walk": {"strategy": "direct"}, "cast": {"strategy": "direct"}, "jump": 
 @contextmanager
 def patched(name: str) -> Iterator[None]:
     """Let rays that do not jump all walk, or all be cast."""
-    cost = rayways.WALK_CALL_NS
-    rayways.WALK_CALL_NS = {"walk": -1e18, "cast": 1e18}.get(name, cost)
+    cost = first_hit.WALK_CALL_NS
+    first_hit.WALK_CALL_NS = {"walk": -1e18, "cast": 1e18}.get(name, cost)
     try:
         yield
     finally:
-        rayways.WALK_CALL_NS = cost
+        first_hit.WALK_CALL_NS = cost
 
 
 def main(counts: list[int]) -> None:

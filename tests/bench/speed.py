@@ -30,9 +30,9 @@ from speed_static import modes, special, static
 from speed_targets import judged
 from strategies import planner
 
-import planes
-from planes import use_jit
-from planes.image import write_text
+import hitplanes
+from hitplanes import use_jit
+from hitplanes.planes.files.png import write_text
 
 SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
     "static": static,
@@ -96,7 +96,7 @@ def measured(settings: Settings, only: Sequence[str], tell: Callable[[str], obje
     rates = bandwidth()
     load = ", ".join(f"{load:.1f}" for load in about["load"])
     tell(f"{about['python']}, numpy {about['versions']['numpy']}, {about['cpus']} CPUs, load {load}")
-    tell(f"measured: {Path(planes.__file__).parent}")
+    tell(f"measured: {Path(hitplanes.__file__).parent}")
     tell("bytes a second: " + ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in rates.items()))
     cells: list[Cell] = []
     try:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from planes.arrays import Ints
+from hitplanes.planes.common.checks import Ints
 
 __all__ = [
     "PROBE",

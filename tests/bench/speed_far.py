@@ -19,9 +19,7 @@ from speed_peers import MARGIN, Masks, first, pygame, rendered
 from speed_static import Settings, hit_rows, modes, ours, touched
 from speed_world import PATTERNS, WORLD, Volleys, items_of, pattern_mask, scene_of, volleys
 
-import planes
-from planes import History
-from weapons import Disc, fire
+from hitplanes import Disc, History, fire
 
 __all__ = ["cold", "huge", "rewind"]
 
@@ -134,9 +132,9 @@ def _half_near(name: str, shots: int, middles: Any) -> Iterator[Volleys]:
 COLD = {
     "python": "pass",
     "import numpy": "import numpy",
-    "import planes, weapons": "import numpy, planes, weapons",
+    "import hitplanes": "import numpy, hitplanes",
     "first fire": (
-        "from planes import Scene, Sprite; from weapons import Disc, fire; s = Scene((1920, 1080)); "
+        "from hitplanes import Disc, Scene, Sprite, fire; s = Scene((1920, 1080)); "
         "s.add(Sprite.circle(12), (160, 100)); fire(s, Disc(40), (165, 102))"
     ),
     "import pygame": "import os; os.environ['PYGAME_HIDE_SUPPORT_PROMPT'] = '1'; import pygame",
@@ -145,17 +143,17 @@ COLD = {
 
 
 IMPORTS = (
-    "import time; a = time.perf_counter_ns(); import numpy; b = time.perf_counter_ns(); import planes, weapons; "
+    "import time; a = time.perf_counter_ns(); import numpy; b = time.perf_counter_ns(); import hitplanes; "
     "print(a, b, time.perf_counter_ns())"
 )
 
 
 def cold(settings: Settings) -> Iterator[Cell]:
     """Fresh processes, in turn: what importing adds to numpy, and the first shot."""
-    root = Path(planes.__file__).parents[1]
+    root = Path(__file__).parents[2]
     cell = Cell("cold", "fresh process", 0, unit="ns a start", asked=settings.starts)
     starts = COLD | (
-        {"first fire, jit": "from planes import use_jit; use_jit(); " + COLD["first fire"]} if settings.jit else {}
+        {"first fire, jit": "from hitplanes import use_jit; use_jit(); " + COLD["first fire"]} if settings.jit else {}
     )
     for number in range(settings.starts + 1):
         for name, code in starts.items():
@@ -164,7 +162,7 @@ def cold(settings: Settings) -> Iterator[Cell]:
             if number:
                 cell.sides.setdefault(name, Times()).rounds.append(float(time.perf_counter_ns() - begin))
     numpy, added = zip(*(_imports(root) for _ in range(settings.starts)), strict=True)
-    cell.values["import planes, weapons: added to numpy's"] = statistics.median(added) / statistics.median(numpy)
+    cell.values["import hitplanes: added to numpy's"] = statistics.median(added) / statistics.median(numpy)
     yield cell
 
 

@@ -20,7 +20,7 @@ from speed_static import Settings, hit_rows, modes, ours
 from speed_targets import TARGETS
 from speed_world import PATTERNS, items_of, pattern_mask, runs, scene_of
 
-from planes import Scene
+from hitplanes import Scene
 
 __all__ = ["floors"]
 
@@ -89,9 +89,12 @@ def _counts(side: Side) -> Side:
 
     def answer(work: Any, units: int) -> Any:
         with (
-            mock.patch("planes.bitrows.nearest", lambda met, left, top: (left, left, top)),
-            mock.patch("planes.bitrows.nearest_seen", lambda seen, beside, near, left, top: (left, left, top)),
-            mock.patch("planes.itemrows._row_order", lambda found, placed: slice(None)),
+            mock.patch("hitplanes.planes.bits.bit_rows.nearest", lambda met, left, top: (left, left, top)),
+            mock.patch(
+                "hitplanes.planes.bits.bit_rows.nearest_visible",
+                lambda seen, beside, near, left, top: (left, left, top),
+            ),
+            mock.patch("hitplanes.planes.bits.front_to_back._row_order", lambda found, placed: slice(None)),
         ):
             return whole(work, units)
 

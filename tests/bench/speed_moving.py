@@ -14,10 +14,9 @@ from speed_peers import Masks, first, pygame_mask, rendered
 from speed_static import Settings, hit_rows, modes, touched
 from speed_world import PATTERNS, WORLD, Volleys, items_of, pattern_mask, scene_of, volleys
 
-from planes import Scene
-from planes.arrays import Floats, Ints
-from planes.compose import CodePlane
-from weapons import Disc, fire, prepare
+from hitplanes import Disc, Scene, fire, prepare
+from hitplanes.planes.bits.label_plane import LabelPlane
+from hitplanes.planes.common.checks import Floats, Ints
 
 __all__ = ["Own", "frames_of", "moving", "moving_rays", "redrawn"]
 
@@ -295,7 +294,7 @@ def _steps(scene: Scene, moved: int, count: int, rng: Any) -> list[tuple[Any, Fl
 
 
 def _redraw(scene: Scene) -> Callable[[Any, int], Scene]:
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
     plane.read(scene.items)
 
@@ -310,9 +309,9 @@ def _redraw(scene: Scene) -> Callable[[Any, int], Scene]:
 
 def check_drawn(scene: Scene) -> None:
     """Check that the plane that was drawn step by step is the one that is drawn at once."""
-    plane = scene.code_plane()
+    plane = scene.label_plane()
     assert plane is not None
-    if not np.array_equal(plane.read(scene.items), CodePlane(plane.box_xyxy).read(scene.items)):
+    if not np.array_equal(plane.read(scene.items), LabelPlane(plane.box_xyxy).read(scene.items)):
         raise DisagreementError(
             f"redrawn, {len(scene)} objects: the plane drawn step by step differs from one drawn at once"
         )

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from speed_world import MARGIN, WORLD, Item, Volleys
 
-from planes.arrays import Bools, Ints
+from hitplanes.planes.common.checks import Bools, Ints
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import pygame

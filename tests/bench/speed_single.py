@@ -15,9 +15,8 @@ from speed_peers import MARGIN, Baked, Masks, Plane, pygame, rendered
 from speed_static import Settings, modes, ours
 from speed_world import PATTERNS, Volleys, items_of, pattern_mask, scene_of, volleys
 
-import weapons
-from planes import Scene
-from weapons import Pistol, Weapon, fire
+import hitplanes
+from hitplanes import Pistol, Scene, Weapon, fire
 
 __all__ = ["masks_call", "own_calls", "preparation", "single", "timed_calls", "works_of"]
 
@@ -71,7 +70,7 @@ def own_calls(scene: Scene, weapon: Weapon, mode: str) -> dict[str, Call]:
         return hits.object.tolist(), hits.samples.tolist()
 
     calls: dict[str, Call] = {f"fire, {mode}": fired}
-    prepare = getattr(weapons, "prepare", None)
+    prepare = getattr(hitplanes, "prepare", None)
     if prepare is None:
         return calls
     ready = prepare(scene, weapon)

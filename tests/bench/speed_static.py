@@ -13,8 +13,7 @@ from speed_engines import EASIER, Space, Tree
 from speed_peers import Baked, Masks, Plane, first, rendered
 from speed_world import MARGIN, PATTERNS, SEED, WORLD, Volleys, items_of, pattern_mask, runs, scene_of, volleys
 
-from planes import Scene, use_jit
-from weapons import Disc, Hits, Laser, Weapon, fire
+from hitplanes import Disc, Hits, Laser, Scene, Weapon, fire, use_jit
 
 __all__ = ["hit_rows", "modes", "ours", "static", "special"]
 

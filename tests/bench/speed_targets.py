@@ -112,8 +112,8 @@ TARGETS: tuple[Target, ...] = (
     ),
     Target("planner: auto over the better", "planner", (), ANY, 1.5, 1.5, value="auto over best, {mode}"),
     Target(
-        "import planes, weapons: added to numpy's", "cold", (), ANY, 0.2, 0.2,
-        value="import planes, weapons: added to numpy's",
+        "import hitplanes: added to numpy's", "cold", (), ANY, 0.2, 0.2,
+        value="import hitplanes: added to numpy's",
     ),
 )  # fmt: skip
 

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from planes import Scene, Sprite
-from planes.arrays import Bools, Floats, Ints
-from planes.grid256 import pixel, snap, unit
-from weapons import Beam, Disc, Pistol, Point, Spread, Stencil, Weapon
-from weapons.arsenal import Plain, pattern_of
-from weapons.draws import disc_offsets
+from hitplanes import Beam, Disc, Pistol, Point, Scene, Spread, Sprite, Stencil, Weapon
+from hitplanes.planes.common.checks import Bools, Floats, Ints
+from hitplanes.planes.grid.fixed_point import pixel, snap, unit
+from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
+from hitplanes.weapons.kinds.placements import disc_offsets
 
 __all__ = [
     "MARGIN", "PATTERNS", "SEED", "WORLD", "Aimed", "Item", "Volleys", "items_of", "pattern_mask", "scene_of",
@@ -136,7 +135,7 @@ PATTERNS: dict[str, Weapon] = {
 }
 
 
-def pattern_mask(weapon: Plain, degrees: float = 0.0) -> tuple[Bools, int, int]:
+def pattern_mask(weapon: AreaWeapon, degrees: float = 0.0) -> tuple[Bools, int, int]:
     """Pixels of a pattern, and where its first corner is, from the shot's pixel: peers get it rendered."""
     c, s = (int(v[0]) for v in unit(np.array([degrees])))
     spans = pattern_of(weapon, c, s).spans

@@ -14,14 +14,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from planes import load_scene
-from weapons import Disc
+from hitplanes import Disc, load_scene
 
 ROOT = Path(__file__).parents[2]
 MIXES = {
-    "point": ["pistol"],
+    "point": ["point"],
     "disc r=8": ["disc"],
-    "mixed": ["pistol"] * 14 + ["disc"] * 3 + ["shotgun"] * 2 + ["blast"],
+    "mixed": ["point"] * 14 + ["disc"] * 3 + ["shotgun"] * 2 + ["blast"],
 }
 
 
@@ -42,7 +41,7 @@ def write_log(path: Path, weapons: list[str], shots: int) -> None:
 def measured(scene: Path, log: Path, output: Path) -> tuple[float, float]:
     """Seconds of a run in a process of its own, from its start to its end, and its peak memory in MB."""
     begin = time.perf_counter()
-    words = [sys.executable, "-m", "weapons", "fire", scene, log, "-o", output]
+    words = [sys.executable, "-m", "hitplanes", "fire", scene, log, "-o", output]
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     assert status == 0

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from turns import least
 
-from planes.constants import CHUNK_ROWS
-from planes.triangles import Mesh, meeting_faces, triangles_meet
+from hitplanes.planes.broadphase.triangles import Mesh, meeting_faces, triangles_meet
+from hitplanes.planes.common.limits import CHUNK_ROWS
 
 ROWS = 400_000
 
@@ -82,8 +82,8 @@ def interval(along: Any, d: Any) -> tuple[Any, Any]:
 def random_pairs(rng: Any) -> tuple[Any, Any]:
     """Triangles in one cube of 2000 px; half of the pairs meet."""
     a, b = (rng.uniform(0, 2000, (3 * ROWS, 3, 3)) for _ in range(2))
-    meet = plain(a, b)
-    half = [np.flatnonzero(meet == value)[: ROWS // 2] for value in (False, True)]
+    meeting = plain(a, b)
+    half = [np.flatnonzero(meeting == value)[: ROWS // 2] for value in (False, True)]
     rows = rng.permutation(np.concatenate(half))
     return a[rows], b[rows]
 
@@ -132,8 +132,8 @@ def pairs_table(shares: list[float]) -> None:
                 lambda a=a, b=b: triangles_meet(a, b, conservative=True),  # type: ignore[misc]
             )
             times = f"{floats / ROWS * 1e9:9.1f} {exacts / ROWS * 1e9:9.1f}"
-            meet = triangles_meet(a, b).mean()
-            print(f"{name:8} {meet:5.2f} {share:9.0e} {times} {exacts / floats:6.2f} {quick / floats:13.2f}")
+            meeting = triangles_meet(a, b).mean()
+            print(f"{name:8} {meeting:5.2f} {share:9.0e} {times} {exacts / floats:6.2f} {quick / floats:13.2f}")
 
 
 def meshes_table() -> None:

@@ -1,4 +1,4 @@
-"""What each kind of volume costs and how wrong it is: the duck of README's picture, and sprites of the gallery.
+"""What each kind of volume costs and how wrong it is: the duck of the picture of volumes, and sprites of the gallery.
 
 python tests/bench/volumes.py
 
@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fixtures"))
 
 from fitted import FITS, Bools, false_area, numbers_of
 
-from planes import Scene, Sprite, fit, load_scene
-from planes.overlap import overlap
-from planes.volumes import Volumes
-from weapons import Disc, fire
+from hitplanes import Disc, Scene, Sprite, fire, load_scene
+from hitplanes.planes.volumes import fit
+from hitplanes.planes.volumes.overlap import overlap
+from hitplanes.planes.volumes.volumes import Volumes
 
 RADIUS = 6
 PAIRS, ROUNDS = 100_000, 3

@@ -1,0 +1,225 @@
+"""Ray casts: the first item that a thin ray touches, found by the masks of all items, without a plane.
+
+A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
+box is left that it enters before the first cell that it found. Times are those of `grid.rasterize`: whole numbers over
+max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on rounding.
+
+Of cells that are entered at once, one with an occluder comes first, then the least (y, x); within a cell the front item
+counts. `jit.rays` has the compiled kernel.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..common.checks import Ints
+from ..common.limits import HALF, SUB
+from ..grid.spans import Box, meets
+from ..scene.items import Stack, clipped
+from .distance_field import LONGEST, NOTHING, UNDECIDED
+
+ROWS_MOST = 400
+"""Most rows of masks that one ray looks at in numpy; with more, the walk is faster."""
+
+Pair = tuple[int, int]
+Spell = tuple[int, int]
+"""Times at which a ray enters and leaves a box or a cell."""
+
+
+class Touched(NamedTuple):
+    """The first cell and item that rays (R,) touch, as columns.
+
+    Parameters
+    ----------
+    entry : time at which a ray enters the cell; NOTHING; or UNDECIDED if it was not followed
+    x, y, rank : the cell, and the item
+    """
+
+    entry: Ints
+    x: Ints
+    y: Ints
+    rank: Ints
+
+
+class Near(NamedTuple):
+    """Items (n,) that a ray may touch, in the order in which it enters their boxes.
+
+    Parameters
+    ----------
+    rank : (n,) places in the stack
+    entry, leave : (n,) times at which the ray enters and leaves the boxes
+    box_xyxy : (n, 4) boxes within the bounds, relative to the pixel on which the ray begins
+    """
+
+    rank: Ints
+    entry: Ints
+    leave: Ints
+    box_xyxy: Ints
+
+
+# house: hit rule of rays
+def first_touched(
+    stack: Stack,
+    bounds: Box | None,
+    start_256: Ints,
+    step_256: Ints,
+    accept: Ints | None = None,
+    exclude: Ints | None = None,
+) -> Touched:
+    """Find the first item that each ray touches.
+
+    Parameters
+    ----------
+    bounds : box beyond which nothing is touched, or None
+    start_256, step_256 : (R, 2) rays, up to 2**48
+    accept, exclude : (R,) accepted category bits, and (R, K) owners whose items are skipped; or None, both
+
+    Returns
+    -------
+    the first cells; a ray without length, or longer than LONGEST, is UNDECIDED, and so is one in numpy that looks at
+    more than ROWS_MOST rows
+    """
+    found = []
+    for ray, (start, step) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
+        if step == [0, 0] or max(map(abs, step)) > LONGEST:
+            found.append((UNDECIDED, 0, 0, -1))
+            continue
+        origin = (start[0] + HALF) // SUB, (start[1] + HALF) // SUB
+        line = Ray((start[0] - SUB * origin[0], start[1] - SUB * origin[1]), (step[0], step[1]))
+        accepts = None if accept is None or exclude is None else (accept[ray], exclude[ray])
+        found.append(_first(line, origin, _near(line, origin, stack, bounds, accepts), stack))
+    return Touched(*np.array(found, np.int64).reshape(-1, 4).T)
+
+
+class Ray:
+    """A thin ray, relative to the pixel on which it begins, in 1/256 px."""
+
+    def __init__(self, start: Pair, step: Pair) -> None:
+        self.start, self.step = start, step
+        self.across = max(abs(step[1]), 1), max(abs(step[0]), 1)
+        self.major = int(abs(step[1]) > abs(step[0]))
+
+    def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """Times at which the ray enters and leaves boxes (n, 4) of pixels; leave < entry if it does not touch a box."""
+        entry, leave = np.zeros(len(boxes_xyxy), np.int64), np.full(len(boxes_xyxy), self.across[0] * self.across[1])
+        for axis, across in enumerate(self.across):
+            low = SUB * boxes_xyxy[:, axis] - (HALF + self.start[axis])
+            high = SUB * boxes_xyxy[:, axis + 2] + (HALF - self.start[axis])
+            if not self.step[axis]:
+                leave[(low > 0) | (high < 0)] = -1
+                continue
+            near, far = (low, high) if self.step[axis] > 0 else (-high, -low)
+            np.maximum(entry, near * across, out=entry)
+            np.minimum(leave, far * across, out=leave)
+        return entry, leave
+
+    def spell(self, x: int, y: int) -> Spell:
+        """Like `times`, for one pixel."""
+        entry, leave = 0, self.across[0] * self.across[1]
+        for at, begin, step, across in zip((x, y), self.start, self.step, self.across, strict=True):
+            ahead = SUB * at - begin if step > 0 else begin - SUB * at
+            if step:
+                entry, leave = max(entry, (ahead - HALF) * across), min(leave, (ahead + HALF) * across)
+            elif abs(ahead) > HALF:
+                return 1, 0
+        return entry, leave
+
+    def rows(self, box: list[int], times: Spell) -> range:
+        """Rows of a box, across the longer axis of the ray, that it visits between two times, in its order."""
+        minor = 1 - self.major
+        begin, step, scale = self.start[minor], self.step[minor], self.across[0] * self.across[1]
+        at = sorted((begin + step * time // scale + HALF) // SUB for time in times)
+        first, last = max(at[0] - 1, box[minor]), min(at[1] + 1, box[minor + 2])  # on a border it is in two rows
+        return range(first, last + 1) if step >= 0 else range(last, first - 1, -1)
+
+    def run(self, row: int) -> Spell:
+        """First and last cell of a row that the ray touches, along its longer axis; (1, 0) if it touches none."""
+        u, along = self.start[self.major], self.step[self.major]
+        begin, step = self.start[1 - self.major], self.step[1 - self.major]
+        first = max(min(begin, begin + step), SUB * row - HALF) - begin
+        last = min(max(begin, begin + step), SUB * row + HALF) - begin
+        if first > last:
+            return 1, 0
+        if step:
+            per, slope = abs(step), along if step > 0 else -along
+            low, high = sorted((u * per + first * slope, u * per + last * slope))
+        else:
+            per, low, high = 1, min(u, u + along), max(u, u + along)
+        return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+
+def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: tuple[Ints, Ints] | None) -> Near:
+    """Accepted items whose boxes a ray touches, in order of entry."""
+    ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
+    around = [(low - HALF) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
+    around += [(high + HALF) // SUB + o for (_, high), o in zip(ends, origin, strict=True)]
+    rank = np.flatnonzero(meets(np.array(around), stack.box_xyxy))
+    if accepts is not None:
+        owned = (stack.owner[rank, None] == accepts[1]).any(axis=1)
+        rank = rank[(stack.categories[rank] & accepts[0] != 0) & ~owned]
+    box = stack.box_xyxy[rank]
+    if bounds is not None:
+        box = clipped(box, bounds)
+    box = box - np.array([*origin, *origin])
+    entry, leave = ray.times(box)
+    rows = np.flatnonzero((entry <= leave) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
+    rows = rows[np.argsort(entry[rows], kind="stable")]
+    return Near(rank[rows], entry[rows], leave[rows], box[rows])
+
+
+def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, int, int]:
+    """Time, cell and rank of the first item that a ray touches."""
+    best: tuple[int, int, int] | None = None
+    left = ROWS_MOST
+    for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
+        if best is not None and entry > best[0]:
+            break
+        box = near.box_xyxy[k].tolist()
+        rows = ray.rows(box, (entry, leave))
+        left -= len(rows) + 1
+        if left < 0:
+            return UNDECIDED, 0, 0, -1
+        found = _in(ray, origin, box, rows, stack, int(near.rank[k]))
+        if found is not None and (best is None or found[0] < best[0]):
+            best = found
+    if best is None:
+        return NOTHING, 0, 0, -1
+    cells = []
+    for x, y in ((best[1] + k % 3 - 1, best[2] + k // 3 - 1) for k in range(9)):
+        first, last = ray.spell(x, y)
+        if first == best[0] <= last:
+            ranks = _holders(x, y, origin, near, stack)
+            if len(ranks):
+                cells.append((not stack.occluder[ranks].any(), y, x, int(ranks.min())))
+    _, y, x, rank = min(cells)
+    return best[0], x + origin[0], y + origin[1], rank
+
+
+def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:
+    """Ranks of the items that cover a pixel."""
+    rank = near.rank[meets(np.array([x, y, x, y]), near.box_xyxy)]
+    own_x, own_y = x + origin[0] - stack.box_xyxy[rank, 0], y + origin[1] - stack.box_xyxy[rank, 1]
+    return np.asarray(rank[stack.masks[stack.offset[rank] + own_y * stack.width[rank] + own_x]])
+
+
+def _in(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> tuple[int, int, int] | None:
+    """Time and cell at which a ray first touches an item in the given rows; None if it does not."""
+    found, major, (left, top) = [], ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
+    width, corner = int(stack.width[rank]), int(stack.offset[rank])
+    step = width if major else 1
+    for row in rows:
+        first, last = ray.run(row)
+        first, last = max(first, box[major]), min(last, box[major + 2])
+        if first > last:
+            continue
+        begin = corner + ((first - top) * width + row - left if major else (row - top) * width + first - left)
+        run = stack.masks[begin : begin + (last - first) * step + 1 : step].tobytes()
+        at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
+        if at >= 0:
+            x, y = (row, first + at) if major else (first + at, row)
+            found.append((ray.spell(x, y)[0], x, y))
+            if ray.step[1 - major]:
+                break  # later rows are entered later
+    return min(found, default=None)

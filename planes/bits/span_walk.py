@@ -1,0 +1,216 @@
+"""The span walk: runs of samples go through the stack, front to back, or read the label plane.
+
+A run is a stretch of one row of one placed pattern, its `placement`; a sample is a pixel of a run. The `rank` of an
+item is its place in the stack, 0 in front.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Ints, Labels
+from ..grid.spans import Box, each_pixel, ragged
+from ..scene.items import Stack
+
+Kinds = npt.NDArray[np.uint8]
+
+HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
+"""State bits of a sample: it hit an object, an occluder ended its walk, it skipped an item, it still walks."""
+
+
+class Verdict(IntEnum):
+    """The outcome of a sample."""
+
+    EMPTY = 0
+    HIT = 1
+    OCCLUDED = 2
+    FILTERED = 3
+    OUTSIDE = 4
+    BEYOND = 5
+
+
+OF_PATTERNS = tuple(Verdict)[: Verdict.BEYOND]
+"""Verdicts of the samples of patterns; rays also have BEYOND, for cells after their end."""
+
+VERDICT_OF = np.array(
+    [
+        Verdict.HIT if state & HIT else Verdict.OCCLUDED if state & BLOCK else Verdict.FILTERED if state & SKIP else 0
+        for state in range(16)
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Runs of samples, sorted by (placement, y, x_first), disjoint within a placement.
+
+    Parameters
+    ----------
+    placement, y, x_first, x_last : (n,) int64
+    ordinal : (n,) number of the run's pixel x = 0 in its pattern's prefix sums
+    """
+
+    placement: Ints
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+    ordinal: Ints
+
+    def __len__(self) -> int:
+        return len(self.placement)
+
+    @classmethod
+    def joined(cls, parts: list[Runs]) -> Runs:
+        """Runs of several parts, one after another."""
+        none = np.zeros(0, np.int64)
+        every = [cls(none, none, none, none, none), *parts]
+        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
+
+    def take(self, chosen: Ints | Bools | slice) -> Runs:
+        """The chosen runs, in order."""
+        return Runs(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+    @property
+    def lengths(self) -> Ints:
+        """Samples of each run."""
+        return self.x_last - self.x_first + 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return 5 * self.y.nbytes
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of a placement and an item that may touch, sorted by (placement, rank).
+
+    Parameters
+    ----------
+    placement, rank : (k,) int64
+    kind : (k,) what the item does to a sample: HIT, BLOCK or SKIP
+    """
+
+    placement: Ints
+    rank: Ints
+    kind: Kinds
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """Events of the walk, in stretches of runs: kind, rank of the item, number of the run, and columns."""
+
+    kind: npt.NDArray[np.integer[Any]]
+    rank: Ints
+    run: Ints
+    x_first: Ints
+    x_last: Ints
+
+    @classmethod
+    def joined(cls, parts: list[Events]) -> Events:
+        """Events of several parts, one after another."""
+        none = np.zeros(0, np.int64)
+        every = [cls(none, none, none, none, none), *parts]
+        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return self.kind.nbytes + 4 * self.run.nbytes
+
+    def take(self, chosen: Ints | Bools) -> Events:
+        """The chosen events."""
+        return Events(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+
+# house: hit rule of areas
+def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tuple[Events, Kinds]:
+    """Walk each sample through the items that cover it, front to back.
+
+    A refused item is skipped. An accepted occluder ends the walk. An accepted object is hit, and ends the walk unless
+    the weapon pierces. All placements meet their first item in one step, their second in the next.
+
+    Parameters
+    ----------
+    emit : kinds of events to return, as bits HIT, BLOCK, SKIP
+
+    Returns
+    -------
+    events, and the state of each sample, in the order of the runs
+    """
+    start = np.cumsum(runs.lengths) - runs.lengths
+    state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
+    kind = pairs.kind
+    ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
+    keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
+    pair, run, x_first, x_last = _meetings(runs, pairs, stack)
+    depth = np.arange(len(pairs.placement)) - np.searchsorted(pairs.placement, pairs.placement)
+    order = np.argsort(depth[pair], kind="stable")
+    steps = np.flatnonzero(np.diff(depth[pair][order], prepend=-1, append=-1))
+    box, item = stack.box_xyxy, pairs.rank[pair]
+    sample = start[run] - runs.x_first[run]
+    texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
+    emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    for begin, end in pairwise(steps):
+        now = order[begin:end]
+        piece, x = each_pixel(x_first[now], x_last[now])
+        meeting = now[piece]
+        index = sample[meeting] + x
+        on = stack.masks[texel[meeting] + x] & (state[index] >= LIVE)
+        meeting, x, index = meeting[on], x[on], index[on]
+        state[index] = (state[index] | kind[pair[meeting]]) & keep[pair[meeting]]
+        wanted = (kind[pair[meeting]] & emit) != 0
+        emitted.append((meeting[wanted], x[wanted]))
+    meeting, x = (np.concatenate(column) for column in zip(*emitted, strict=True))
+    first, last = _stretches(meeting, x)
+    met = meeting[first]
+    return Events(kind[pair[met]], pairs.rank[pair[met]], run[met], x[first], x[last]), state
+
+
+def read_labels(runs: Runs, labels: Labels, plane_xyxy: Box) -> tuple[Ints, Ints, Ints, Ints]:
+    """Read the label plane under runs within it, as stretches of one label: (run, x_first, x_last, label)."""
+    x, y = plane_xyxy[:2]
+    run, column = each_pixel(runs.x_first, runs.x_last)
+    found = labels.reshape(-1)[((runs.y - y) * labels.shape[1] - x)[run] + column]
+    mask = found != 0
+    run, column, found = run[mask], column[mask], found[mask]
+    first, last = _stretches(run, column, found)
+    return run[first], column[first], column[last], found[first].astype(np.int64)
+
+
+def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:
+    """Stretches of runs inside the boxes of the items that they are paired with: (pair, run, x_first, x_last)."""
+    if not len(runs):
+        none = np.zeros(0, np.int64)
+        return none, none, none, none
+    low, high = int(runs.y.min()), int(runs.y.max())
+    rows = high - low + 1
+    row = runs.placement * rows + (runs.y - low)
+    box = stack.box_xyxy[pairs.rank]
+    top, bottom = np.maximum(box[:, 1], low), np.minimum(box[:, 3], high)
+    first = np.searchsorted(row, pairs.placement * rows + (top - low))
+    last = np.searchsorted(row, pairs.placement * rows + (bottom - low), side="right")
+    pair, place = ragged(np.where(top <= bottom, last - first, 0))
+    run = first[pair] + place
+    x_first = np.maximum(runs.x_first[run], box[pair, 0])
+    x_last = np.minimum(runs.x_last[run], box[pair, 2])
+    mask = x_first <= x_last
+    return pair[mask], run[mask], x_first[mask], x_last[mask]
+
+
+def _stretches(group: Ints, x: Ints, value: npt.NDArray[np.generic] | None = None) -> tuple[Ints, Ints]:
+    """First and last index of each stretch of neighbours that have one group and one value."""
+    if not len(x):
+        none = np.zeros(0, np.int64)
+        return none, none
+    apart = (group[1:] != group[:-1]) | (x[1:] != x[:-1] + 1)
+    if value is not None:
+        apart |= value[1:] != value[:-1]
+    cut = np.flatnonzero(apart)
+    return np.concatenate([[0], cut + 1]), np.concatenate([cut, [len(x) - 1]])

@@ -1,0 +1,471 @@
+"""Tiles: masks cut into bit rows of up to 64 x 64 px; and sets of pixels as Python integers, for a few shots.
+
+An integer holds all rows of a set of pixels. A shift places a pattern on a tile, and `&` gives the shared pixels:
+
+    y = 0   . # # .        stride 5: 0b01111_00110, the first pixel lowest
+    y = 1   # # # #
+
+The stride leaves room for both sets side by side, so that pixels shifted out of a row meet nothing in the next.
+`front_to_back` answers the same shots with arrays; for a few placements one call of numpy takes as long as a pair here.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Ints
+from ..grid.spans import Box, Spans, ragged
+from ..scene.items import Stack
+from .bit_rows import WORD, Placed, Words, packed
+from .front_to_back import OrderedTiles
+
+OFTEN = 8
+"""Answers of a pattern after which the planes of its depths are made; they take as long as so many answers."""
+
+PATTERN_BYTES = 500
+"""Memory of a pattern beside its pixels, bytes."""
+
+PLANES = 10
+"""Approximate number of copies of its pixels that a pattern holds, including the planes of its depths."""
+
+TILES_BYTES_MOST = 2**23
+"""Size of the cache of tiles as integers of one stride, bytes."""
+
+
+def packed_integer(mask: Bools, stride: int) -> int:
+    """Rows of a mask (h, w) as one integer; w <= stride."""
+    padded = np.zeros((mask.shape[0], stride), np.bool_)
+    padded[:, : mask.shape[1]] = mask
+    return int.from_bytes(np.packbits(padded.reshape(-1), bitorder="little").tobytes(), "little")
+
+
+def rows_of_spans(spans: Spans, corner_xy: tuple[int, int], stride: int) -> int:
+    """Rows of a set of pixels as one integer that begins at a corner; no pixel lies left of or above it."""
+    mask, (x, y) = spans.to_mask()
+    return packed_integer(mask, stride) << (y - corner_xy[1]) * stride + x - corner_xy[0] if mask.size else 0
+
+
+def pixels_of(bits: int, stride: int) -> Ints:
+    """Pixels (n, 2) of an integer, rows (x, y) ordered by (y, x)."""
+    data = np.frombuffer(bits.to_bytes((bits.bit_length() + 7) // 8, "little"), np.uint8)
+    y, x = np.divmod(np.flatnonzero(np.unpackbits(data, bitorder="little")), stride)
+    return np.stack([x, y], axis=1)
+
+
+class Depths:
+    """Planes that find the nearest pixel of a subset of a pattern, or of a part of it.
+
+    Distances are numbered from 0, the nearest. Each binary digit has a plane of the pixels whose number has a 0 there.
+    From the highest digit on, pixels of the subset that lie in the plane are nearer than those that do not.
+
+    Parameters
+    ----------
+    rows, stride : the pixels as an integer
+    x, y : first column and row, relative to the round's pixel
+    """
+
+    def __init__(self, rows: int, stride: int, x: int, y: int) -> None:
+        self._rows, self._stride, self._x, self._y, self._corner = rows, stride, x, y, np.array([x, y])
+        self._planes: list[int] | None = None
+        self._calls = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the pixels and the planes; a Python integer holds 30 bits in 4 bytes."""
+        return PLANES * self._rows.bit_length() // 7
+
+    def nearest(self, bits: int) -> tuple[int, int, int]:
+        """Squared distance, y and x of the nearest pixel of a subset, from the round's; ties go to the least (y, x)."""
+        if self._planes is None:
+            self._calls += 1
+            if self._calls <= OFTEN:
+                pixels, distance2 = self._pixels(bits)
+                first = int(distance2.argmin())
+                x, y = (pixels[first] + self._corner).tolist()
+                return int(distance2[first]), y, x
+            self._planes = self._made()
+        for plane in self._planes:
+            nearer = bits & plane
+            if nearer:
+                bits = nearer
+        y, x = divmod((bits ^ bits - 1).bit_length() - 1, self._stride)
+        x, y = x + self._x, y + self._y
+        return x * x + y * y, y, x
+
+    def _pixels(self, bits: int) -> tuple[Ints, Ints]:
+        """Pixels (n, 2) of a subset, and their squared distances."""
+        pixels = pixels_of(bits, self._stride)
+        return pixels, ((pixels + self._corner) ** 2).sum(axis=1)
+
+    def _made(self) -> list[int]:
+        """The planes, that of the highest digit first."""
+        pixels, distance2 = self._pixels(self._rows)
+        number = np.unique(distance2, return_inverse=True)[1].reshape(-1)
+        places = np.arange(int(number.max(initial=0)).bit_length() - 1, -1, -1)
+        mask = np.zeros((len(places), int(pixels[:, 1].max(initial=0)) + 1, self._stride), np.bool_)
+        mask[:, pixels[:, 1], pixels[:, 0]] = (number >> places[:, None]) & 1 == 0
+        return [packed_integer(plane, self._stride) for plane in mask]
+
+
+@dataclass(frozen=True, eq=False)
+class BigPattern:
+    """A pattern as one integer, whose stride leaves room for a tile on either side.
+
+    Parameters
+    ----------
+    x, y : first column and row, relative to the pixel that it is placed on
+    wide, high : columns and rows
+    stride : a multiple of WORD
+    rows : the pixels
+    depths : the planes that find the nearest pixel
+    """
+
+    x: int
+    y: int
+    wide: int
+    high: int
+    stride: int
+    rows: int
+    depths: Depths
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the pixels and of the planes of their depths."""
+        return PATTERN_BYTES + self.depths.nbytes
+
+    def within(self, x: int, y: int, bounds: Box) -> int:
+        """Its pixels within bounds, if it is placed on pixel (x, y)."""
+        left, top = x + self.x, y + self.y
+        first, last = max(bounds[0] - left, 0), min(bounds[2] - left, self.wide - 1)
+        upper, lower = max(bounds[1] - top, 0), min(bounds[3] - top, self.high - 1)
+        if (first, upper, last, lower) == (0, 0, self.wide - 1, self.high - 1):
+            return self.rows
+        if first > last or upper > lower:
+            return 0
+        row = ((1 << last - first + 1) - 1 << first).to_bytes(self.stride // 8, "little")
+        return self.rows & int.from_bytes(row * (lower - upper + 1), "little") << self.stride * upper
+
+
+def stride_of(wide: int) -> int:
+    """Stride of a pattern of `wide` columns, px."""
+    return WORD * -(-(wide + WORD - 1) // WORD)
+
+
+def big_pattern(spans: Spans) -> BigPattern:
+    """A pattern as one integer."""
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, 0, 0)
+    stride = stride_of(x_max - x + 1)
+    rows = rows_of_spans(spans, (x, y), stride)
+    return BigPattern(x, y, x_max - x + 1, y_max - y + 1, stride, rows, Depths(rows, stride, x, y))
+
+
+class BigTiles(dict[int, int]):
+    """Tiles as integers of one stride, by their first row in an atlas; each is made when it is first read."""
+
+    def __init__(self, stride: int) -> None:
+        super().__init__()
+        self._columns, self._most = stride // WORD, TILES_BYTES_MOST // (WORD * stride // 8)
+
+    def read(self, words: Words, begin: int) -> int:
+        """Make the tile whose 64 rows begin at a place in `words`."""
+        if len(self) > self._most:
+            self.clear()
+        rows = np.zeros((WORD, self._columns), "<u8")
+        rows[:, 0] = words[begin : begin + WORD]
+        made = self[begin] = int.from_bytes(rows.tobytes(), "little")
+        return made
+
+
+STRIDE = 3 * WORD
+"""Words from one tile to the next: 64 rows of pixels, with 64 empty rows before and after."""
+
+ATLAS_SLACK = 1024
+"""Unused tiles that an atlas may keep, beyond as many as are in use."""
+
+STRIDES_MOST = 8
+"""Most strides for which tiles are kept as integers."""
+
+PACKED_AT_ONCE = 1024
+"""Tiles packed at a time; their unpacked pixels take 4 KB each."""
+
+NO_FLAGS, NO_NUMBERS = np.zeros(0, np.bool_), np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """The tiles of a stack, front to back, as columns.
+
+    Parameters
+    ----------
+    rank : (T,) place in the stack of each tile's item, rising
+    left, top : (T,) corner of the tile on its item's mask, px
+    size_wh : (T, 2) px, up to 64
+    begin : (T,) first row in `words`
+    words : flat rows of all tiles
+    whole : whether each item is one tile
+    bigs : tiles as integers, by stride
+    """
+
+    rank: Ints
+    left: Ints
+    top: Ints
+    size_wh: Ints
+    begin: Ints
+    words: Words
+    whole: bool
+    bigs: dict[int, BigTiles]
+
+    def __len__(self) -> int:
+        return len(self.rank)
+
+    def of(self, rank: Ints) -> tuple[Ints, Ints]:
+        """Tiles of items of ranks (n,), as (place in `rank`, tile)."""
+        if self.whole:
+            return np.arange(len(rank)), rank
+        begin = np.searchsorted(self.rank, rank)
+        place, tile = ragged(np.searchsorted(self.rank, rank, side="right") - begin)
+        return place, begin[place] + tile
+
+    def each(self, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """A column of items (M,) as a column of their tiles (T,)."""
+        return column if self.whole else column[self.rank]
+
+    def boxes(self, items_xyxy: Ints) -> Ints:
+        """Inclusive boxes (T, 4) of tiles, from the boxes (M, 4) of the stack's items."""
+        if self.whole:
+            return items_xyxy
+        corner = np.stack([items_xyxy[self.rank, 0] + self.left, items_xyxy[self.rank, 1] + self.top], axis=1)
+        return np.concatenate([corner, corner + self.size_wh - 1], axis=1)
+
+    def big(self, stride: int) -> BigTiles:
+        """Tiles as integers of a stride, by `begin`."""
+        known = self.bigs.get(stride)
+        if known is None:
+            if len(self.bigs) >= STRIDES_MOST:
+                self.bigs.clear()
+            known = self.bigs[stride] = BigTiles(stride)
+        return known
+
+    def ordered(self, stack: Stack) -> OrderedTiles:
+        """The tiles at their places in the world, with the filter columns of their items; `stack` is their own."""
+        occluder = self.each(stack.occluder) if stack.has_occluders else NO_FLAGS
+        whose = self.each(stack.categories), self.each(stack.owner)
+        return OrderedTiles(self.rank, self.boxes(stack.box_xyxy), self.begin, self.words, occluder, *whose)
+
+
+class TileAtlas:
+    """Tiles of masks, by the number of the mask; unused tiles are dropped in time.
+
+    Each has a slot of STRIDE words, which is written once, so that tiles that were handed out never change.
+    """
+
+    def __init__(self) -> None:
+        self.words: Words = np.zeros(4 * STRIDE, np.uint64)
+        self._columns = np.zeros((4, 4), np.int64)  # left, top, width, height
+        self._used = self._enough = 0  # slots; with more than enough, unused tiles are searched
+        self._places: dict[int, tuple[int, int]] = {}  # by mask number: first slot, and count
+        self._number, self._slots = NO_NUMBERS, np.zeros((0, 2), np.int64)  # of the last stack: masks, places
+        self._last: tuple[int, Tiles] | None = None
+        self._bigs: dict[int, BigTiles] = {}
+        self._lock = threading.Lock()
+
+    def known(self, forms: int) -> Tiles | None:
+        """Tiles of the last stack, if its forms had this number."""
+        last = self._last
+        return last[1] if last is not None and last[0] == forms else None
+
+    def tiles(self, mask_of: Callable[[int], Bools], number: Ints, forms: int) -> Tiles:
+        """Tiles of the items of a stack.
+
+        Parameters
+        ----------
+        mask_of : returns the mask (h, w) of the item of a rank
+        number : (M,) number of each item's mask; equal masks may have the same
+        forms : number of the stack's forms; stacks with the same have the same tiles
+        """
+        with self._lock:
+            if self._last is None or self._last[0] != forms:
+                self._last = forms, self._listed(*self._found(mask_of, number))
+            return self._last[1]
+
+    def _listed(self, first: Ints, count: Ints) -> Tiles:
+        """Tiles of masks (M,), each in `count` slots from `first` on."""
+        whole = bool((count == 1).all())
+        rank, place = (np.arange(len(count)), 0) if whole else ragged(count)
+        slot = first[rank] + place
+        columns = self._columns.take(slot, axis=0)
+        whole &= not columns[:, :2].any()
+        left, top, size = columns[:, 0], columns[:, 1], columns[:, 2:]
+        return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole, self._bigs)
+
+    def _found(self, mask_of: Callable[[int], Bools], number: Ints) -> Ints:
+        """First slot and count (2, M) of each mask of a stack; masks that the atlas does not hold are added."""
+        if len(self._number) != len(number) or self._used > self._enough:
+            self._drop_unused(number)
+            self._number, self._slots = np.full(len(number), -1), np.zeros((len(number), 2), np.int64)
+        changed = np.flatnonzero(self._number != number)
+        numbers = number[changed].tolist()
+        missing = {mask: rank for mask, rank in zip(numbers, changed.tolist(), strict=True) if mask not in self._places}
+        self._add([(mask, mask_of(rank)) for mask, rank in missing.items()])
+        self._slots[changed] = np.array([self._places[mask] for mask in numbers], np.int64).reshape(-1, 2)
+        self._number = number
+        return self._slots.T
+
+    def _drop_unused(self, number: Ints) -> None:
+        """Keep only the tiles of the given masks, if that halves the atlas."""
+        used = {mask: self._places[mask] for mask in sorted(set(number.tolist())) if mask in self._places}
+        first, count = np.array(list(used.values()), np.int64).reshape(-1, 2).T
+        kept = int(count.sum())
+        self._enough = 2 * kept + ATLAS_SLACK
+        if self._used <= self._enough:
+            return
+        which, place = ragged(count)
+        slots, words, columns = first[which] + place, self.words.reshape(-1, STRIDE), self._columns
+        self._allot(max(2 * kept, 4))
+        self.words.reshape(-1, STRIDE)[:kept], self._columns[:kept] = words[slots], columns[slots]
+        begin = (np.cumsum(count) - count).tolist()
+        self._places = dict(zip(used, zip(begin, count.tolist(), strict=True), strict=True))
+        self._used, self._bigs = kept, {}
+
+    def _allot(self, slots: int) -> None:
+        self.words, self._columns = np.zeros(slots * STRIDE, np.uint64), np.zeros((slots, 4), np.int64)
+
+    def _add(self, masks: Sequence[tuple[int, Bools]]) -> None:
+        """Cut masks into tiles; tiles without a pixel are left out."""
+        parts = [
+            (which, left, top, mask[top : top + WORD, left : left + WORD])
+            for which, (_, mask) in enumerate(masks)
+            for top in range(0, mask.shape[0], WORD)
+            for left in range(0, mask.shape[1], WORD)
+        ]
+        begin, count = self._used, np.zeros(len(masks), np.int64)
+        for first in range(0, len(parts), PACKED_AT_ONCE):
+            count += np.bincount(self._put(parts[first : first + PACKED_AT_ONCE]), minlength=len(masks))
+        places = zip((begin + np.cumsum(count) - count).tolist(), count.tolist(), strict=True)
+        self._places.update(zip((number for number, _ in masks), places, strict=True))
+
+    def _put(self, parts: Sequence[tuple[int, int, int, Bools]]) -> Ints:
+        """Pack parts (mask, left, top, pixels) into the next slots; return the masks of those that have a pixel."""
+        rows = packed([part for *_, part in parts])
+        columns = np.array([(which, left, top, *part.shape[::-1]) for which, left, top, part in parts])
+        full = np.flatnonzero(rows.any(axis=1))
+        end = self._used + len(full)
+        if end > len(self._columns):
+            old = self.words, self._columns
+            self._allot(max(end, 2 * len(old[1])))
+            self.words[: len(old[0])], self._columns[: len(old[1])] = old
+        self.words.reshape(-1, STRIDE)[self._used : end, WORD : 2 * WORD] = rows[full]
+        self._columns[self._used : end] = columns[full, 1:]
+        self._used = end
+        return np.asarray(columns[full, 0])
+
+
+PAIR_NS, BIT_NS = 3000.0, 0.16
+"""Time for each tile near a placement, ns, and for each bit of the pattern's rows."""
+
+ARRAYS_NS = 350_000.0
+"""Time that arrays take for a few placements, ns."""
+
+Hit = tuple[int, int, int, int, int, int]
+"""Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels."""
+
+Pair = tuple[int, int, int, int, int, bool]
+"""Placement, and a tile near it: left, top, first row in the atlas, rank of its item, whether that is an occluder."""
+
+
+class Ground(NamedTuple):
+    """What patterns are placed on.
+
+    Parameters
+    ----------
+    stack : the items
+    tiles, boxes_xyxy : their tiles, and the boxes (T, 4) of these
+    pierce : whether pixels go on through objects; they end at occluders
+    bounds : box beyond which nothing is hit
+    """
+
+    stack: Stack
+    tiles: Tiles
+    boxes_xyxy: Ints
+    pierce: bool
+    bounds: Box | None
+
+
+def pays(pairs: int, wide: int, high: int) -> bool:
+    """Whether integers are faster than arrays, for pairs of a tile and a pattern of `wide` columns and `high` rows."""
+    return pairs * (PAIR_NS + BIT_NS * stride_of(wide) * high) <= ARRAYS_NS
+
+
+def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
+    """Hits of placed patterns, in the order of rows.
+
+    Parameters
+    ----------
+    placed : placements; distances are counted from the pixels that patterns are placed on
+    patterns : the distinct patterns
+    near : sorted pairs (n,) of a placement and an accepted tile that it may meet
+    """
+    hits: list[Hit] = []
+    for who, close in groupby(_near(*near, ground), itemgetter(0)):
+        pattern, x, y = patterns[placed.pattern.item(who)], placed.x.item(who), placed.y.item(who)
+        hits += _hit_by(pattern, x, y, close, ground)
+    return _in_order(hits, ground)
+
+
+def hit_by_one(pattern: BigPattern, x: int, y: int, near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:
+    """Like `hit_by_few`, for one pattern on pixel (x, y)."""
+    return _in_order(list(_hit_by(pattern, x, y, _near(*near, ground), ground)), ground)
+
+
+def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:
+    """Pairs of placements and tiles, with the columns of the tiles."""
+    if not len(tile):
+        return iter(())
+    rank, box = ground.tiles.rank[tile], ground.boxes_xyxy[tile]
+    blocks = ground.stack.occluder[rank] if ground.stack.has_occluders else np.zeros(len(rank), np.bool_)
+    columns = placement, box[:, 0], box[:, 1], ground.tiles.begin[tile], rank, blocks
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+# house: hit rule of areas
+def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: Ground) -> Iterator[Hit]:
+    """Hits of one placed pattern on each tile, front to back."""
+    _, tiles, _, pierce, bounds = ground
+    rest = pattern.rows if bounds is None else pattern.within(x, y, bounds)
+    stride, known, nearest = pattern.stride, tiles.big(pattern.stride), pattern.depths.nearest
+    corner = (y + pattern.y) * stride + x + pattern.x
+    for who, left, top, begin, rank, blocks in near:
+        rows = known.get(begin)
+        if rows is None:
+            rows = known.read(tiles.words, begin)
+        shift = top * stride + left - corner
+        hit = (rows << shift if shift >= 0 else rows >> -shift) & rest
+        if hit:
+            if not blocks:
+                distance2, down, right = nearest(hit)
+                yield who, distance2, y + down, x + right, rank, hit.bit_count()
+            if blocks or not pierce:
+                rest ^= hit
+                if not rest:
+                    return
+
+
+# house: row order
+def _in_order(hits: list[Hit], ground: Ground) -> list[Hit]:
+    """Hits of items, in the order of rows, from hits of tiles."""
+    if not ground.tiles.whole:
+        every: dict[tuple[int, int], Hit] = {}
+        for hit in hits:
+            key = hit[0], hit[4]
+            other = every.get(key)
+            every[key] = hit if other is None else (*min(hit[:5], other[:5]), hit[5] + other[5])
+        hits = list(every.values())
+    return sorted(hits)

@@ -1,0 +1,270 @@
+"""The visible set: the bit rows of each object without the pixels that items in front of it cover.
+
+A shot hits the front item of a pixel and nothing else, so its hits on an object are the object's visible pixels that
+it covers; a shot that pierces hits all pixels that no occluder hides. Visible pixels depend on the view of shots, not
+on their positions: they are computed once for a version of a scene, or only for the objects near the shots.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from typing import NamedTuple
+
+import numpy as np
+
+from ..common.backend import kernels_of
+from ..common.caches import LruCache, cached_attribute
+from ..common.checks import Bools, Ints
+from ..grid.spans import Box
+from ..scene.items import Items, Stack
+from . import bit_rows, cells
+from .bit_rows import PAD, Beside, VisibleTiles, Words, beside_of
+from .cells import Cells
+from .tiles import Tiles
+
+
+def sides_of(rows: Words) -> Ints:
+    """Inclusive boxes (V, 4) of the pixels in rows (V, height) of tiles; (0, 0, -1, -1) of an empty tile."""
+    sides = np.empty((len(rows), 4), np.int64)
+    filled = rows != 0
+    columns = np.bitwise_or.reduce(rows, axis=1)
+    sides[:, 0] = np.bitwise_count(~columns & (columns - np.uint64(1)))
+    sides[:, 1], sides[:, 3] = filled.argmax(axis=1), rows.shape[1] - 1 - filled[:, ::-1].argmax(axis=1)
+    for bits in (1, 2, 4, 8, 16, 32):
+        columns |= columns >> np.uint64(bits)
+    sides[:, 2] = np.bitwise_count(columns)
+    sides[:, 2] -= 1
+    sides[columns == 0] = 0, 0, -1, -1
+    return sides
+
+
+def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
+    """Rows (n, height) of tiles, moved so that the box of their pixels begins in row 0 and column 0.
+
+    Parameters
+    ----------
+    rows : (V, h) rows of all tiles
+    kept : (n,) tiles to move
+    sides : (n, 4) boxes of their pixels, no higher than `height`
+    """
+    step = np.arange(height)
+    inside = step <= (sides[:, 3] - sides[:, 1])[:, None]
+    row = np.where(inside, step + (sides[:, 1] + kept * rows.shape[1])[:, None], 0)
+    found = rows.reshape(-1).take(row)
+    found >>= sides[:, :1].astype(np.uint64)
+    found *= inside
+    return found
+
+
+VIEWS_MOST = 4
+"""Most visible sets that a scene keeps, one for each view."""
+
+CELLS_BYTES = 2**25
+"""Size of the cache of cells of a visible set, for the last few boxes of patterns, bytes."""
+
+WITHOUT_MOST = 128
+"""Placements that are compared with all visible tiles before cells are made; making them takes about as long."""
+
+PAIRS_MOST = 2**20
+"""Most pairs of placements and tiles that a call compares without cells."""
+
+SHOT_BITS = 4
+"""Cells of shot positions have sides of 2**SHOT_BITS px; larger ones list more boxes that no pattern meets."""
+
+
+class View(NamedTuple):
+    """What shots accept: whether they pierce, the category bits, and the owners whose items they skip."""
+
+    pierce: bool
+    accept: int
+    exclude: tuple[int, ...]
+
+    def accepts(self, stack: Stack) -> Bools:
+        """Which items (M,) of a stack such shots accept."""
+        there = (stack.categories & self.accept) != 0
+        for owner in self.exclude:
+            there &= stack.owner != owner
+        return np.asarray(there)
+
+
+class VisibleSet:
+    """The visible pixels of all objects of one version of a scene, and cells to look them up; it never changes.
+
+    Parameters
+    ----------
+    stack, tiles, bounds : those of the scene at that version
+    view : what the shots accept
+    """
+
+    # house: hit rule of areas
+    def __init__(self, stack: Stack, tiles: Tiles, bounds: Box | None, view: View) -> None:
+        there = view.accepts(stack)
+        boxes = tiles.boxes(stack.box_xyxy)
+        objects = np.flatnonzero((there & ~stack.occluder)[tiles.rank])
+        blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
+        rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
+        self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
+        self.ids = stack.ids[self.seen.rank]
+        self._cells: LruCache[tuple[int, ...], Cells] = LruCache(CELLS_BYTES, lambda made: made.nbytes)
+        self._without = 0
+
+    @cached_attribute
+    def beside(self) -> Beside:
+        """Distances along the rows of the visible tiles, by which discs find their nearest pixel."""
+        return beside_of(self.seen)
+
+    def cells(self, reach_xyxy: Ints) -> Cells:
+        """Tiles that a pattern with this box may meet, by cells of its position; kept for the last few boxes."""
+        make = kernels_of(cells).cells_of
+        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: make(self.seen.box_xyxy, reach_xyxy, SHOT_BITS))
+
+    def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells, int]:
+        """Cells for a number of placements, and the bytes newly made; for the first few, one cell with all tiles."""
+        reach = tuple(reach_xyxy.tolist())
+        if reach in self._cells.values:
+            return self.cells(reach_xyxy), 0
+        self._without += placements
+        if self._without <= WITHOUT_MOST and placements * len(self.seen.rank) <= PAIRS_MOST:
+            return self._everything(*reach), 0
+        self._without = 0
+        made = self.cells(reach_xyxy)
+        return made, made.nbytes
+
+    def _everything(self, left: int, top: int, right: int, low: int) -> Cells:
+        """One cell that lists all tiles, over all positions at which a pattern with this box may meet any."""
+        x, y, x_max, y_max = self._around
+        size = max(x_max - left - (x - right), y_max - top - (y - low))
+        return Cells(x - right, y - low, size.bit_length(), 1, 1, *self._listed)
+
+    @cached_attribute
+    def _listed(self) -> tuple[Ints, Ints]:
+        """Begin and end of the list of that cell, and the list."""
+        count = len(self.seen.rank)
+        return np.array([0, count]), np.arange(count)
+
+    @cached_attribute
+    def _around(self) -> Box:
+        """Box around all tiles."""
+        low = self.seen.box_xyxy[:, :2].min(axis=0, initial=0)
+        high = self.seen.box_xyxy[:, 2:].max(axis=0, initial=0)
+        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the visible tiles."""
+        seen = self.seen
+        return sum(int(column.nbytes) for column in (seen.rank, seen.box_xyxy, seen.begin, seen.words))
+
+
+class VisibleSets:
+    """Visible sets of a scene for the last few views, and the time that calls lost for want of one.
+
+    Threads may read them as long as none changes the scene.
+    """
+
+    def __init__(self) -> None:
+        self._version = -1
+        self._kept: dict[View, VisibleSet] = {}
+        self._missed: dict[View, float] = {}
+        self._lock = threading.Lock()
+
+    def kept(self, view: View, version: int) -> VisibleSet | None:
+        """The visible set of a view and version, if it is made."""
+        return self._kept.get(view) if self._version == version else None
+
+    def pays(self, view: View, version: int, lost: float, cost: float) -> bool:
+        """Whether a view's calls, including this one, have lost as much time as the visible set costs.
+
+        So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
+        The count begins anew when a visible set is made, or the scene changes.
+        """
+        with self._lock:
+            self._forget(version)
+            self._missed[view] = self._missed.get(view, 0.0) + max(lost, 0.0)
+            return self._missed[view] > cost
+
+    def read(self, view: View, items: Items, bounds: Box | None) -> VisibleSet:
+        """The visible set of the items as they are now, within the bounds of the scene."""
+        found = self.kept(view, items.version)
+        if found is None:
+            found = VisibleSet(items.stack(), items.tiles(), bounds, view)
+            with self._lock:
+                self._forget(items.version)
+                self._missed[view] = 0.0
+                self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
+        return found
+
+    def _forget(self, version: int) -> None:
+        if self._version != version:
+            self._kept, self._missed, self._version = {}, {}, version  # in this order: `kept` holds no lock
+
+
+def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:
+    """Pairs of a tile and a tile in front of it whose boxes meet, as (place in `tiles`, tile in front), sorted.
+
+    Parameters
+    ----------
+    boxes_xyxy : (T, 4) boxes of all tiles, front to back
+    tiles : (n,) the tiles that may be covered
+    blocks : (T,) whether a tile can cover others
+    """
+    front = np.arange(len(boxes_xyxy)) if blocks.all() else np.flatnonzero(blocks)
+    place, other = kernels_of(cells).met_boxes(boxes_xyxy[tiles], boxes_xyxy[front])
+    before = (front[other] < tiles[place]).nonzero()[0]
+    return place[before], front[other[before]]
+
+
+def visible_tiles_of(
+    tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints
+) -> VisibleTiles:
+    """Visible pixels of tiles.
+
+    Parameters
+    ----------
+    boxes_xyxy : (T, 4) boxes of all tiles
+    bounds : bounds of the scene; pixels beyond them cannot be hit
+    which : (V,) the tiles to look at
+    of, front : (n,) pairs of a place in `which`, sorted, and a tile that covers it
+    """
+    return _laid_out(tiles.rank[which], boxes_xyxy[which], _rows(tiles, boxes_xyxy, bounds, which, of, front))
+
+
+def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Words:
+    """Rows (V, height) of the visible pixels of tiles; see `visible_tiles_of`."""
+    height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
+    boxes = boxes_xyxy[which]
+    right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
+    rows = kernels_of(bit_rows).visible(tiles.words, height, tiles.begin[which], of, tiles.begin[front] - down, right)
+    if bounds is not None:
+        bit_rows.cut_off(rows, boxes[:, 0], boxes[:, 1], bounds)
+    return np.asarray(rows)
+
+
+def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> VisibleTiles:
+    """Tiles with a visible pixel, each cropped to the box of its visible pixels.
+
+    Parameters
+    ----------
+    rank : (V,) place in the stack of the item of each tile
+    boxes_xyxy : (V, 4) boxes of the tiles
+    rows : (V, height) their visible pixels
+    """
+    kernels = kernels_of(sys.modules[__name__])
+    sides = kernels.sides_of(rows)
+    kept = np.flatnonzero(sides[:, 2] >= 0)
+    sides = sides[kept]
+    height = -(-int((sides[:, 3] - sides[:, 1]).max(initial=0) + 1) // 8) * 8
+    corner = boxes_xyxy[kept, :2]
+    return _laid_out(
+        rank[kept], sides + np.concatenate([corner, corner], axis=1), kernels.moved(rows, kept, sides, height)
+    )
+
+
+def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> VisibleTiles:
+    """Rows (V, height) of tiles as one flat array, with empty rows around each tile."""
+    count, height = rows.shape
+    stride = height + PAD
+    words = np.zeros(count * stride + PAD, np.uint64)
+    words[PAD:].reshape(count, stride)[:, :height] = rows
+    return VisibleTiles(rank, boxes_xyxy, np.arange(count) * stride + PAD, words, height)

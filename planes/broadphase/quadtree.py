@@ -1,0 +1,424 @@
+"""A quadtree of boxes: cells that split in four, and leaves that list every box that overlaps them.
+
+A box goes left if its min <= the middle, right if its max >= the middle, and both ways if it straddles the middle.
+Cells at the border are unbounded, so no box is ever outside. A cell is split if
+
+- it holds more boxes than the capacity,
+- it is not yet at the deepest level, and
+- at most half of its boxes straddle a middle: those would be copied, not separated.
+
+So the tree depends on the boxes and the root cell, but not on the order of insertion.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Floats, InputError, Ints, integer
+from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
+from ..grid.spans import pieces, ragged
+from .boxes import BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
+
+Nodes = dict[str, npt.NDArray[Any]]
+"""Rows of nodes, one array per field of FIELDS."""
+
+FIELDS: dict[str, tuple[type, int]] = {
+    "cell": (np.float64, 4),  # as drawn: the root in quarters
+    "gate": (np.float64, 4),  # points that belong to this cell: above the first two numbers, up to the last two
+    "mid": (np.float64, 2),
+    "child": (np.int64, 0),  # first of four, -1 for a leaf
+    "parent": (np.int64, 0),
+    "depth": (np.int64, 0),  # -1 when the row is free
+    "total": (np.int64, 0),  # boxes that reach into it
+    "straddle": (np.int64, 0),  # those of them that cross a middle
+    "start": (np.int64, 0),  # of a leaf's ids in the pool
+    "length": (np.int64, 0),
+}
+Paths = tuple[Ints, Ints, Bools]
+LARGEST = float(np.finfo(np.float64).max)
+BULK = 64
+"""The root cell leaves out one box in this many on each side, and is then doubled: outliers do not stretch it."""
+
+
+class Quadtree(BroadPhase):
+    """A quadtree of boxes in 2-D.
+
+    Parameters
+    ----------
+    boxes : (N, 4) float
+    capacity : most boxes of a leaf before it splits
+    depth : deepest level; the root is level 0
+
+    Raises
+    ------
+    InputError
+        For boxes as in `BroadPhase`, boxes in 3-D, a capacity below 1 or a depth below 0.
+    """
+
+    def __init__(self, boxes: object, capacity: int = QUADTREE_CAPACITY, depth: int = QUADTREE_DEPTH) -> None:
+        super().__init__(boxes)
+        if self.dim != 2:
+            raise InputError(f"boxes: expected shape (any, 4), got {self._rows.shape}")
+        self.capacity = integer("capacity", capacity, 1, 2**31)
+        self.depth = integer("depth", depth, 0, 1000)
+        self._outside = self._least = 0
+        """Number of boxes that extend beyond the root cell, and the least such number since the root was made."""
+        self._build()
+
+    @property
+    def leaves(self) -> Floats:
+        """Cells of the leaves, (L, 4) float; those at the border extend beyond these numbers."""
+        return np.asarray(self._nodes["cell"][self._leaf_numbers()])
+
+    def cell_boxes(self) -> Cells:
+        """Cells from the root down; those at the border are unbounded."""
+        number = np.flatnonzero(self._nodes["depth"] >= 0)
+        number = number[np.argsort(self._nodes["depth"][number], kind="stable")]
+        return Cells(number, self._nodes["gate"][number], self._nodes["child"][number] < 0)
+
+    def check(self) -> None:
+        """Raise AssertionError naming the first invariant that does not hold."""
+        self._check_table()
+        nodes, ids = self._nodes, self.ids
+        used = np.flatnonzero(nodes["depth"] >= 0)
+        inner = used[nodes["child"][used] >= 0]
+        children = (nodes["child"][inner][:, None] + np.arange(4)).ravel()
+        assert np.array_equal(np.sort(np.append(children, 0)), used), "a node is not the child of one parent"
+        assert (nodes["parent"][children] == np.repeat(inner, 4)).all(), "a child does not know its parent"
+        assert (nodes["depth"][children] == np.repeat(nodes["depth"][inner] + 1, 4)).all(), "a depth is wrong"
+        assert len(used) + 4 * len(self._free) == len(nodes["depth"]), "a row is neither in use nor free"
+        which, node, straddle = self._paths(self._rows[ids])
+        reaching, crossing = (np.bincount(part, minlength=len(nodes["depth"])) for part in (node, node[straddle]))
+        assert np.array_equal(nodes["total"][used], reaching[used]), "a total is wrong"
+        assert np.array_equal(nodes["straddle"][used], crossing[used]), "straddling boxes are miscounted"
+        assert np.array_equal(self._overfull(used), nodes["child"][used] >= 0), "a cell should split or merge"
+        leaf = nodes["child"][node] < 0
+        due = sorted_pairs(node[leaf], ids[which[leaf]], self._count)
+        listed = sorted_pairs(*self._entries(self._leaf_numbers()), self._count)
+        assert np.array_equal(due, listed), "leaves do not list the boxes that reach into them"
+        assert nodes["length"].sum() == self._live, "the pool is miscounted"
+        assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
+
+    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+        every = np.arange(len(queries))
+        stack = [(every, np.zeros_like(every))]
+        leaves: list[Pairs] = []
+        while stack:
+            query, node = stack.pop()
+            if len(query) > CHUNK_SAMPLES:  # bounds the memory of a wide search
+                half = len(query) // 2
+                stack += [(query[half:], node[half:]), (query[:half], node[:half])]
+                continue
+            if work is not None:
+                work.visits.append((query, node))
+            child = self._nodes["child"].take(node)
+            leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
+            leaves.append((query.take(leaf), node.take(leaf)))
+            if work is not None:
+                work.compared += 4 * len(inner)
+            query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
+            row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
+            if len(row):
+                stack.append((query.take(row), child.take(inner.take(row)) + quarter))
+        query, leaf = piled(leaves)
+        return self._in_leaves(queries, query, leaf, work)
+
+    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> Pairs:
+        """Search leaves; a pair counts only in the cell of its first common point, so that it is found once."""
+        found: list[Pairs] = []
+        length = self._nodes["length"].take(leaf)
+        filled = np.flatnonzero(length)
+        query, leaf, length = query.take(filled), leaf.take(filled), length.take(filled)
+        for piece in pieces(length, CHUNK_SAMPLES):
+            group, place = ragged(length[piece])
+            box = self._pool.take(self._nodes["start"].take(leaf[piece]).take(group) + place)
+            asked = query[piece].take(group)
+            good = np.flatnonzero(self._meeting(queries, asked, box, work))
+            asked, box, group = asked.take(good), box.take(good), group.take(good)
+            corner = np.maximum(queries.take(asked, axis=0), self._rows.take(box, axis=0))
+            gate = self._nodes["gate"].take(leaf[piece].take(group), axis=0)
+            own = (gate[:, 0] < corner[:, 0]) & (corner[:, 0] <= gate[:, 2])
+            own &= (gate[:, 1] < corner[:, 1]) & (corner[:, 1] <= gate[:, 3])
+            mine = np.flatnonzero(own)
+            found.append((asked.take(mine), box.take(mine)))
+        asked, box = piled(found)
+        return asked, box
+
+    def _node_count(self) -> int:
+        return int(np.count_nonzero(self._nodes["depth"] >= 0))
+
+    def _enter(self, ids: Ints) -> None:
+        self._outside += self._count_out(self._rows[ids])
+        if not self._rebuilt():
+            nothing = ids[:0]
+            self._change(nothing, self._paths(self._rows[nothing]), ids, self._paths(self._rows[ids]))
+
+    def _leave(self, ids: Ints) -> None:
+        self._outside -= self._count_out(self._rows[ids])
+        self._least = min(self._least, self._outside)
+        nothing = ids[:0]
+        self._change(ids, self._paths(self._rows[ids]), nothing, self._paths(self._rows[nothing]))
+
+    def _shift(self, ids: Ints, rows: Floats) -> None:
+        old = self._rows[ids]
+        self._rows[ids] = rows
+        self._outside += self._count_out(rows) - self._count_out(old)
+        self._least = min(self._least, self._outside)
+        if self._rebuilt():
+            return
+        goes = self._rerouted(old, rows)
+        if goes.any():
+            ids = ids[goes]
+            self._change(ids, self._paths(old[goes]), ids, self._paths(rows[goes]))
+
+    def _build(self) -> None:
+        """Build the tree anew, with a root cell that suits the present boxes."""
+        ids = self.ids
+        rows = self._rows[ids]
+        self._nodes = nodes = _nodes(1)
+        nodes["cell"][0] = _root_of(rows)
+        nodes["gate"][0] = (-np.inf, -np.inf, np.inf, np.inf)
+        nodes["mid"][:] = _middle(nodes["cell"])
+        nodes["child"][0] = nodes["parent"][0] = -1
+        self._free = np.empty(0, np.int64)
+        self._pool = np.empty(0, np.int64)
+        self._used = self._live = 0
+        self._outside = self._least = self._count_out(rows)
+        nodes["total"][0] = len(ids)
+        nodes["straddle"][0] = np.count_nonzero(_straddling(_quarters(rows, nodes["mid"])))
+        self._settle(np.zeros_like(ids), ids, np.zeros(1, np.int64))
+
+    def _rebuilt(self) -> bool:
+        """Build the tree anew if more than a quarter of the boxes have left the root cell or were added outside it.
+
+        Boxes larger than any root cell would extend beyond a new one, too, and do not count.
+        """
+        if 4 * (self._outside - self._least) <= len(self):
+            return False
+        self._build()
+        return True
+
+    def _count_out(self, rows: Floats) -> int:
+        """Number of boxes that extend beyond the root cell."""
+        x, y, x_max, y_max = self._nodes["cell"][0].tolist()
+        out = (rows[:, 0] < x) | (rows[:, 1] < y) | (rows[:, 2] > x_max) | (rows[:, 3] > y_max)
+        return int(np.count_nonzero(out))
+
+    def _overfull(self, node: Ints) -> Bools:
+        """Whether each cell must be split."""
+        total, depth, straddle = (self._nodes[name][node] for name in ("total", "depth", "straddle"))
+        return np.asarray((total > self.capacity) & (depth < self.depth) & (2 * straddle <= total))
+
+    def _reached(self, box: Ints, node: Ints) -> Bools:
+        return _quarters(self._rows.take(box, axis=0), self._nodes["mid"].take(node, axis=0))
+
+    def _paths(self, rows: Floats) -> Paths:
+        """Every (box, node, whether it straddles) on the way from the root to the leaves."""
+        which = np.arange(len(rows))
+        node = np.zeros_like(which)
+        steps: list[Paths] = []
+        while len(which) or not steps:
+            mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
+            reached = _quarters(rows.take(which, axis=0), mid)
+            steps.append((which, node, _straddling(reached)))
+            inner = np.flatnonzero(child >= 0)
+            row, quarter = np.divmod(np.flatnonzero(reached.take(inner, axis=0)), 4)
+            row = inner.take(row)
+            which, node = which.take(row), child.take(row) + quarter
+        all_which, all_node, straddle = (np.concatenate(parts) for parts in zip(*steps, strict=True))
+        return all_which, all_node, straddle
+
+    def _rerouted(self, old: Floats, rows: Floats) -> Bools:
+        """Whether moved boxes take another path, or straddle other middles."""
+        goes = np.zeros(len(rows), np.bool_)
+        which = np.arange(len(rows))
+        node = np.zeros_like(which)
+        while len(which):
+            mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
+            before, after = _quarters(old.take(which, axis=0), mid), _quarters(rows.take(which, axis=0), mid)
+            goes[which.take(np.flatnonzero(before != after) >> 2)] = True
+            on = np.flatnonzero((child >= 0) & ~goes.take(which))
+            row, quarter = np.divmod(np.flatnonzero(before.take(on, axis=0)), 4)
+            row = on.take(row)
+            which, node = which.take(row), child.take(row) + quarter
+        return goes
+
+    def _change(self, gone: Ints, before: Paths, come: Ints, after: Paths) -> None:
+        """Take boxes off their old paths and put them on new ones, then merge and split cells as needed."""
+        nodes = self._nodes
+        for (_, node, straddle), sign in ((before, -1), (after, 1)):
+            np.add.at(nodes["total"], node, sign)
+            np.add.at(nodes["straddle"], node[straddle], sign)
+        touched = np.unique(np.concatenate((before[1], after[1])))
+        self.written += len(touched)
+        leaves = touched[nodes["child"][touched] < 0]
+        node, box = self._entries(leaves)
+        off, on = (nodes["child"][path[1]] < 0 for path in (before, after))
+        keep = ~np.isin(node * self._count + box, before[1][off] * self._count + gone[before[0][off]])
+        node = np.concatenate((node[keep], after[1][on]))
+        box = np.concatenate((box[keep], come[after[0][on]]))
+        inner = touched[nodes["child"][touched] >= 0]
+        node, box, leaves = self._merge(inner[~self._overfull(inner)], node, box, leaves)
+        self._settle(node, box, leaves)
+
+    def _merge(self, tops: Ints, node: Ints, box: Ints, leaves: Ints) -> tuple[Ints, Ints, Ints]:
+        """Turn cells into leaves; return the entries and leaves to be written, with those of the cells."""
+        nodes = self._nodes
+        up = nodes["parent"][tops]
+        inside = np.zeros(len(tops), np.bool_)
+        while (up >= 0).any():  # a cell inside another merged cell needs no merge of its own
+            inside |= np.isin(up, tops)
+            up = np.where(up >= 0, nodes["parent"][up], -1)
+        tops = tops[~inside]
+        if not len(tops):
+            return node, box, leaves
+        below, top, firsts = self._below(tops)
+        order = np.argsort(below)
+        below, top = below[order], top[order]
+        left = below[(nodes["child"][below] < 0) & ~np.isin(below, leaves)]
+        more_node, more_box = self._entries(left)
+        node, box = np.concatenate((node, more_node)), np.concatenate((box, more_box))
+        place = np.minimum(np.searchsorted(below, node), len(below) - 1)
+        node = np.where(below[place] == node, top[place], node)
+        node, box = sorted_pairs(node, box, self._count)
+        once = np.append(True, (np.diff(node) != 0) | (np.diff(box) != 0))[: len(node)]
+        self._live -= int(nodes["length"][below].sum())
+        nodes["length"][below] = 0
+        nodes["depth"][below] = -1
+        nodes["child"][tops] = -1
+        self._free = np.sort(np.concatenate((self._free, firsts)))
+        return node[once], box[once], np.union1d(np.setdiff1d(leaves, below), tops)
+
+    def _below(self, tops: Ints) -> tuple[Ints, Ints, Ints]:
+        """All nodes below the given ones, the given node above each, and the first of each four siblings."""
+        below, owner, firsts = [tops[:0]], [tops[:0]], [tops[:0]]
+        node, top = tops, tops
+        while len(node):
+            inner = self._nodes["child"][node] >= 0
+            first, top = self._nodes["child"][node[inner]], np.repeat(top[inner], 4)
+            node = (first[:, None] + np.arange(4)).ravel()
+            below.append(node)
+            owner.append(top)
+            firsts.append(first)
+        return np.concatenate(below), np.concatenate(owner), np.concatenate(firsts)
+
+    def _settle(self, node: Ints, box: Ints, leaves: Ints) -> None:
+        """Write the entries of leaves, and split leaves that hold too many, level by level."""
+        done = []
+        while len(leaves):
+            splits = leaves[self._overfull(leaves)]
+            self._live -= int(self._nodes["length"][splits].sum())
+            self._nodes["length"][splits] = 0
+            goes = np.isin(node, splits) if len(splits) else np.zeros(len(node), np.bool_)
+            stay = np.setdiff1d(leaves, splits)
+            done.append((node[~goes], box[~goes], stay))
+            if not len(splits):
+                break
+            self._split(splits)
+            node, box = node[goes], box[goes]
+            row, quarter = np.divmod(np.flatnonzero(self._reached(box, node)), 4)
+            node, box = self._nodes["child"].take(node.take(row)) + quarter, box.take(row)
+            leaves = np.sort((self._nodes["child"][splits][:, None] + np.arange(4)).ravel())
+            straddle = _straddling(self._reached(box, node))
+            place = np.searchsorted(leaves, node)
+            self._nodes["total"][leaves] = np.bincount(place, minlength=len(leaves))
+            self._nodes["straddle"][leaves] = np.bincount(place[straddle], minlength=len(leaves))
+        if done:
+            all_node, all_box, all_leaves = (np.concatenate(parts) for parts in zip(*done, strict=True))
+            self._write(all_node, all_box, np.sort(all_leaves))
+
+    def _split(self, splits: Ints) -> None:
+        """Give cells four empty children; the length of a free row is 0."""
+        short = max(0, len(splits) - len(self._free))
+        if short:
+            rows = len(self._nodes["depth"])
+            short = max(short, rows // 4)
+            more = _nodes(4 * short)
+            more["depth"][:] = -1
+            self._free = np.append(self._free, rows + 4 * np.arange(short))
+            self._nodes.update({name: np.concatenate((self._nodes[name], more[name])) for name in FIELDS})
+        nodes = self._nodes
+        first, self._free = self._free[: len(splits)], self._free[len(splits) :]
+        self.written += 4 * len(first)
+        nodes["child"][splits] = first
+        for quarter in range(4):
+            right, down, child = quarter % 2, quarter // 2, first + quarter
+            for bounds in ("cell", "gate"):
+                part = nodes[bounds][splits]
+                part[:, 0 if right else 2] = nodes["mid"][splits, 0]
+                part[:, 1 if down else 3] = nodes["mid"][splits, 1]
+                nodes[bounds][child] = part
+            nodes["mid"][child] = _middle(nodes["cell"][child])
+            nodes["child"][child], nodes["parent"][child] = -1, splits
+            nodes["depth"][child] = nodes["depth"][splits] + 1
+
+    def _write(self, node: Ints, box: Ints, leaves: Ints) -> None:
+        """Append the entries of leaves to the pool; compact it when half is unused."""
+        node, box = sorted_pairs(node, box, self._count)
+        length = np.bincount(np.searchsorted(leaves, node), minlength=len(leaves))
+        self._live += len(box) - int(self._nodes["length"][leaves].sum())
+        self._nodes["length"][leaves] = length
+        if self._used + len(box) > len(self._pool):
+            kept = np.setdiff1d(self._leaf_numbers(), leaves)
+            _, old = self._entries(kept)
+            self._nodes["start"][kept] = np.cumsum(self._nodes["length"][kept]) - self._nodes["length"][kept]
+            self._pool = np.concatenate((old, np.zeros(2 * len(box) + len(old), np.int64)))
+            self._used = len(old)
+            self.written += len(old)
+        self._nodes["start"][leaves] = self._used + np.cumsum(length) - length
+        self._pool[self._used : self._used + len(box)] = box
+        self._used += len(box)
+        self.written += len(box)
+
+    def _entries(self, leaves: Ints) -> Pairs:
+        """Entries of leaves, as (leaf, box)."""
+        group, place = ragged(self._nodes["length"][leaves])
+        return leaves[group], self._pool[self._nodes["start"][leaves][group] + place]
+
+    def _leaf_numbers(self) -> Ints:
+        return np.flatnonzero((self._nodes["depth"] >= 0) & (self._nodes["child"] < 0))
+
+
+def _nodes(n: int) -> Nodes:
+    return {name: np.zeros((n, wide) if wide else n, kind) for name, (kind, wide) in FIELDS.items()}
+
+
+def _quarters(rows: Floats, mid: Floats) -> Bools:
+    """Whether boxes overlap each quarter: (N, 4), by x, then y."""
+    left, up = rows[:, 0] <= mid[:, 0], rows[:, 1] <= mid[:, 1]
+    right, down = rows[:, 2] >= mid[:, 0], rows[:, 3] >= mid[:, 1]
+    reached = np.empty((len(rows), 4), np.bool_)
+    for quarter, (x, y) in enumerate(((left, up), (right, up), (left, down), (right, down))):
+        np.logical_and(x, y, out=reached[:, quarter])
+    return reached
+
+
+def _straddling(reached: Bools) -> Bools:
+    """Whether more than one quarter is reached; the four booleans are read as one 32-bit number."""
+    number = reached.view(np.uint32)[:, 0]
+    return np.asarray(number & (number - 1) != 0)
+
+
+def _middle(cell: Floats) -> Floats:
+    """Middle of cells; coordinates are halved before they are added, or the sum could overflow."""
+    return np.asarray(cell[:, :2] / 2 + cell[:, 2:] / 2)
+
+
+def _root_of(rows: Floats) -> Floats:
+    """Find a square around the bulk of the boxes."""
+    n = len(rows)
+    if not n:
+        return np.zeros(4)
+    low, high = rows[:, :2].min(axis=0), rows[:, 2:].max(axis=0)
+    first, last = n // BULK, n - 1 - n // BULK
+    bulk = np.partition(rows[:, :2] / 2 + rows[:, 2:] / 2, (first, last), axis=0)
+    half = bulk[last] / 2 - bulk[first] / 2
+    if half.max() > 0:
+        with np.errstate(over="ignore"):
+            low, high = np.maximum(low, bulk[first] - half), np.minimum(high, bulk[last] + half)
+    centre, half = low / 2 + high / 2, (high / 2 - low / 2).max()
+    with np.errstate(over="ignore"):
+        return np.asarray(np.clip(np.concatenate((centre - half, centre + half)), -LARGEST, LARGEST))

@@ -1,0 +1,153 @@
+"""The backend: numpy kernels or compiled ones (the extra `jit`), the threads that they use, and the memory arena.
+
+A compiled module has the same functions as the numpy module and gives the same rows; COMPILED lists the pairs. It is
+imported only after `use_jit`: installing numba changes nothing by itself.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import pairwise
+from types import ModuleType
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from .checks import InputError, flag, integer
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
+
+LARGEST = 2**24
+"""Largest block that is kept, bytes: more than a batch allocates at a time."""
+
+
+@cache
+def keep_arena() -> None:
+    """Make the C library keep freed memory, up to twice LARGEST, from the first call on.
+
+    glibc returns a large block to the system when it is freed, until a block of that size has been freed once; then it
+    keeps such blocks (`mallopt(3)`, M_MMAP_THRESHOLD). A batch works in arrays of up to a megabyte; with new pages for
+    each array, discs took twice as long. Other C libraries are unaffected.
+    """
+    np.empty(LARGEST, np.uint8)
+
+
+Part = TypeVar("Part")
+
+COMPILED = {
+    "hitplanes.planes.grid.fixed_point": "hitplanes.planes.jit.scene",
+    "hitplanes.planes.scene.sprite": "hitplanes.planes.jit.scene",
+    "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.scene",
+    "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
+    "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
+    "hitplanes.planes.bits.cells": "hitplanes.planes.jit.bit_rows",
+    "hitplanes.planes.bits.visible": "hitplanes.planes.jit.bit_rows",
+    "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
+    "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.rays",
+    "hitplanes.planes.bits.raycast": "hitplanes.planes.jit.rays",
+    "hitplanes.weapons.prepared.position_cache": "hitplanes.weapons.prepared.compiled",
+    "hitplanes.weapons.prepared.prepared_ray": "hitplanes.weapons.prepared.compiled",
+}
+"""Each module with numpy kernels, and the module that has the same functions compiled."""
+
+THREADS_MOST = 64
+
+_asked: list[bool] = [False]
+_news: deque[str] = deque()
+_told: set[str] = set()
+_threads: list[int] = []
+_twins: dict[ModuleType, ModuleType] = {}
+
+
+def use_jit(on: bool | None = True) -> None:
+    """Use compiled kernels from now on; with False or None only numpy, which is the default.
+
+    Results do not change. The first call compiles a kernel and stores it on disk. If it cannot be stored, each process
+    compiles it again, and the plan of the next call of `fire` says why.
+
+    Raises
+    ------
+    InputError
+        If `on` is not a boolean, or if numba (the extra `jit`) is not installed.
+    """
+    on = None if on is None else flag("on", on)
+    if on and find_spec("numba") is None:
+        raise InputError("jit: expected numba, which the extra 'jit' installs, got no such module")
+    _asked[:] = [bool(on)]
+
+
+def use_threads(count: int | None = None) -> None:
+    """Set the most threads that a call of compiled kernels uses; None, the default: one per core of the process.
+
+    Results do not change. Only long calls are split.
+
+    Raises
+    ------
+    InputError
+        If `count` is not a whole number from 1 on.
+    """
+    _threads[:] = [] if count is None else [integer("count", count, 1, THREADS_MOST)]
+
+
+def in_parts(count: int, least: float, work: Callable[[int, int], Part]) -> list[Part]:
+    """Split range(count) into parts, run `work(first, end)` on each in its own thread, and return the results in order.
+
+    Parameters
+    ----------
+    least : smallest part that is worth a thread
+    """
+    parts = int(min(_threads[0] if _threads else _cores(), count // max(least, 1)))
+    if parts < 2:
+        return [work(0, count)]
+    edges = [count * k // parts for k in range(parts + 1)]
+    others = [_pool().submit(work, first, last) for first, last in pairwise(edges[1:])]
+    return [work(0, edges[1]), *(other.result() for other in others)]
+
+
+@cache
+def _cores() -> int:
+    """Number of cores that the process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    """Thread pool of the process; a forked process makes its own."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_pool.cache_clear)
+    return ThreadPoolExecutor(THREADS_MOST, "hitplanes")
+
+
+def tell(what: str) -> None:
+    """Add a message about the compiled kernels to the plan of the next call, once per process."""
+    if what not in _told:
+        _told.add(what)
+        _news.append(what)
+
+
+def news() -> list[str]:
+    """Messages about the compiled kernels that no plan has shown yet."""
+    messages: list[str] = []
+    while _news:
+        with suppress(IndexError):  # another thread may take it
+            messages.append(_news.popleft())
+    return messages
+
+
+def kernels_of(module: ModuleType) -> ModuleType:
+    """The numpy module itself, or its compiled module after `use_jit`."""
+    if not _asked[0]:
+        return module
+    if module not in _twins:
+        _twins[module] = import_module(COMPILED[module.__name__])
+    return _twins[module]

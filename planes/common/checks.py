@@ -1,0 +1,271 @@
+"""Input checks: every outside value is checked once, here, and an error names the bad field."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import reprlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Image = npt.NDArray[np.uint8]
+Labels = npt.NDArray[np.unsignedinteger[Any]]  # of a label plane, see `hitplanes.planes.bits.label_plane`
+Shape = tuple[int | None, ...]
+
+SHOWN = 60
+"""Most characters of a value that an error shows."""
+
+FLOAT_MAX = sys.float_info.max
+
+FLOAT_BITS = 1023
+"""Whole numbers of fewer bits than this fit a float."""
+
+NAMES_SHOWN = 20
+"""Most names that an error lists: beyond it the nearest name says more than a list."""
+
+
+class InputError(ValueError):
+    """Bad input. The message names the field, the row, what was expected and what came, in printable characters."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Put the place of a field in front of the errors raised inside: file, list, row."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+
+
+def array_of(
+    field: str, values: object, shape: Shape | None = None, dtype: npt.DTypeLike | None = None
+) -> npt.NDArray[Any]:
+    """Convert a value as `numpy.asarray` does, and raise an InputError with the field's name if that fails.
+
+    Values that numpy would change silently are refused, too: masked values, and booleans among numbers.
+    """
+    try:
+        array = np.asarray(values, dtype)
+    except (ValueError, TypeError, OverflowError) as error:
+        of_shape = "" if shape is None else f" of shape {_spelled(shape)}"
+        raise InputError(f"{field}: expected an array{of_shape}, got {shown(values)}") from error
+    if values is not array and array.dtype.kind in "biuf" and not _plain(values):
+        _refuse_changed(field, values, array.dtype.kind == "b")
+    return array
+
+
+def each(field: str, value: object, n: int) -> npt.NDArray[Any]:
+    """Repeat a single value n times; an array is returned as it is, for the next check."""
+    array = array_of(field, value)
+    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array
+
+
+def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> Floats:
+    """Check an array of finite numbers.
+
+    Parameters
+    ----------
+    field : name for the error
+    values : anything that `numpy.asarray` takes
+    shape : expected shape; None stands for any length
+    limit : largest absolute value
+
+    Returns
+    -------
+    float64 array of that shape
+
+    Raises
+    ------
+    InputError
+        If it is not numeric, not finite, of another shape, or beyond the limit.
+    """
+    array = _float64(_numeric(field, values, shape, "iuf"))
+    if not all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):
+        _first_bad(field, array, np.isfinite(array), "a finite number")
+        _first_bad(field, array, np.abs(array) <= limit, f"a number within ±{limit:.15g}")
+    return array
+
+
+def integers(field: str, values: object, shape: Shape, low: int, high: int) -> Ints:
+    """Check an array of whole numbers in [low, high]; whole floats pass."""
+    array = _numeric(field, values, shape, "iuf")
+    whole = f"a whole number from {low} to {high}"
+    if array.dtype.kind == "f":
+        array = _float64(array)
+        _first_bad(field, array, (np.rint(array) == array) & (np.abs(array) <= 2.0**53), whole)
+    if not all_within(array, low, high):
+        _first_bad(field, array, (array >= low) & (array <= high), whole)
+    return array.astype(np.int64)
+
+
+def rising(array: Ints, count: int) -> bool:
+    """Whether an array (n,) is strictly rising within 0 .. count - 1, and so has no number twice."""
+    if not len(array):
+        return True
+    return bool(array[0] >= 0 and array[-1] < count and (array[1:] > array[:-1]).all())
+
+
+def bools(field: str, values: object, shape: Shape) -> Bools:
+    """Check an array of booleans; numbers 0 and 1 pass."""
+    array = _numeric(field, values, shape, "biu")
+    if array.dtype.kind != "b":
+        _first_bad(field, array, (array == 0) | (array == 1), "0 or 1")
+        return array.astype(np.bool_)
+    return np.not_equal(array.view(np.uint8), 0)  # a view of other bytes as booleans may have any true byte
+
+
+def real(field: str, value: object, low: float, high: float) -> float:
+    """Check one finite number in [low, high]."""
+    if type(value) is float and low <= value <= high:
+        return value
+    given = float(value) if type(value) is int and value.bit_length() < FLOAT_BITS else value
+    number = float(reals(field, given, ()))
+    if not low <= number <= high:
+        raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {shown(value)}")
+    return number
+
+
+def integer(field: str, value: object, low: int, high: int) -> int:
+    """Check one whole number in [low, high], of any size."""
+    whole = isinstance(value, int | np.integer) or (isinstance(value, float) and value.is_integer())
+    if isinstance(value, bool) or not whole or not low <= int(value) <= high:  # type: ignore[call-overload]
+        raise InputError(f"{field}: expected a whole number from {low} to {high}, got {shown(value)}")
+    return int(value)  # type: ignore[call-overload,no-any-return]
+
+
+def flag(field: str, value: object) -> bool:
+    """Check one boolean."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{field}: expected true or false, got {shown(value)}")
+    return bool(value)
+
+
+def choice(field: str, value: object, options: Iterable[str]) -> str:
+    """Check that a value is one of the options; the error suggests the nearest."""
+    names = options if isinstance(options, tuple) else list(options)
+    if isinstance(value, str) and value in names:
+        return value
+    import difflib  # only an error needs it
+
+    near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    listed = ", ".join(map(repr, names[:NAMES_SHOWN])) or "none"
+    if len(names) > NAMES_SHOWN:
+        listed += f" and {len(names) - NAMES_SHOWN} more"
+    raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")
+
+
+def path_of(field: str, value: object) -> Path:
+    """Check a path, given as a text or a `pathlib` path; it need not exist."""
+    if not isinstance(value, str | PurePath):
+        raise InputError(f"{field}: expected a path, got {shown(value)}")
+    text = str(value)
+    try:
+        os.fsencode(text)
+    except UnicodeEncodeError as error:
+        raise InputError(f"{field}: expected a path, got {shown(text)}, which holds half a letter") from error
+    if "\0" in text:
+        raise InputError(f"{field}: expected a path, got {shown(text)}, which holds a zero byte")
+    return Path(value)
+
+
+def listed(field: str, values: object, expected: str) -> list[Any]:
+    """Convert any iterable to a list; a text or a mapping is refused."""
+    if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
+        raise InputError(f"{field}: expected {expected}, got {shown(values)}")
+    return list(values)
+
+
+def printable(text: str) -> str:
+    r"""Escape the characters of a text that a terminal or a page would obey or not show, as "\x7f" or "\u202e".
+
+    These are control characters, line breaks, marks of writing direction, spaces other than " ", and lone surrogates.
+    Escapes that are in the text stay as they are.
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shown(value: object) -> str:
+    """A short text of any value for an error, on one line, however long, deep or large the value is."""
+    try:
+        text = " ".join(_brief.repr(value).split())
+    except (ValueError, RecursionError):  # a whole number of too many digits
+        text = f"a {type(value).__name__} that is too long to show"
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
+
+
+_brief = reprlib.Repr()
+_brief.maxlist = _brief.maxtuple = _brief.maxset = _brief.maxdict = _brief.maxarray = SHOWN // 3
+_brief.maxstring = _brief.maxother = _brief.maxlong = 2 * SHOWN
+
+
+def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArray[Any]:
+    array = array_of(field, values, shape)
+    empty = not array.size and array.dtype.kind == "f"  # numpy makes an empty list an array of floats
+    if array.dtype.kind not in kinds and not empty:
+        kind = "booleans" if kinds.startswith("b") else "numbers"
+        raise InputError(f"{field}: expected {kind}, got {shown(array.tolist() if array.size <= SHOWN else array)}")
+    if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
+        raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
+    return array
+
+
+def _plain(values: object) -> bool:
+    """Whether nested lists hold nothing but Python's own numbers."""
+    level: list[Any] = [values]
+    while (kinds := set(map(type, level))) and kinds <= {list, tuple}:
+        level = list(itertools.chain.from_iterable(level))
+    return kinds <= {int, float}
+
+
+def _refuse_changed(field: str, values: object, booleans: bool) -> None:
+    """Refuse masked values, and booleans unless all values are booleans."""
+    if isinstance(values, np.ndarray) and np.ma.is_masked(values):
+        place = _place(np.argwhere(np.ma.getmaskarray(values))[0].tolist())
+        raise InputError(f"{field}{place}: expected a value, got a masked one")
+    for i, value in enumerate(values if isinstance(values, list | tuple) else ()):
+        is_boolean = isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.dtype.kind == "b")
+        if is_boolean and not booleans:
+            raise InputError(f"{field}[{i}]: expected a number like the others, got {shown(value)}")
+        _refuse_changed(f"{field}[{i}]", value, booleans)
+
+
+def _float64(array: npt.NDArray[Any]) -> Floats:
+    """Convert numbers to float64; long doubles beyond its range become infinite, which the caller refuses."""
+    if array.dtype.itemsize <= 8:
+        return array.astype(np.float64)
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64)
+
+
+def all_within(array: npt.NDArray[Any], low: float, high: float) -> bool:
+    """Whether all numbers lie in [low, high]; False if any is NaN."""
+    return not array.size or bool(array.min() >= low and array.max() <= high)
+
+
+def _first_bad(field: str, array: npt.NDArray[Any], good: Bools | np.bool_, expected: str) -> None:
+    if np.all(good):
+        return
+    row = tuple(np.argwhere(~np.asarray(good))[0].tolist())
+    raise InputError(f"{field}{_place(row)}: expected {expected}, got {array[row]}")
+
+
+def _place(row: Iterable[int]) -> str:
+    return "".join(f"[{i}]" for i in row)
+
+
+def _spelled(shape: Shape) -> str:
+    return "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"

@@ -1,0 +1,1 @@
+"""Files of a scene: PNG images, and the scene folder."""

@@ -1,0 +1,511 @@
+"""Scene folders (scene.json and its PNGs), read and written; and the checks of output folders."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from ..common.checks import Image, InputError, path_of, within
+from ..common.limits import (
+    COST_MAX,
+    ITEMS_MAX,
+    LAYER_MAX,
+    MASK_AREA_MAX,
+    MASK_SIDE_MAX,
+    POSITION_MAX,
+    REACH_MAX,
+    SCALE_MAX,
+    SCALE_MIN,
+    SUB,
+)
+from ..common.tables import (
+    TEXT_MAX,
+    Const,
+    Either,
+    Keys,
+    Mapped,
+    Mask,
+    Names,
+    Number,
+    Numbers,
+    Optional,
+    Ref,
+    Rows,
+    Text,
+    Value,
+    Whole,
+    Wholes,
+    Within,
+    Word,
+    inside,
+    json_of,
+    typed,
+)
+from ..scene.items import Role
+from ..scene.scene import Scene
+from ..scene.sprite import FLIPS, Sprite, rows_of
+from .png import read_png, read_text, write_png, write_text
+
+FORMAT = "hitplanes-scene/1"
+FILE_NAME = "scene.json"
+SECTIONS = {
+    "background": Role.BACKGROUND,
+    "hittable": Role.HITTABLE,
+    "movers": Role.MOVER,
+    "occluders": Role.OCCLUDER,
+    "hud": Role.HUD,
+}
+POINT = Numbers((2,), POSITION_MAX)
+PIVOT = Numbers((2,), MASK_SIDE_MAX)
+COLOR = Wholes((3,), 0, 255)
+RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
+ID = Whole(0, ITEMS_MAX - 1)
+FRAMES = Keys(
+    {
+        "grid_wh": Wholes((2,), 1, MASK_SIDE_MAX),
+        "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX),
+    }
+)
+SOURCES: dict[str, dict[str, Value]] = {
+    "image": {
+        "image": Text(),
+        "alpha_threshold": Whole(0, 255),
+        "color_key": COLOR,
+        "frames": Within(FRAMES),
+        "pivot_xy": PIVOT,
+    },
+    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR},
+    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR},
+    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR},
+    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR},
+}
+POSE: dict[str, Value] = {
+    "angle": Number(),
+    "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
+    "flip": Word(FLIPS),
+    "frame": Whole(0, 2**31 - 1),
+    "layer": Whole(-LAYER_MAX, LAYER_MAX),
+    "cost": Whole(0, COST_MAX),
+    "velocity_xy": Numbers((2,), REACH_MAX),
+}
+PLACED: dict[str, Value] = {
+    "id": ID,
+    "name": Text(),
+    "position_xy": POINT,
+    **POSE,
+    "categories": Names(),
+    "owner": Either(str, Text(), ID),
+}
+OBJECT = {kind: Keys({**PLACED, **keys}, (kind, "position_xy")) for kind, keys in SOURCES.items()}
+BOUNDS = Keys(
+    {"origin_xy": Wholes((2,), -POSITION_MAX, POSITION_MAX), "size_wh": Wholes((2,), 1, POSITION_MAX)}, ("size_wh",)
+)
+SCENE = Keys(
+    {
+        "$schema": Text(),
+        "format": Const(FORMAT),
+        "name": Text(),
+        "bounds": Optional(Within(BOUNDS)),
+        "categories": Names(),
+        "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
+        "weapons": Mapped(Ref("weapon")),
+        "shots": Rows(Ref("shot")),
+    },
+    ("format",),
+)
+"""The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
+
+SHEET_WIDTH = 4096
+"""Approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px."""
+
+MASK_ROWS_AREA = 4096
+"""Largest mask that is saved as rows of text, px; larger ones are saved as images."""
+
+
+@dataclass
+class FileObject:
+    """An object of a scene file; `pose` has only the keys that are given; `place` is for errors."""
+
+    role: Role
+    sprite: Sprite
+    position_xy: tuple[float, float]
+    pose: dict[str, Any] = field(default_factory=dict)
+    name: str | None = None
+    categories: list[str] | None = None
+    owner: str | int | None = None
+    id: int | None = None
+    place: str = ""
+
+
+@dataclass
+class SceneFile:
+    """The content of a scene file, in the order of the file."""
+
+    name: str = "scene"
+    origin_xy: tuple[int, int] = (0, 0)
+    size_wh: tuple[int, int] | None = None
+    categories: list[str] = field(default_factory=list)
+    objects: list[FileObject] = field(default_factory=list)
+    weapons: dict[str, Any] = field(default_factory=dict)
+    shots: list[Any] = field(default_factory=list)
+
+
+def read_scene(folder: Path) -> SceneFile:
+    """Read a scene folder.
+
+    Raises
+    ------
+    InputError
+        With the names of the file, the section, the row and the field.
+    """
+    path = folder / FILE_NAME
+    with within(str(path)):
+        data = SCENE.check("scene", json_of(read_text(path)))
+        bounds = data.get("bounds") or {}
+        scene = SceneFile(
+            name=data.get("name") or Text().check("name", folder.resolve().name),
+            origin_xy=bounds.get("origin_xy", (0, 0)),
+            size_wh=bounds.get("size_wh"),
+            categories=data.get("categories", []),
+            weapons=data.get("weapons", {}),
+            shots=list(data.get("shots", [])),
+        )
+        sprites: dict[str, Sprite] = {}
+        for section, role in SECTIONS.items():
+            for row, entry in enumerate(data.get("objects", {}).get(section, [])):
+                place = f"objects.{section}[{row}]"
+                with within(place):
+                    scene.objects.append(_object(entry, role, folder, sprites))
+                    scene.objects[-1].place = place
+        return scene
+
+
+def write_scene(folder: Path, scene: SceneFile) -> None:
+    """Write a scene folder, images first and scene.json last, so that an interrupt leaves the old scene intact."""
+    for entry in scene.objects:
+        with within(f"object {entry.id}"):
+            _image_name(entry.sprite)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
+    saved: dict[int, dict[str, Any]] = {}
+    images: dict[str, str | None] = {}
+    sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
+    for entry in scene.objects:
+        if entry.sprite.uid not in saved:
+            saved[entry.sprite.uid] = _saved_source(entry.sprite, folder, images)
+        section = next(name for name, role in SECTIONS.items() if role is entry.role)
+        sections[section].append(_object_json(entry, saved[entry.sprite.uid]))
+    bounds = None
+    if scene.size_wh is not None:
+        bounds = {"origin_xy": list(scene.origin_xy), "size_wh": list(scene.size_wh)}
+    data = {
+        "format": FORMAT,
+        "name": scene.name,
+        "bounds": bounds,
+        "categories": scene.categories,
+        "objects": sections,
+        "weapons": scene.weapons,
+        "shots": scene.shots,
+    }
+    try:
+        SCENE.forms["weapons"].check("weapons", scene.weapons)
+        text = laid_out(data)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(
+            f"scene: expected weapons and shots of plain JSON, got a value that is not: {error}"
+        ) from error
+    write_text(folder / FILE_NAME, text + "\n")
+
+
+def scene_folder(path: Path) -> Path:
+    """Folder of a scene, given its path or that of its scene.json."""
+    return path.parent if path.name == FILE_NAME else path
+
+
+def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:
+    """Write JSON with line breaks that suit a text diff.
+
+    Short values take one line, and so does everything from the depth `whole` on. By default this is every object from
+    the third level on: one object of the scene, one weapon or one shot a line.
+    """
+    flat, pad, end = json.dumps(value, allow_nan=False), "\n" + "  " * (depth + 1), "\n" + "  " * depth
+    entry = depth > 1 and isinstance(value, dict) if whole is None else depth >= whole
+    if (depth > 0 and len(flat) <= 100) or entry or not isinstance(value, dict | list):
+        return flat
+    if isinstance(value, dict):
+        rows = [f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1, whole=whole)}" for key, v in value.items()]
+        return "{" + ",".join(rows) + end + "}"
+    return "[" + ",".join(pad + laid_out(v, depth + 1, whole=whole) for v in value) + end + "]"
+
+
+def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
+    given = typed("object", entry, dict)
+    kinds = [key for key in SOURCES if key in given]
+    if len(kinds) != 1:
+        raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {' and '.join(kinds) or 'none'}")
+    kind = kinds[0]
+    data = OBJECT[kind].check("object", given)
+    source = {key: given[key] for key in SOURCES[kind] if key in given}
+    shared = json.dumps(source, sort_keys=True)
+    if shared not in sprites:
+        sprites[shared] = READERS[kind]({key: data[key] for key in source}, folder, source)
+    return FileObject(
+        role=role,
+        sprite=sprites[shared],
+        position_xy=data["position_xy"],
+        pose={key: data[key] for key in POSE if key in data},
+        name=data.get("name"),
+        categories=data.get("categories"),
+        owner=data.get("owner"),
+        id=data.get("id"),
+    )
+
+
+def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    options = {key: data[key] for key in ("alpha_threshold", "color_key", "pivot_xy") if key in data}
+    image = read_png(_inside(folder, data["image"]))
+    return Sprite.from_image(image, **options, **data.get("frames", {}), source=source)
+
+
+def _polygon_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.polygon(data["polygon"], data.get("holes", ()), color=data.get("color"))
+
+
+def _circle_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.circle(data["circle"], color=data.get("color"))
+
+
+def _box_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.box(*data["box_wh"], color=data.get("color"))
+
+
+def _mask_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    return Sprite.from_mask(data["mask"], pivot_xy=data.get("pivot_xy"), color=data.get("color"), source=source)
+
+
+READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
+    "image": _image_sprite,
+    "polygon": _polygon_sprite,
+    "circle": _circle_sprite,
+    "box_wh": _box_sprite,
+    "mask": _mask_sprite,
+}
+
+
+def _inside(folder: Path, text: str) -> Path:
+    """Path of a file in the scene's folder; a path that leads out of the folder is refused."""
+    path = folder.joinpath(*PurePosixPath(inside("image", text)).parts)
+    try:
+        within_it = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a link to itself, a name that is too long
+        within_it = False
+    if not within_it:
+        raise InputError(f"image: expected a path inside the scene's folder, got {text!r}, which leads out of it")
+    return path
+
+
+def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
+    data: dict[str, Any] = {"id": entry.id, "name": entry.name, **source}
+    data |= {"position_xy": list(entry.position_xy), **entry.pose}
+    if entry.categories is not None:
+        data["categories"] = entry.categories
+    if entry.owner is not None:
+        data["owner"] = entry.owner
+    return data
+
+
+def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
+    """Source of a sprite as JSON; its image is written to the folder without overwriting another file."""
+    if sprite.outline is not None:
+        color = {} if sprite.color is None else {"color": list(sprite.color)}
+        return {**(sprite.source or {}), **color}
+    masks = [frame.mask for frame in sprite.frames]
+    options: dict[str, Any] = {}
+    if sprite.pivot_256 is not None:
+        options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
+    if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
+        color = {} if sprite.color is None else {"color": list(sprite.color)}
+        return {"mask": rows_of(masks[0]), **options, **color}
+    known = sprite.source or {}
+    if sprite.frames[0].image is not None and "alpha_threshold" in known:
+        options["alpha_threshold"] = known["alpha_threshold"]
+    sheet, rects = _sheet(sprite)
+    if len(rects) > 1:
+        options["frames"] = {"rects_xywh": rects}
+    return {"image": _write_apart(folder, _image_name(sprite), sheet, images), **options}
+
+
+def _image_name(sprite: Sprite) -> str:
+    """Path from which the image of a sprite was read, or a new name for it."""
+    return inside("source.image", (sprite.source or {}).get("image", "sprite.png"))
+
+
+def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:
+    """Lay out all frames in rows on one sheet; return it and the rectangles."""
+    widest = max(SHEET_WIDTH, *(frame.mask.shape[1] for frame in sprite.frames), 0)
+    rects, x, y, tall = [], 0, 0, 0
+    for frame in sprite.frames:
+        h, w = frame.mask.shape
+        if x + w > widest:
+            x, y, tall = 0, y + tall, 0
+        rects.append([x, y, w, h])
+        x, tall = x + w, max(tall, h)
+    width, height = max(r[0] + r[2] for r in rects), y + tall
+    if height > MASK_SIDE_MAX or width * height > MASK_AREA_MAX:
+        raise InputError(f"frames: expected frames that fit one sheet of {MASK_AREA_MAX} px, got {width} x {height}")
+    sheet = np.zeros((height, width, 4), np.uint8)
+    for frame, (left, top, w, h) in zip(sprite.frames, rects, strict=True):
+        part = sheet[top : top + h, left : left + w]
+        if frame.image is not None:
+            part[:] = frame.image
+        else:
+            part[frame.mask] = (*(sprite.color or (255, 255, 255)), 255)
+    return sheet, rects
+
+
+def _write_apart(folder: Path, name: str, sheet: Image, images: dict[str, str | None]) -> str:
+    """Write an image under its own name, or under a numbered one if another image has that name.
+
+    `images` holds the digests of the files that were read; None stands for no file.
+    """
+    stem, own = PurePosixPath(name).stem, _digest(sheet)
+    for number in range(1, 10**6):
+        ending = ".png" if number == 1 else f"-{number}.png"
+        path = folder / (stem[: TEXT_MAX - len(ending)] + ending)
+        if path.name not in images:
+            images[path.name] = _digest_of(path)
+        if images[path.name] is None:
+            write_png(path, sheet)
+            images[path.name] = own
+        if images[path.name] == own:
+            return path.name
+    raise InputError(f"image: expected a free name like {name!r} in {folder}")
+
+
+def _digest_of(path: Path) -> str | None:
+    """Digest of an image file; for another file one that no image has."""
+    if not path.exists() and not path.is_symlink():
+        return None
+    try:
+        return _digest(read_png(path))
+    except InputError:
+        return ""
+
+
+def _digest(image: Image) -> str:
+    import hashlib  # few calls need it, and it is slow to load
+
+    return hashlib.sha256(repr(image.shape).encode() + image.tobytes()).hexdigest()
+
+
+def load_scene(folder: str | Path) -> Scene:
+    """Read a scene folder, scene.json and the PNGs that it names, given its path or that of its scene.json.
+
+    Weapons and shots of the file are kept as plain JSON in `scene.weapons` and `scene.shots`.
+
+    Raises
+    ------
+    InputError
+        With the names of the file, the section, the row and the field.
+    """
+    path = scene_folder(path_of("folder", folder))
+    file = read_scene(path)
+    with within(str(path / FILE_NAME)):
+        x, y = file.origin_xy
+        scene = Scene(file.size_wh, (x, y), categories=file.categories, name=file.name)
+        scene.weapons, scene.shots = file.weapons, file.shots
+        numbered = [entry.id is not None for entry in file.objects]
+        if any(numbered) and not all(numbered):
+            raise InputError("objects: expected an id for each object or for none, got some")
+        entries = sorted(file.objects, key=lambda entry: entry.id) if any(numbered) else file.objects  # type: ignore[arg-type,return-value]
+        for entry in entries:
+            _add_entry(scene, entry)
+        _set_owners(scene, entries)
+        return scene
+
+
+def _add_entry(scene: Scene, entry: FileObject) -> None:
+    with within(entry.place):
+        if entry.id is not None:
+            if entry.id < scene.items.count:
+                raise InputError(f"id: expected each id once, got {entry.id} again")
+            scene.items.skip_to(entry.id)
+        scene.add(
+            entry.sprite,
+            entry.position_xy,
+            role=entry.role,
+            name=entry.name,
+            categories=entry.categories,
+            **entry.pose,
+        )
+
+
+def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
+    for item, entry in zip(scene.ids().tolist(), entries, strict=True):
+        if entry.owner is not None:
+            with within(f"{entry.place}: owner"):
+                owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
+                if entry.id is not None and owner >= scene.items.count:
+                    scene.items.skip_to(owner + 1)  # the owner was removed before the scene was saved
+                scene.set(item, owner=owner)
+
+
+def empty_folder(folder: Path) -> bool:
+    """Make a folder unless it exists and is empty; return whether it was made."""
+    try:
+        folder.mkdir()
+        return True
+    except FileExistsError:
+        if not folder.is_dir():
+            raise InputError(f"folder: expected a new folder, got the file {folder}") from None
+        try:
+            held = sorted(path.name for path in folder.iterdir())
+        except OSError as error:
+            raise InputError(f"folder: cannot read {folder}: {error.strerror}") from error
+        if held:
+            raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it") from None
+        return False
+    except OSError as error:
+        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
+
+
+def own_folder(folder: Path, names: Sequence[str]) -> None:
+    """Make a folder, or accept one that holds only files of these names.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made, or holds other files.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+        held = sorted(path.name for path in folder.iterdir() if path.name not in names)
+    except FileExistsError:
+        raise InputError(f"--output: expected a folder, got the file {folder}") from None
+    except OSError as error:
+        raise InputError(f"--output: cannot make {folder}: {error.strerror}") from error
+    if held:
+        got = f"got {folder} with {held[0]!r} in it"
+        raise InputError(f"--output: expected a new folder, or that of an earlier run, {got}")
+
+
+def cleared(folder: Path, names: Sequence[str]) -> None:
+    """Remove the files of these names that exist.
+
+    Raises
+    ------
+    InputError
+        If one cannot be removed.
+    """
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"--output: cannot remove {folder / name}: {error.strerror}") from error

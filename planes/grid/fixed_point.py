@@ -1,0 +1,245 @@
+"""Fixed-point numbers: positions in 1/256 px and directions as integers, each rounded once.
+
+A position is `snap(v) = rint(256 v)`, half to even. A direction is (cos, sin) times 2**30, correctly rounded: it is the
+same on every machine, and quarter turns and mirrors are exact.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+
+from ..common.backend import kernels_of
+from ..common.checks import Floats, InputError, Ints, all_within, rising
+from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
+
+UNIT = 1 << TRIG_BITS
+"""1 as a component of a direction."""
+
+DOUBT = 2.0**-12
+"""A scaled sine nearer to a tie than this is in doubt; float sines err by a few ulp, 2**-21 after the scaling."""
+
+
+def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
+    """Cosines and sines of angles (n,), each times 2**30 and rounded, and the rows whose rounding is in doubt.
+
+    The angle is folded into [0, 45] by differences that are exact in float64, so a quarter turn exactly swaps the two
+    numbers, and a mirror exactly changes a sign.
+    """
+    folded = np.abs(degrees)
+    if folded.max(initial=0) >= 360:
+        folded = np.fmod(folded, 360.0)
+    down = folded > 180
+    folded = np.where(down, 360 - folded, folded)
+    left = folded > 90
+    folded = np.where(left, 180 - folded, folded)
+    steep = folded > 45
+    radians = np.radians(np.where(steep, 90 - folded, folded))
+    near, far = np.cos(radians) * UNIT, np.sin(radians) * UNIT
+    whole_near, whole_far = np.rint(near), np.rint(far)
+    doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
+    x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
+    c, s = np.where(steep, y, x), np.where(steep, x, y)
+    return np.where(left, -c, c), np.where(down ^ (degrees < 0), -s, s), np.flatnonzero(doubt)
+
+
+ONE = 1 << TRIG_BITS
+Whole = TypeVar("Whole", int, Ints)
+_PI = (31415926535897932384626433832795028841971693993751, 10**49)
+_FIXED_BITS = 160  # as exact as _PI
+
+ANGLES_KEPT = 2**12
+"""Angles whose directions are kept: objects turn by the same steps again and again."""
+
+
+def snap(values: object) -> Ints:
+    """Round positions in px to the 1/256-px grid, half to even; a position is rounded nowhere else."""
+    return np.rint(np.asarray(values, np.float64) * SUB).astype(np.int64)
+
+
+def pixel(position_256: Ints) -> Ints:
+    """Pixel that holds a position; on a border, the pixel to the right or below."""
+    moved = position_256 + HALF
+    moved >>= 8  # in the same array
+    return moved
+
+
+def rounded_div(numerator: Ints, denominator: Ints | int) -> Ints:
+    """Divide integers (denominator > 0), rounding half to even: an odd function of the numerator."""
+    quotient, rest = np.divmod(np.asarray(numerator), denominator)
+    twice = 2 * rest
+    up = (twice > denominator) | ((twice == denominator) & (quotient & 1 == 1))
+    return np.asarray(quotient + up)
+
+
+def isqrt(values: Ints) -> Ints:
+    """Floor of the square root of non-negative int64 values, exactly."""
+    values = np.asarray(values, np.int64)
+    root = np.sqrt(values.astype(np.float64)).astype(np.int64)
+    root = np.minimum(root, 3_037_000_499)  # floor(sqrt(2**63 - 1)): its square must not wrap
+    root -= root * root > values
+    above = np.minimum(root + 1, 3_037_000_499)
+    return np.where((above * above <= values) & (above > root), above, root)
+
+
+def unit(degrees: object) -> tuple[Ints, Ints]:
+    """(cos, sin) times 2**30 of angles in degrees, correctly rounded.
+
+    A value too near to a tie for the float sine is computed in integers.
+    """
+    angle = np.asarray(degrees, np.float64)
+    each = angle.ravel()
+    c, s, doubt = kernels_of(sys.modules[__name__]).nearest(each)
+    for i in doubt.tolist():
+        c[i], s[i] = _exactly(float(each[i]))
+    return c.reshape(angle.shape), s.reshape(angle.shape)
+
+
+def unit_toward(dx: Ints | int, dy: Ints | int) -> tuple[Ints, Ints]:
+    """Directions of integer vectors as (cos, sin) times 2**30, correctly rounded, computed without an angle."""
+    x, y = np.broadcast_arrays(np.asarray(dx, np.int64), np.asarray(dy, np.int64))
+    pairs = [toward(int(a), int(b)) for a, b in zip(x.ravel(), y.ravel(), strict=True)]
+    both = np.array(pairs, np.int64).reshape((*x.shape, 2))
+    return both[..., 0], both[..., 1]
+
+
+def quarters(c: int, s: int) -> tuple[int, int, int]:
+    """Split a rounded direction into k quarter turns and a rest in [-45, 45), as (k, cos, sin) of the rest.
+
+    Every turn of a mask starts with this split.
+    """
+    k = 0
+    while not -c <= s < c:
+        k, c, s = k + 1, s, -c
+    return k, c, s
+
+
+@lru_cache(maxsize=ANGLES_KEPT)
+def quarter_turns(degrees: float) -> tuple[int, int, int]:
+    """Split an angle into k quarter turns and a rest in [-45, 45), as (k mod 4, cos, sin) of the rest.
+
+    The direction is rounded before it is split: an angle that rounds to the direction of 45 degrees is 45 degrees.
+    """
+    folded = math.fmod(degrees, 360.0)
+    k = round(folded / 90)
+    radians = math.radians(folded - 90 * k)
+    c, s = math.cos(radians) * ONE, math.sin(radians) * ONE
+    if max(abs(c - round(c)), abs(s - round(s))) > 0.5 - DOUBT:
+        c, s = _exactly(folded - 90 * k)
+    more, c, s = quarters(round(c), round(s))
+    return (k + more) % 4, c, s
+
+
+def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
+    """Turn points (N, 2) about the origin by one direction, or by one each (N,); rounded once, half to even."""
+    x, y = points_256[..., 0], points_256[..., 1]
+    return np.stack([over_one(x * c - y * s), over_one(x * s + y * c)], axis=-1)
+
+
+def scaled(directions: Ints, length_256: int) -> Ints:
+    """Vectors of a length along directions, (cos, sin) times 2**30; rounded once, half to even."""
+    return over_one(directions * length_256)
+
+
+def over_one(numerator: Whole) -> Whole:
+    """Divide by 2**30, rounding half to even."""
+    return (numerator + (ONE // 2 - 1) + ((numerator >> TRIG_BITS) & 1)) >> TRIG_BITS
+
+
+def _exactly(degrees: float) -> tuple[int, int]:
+    """`unit` of one angle, computed in integers."""
+    folded = math.fmod(abs(degrees), 360.0)
+    down = folded > 180
+    folded = 360 - folded if down else folded
+    left = folded > 90
+    folded = 180 - folded if left else folded
+    steep = folded > 45
+    s, c = (_taylor(90 - folded if steep else folded, first) for first in (1 - steep, int(steep)))
+    return -c if left else c, -s if down ^ (degrees < 0) else s
+
+
+def _taylor(degrees: float, first: int) -> int:
+    """Round 2**30 times the sine (first = 1) or cosine (first = 0) of [0, 45] degrees, from 30 terms in fixed point."""
+    part, whole = float(degrees).as_integer_ratio()
+    x = (part * _PI[0] << _FIXED_BITS) // (whole * 180 * _PI[1])
+    term = total = x if first else 1 << _FIXED_BITS
+    for n in range(first + 1, first + 30, 2):
+        term = -(term * x * x >> 2 * _FIXED_BITS) // (n * (n + 1))
+        total += term
+    return (2 * total * ONE + (1 << _FIXED_BITS)) >> (_FIXED_BITS + 1)
+
+
+def toward(dx: int, dy: int) -> tuple[int, int]:
+    """`unit_toward` of one vector, in Python integers."""
+    if dx == dy == 0:
+        raise InputError("toward: expected a point other than the shot's own position, got the same")
+    return _over_length(dx, dx * dx + dy * dy), _over_length(dy, dx * dx + dy * dy)
+
+
+def _over_length(component: int, squared_length: int) -> int:
+    """Round 2**30 component / sqrt(squared_length), by way of the floor of twice the value."""
+    twice = math.isqrt((component * component << (2 * TRIG_BITS + 2)) // squared_length)
+    return int(math.copysign((twice + 1) // 2, component))
+
+
+LIMIT, SCALE = np.array(float(POSITION_MAX)), np.array(float(SUB))
+
+ROUNDING = np.array(1.5 * 2.0**52)
+"""A float64 of this size has no fraction: adding a number to it rounds that to a whole number, half to even."""
+
+ROUNDING_BITS = ROUNDING.view(np.int64)
+"""Bits of ROUNDING: subtracted from the bits of the sum they leave that whole number, twice as fast as a conversion."""
+
+
+def snapped(at: Floats) -> Ints | None:
+    """Positions (N, 2) in px, rounded to 1/256 px as `snap` does; None if any is NaN or out of range."""
+    if not (at.max(initial=0) <= LIMIT and at.min(initial=0) >= -LIMIT):  # false if any is NaN
+        return None
+    made = at * SCALE
+    made += ROUNDING
+    whole: Ints = made.view(np.int64)
+    whole -= ROUNDING_BITS
+    return whole
+
+
+def pixels(at_256: Ints) -> Ints:
+    """Pixels (N, 2) that hold positions in 1/256 px; see `pixel`."""
+    return pixel(at_256)
+
+
+def place(
+    ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
+) -> bool:
+    """Move items to new positions; return whether that was done.
+
+    Nothing is changed unless the ids are rising and all in the scene, and all positions finite and in range.
+
+    Parameters
+    ----------
+    ids, xy : (n,) and (n, 2), px; neither is kept
+    count : number of ids of the scene
+    alive, edge, position_256, box : columns of `Items`; the last two are changed
+    before, after : (n, 4), filled with the boxes of the items
+    """
+    if not (rising(ids, count) and all_within(xy, -POSITION_MAX, POSITION_MAX) and alive.take(ids).all()):
+        return False
+    n, first = len(ids), int(ids[0]) if len(ids) else 0
+    rows = slice(first, first + n) if n and ids[-1] - first == n - 1 else ids
+    now = snap(xy)
+    before[:] = box[rows]
+    after[:] = boxes_at(now, edge[rows])
+    position_256[rows], box[rows] = now, after
+    return True
+
+
+def boxes_at(position_256: Ints, edge: Ints) -> Ints:
+    """Boxes (n, 4) of items at positions (n, 2); `edge` (n, 4) leads to their first and last pixels, 1/256 px."""
+    pairs = np.ascontiguousarray(position_256).view(np.complex128)  # x and y are copied as one
+    boxes = np.repeat(pairs, 2).view(np.int64).reshape(-1, 4)
+    boxes += edge
+    boxes >>= 8
+    return np.asarray(boxes)

@@ -1,0 +1,487 @@
+"""Exact rasterization of shapes and segments to pixels.
+
+A filled shape has the pixels whose centres lie inside it or on its edge. A segment has its closed supercover: the
+pixels whose closed squares it touches, so nothing slips through a corner, and either direction gives the same pixels. A
+shape with an axis (beam, cone) also has the closed supercover of its axis: even a thin one has no gaps, and a wider one
+covers a narrower one. All arguments are integers in 1/256 px, and the origin is the centre of pixel (0, 0).
+
+The times at which a ray enters and leaves a cell are whole numbers over a scale of the ray's own, so they have a total
+order. Coordinates of rays are relative to a whole pixel near their start.
+
+    scale of a thin ray     max(1, |dx|) * max(1, |dy|)        of a thick ray     dx^2 + dy^2
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Floats, Ints
+from ..common.limits import HALF, SUB
+from .fixed_point import isqrt, turned
+from .spans import Spans, each_pixel, ragged
+
+Runs = tuple[Ints, Ints, Ints]
+
+
+def disc(radius: int) -> Spans:
+    """Centres at most `radius` from the origin."""
+    return _union([_disc_runs(np.zeros(2, np.int64), radius)])
+
+
+def ring(inner: int, outer: int) -> Spans:
+    """Centres p with inner <= |p| <= outer."""
+    y = _rows(-outer, outer)
+    edge = isqrt(outer * outer - (SUB * y) ** 2)
+    rest = inner * inner - (SUB * y) ** 2
+    # The hole is open: the first centre outside it has x * x >= rest, so x >= the root rounded up.
+    root = isqrt(np.maximum(rest, 0))
+    hole = np.where(rest > 0, root + (root * root < rest), 0)
+    return _union([_closed(y, -edge, -hole), _closed(y, hole, edge)])
+
+
+def ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
+    """Centres inside an ellipse whose semi-axes are turned by the direction (c, s); a flat one is a segment.
+
+    With u = x c + y s and v = y c - x s: (ry u)^2 + (rx v)^2 <= rx^2 ry^2 (c^2 + s^2). In one row that is
+    |A x + B| <= sqrt(D) with numbers of up to 200 bits, hence Python integers.
+    """
+    if radius_x == 0 or radius_y == 0:
+        return _flat_ellipse(radius_x, radius_y, c, s)
+    xx, yy = radius_x**2, radius_y**2
+    a, b = yy * c * c + xx * s * s, (yy - xx) * c * s
+    last = xx * yy * (c * c + s * s)
+    y = _rows(-max(radius_x, radius_y), max(radius_x, radius_y))
+    rows = []
+    for row in y.tolist():
+        v = SUB * row
+        squared = (b * v) ** 2 - a * ((yy * s * s + xx * c * c) * v * v - last)
+        if squared >= 0:
+            root = math.isqrt(squared)
+            rows.append((row, -((b * v + root) // (SUB * a)), (root - b * v) // (SUB * a)))
+    runs = np.array(rows, np.int64).reshape(-1, 3).T
+    return Spans.from_runs(*runs)
+
+
+def polygon(rings: Sequence[Ints]) -> Spans:
+    """Centres inside rings of points (N, 2) by the even-odd rule over all rings, and centres on any edge.
+
+    A centre is inside if an odd number of crossings lies at or left of it. Crossings are rounded up to centres before
+    they are sorted, which changes no count and avoids comparing rationals.
+    """
+    start = np.concatenate([np.asarray(r, np.int64) for r in rings])
+    end = np.concatenate([np.roll(np.asarray(r, np.int64), -1, axis=0) for r in rings])
+    down = (start[:, 1] > end[:, 1])[:, None]
+    top, low = np.where(down, end, start), np.where(down, start, end)
+    first, last = -(-top[:, 1] // SUB), low[:, 1] // SUB
+    edge, place = ragged(np.maximum(last - first + 1, 0))
+    y = first[edge] + place
+    flat = top[edge, 1] == low[edge, 1]
+    left, right = _crossings(top[edge], low[edge], y)
+    touching = (y, left, right)
+    crossing = ~flat & (SUB * y < low[edge, 1])  # half-open in y: a vertex between two edges counts once
+    y, x = y[crossing], left[crossing]
+    order = np.lexsort((x, y))
+    y, x = y[order], x[order]
+    return _union([touching, (y[::2], x[::2], x[1::2] - 1)])
+
+
+def beam(a: Ints, b: Ints, radius: int) -> Spans:
+    """Centres at most `radius` from the segment ab, and the closed supercover of ab."""
+    (ax, ay), (bx, by) = np.asarray(a).tolist(), np.asarray(b).tolist()
+    dx, dy = bx - ax, by - ay
+    length2 = dx * dx + dy * dy
+    parts = [_segment_runs(a, b), _disc_runs(a, radius), _disc_runs(b, radius)]
+    if length2 == 0:
+        return _union(parts)
+    # Beside the segment: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|.
+    side = math.isqrt(radius * radius * length2)
+    y = _rows(min(ay, by) - radius, max(ay, by) + radius)
+    v = SUB * y - ay
+    along, across = dx * ax - dy * v, dy * ax + dx * v
+    x_min, x_max = ax * np.ones_like(y) + min(0, dx) - radius, ax * np.ones_like(y) + max(0, dx) + radius
+    for slope, low, high in ((dx, along, along + length2), (dy, across - side, across + side)):
+        x_min, x_max = _between(slope, low, high, x_min, x_max)
+    return _union([*parts, _closed(y, x_min, x_max)])
+
+
+def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
+    """Centres within `reach` and within the half angle of the direction (c, s), and the supercover of the axis.
+
+    With u = x c + y s and v = y c - x s: |v| c_half <= u s_half. Up to 90 degrees correctly rounded cosines fall and
+    sines rise with the half angle, so a wider cone covers a narrower one. The products exceed 64 bits: Python integers.
+    """
+    y = _rows(-reach, reach)
+    half = isqrt(reach * reach - (SUB * y) ** 2)
+    axis = _segment_runs(np.zeros(2, np.int64), turned(np.array([reach, 0]), c, s))
+    if s_half == 0 and c_half > 0:
+        return _union([axis])
+    sides = []
+    for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
+        slope = -sign * s * c_half - c * s_half
+        limit = (s * s_half - sign * c * c_half) * SUB
+        sides.append(_half_plane(slope, y.astype(object) * limit, -half, half))
+    (a_min, a_max), (b_min, b_max) = sides
+    if c_half >= 0:
+        return _union([axis, _closed(y, np.maximum(a_min, b_min), np.minimum(a_max, b_max))])
+    return _union([axis, _closed(y, a_min, a_max), _closed(y, b_min, b_max)])
+
+
+def segment(a: Ints, b: Ints) -> Spans:
+    """Closed supercover of a segment: every pixel whose closed square touches it; the ends may be swapped."""
+    return _union([_segment_runs(a, b)])
+
+
+def _segment_runs(a: Ints, b: Ints) -> Runs:
+    (x0, y0), (x1, y1) = sorted([np.asarray(a).tolist(), np.asarray(b).tolist()], key=lambda p: (p[1], p[0]))
+    y = np.arange(-((HALF - y0) // SUB), (y1 + HALF) // SUB + 1)
+    dx, dy = x1 - x0, y1 - y0
+    if dy == 0:
+        low, high, per = np.full_like(y, x0), np.full_like(y, x1), 1
+    else:
+        enter = x0 * dy + (np.maximum(y0, SUB * y - HALF) - y0) * dx
+        leave = x0 * dy + (np.minimum(y1, SUB * y + HALF) - y0) * dx
+        low, high, per = np.minimum(enter, leave), np.maximum(enter, leave), dy
+    return y, -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+
+def _disc_runs(center: Ints, radius: int) -> Runs:
+    """Centres at most `radius` from a point."""
+    cx, cy = np.asarray(center).tolist()
+    y = _rows(cy - radius, cy + radius)
+    half = isqrt(radius * radius - (SUB * y - cy) ** 2)
+    return _closed(y, cx - half, cx + half)
+
+
+def _union(parts: Sequence[Runs]) -> Spans:
+    """Merge all runs at once."""
+    y, x_first, x_last = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Spans.from_runs(y, x_first, x_last)
+
+
+def _rows(low: int, high: int) -> Ints:
+    """Rows whose centres lie in [low, high]."""
+    return np.arange(-(-low // SUB), high // SUB + 1, dtype=np.int64)
+
+
+def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
+    """Centres of rows y from low to high."""
+    return y, -(-low // SUB), high // SUB
+
+
+def _crossings(top: Ints, low: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """Crossings of edges and rows: the first centre at or right of each, and the last at or left of it.
+
+    A flat edge extends from end to end.
+    """
+    dy = low[:, 1] - top[:, 1]
+    per = np.maximum(dy, 1)
+    x = top[:, 0] * per + (SUB * y - top[:, 1]) * (low[:, 0] - top[:, 0])
+    flat = dy == 0
+    left = np.where(flat, np.minimum(top[:, 0], low[:, 0]), x)
+    right = np.where(flat, np.maximum(top[:, 0], low[:, 0]), x)
+    return -(-left // (SUB * per)), right // (SUB * per)
+
+
+def _between(slope: int, low: Ints, high: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:
+    """Narrow [x_min, x_max] to low <= slope * x <= high."""
+    if slope == 0:
+        return np.where((low <= 0) & (high >= 0), x_min, x_max + 1), x_max
+    if slope < 0:
+        slope, low, high = -slope, -high, -low
+    return np.maximum(x_min, -(-low // slope)), np.minimum(x_max, high // slope)
+
+
+def _half_plane(slope: int, limit: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:
+    """Narrow [x_min, x_max] to slope * x <= limit; limits are Python integers of any size."""
+    if slope == 0:
+        return np.where(limit >= 0, x_min, x_max + 1), x_max
+    if slope > 0:
+        return x_min, np.minimum(x_max, limit // slope).astype(np.int64)
+    return np.maximum(x_min, -(limit // -slope)).astype(np.int64), x_max
+
+
+def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
+    """Centres on an ellipse without width, which is a segment."""
+    longest = max(radius_x, radius_y)
+    if radius_y > radius_x:
+        c, s = -s, c
+    if c == 0 or s == 0:
+        y = np.arange(-(longest // SUB), longest // SUB + 1)
+        zero = np.zeros_like(y)
+        return Spans.from_runs(y, zero, zero) if c == 0 else Spans.from_runs(zero[:1], y[:1], y[-1:])
+    y = _rows(-longest, longest)
+    x = y * c // s
+    near = np.abs(x) <= longest // SUB  # in a shallow direction the squares of the others would overflow
+    on = near & (x * s == y * c) & ((SUB * x) ** 2 + (SUB * y) ** 2 <= longest * longest)
+    return Spans.from_runs(y[on], x[on], x[on])
+
+
+DIAGONAL = 182
+"""Half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre."""
+
+COMMON = 2**60
+"""Scale of the times of rays at moving items, where each item would otherwise have a scale of its own."""
+
+ROOM = 2**62
+"""Products below it leave room for a sum in int64; larger ones are computed in Python integers."""
+
+FAR = 2**90
+"""Squares below it differ from those of their float roots by less than 2**46, which one Newton step corrects."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Segments of one width, as columns.
+
+    Parameters
+    ----------
+    start, step : (n, 2) starts, and vectors from there to the ends, 1/256 px
+    radius : half of the width, 1/256 px; 0 for thin rays
+    common : scale of the times of all segments; 0 if each has its own
+    """
+
+    start: Ints
+    step: Ints
+    radius: int
+    common: int = 0
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, rows: Ints | Bools) -> Lines:
+        """Select segments by rows or by a mask."""
+        return Lines(self.start[rows], self.step[rows], self.radius, self.common)
+
+    @cached_property
+    def steep(self) -> Bools:
+        """Whether each segment goes farther along y than along x."""
+        return np.asarray(np.abs(self.step[:, 1]) > np.abs(self.step[:, 0]))
+
+    @cached_property
+    def length2(self) -> Ints:
+        """Squared lengths, (1/256 px)^2."""
+        dx, dy = self.step.T
+        return np.asarray(dx * dx + dy * dy)
+
+    @cached_property
+    def length(self) -> Floats:
+        """Lengths, px."""
+        return np.asarray(np.sqrt(self.length2) / SUB)
+
+    @cached_property
+    def scale(self) -> Ints:
+        """Scale of the times (n,): the time at the end of each segment."""
+        if self.common:
+            return np.full(len(self), self.common)
+        if self.radius:
+            return np.maximum(self.length2, 1)
+        dx, dy = np.maximum(np.abs(self.step), 1).T
+        return np.asarray(dx * dy)
+
+    @cached_property
+    def sides(self) -> Ints:
+        """Largest distance of covered centres from the axis, times the length, rounded down."""
+        return self._lengths_times(self.radius)
+
+    @cached_property
+    def wide_sides(self) -> Ints:
+        """The same bound for all cells, including those that only the axis touches."""
+        return self._lengths_times(max(self.radius, DIAGONAL))
+
+    def _lengths_times(self, reach: int) -> Ints:
+        return np.array([math.isqrt(reach * reach * n) for n in self.length2.tolist()], np.int64)
+
+    def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
+        """Cells of each segment within its own inclusive box (n, 4), as (segment, x, y).
+
+        For thick segments these include some cells that are not touched; `times` gives them an empty interval.
+        """
+        steep = self.steep
+        if steep.any() and not steep.all():
+            flat, upright = np.flatnonzero(~steep), np.flatnonzero(steep)
+            parts = [(rows, self.take(rows).candidates(boxes_xyxy[rows])) for rows in (flat, upright)]
+            return (
+                np.concatenate([rows[line] for rows, (line, _, _) in parts]),
+                np.concatenate([x for _, (_, x, _) in parts]),
+                np.concatenate([y for _, (_, _, y) in parts]),
+            )
+        if len(steep) and steep[0]:
+            line, y, x = self._along(1, boxes_xyxy)
+        else:
+            line, x, y = self._along(0, boxes_xyxy)
+        return line, x, y
+
+    def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Times at which segments enter and leave cells; a cell that is not touched is left before it is entered."""
+        (entry, leave), *others = self.spells(line, x, y)
+        for first, last in others:
+            met, also = entry <= leave, first <= last
+            entry, leave = (
+                np.where(also & (~met | (first < entry)), first, entry),
+                np.where(also & (~met | (last > leave)), last, leave),
+            )
+        return entry, leave
+
+    def spells(self, line: Ints, x: Ints, y: Ints) -> list[tuple[Ints, Ints]]:
+        """Times at which a disc moving along the segment covers cell centres, and its own centre is in their squares.
+
+        Thin segments have only the second interval, wide ones only the first, which contains the second.
+        """
+        if not self.radius:
+            return [self._thin_times(line, x, y)]
+        wide = self._thick_times(line, x, y)
+        return [wide] if self.radius >= DIAGONAL else [wide, self._axis_times(line, x, y)]
+
+    def _axis_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Times at which the axis of a thick segment is in cells, over the segment's scale, rounded inward."""
+        first, last = self._thin_times(line, x, y)
+        axis, length2 = np.maximum(np.abs(self.step), 1).prod(axis=1)[line], self.length2[line]
+        beside = np.abs(SUB * np.stack([x, y], axis=1) - self.start[line]) > HALF
+        met = (first <= last) & ~(beside & (self.step[line] == 0)).any(axis=1)
+        first, last = np.where(met, first, 0), np.where(met, last, 0)
+        if int(last.max(initial=0)) * int(length2.max(initial=0)) >= ROOM:
+            first, last, axis = first.astype(object), last.astype(object), axis.astype(object)
+        entry, leave = np.asarray(-(-first * length2 // axis), np.int64), np.asarray(last * length2 // axis, np.int64)
+        return np.where(met, entry, 1), np.where(met, leave, 0)
+
+    def entered_by(self, line: Ints, x: Ints, y: Ints) -> Ints:
+        """Outward normal (n, 2) of the side by which cells are entered; (0, 0) if the segment begins inside."""
+        step = self.step[line]
+        sign = np.sign(step)
+        ahead = (SUB * np.stack([x, y], axis=1) - self.start[line]) * sign
+        if self.radius:
+            larger = np.stack([~self.steep[line], self.steep[line]], axis=1)
+            return np.asarray(np.where(larger & (ahead > 0), -sign, 0))
+        entry, _ = self._thin_times(line, x, y)
+        across = np.maximum(np.abs(step), 1)[:, ::-1]
+        return np.asarray(np.where((sign != 0) & ((ahead - HALF) * across == entry[:, None]), -sign, 0))
+
+    def _along(self, major: int, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
+        """Cells as (segment, coordinate along the longer axis of the segment, coordinate along the other)."""
+        minor = 1 - major
+        start, step = self.start[:, minor], self.step[:, minor]
+        reach = self.radius + HALF
+        low, high = np.minimum(start, start + step) - reach, np.maximum(start, start + step) + reach
+        first = np.maximum(-(-low // SUB), boxes_xyxy[:, minor])
+        last = np.minimum(high // SUB, boxes_xyxy[:, minor + 2])
+        line, place = ragged(np.maximum(last - first + 1, 0))
+        v = first[line] + place
+        u_first, u_last = (self._thick_runs if self.radius else self._thin_runs)(major, line, v)
+        u_first = np.maximum(u_first, boxes_xyxy[line, major])
+        u_last = np.minimum(u_last, boxes_xyxy[line, major + 2])
+        run, u = each_pixel(u_first, np.maximum(u_last, u_first - 1))
+        return line[run], u, v[run]
+
+    def _thin_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
+        """First and last cell of segments in rows v of the minor axis."""
+        minor = 1 - major
+        begin, step = self.start[line, minor], self.step[line, minor]
+        u, along = self.start[line, major], self.step[line, major]
+        low, high = np.minimum(begin, begin + step), np.maximum(begin, begin + step)
+        per, slope = np.maximum(np.abs(step), 1), along * np.sign(step)
+        enter = u * per + (np.maximum(low, SUB * v - HALF) - begin) * slope
+        leave = u * per + (np.minimum(high, SUB * v + HALF) - begin) * slope
+        level = step == 0
+        enter, leave = np.where(level, u, enter), np.where(level, u + along, leave)
+        low, high = np.minimum(enter, leave), np.maximum(enter, leave)
+        return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+    def _thick_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
+        """Cells around thick segments in rows v: no fewer than there are."""
+        minor = 1 - major
+        reach = max(self.radius, DIAGONAL)
+        begin, along = self.start[line, major], self.step[line, major]
+        low, high = np.minimum(begin, begin + along) - reach, np.maximum(begin, begin + along) + reach
+        # |(p - start) x step| <= reach * length bounds p along the major axis, unless the segment is level.
+        cross, side = (SUB * v - self.start[line, minor]) * along, self.wide_sides[line]
+        step = self.step[line, minor]
+        per, sign = np.maximum(np.abs(step), 1), np.where(step < 0, -1, 1)
+        cross = cross * sign
+        sloping = step != 0
+        low = np.where(sloping, np.maximum(low, begin - ((side - cross) // per)), low)
+        high = np.where(sloping, np.minimum(high, begin + ((cross + side) // per)), high)
+        return -(-low // SUB), high // SUB
+
+    def _thin_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        step = self.step[line]
+        sign, length = np.sign(step), np.abs(step)
+        across = np.maximum(length, 1)
+        ahead_x = (SUB * x - self.start[line, 0]) * sign[:, 0]
+        ahead_y = (SUB * y - self.start[line, 1]) * sign[:, 1]
+        # Along an axis without a step the square is never entered or left: those times lie beyond the ends.
+        entry = np.maximum((ahead_x - HALF) * across[:, 1], (ahead_y - HALF) * across[:, 0])
+        leave = np.minimum((ahead_x + HALF) * across[:, 1], (ahead_y + HALF) * across[:, 0])
+        end = np.where((length == 0).all(axis=1), 0, across.prod(axis=1))
+        return np.maximum(entry, 0), np.minimum(leave, end)
+
+    def _thick_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Times at which a disc that moves along the segment covers centres: u -+ sqrt(q), rounded inward."""
+        dx, dy = self.step[line].T
+        px, py = SUB * x - self.start[line, 0], SUB * y - self.start[line, 1]
+        u, v = px * dx + py * dy, px * dy - py * dx
+        length2 = self.length2[line]
+        still = length2 == 0
+        near = np.where(still, px * px + py * py <= self.radius**2, np.abs(v) <= self.sides[line])
+        root = np.zeros_like(u)
+        root[near] = self._roots(v[near], length2[near])
+        entry, leave = np.maximum(u - root, 0), np.minimum(u + root, length2)
+        entry[~near], leave[~near] = 1, 0
+        return entry, leave
+
+    def _roots(self, v: Ints, length2: Ints) -> Ints:
+        """Roots of radius^2 length^2 - v^2, rounded down."""
+        most = self.radius**2 * int(length2.max(initial=0))
+        if most < ROOM:
+            return isqrt(self.radius**2 * length2 - v * v)
+        if most < FAR:
+            return _far_roots(self.radius, v, length2)
+        squares: npt.NDArray[np.object_] = self.radius**2 * length2.astype(object) - v.astype(object) ** 2
+        return np.array([math.isqrt(square) for square in squares.tolist()], np.int64)
+
+
+def _far_roots(radius: int, v: Ints, length2: Ints) -> Ints:
+    """Roots of radius^2 length^2 - v^2, from 0 to FAR, rounded down.
+
+    The float root is so near that the remainder of the square fits int64, and is exact although the squares wrap
+    around. Below 2**31 the remainder gives the square itself; above, one Newton step gives the root or 1 more.
+    """
+    side = radius * np.sqrt(length2)
+    root = np.rint(np.sqrt(np.maximum((side - v) * (side + v), 0))).astype(np.int64)
+    left = radius**2 * length2 - v * v - root * root
+    small = root < 2**31
+    step = left // np.maximum(2 * root, 1)
+    newton = root + step - (left - 2 * root * step - step * step < 0)
+    return np.where(small, isqrt(np.where(small, root * root + left, 0)), newton)
+
+
+def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
+    """Cells of segments in the order in which they are entered.
+
+    Parameters
+    ----------
+    start_256, end_256 : (n, 2) 1/256 px, up to 2**48
+    radius_256 : half of the width
+
+    Returns
+    -------
+    segment (k,), pixel (k, 2), entry (k,) and exit (k,), sorted by (segment, entry, y, x); and the scale (n,) of the
+    times: the time at each segment's end
+    """
+    origin = (start_256 + HALF) // SUB
+    lines = Lines(start_256 - SUB * origin, end_256 - start_256, radius_256)
+    reach = (lines.step // SUB, -(-lines.step // SUB))
+    wide = radius_256 // SUB + 2
+    low, high = np.minimum(reach[0], 0) - wide, np.maximum(reach[1], 0) + wide
+    line, x, y = lines.candidates(np.concatenate([low, high], axis=1))
+    entry, leave = lines.times(line, x, y)
+    order = np.lexsort((x, y, entry, line))
+    order = order[entry[order] <= leave[order]]
+    line = line[order]
+    xy = np.stack([x, y], axis=1)[order] + origin[line]
+    return line, xy, entry[order], leave[order], lines.scale

@@ -1,0 +1,269 @@
+"""Sets of pixels as row spans (y, x_first, x_last), and tests before pixels are counted: boxes, strips, slabs.
+
+y = 0   . # # . #      (0, 1, 2) (0, 4, 4)
+y = 1   # # # # #      (1, 0, 4)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Floats, Ints
+
+Box = tuple[int, int, int, int]
+
+
+def begins(group: Ints) -> Bools:
+    """Whether each number (n,) differs from the one before it, and so begins a group."""
+    new = np.ones(len(group), np.bool_)
+    np.not_equal(group[1:], group[:-1], out=new[1:])
+    return new
+
+
+def ragged(lengths: Ints) -> tuple[Ints, Ints]:
+    """Number the elements of groups: [2, 3] gives groups [0, 0, 1, 1, 1] and places [0, 1, 0, 1, 2]."""
+    group = np.repeat(np.arange(len(lengths)), lengths)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+
+
+def each_pixel(x_first: Ints, x_last: Ints) -> tuple[Ints, Ints]:
+    """List the pixels of runs, as (run number, x)."""
+    run, place = ragged(x_last - x_first + 1)
+    return run, x_first[run] + place
+
+
+def pieces(lengths: Ints, limit: int) -> list[slice]:
+    """Cut a list of groups into slices of about `limit` elements; a larger group is a slice of its own."""
+    total = np.cumsum(lengths)
+    if not len(lengths) or total[-1] <= limit:
+        return [slice(0, len(lengths))]
+    cuts = np.flatnonzero(np.diff(total // limit)) + 1
+    edges = [0, *cuts.tolist(), len(lengths)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def meets(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Bools:
+    """Whether boxes (..., 2d) overlap or touch; the two arrays broadcast.
+
+    A row has the least coordinate of each axis and then the greatest; inclusive boxes of pixels that touch share one.
+    """
+    dim = a.shape[-1] // 2
+    good = (a[..., 0] <= b[..., dim]) & (b[..., 0] <= a[..., dim])
+    for axis in range(1, dim):
+        good &= a[..., axis] <= b[..., dim + axis]
+        good &= b[..., axis] <= a[..., dim + axis]
+    return np.asarray(good)
+
+
+def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:
+    """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); empty runs are dropped.
+
+    Returns
+    -------
+    number of the first run that went into each maximal run, x_first, x_last
+    """
+    filled = np.flatnonzero(x_first <= x_last)
+    order = filled[np.lexsort((x_first[filled], row[filled]))]
+    row, x_first, x_last = row[order], x_first[order], x_last[order]
+    if not len(row):
+        return order, x_first, x_last
+    # Put all rows on one line, two pixels apart, so that one running maximum serves all.
+    left = x_first.min()
+    shift = np.cumsum(np.diff(row, prepend=row[0]) != 0) * (x_last.max() - left + 3) - left
+    reach = np.maximum.accumulate(x_last + shift)
+    begins = np.concatenate(([True], (x_first + shift)[1:] > reach[:-1] + 1))
+    ends = np.concatenate((begins[1:], [True]))
+    return order[begins], x_first[begins], (reach - shift)[ends]
+
+
+@dataclass(frozen=True, eq=False)
+class Spans:
+    """A set of pixels as runs x_first .. x_last in rows y; runs are maximal, disjoint, sorted by (y, x_first).
+
+    Parameters
+    ----------
+    y, x_first, x_last : (n,) int64, px
+    """
+
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+
+    @classmethod
+    def from_runs(cls, y: Ints, x_first: Ints, x_last: Ints) -> Spans:
+        """Union of any runs: unsorted, overlapping, or empty (x_first > x_last)."""
+        row = np.asarray(y, np.int64)
+        which, first, last = merged_runs(row, np.asarray(x_first, np.int64), np.asarray(x_last, np.int64))
+        return cls(row[which], first, last)
+
+    @classmethod
+    def empty(cls) -> Spans:
+        """The empty set."""
+        none = np.zeros(0, np.int64)
+        return cls(none, none, none)
+
+    @classmethod
+    def from_mask(cls, mask: Bools, origin_xy: tuple[int, int] = (0, 0)) -> Spans:
+        """Set pixels of a mask (h, w) whose pixel [0, 0] lies at `origin_xy`."""
+        edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        y, x_first = np.nonzero(edges == 1)
+        x_last = np.nonzero(edges == -1)[1] - 1
+        return cls(y + origin_xy[1], x_first + origin_xy[0], x_last + origin_xy[0])
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Spans):
+            return NotImplemented
+        pairs = ((self.y, other.y), (self.x_first, other.x_first), (self.x_last, other.x_last))
+        return all(np.array_equal(a, b) for a, b in pairs)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def lengths(self) -> Ints:
+        """Number of pixels of each run."""
+        return self.x_last - self.x_first + 1
+
+    @cached_property
+    def count(self) -> int:
+        """Number of pixels of the set."""
+        return int(self.lengths.sum())
+
+    @cached_property
+    def box_xyxy(self) -> Box | None:
+        """(x_min, y_min, x_max, y_max), inclusive; None for the empty set."""
+        if not len(self):
+            return None
+        return int(self.x_first.min()), int(self.y[0]), int(self.x_last.max()), int(self.y[-1])
+
+    def to_mask(self) -> tuple[Bools, tuple[int, int]]:
+        """Mask (h, w) of the box of the set, and the position of its pixel [0, 0]."""
+        box = self.box_xyxy
+        if box is None:
+            return np.zeros((0, 0), np.bool_), (0, 0)
+        x, y, x_max, y_max = box
+        edges = np.zeros((y_max - y + 1, x_max - x + 2), np.int8)
+        edges[self.y - y, self.x_first - x] = 1
+        edges[self.y - y, self.x_last - x + 1] = -1  # runs are maximal: no run begins right after another
+        return np.cumsum(edges, axis=1, dtype=np.int8)[:, :-1].astype(np.bool_), (x, y)
+
+    def runs(self) -> Ints:
+        """Runs (n, 3) as rows [y, x_first, x_last]."""
+        return np.stack([self.y, self.x_first, self.x_last], axis=1)
+
+    def pixels(self) -> Ints:
+        """Pixels as rows (x, y), ordered by (y, x)."""
+        run, x = each_pixel(self.x_first, self.x_last)
+        return np.stack([x, self.y[run]], axis=1)
+
+    def translated(self, dx: int, dy: int) -> Spans:
+        """Shift the set by whole pixels."""
+        return Spans(self.y + dy, self.x_first + dx, self.x_last + dx)
+
+    def union(self, other: Spans) -> Spans:
+        """Pixels of either set."""
+        y = np.concatenate([self.y, other.y])
+        return Spans.from_runs(
+            y, np.concatenate([self.x_first, other.x_first]), np.concatenate([self.x_last, other.x_last])
+        )
+
+
+Strip = tuple[int, int, int, int]
+
+NO_STRIPS: Ints = np.zeros((0, 4), np.int64)
+
+SCALE = 2**10
+"""Approximate length of the normals of strips: they are whole numbers."""
+
+TILE = 48
+"""Typical side of the boxes that patterns are tested against, px: a strip rejects larger boxes less often."""
+
+PAYS = 0.75
+"""Strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too."""
+
+
+def strips_of(strips: Sequence[Strip], boxes_xyxy: Ints) -> Ints:
+    """Strips (n, 4) of patterns with boxes (n, 4); an empty array (0, 4) if they would reject too few boxes."""
+    made = np.array(strips, np.int64).reshape(-1, 4)
+    normal, side = np.abs(made[:, :2]), boxes_xyxy[:, 2:] - boxes_xyxy[:, :2]
+    grown = TILE * normal.sum(axis=1)
+    met = (made[:, 3] - made[:, 2] + grown) / np.maximum((normal * side).sum(axis=1) + grown, 1)
+    return made if met.mean() <= PAYS else NO_STRIPS
+
+
+def strip_of(spans: Spans) -> Strip:
+    """The narrow strip that holds a set of pixels, as (a, b, low, high): low <= a * x + b * y <= high.
+
+    Its normal is the direction in which the pixels are least spread, by their second moments. This is the separating
+    axis of an oriented box; compiled kernels have the same test inline.
+
+    References
+    ----------
+    Gottschalk, Lin and Manocha, "OBBTree: a hierarchical structure for rapid interference detection" (1996).
+    """
+    if not len(spans):
+        return 0, 0, 0, 0
+    length = (spans.x_last - spans.x_first + 1).astype(np.float64)
+    x, y = (spans.x_first + spans.x_last) / 2, spans.y.astype(np.float64)
+    x, y = x - np.average(x, weights=length), y - np.average(y, weights=length)
+    xx, xy, yy = (float((length * part).sum()) for part in (x * x + (length * length - 1) / 12, x * y, y * y))
+    along = math.atan2(2 * xy, xx - yy) / 2
+    a, b = round(-SCALE * math.sin(along)), round(SCALE * math.cos(along))
+    ends = np.concatenate([a * spans.x_first, a * spans.x_last]) + b * np.concatenate([spans.y, spans.y])
+    return a, b, int(ends.min()), int(ends.max())
+
+
+def meets_strip(strips: Ints, which: Ints | int, left: Ints, top: Ints, wide: int, high: int) -> Ints:
+    """Rows of the boxes that touch the strip of their pattern.
+
+    Parameters
+    ----------
+    strips, which : (m, 4) strips, and the row of the strip for each box
+    left, top : (n,) corners of the boxes relative to the pattern's origin
+    wide, high : largest width and height of a box
+    """
+    a, b = strips[:, 0], strips[:, 1]
+    least = strips[:, 2] - np.maximum(a, 0) * (wide - 1) - np.maximum(b, 0) * (high - 1)
+    most = strips[:, 3] - np.minimum(a, 0) * (wide - 1) - np.minimum(b, 0) * (high - 1)
+    across = a[which] * left
+    across += b[which] * top
+    met = across >= least[which]
+    met &= across <= most[which]
+    return np.asarray(met.nonzero()[0])
+
+
+Reals = npt.NDArray[np.floating[Any]]
+
+
+def slabs(begin: Reals, step: Reals, low: Reals, high: Reals) -> tuple[Floats, Floats]:
+    """Clip segments to boxes: the fractions of each segment at which it enters and leaves its box.
+
+    An axis along which a segment does not move is ignored. A segment misses its box if it leaves before it enters, or
+    if that interval lies outside [0, 1].
+
+    Parameters
+    ----------
+    begin, step : (..., d) starts of the segments, and vectors to their ends
+    low, high : (..., d) sides of the boxes
+
+    References
+    ----------
+    Kay and Kajiya, "Ray tracing complex scenes" (1986); Liang and Barsky, "A new concept and method for line clipping"
+    (1984).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_low, to_high = (low - begin) / step, (high - begin) / step
+    level = step == 0
+    first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=-1)
+    last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=-1)
+    return np.asarray(first), np.asarray(last)

@@ -1,0 +1,516 @@
+"""Compiled kernels of bit rows, cells and visible tiles; they work pair by pair and row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+from ..bits import bit_rows
+from ..bits.bit_rows import Beside, PatternBits, Placed, TileHits, VisibleTiles, Words
+from ..bits.cells import Cells, coarse_enough
+from ..common.backend import in_parts
+from ..common.checks import Ints
+from .cache import compiled
+
+INTS = types.Array(types.int64, 1, "A", readonly=True)
+BOXES = types.Array(types.int64, 2, "C", readonly=True)
+WORDS = types.Array(types.uint64, 1, "C", readonly=True)
+FLAGS = types.Array(types.boolean, 1, "C", readonly=True)
+OUT = types.int64[::1]
+ROWS_OUT = types.int64[:, ::1]
+ALL = np.uint64(2**64 - 1)
+FAR = np.int64(2**62)
+EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
+ONE = np.uint64(1)
+ROW_BITS, WORD_ROWS = 7, 127
+ROOM, ROOM_LEAST = 8, 64
+"""Initial room for rows: ROOM for each placement, plus ROOM_LEAST."""
+
+FEW_ROWS = 128
+"""Most rows of a placement that are sorted by insertion; if any has more, all rows are sorted at the end."""
+
+SIDE, SIDE_BITS = np.int64(2**17), 19  # farther than any pixel of a pattern from its origin
+
+
+@intrinsic
+def bits_of(_: Any, word: Any) -> Any:
+    """Number of bits set in a word."""
+
+    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+        return builder.ctpop(values[0])
+
+    return types.int64(types.uint64), made
+
+
+@intrinsic
+def _lowest(_: Any, word: Any) -> Any:
+    """Place of the lowest set bit of a word; 64 if none is set."""
+
+    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+        return builder.cttz(values[0], ir.Constant(ir.IntType(1), 0))
+
+    return types.int64(types.uint64), made
+
+
+@intrinsic
+def _above(_: Any, word: Any) -> Any:
+    """Number of bits above the highest set bit of a word; 64 if none is set."""
+
+    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+        return builder.ctlz(values[0], ir.Constant(ir.IntType(1), 0))
+
+    return types.int64(types.uint64), made
+
+
+@njit(inline="always")
+def _window(words: Any, begin: Any, following: Any, shift: Any) -> Any:
+    """One row of a window: a word, or parts of two neighbouring words."""
+    if shift == 0:
+        return words[begin]
+    return (words[begin] >> np.uint64(shift)) | (words[begin + following] << np.uint64(64 - shift))
+
+
+@njit(inline="always")
+def key_of(distance2, x, y):
+    """A number that sorts as (distance2, y, x); two equally far pixels of a row lie on both sides of the origin."""
+    return (distance2 << SIDE_BITS) | ((y + SIDE) << 1) | (x > 0)
+
+
+@njit(inline="always")
+def is_far(origin_x, origin_y, left, top, right, bottom):
+    """Whether a box reaches too far from an origin for `key_of`."""
+    across = max(abs(left - origin_x), abs(right - origin_x))
+    return max(across, abs(top - origin_y), abs(bottom - origin_y)) >= SIDE
+
+
+@njit(inline="always")
+def is_beyond(strips, pattern, x, y, left, top, right, bottom):
+    """Whether a box lies beyond the strip of a pattern that is placed on a pixel."""
+    a, b = strips[pattern, 0], strips[pattern, 1]
+    low = min(a * (left - x), a * (right - x)) + min(b * (top - y), b * (bottom - y))
+    high = max(a * (left - x), a * (right - x)) + max(b * (top - y), b * (bottom - y))
+    return (low > strips[pattern, 3]) | (high < strips[pattern, 2])
+
+
+@njit(inline="always")
+def _sooner(a, b, distance2, y, x):
+    if distance2[a] != distance2[b]:
+        return distance2[a] < distance2[b]
+    if y[a] != y[b]:
+        return y[a] < y[b]
+    return x[a] < x[b] if x[a] != x[b] else a < b
+
+
+# house: row order
+@njit
+def sort_places(order, distance2, y, x):
+    """Sort places of rows by (distance2, y, x, place): Shell (1959), as rows are mostly few and in sorted runs."""
+    step = 1
+    while step < len(order) // 3:
+        step = 3 * step + 1
+    while step:
+        for i in range(step, len(order)):
+            row, j = order[i], i
+            while j >= step and _sooner(row, order[j - step], distance2, y, x):
+                order[j] = order[j - step]
+                j -= step
+            order[j] = row
+        step //= 3
+
+
+@njit(inline="always")
+def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
+    """Replace keys and relative columns of rows `first` .. `last` - 1 by squared distances and pixels."""
+    for i in range(first, last):
+        x[i] += origin_x
+        y[i] = origin_y + ((distance2[i] >> 1) & (2 * SIDE - 1)) - SIDE
+        distance2[i] >>= SIDE_BITS
+
+
+# house: row order
+@njit(inline="always")
+def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
+    """Sort rows `first` .. `last` - 1 of a placement by their keys, then replace the keys: see `pixels_of`.
+
+    More than FEW_ROWS rows are left unsorted for `rows_by`, or for the caller.
+
+    Parameters
+    ----------
+    origin_x, origin_y : the pixel from which distances are counted
+    distance2, x : keys, which become squared distances, and columns of the nearest pixels, relative to the origin
+    y : output
+    """
+    for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
+        item, count, key, across, j = seen[i], samples[i], distance2[i], x[i], i
+        while j > first and distance2[j - 1] > key:
+            seen[j], samples[j], distance2[j], x[j] = seen[j - 1], samples[j - 1], distance2[j - 1], x[j - 1]
+            j -= 1
+        seen[j], samples[j], distance2[j], x[j] = item, count, key, across
+    pixels_of(first, last, origin_x, origin_y, distance2, x, y)
+
+
+Kernel = Callable[..., tuple[int, int, int]]
+"""A function of (placement, end, rows written so far, columns of rows, further arguments), which goes on from there.
+
+It returns (placement where it stopped, or -1 if it cannot decide; rows written; most rows of a placement). Columns
+begin with the placement and what it hits, and end with squared distance, x and y.
+"""
+
+
+def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any) -> Ints | None:
+    """Rows of all placements, as columns, in threads if there are enough; None if the kernel cannot decide them.
+
+    Parameters
+    ----------
+    least : least number of placements of a thread
+    given : further arguments of the kernel
+    """
+    parts = in_parts(count, least, lambda first, last: _filled(kernel, columns, first, last, given))
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    return known[0] if len(known) == 1 else np.concatenate(known, axis=1)
+
+
+# house: row order
+def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
+    """Columns of the rows of placements `who` .. `last` - 1; memory that is never written costs nothing."""
+    count, crowd, out = 0, 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
+    while True:
+        who, count, most = kernel(who, last, count, out, *given)
+        crowd = max(crowd, most)
+        if who < 0:
+            return None
+        if who == last:
+            rows = out[:, :count]
+            return rows if crowd <= FEW_ROWS else rows[:, np.lexsort(rows[[1, -2, -1, -3, 0]])]
+        more = np.empty((columns, 2 * out.shape[1]), np.int64)
+        more[:, :count] = out[:, :count]
+        out = more
+
+
+@njit(inline="always")
+def columns_about(own):
+    """Shifts that keep the pixels from a column on, and up to it; and the column's distance from the tile."""
+    column = min(max(own, 0), 63)
+    return np.uint64(column), np.uint64(63 - column), abs(own - column)
+
+
+@njit(inline="always")
+def row_key(met, row, down, ahead, behind, beyond):
+    """A number that sorts the nearest pixels of rows by (squared distance, row); the last bit is set if it is after."""
+    after, before = _lowest(met >> ahead), _above(met << behind)
+    across = beyond + min(after, before)
+    key = ((across * across + down * down) << ROW_BITS) | (row << 1) | (after < before)
+    return key if met else FAR
+
+
+@njit(inline="always")
+def pixel_of(key, own, top):
+    """Squared distance, x and y of the pixel of a `row_key`, from an origin in column `own`, `top` px above row 0."""
+    distance2, down = key >> ROW_BITS, top + ((key & WORD_ROWS) >> 1)
+    column = min(max(own, 0), 63)
+    along = np.int64(np.sqrt(distance2 - down * down)) - abs(own - column)  # of a square that a float holds
+    return distance2, column - own + (along if key & 1 else -along), down
+
+
+@njit
+def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
+    """Count the pixels that a tile shares with a window, in rows `low` to `high` of the world.
+
+    There is no branch in the loop, so that eight rows take one instruction each.
+
+    Returns
+    -------
+    samples; squared distance, x and y of the nearest pixel, relative to the origin at (own, level), ties by (y, x)
+    """
+    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
+    right, left = np.uint64(shift), np.uint64(63 - shift)
+    ahead, behind, beyond = columns_about(own)
+    samples, nearest = np.int64(0), FAR
+    for i in range((high - low + 8) & -8):
+        row = np.uint64(i)
+        met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
+        samples += bits_of(met)
+        nearest = min(nearest, row_key(met, i, low - level + i, ahead, behind, beyond))
+    if samples == 0:
+        return samples, FAR, np.int64(0), np.int64(0)
+    return samples, *pixel_of(nearest, own, low - level)
+
+
+@compiled(types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6))
+def _found(
+    pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, box, begin, tiles,
+    placement, near, out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
+):  # fmt: skip
+    count = 0
+    for pair in range(len(placement)):
+        who, at = placement[pair], near[pair]
+        kind, left, top = pattern[who], box[at, 0], box[at, 1]
+        pattern_left, pattern_top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
+        low = max(top, pattern_top)
+        high = min(box[at, 3], y[who] + pattern_box[kind, 3])
+        if low > high or left > x[who] + pattern_box[kind, 2] or pattern_left > box[at, 2]:
+            continue
+        column = left - pattern_left + 63
+        shift, step = column & 63, following[kind]
+        word = first[kind] + (column >> 6) * step - pattern_top
+        tile = begin[at] - top
+        own, level = origin_x[who] - left, origin_y[who]
+        samples, distance2, across, down = shared(tiles, tile, windows, word, step, shift, low, high, own, level)
+        if samples:
+            out_placement[count], out_seen[count], out_samples[count] = who, at, samples
+            out_distance2[count], out_x[count], out_y[count] = distance2, origin_x[who] + across, origin_y[who] + down
+            count += 1
+    return count
+
+
+def found(
+    placed: Placed, windows: PatternBits, seen: VisibleTiles, placement: Ints, near: Ints, beside: Beside
+) -> TileHits:
+    """See `bits.bit_rows.found`; `beside` is not needed, and tables of all shifts are left to numpy."""
+    if windows.shifted:
+        return bit_rows.found(placed, windows, seen, placement, near, beside)
+    out = np.empty((6, len(near)), np.int64)
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
+    count = _found(*placed, *pattern, seen.box_xyxy, seen.begin, seen.words, placement, near, *out)
+    return TileHits(*out[:, :count])
+
+
+@compiled(types.void(WORDS, INTS, INTS, INTS, INTS, types.uint64[:, ::1]))
+def _visible(words, begin, of, front, right, seen):
+    height = seen.shape[1]
+    for tile in range(len(begin)):
+        for row in range(height):
+            seen[tile, row] = words[begin[tile] + row]
+    for pair in range(len(of)):
+        tile, shift = of[pair], right[pair]
+        for row in range(height):
+            cover = words[front[pair] + row]
+            if shift >= 0:
+                seen[tile, row] &= ~(cover << np.uint64(shift))
+            else:
+                seen[tile, row] &= ~(cover >> np.uint64(-shift))
+
+
+def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right: Ints) -> Words:
+    """See `bits.bit_rows.visible`."""
+    seen = np.empty((len(begin), height), np.uint64)
+    _visible(words, begin, of, front, right, seen)
+    return seen
+
+
+@compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT))
+def _union(
+    pattern, x, y, pattern_box, first, following, windows, box, begin, tiles, height, placement, near, group,
+    out,
+):  # fmt: skip
+    together = np.zeros(height, np.uint64)
+    for number in range(len(group)):
+        last = group[number + 1] if number + 1 < len(group) else len(placement)
+        at = near[group[number]]
+        left, top = box[at, 0], box[at, 1]
+        together[:] = 0
+        for pair in range(group[number], last):
+            who = placement[pair]
+            kind = pattern[who]
+            pattern_top = y[who] + pattern_box[kind, 1]
+            column = left - x[who] - pattern_box[kind, 0] + 63
+            shift, step = column & 63, following[kind]
+            word = first[kind] + (column >> 6) * step - pattern_top
+            for row in range(max(top, pattern_top), min(box[at, 3], y[who] + pattern_box[kind, 3]) + 1):
+                together[row - top] |= tiles[begin[at] + row - top] & _window(windows, word + row, step, shift)
+        samples = 0
+        for row in range(height):
+            samples += bits_of(together[row])
+        out[number] = samples
+
+
+def union(placed: Placed, windows: PatternBits, seen: VisibleTiles, placement: Ints, near: Ints, first: Ints) -> Ints:
+    """See `bits.bit_rows.union`."""
+    if windows.shifted:
+        return bit_rows.union(placed, windows, seen, placement, near, first)
+    out = np.empty(len(first), np.int64)
+    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
+    tiles = (seen.box_xyxy, seen.begin, seen.words, seen.height)
+    _union(*placed[:3], *pattern, *tiles, placement, near, first, out)
+    return out
+
+
+@compiled(types.void(*[INTS] * 4, OUT))
+def _row_order(group, distance2, y, x, order):
+    begin = 0
+    while begin < len(order):
+        end = begin
+        while end < len(order) and group[end] == group[begin]:
+            order[end] = end
+            end += 1
+        sort_places(order[begin:end], distance2, y, x)
+        begin = end
+
+
+def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
+    """See `bits.bit_rows.row_order`."""
+    order = np.empty(len(group), np.int64)
+    _row_order(group, distance2, y, x, order)
+    return order
+
+
+BRUTE_PAIRS = 2**14
+"""Most pairs of boxes that are compared one by one; with more, listing boxes in cells is faster."""
+
+
+@compiled(OUT(BOXES, types.int64, types.int64, OUT))
+def _listed(spans, wide, cells, begin):
+    for box in range(len(spans)):
+        for row in range(spans[box, 1], spans[box, 3] + 1):
+            for column in range(spans[box, 0], spans[box, 2] + 1):
+                begin[row * wide + column + 1] += 1
+    for cell in range(cells):
+        begin[cell + 1] += begin[cell]
+    listed = np.empty(begin[cells], np.int64)
+    for box in range(len(spans)):
+        for row in range(spans[box, 1], spans[box, 3] + 1):
+            for column in range(spans[box, 0], spans[box, 2] + 1):
+                cell = row * wide + column
+                listed[begin[cell]] = box
+                begin[cell] += 1
+    for cell in range(cells, 0, -1):
+        begin[cell] = begin[cell - 1]
+    begin[0] = 0
+    return listed
+
+
+def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:
+    """See `bits.cells.cells_of`."""
+    if not len(boxes_xyxy):
+        return Cells(0, 0, bits, 0, 0, np.zeros(1, np.int64), np.zeros(0, np.int64))
+    spans = boxes_xyxy - np.concatenate([reach_xyxy[2:], reach_xyxy[:2]])
+    x, y = spans[:, :2].min(axis=0).tolist()
+    spans -= (x, y, x, y)
+    bits = coarse_enough(spans[:, :2], spans[:, 2:], bits)
+    spans >>= bits
+    wide, high = (spans[:, 2:].max(axis=0) + 1).tolist()
+    begin = np.zeros(wide * high + 1, np.int64)
+    return Cells(x, y, bits, wide, high, begin, _listed(spans, wide, wide * high, begin))
+
+
+@njit(inline="always")
+def cell_at(at_x, at_y, x, y, bits, wide, high):
+    """The cell of a pixel; -1 if it lies in none."""
+    column, row = np.uint64((at_x - x) >> bits), np.uint64((at_y - y) >> bits)  # negative numbers become very large
+    inside = (column < np.uint64(wide)) & (row < np.uint64(high))
+    return np.int64(row * np.uint64(wide) + column) if inside else -1
+
+
+@compiled(types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT))
+def _at(x, y, bits, wide, high, begin, listed, at_x, at_y, place, box):
+    count, room = 0, len(place)
+    for i in range(len(at_x)):
+        cell = cell_at(at_x[i], at_y[i], x, y, bits, wide, high)
+        if cell < 0:
+            continue
+        for entry in range(begin[cell], begin[cell + 1]):
+            if count < room:
+                place[count], box[count] = i, listed[entry]
+            count += 1
+    return count
+
+
+def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """See `bits.cells.listed_at`."""
+    room = 2 * len(x) + 64
+    while True:
+        place, box = np.empty(room, np.int64), np.empty(room, np.int64)
+        count = _at(*cells, x, y, place, box)
+        if count <= room:
+            return place[:count], box[:count]
+        room = count
+
+
+@compiled(types.int64(BOXES, BOXES, OUT, OUT))
+def _met(asked, boxes, rows, others):
+    count, room = 0, len(rows)
+    for row in range(len(asked)):
+        left, top, right, bottom = asked[row]
+        for box in range(len(boxes)):
+            if (left <= boxes[box, 2]) & (right >= boxes[box, 0]) & (top <= boxes[box, 3]) & (bottom >= boxes[box, 1]):
+                if count < room:
+                    rows[count], others[count] = row, box
+                count += 1
+    return count
+
+
+@compiled(types.int64(BOXES, BOXES, INTS, INTS, OUT, OUT))
+def _met_of(asked, boxes, row, box, rows, others):
+    count = 0
+    for pair in range(len(row)):
+        a, b = row[pair], box[pair]
+        across = (asked[a, 0] <= boxes[b, 2]) & (asked[a, 2] >= boxes[b, 0])
+        if across & (asked[a, 1] <= boxes[b, 3]) & (asked[a, 3] >= boxes[b, 1]):
+            rows[count], others[count] = a, b
+            count += 1
+    return count
+
+
+def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+    """See `bits.cells.met_boxes`."""
+    asked_xyxy, boxes_xyxy = np.ascontiguousarray(asked_xyxy), np.ascontiguousarray(boxes_xyxy)
+    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS and (asked_xyxy[:, :2] <= asked_xyxy[:, 2:]).all():
+        reach = np.zeros(4, np.int64)
+        reach[2:] = (asked_xyxy[:, 2:] - asked_xyxy[:, :2]).max(axis=0)
+        listed = cells_of(boxes_xyxy, reach, int(reach.max()).bit_length())
+        row, box = listed_at(listed, asked_xyxy[:, 0], asked_xyxy[:, 1])
+        rows, others = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
+        count = _met_of(asked_xyxy, boxes_xyxy, row, box, rows, others)
+        return rows[:count], others[:count]
+    room = 4 * len(asked_xyxy) + 64
+    while True:
+        rows, others = np.empty(room, np.int64), np.empty(room, np.int64)
+        count = _met(asked_xyxy, boxes_xyxy, rows, others)
+        if count <= room:
+            return rows[:count], others[:count]
+        room = count
+
+
+ROWS = types.Array(types.uint64, 2, "C", readonly=True)
+ANY_INTS = types.Array(types.int64, 1, "C", readonly=True)
+
+
+@compiled(types.int64[:, ::1](ROWS))
+def sides_of(rows: Words) -> Ints:
+    """Inclusive boxes (V, 4) of the pixels of tiles; see `bits.visible.sides_of`."""
+    zero, one = np.uint64(0), np.uint64(1)
+    sides = np.empty((len(rows), 4), np.int64)
+    for tile in range(len(rows)):
+        columns, top, bottom = zero, 0, -1
+        for row in range(rows.shape[1]):
+            word = rows[tile, row]
+            if word != zero:
+                if columns == zero:
+                    top = row
+                bottom = row
+                columns |= word
+        left, right = 0, 63 if columns != zero else -1
+        while columns != zero and (columns >> np.uint64(left)) & one == zero:
+            left += 1
+        while columns != zero and (columns >> np.uint64(right)) & one == zero:
+            right -= 1
+        sides[tile, 0], sides[tile, 1], sides[tile, 2], sides[tile, 3] = left, top, right, bottom
+    return sides
+
+
+@compiled(types.uint64[:, ::1](ROWS, ANY_INTS, BOXES, types.int64))
+def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
+    """Rows of some tiles with the first pixel of each in row 0 and in column 0; see `bits.visible.moved`."""
+    found = np.zeros((len(kept), height), np.uint64)
+    for i in range(len(kept)):
+        left, top = np.uint64(sides[i, 0]), sides[i, 1]
+        for row in range(sides[i, 3] - top + 1):
+            found[i, row] = rows[kept[i], top + row] >> left
+    return found

@@ -1,0 +1,408 @@
+"""Compiled kernels of fixed point, turned masks and label planes, and of the draws of pellets."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+
+from ..bits.label_plane import CELL_BITS, FIELD, GUARDS, NOWHERE, Front
+from ..common.checks import Bools, Floats, Ints, Labels
+from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB
+from ..grid.fixed_point import DOUBT, UNIT
+from ..grid.spans import Box
+from ..scene.items import Stack
+from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, OUT, ROWS_OUT
+from .cache import compiled
+
+TERMS = 8
+"""Terms of each series; up to 45 degrees the rest is below 2**-53."""
+
+SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(TERMS))
+COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(TERMS + 1))
+
+RADIAN = math.pi / 180
+FLOATS = types.Array(types.float64, 1, "C", readonly=True)
+
+
+@compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1], types.boolean[::1]))
+def _nearest(degrees, cosine, sine, doubt):
+    folded, any_doubt = np.abs(degrees), False
+    for i in range(len(folded)):
+        if folded[i] >= 360:
+            folded[i] = np.fmod(folded[i], 360.0)
+    for i in range(len(folded)):
+        angle = folded[i]
+        down = angle > 180
+        angle = 360 - angle if down else angle
+        left = angle > 90
+        angle = 180 - angle if left else angle
+        steep = angle > 45
+        x = (90 - angle if steep else angle) * RADIAN
+        far, near = SINE[TERMS - 1], COSINE[TERMS]
+        for k in range(TERMS - 2, -1, -1):
+            far = far * (x * x) + SINE[k]
+        for k in range(TERMS - 1, -1, -1):
+            near = near * (x * x) + COSINE[k]
+        far *= x
+        c, s = (far if steep else near) * UNIT, (near if steep else far) * UNIT
+        c, s = -c if left else c, -s if down ^ (degrees[i] < 0) else s
+        whole_c, whole_s = np.rint(c), np.rint(s)
+        cosine[i], sine[i] = np.int32(whole_c), np.int32(whole_s)
+        doubt[i] = max(abs(c - whole_c), abs(s - whole_s)) > 0.5 - DOUBT
+        any_doubt |= doubt[i]
+    return any_doubt
+
+
+def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
+    """See `grid.fixed_point.nearest`."""
+    count = len(degrees)
+    cosine, sine, doubt = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.bool_)
+    in_doubt = _nearest(degrees, cosine, sine, doubt)
+    return cosine, sine, np.flatnonzero(doubt) if in_doubt else np.zeros(0, np.int64)
+
+
+@compiled(types.boolean(FLOATS, types.int64[::1]))
+def _snapped(at, whole):
+    good = True
+    for i in range(len(at)):
+        good &= abs(at[i]) <= POSITION_MAX  # false for NaN
+        whole[i] = np.int64(np.rint(at[i] * SUB))
+    return good
+
+
+def snapped(at: Floats) -> Ints | None:
+    """See `grid.fixed_point.snapped`."""
+    whole = np.empty(at.shape, np.int64)
+    return whole if _snapped(at.ravel(), whole.ravel()) else None
+
+
+@compiled(types.void(INTS, types.int64[::1]))
+def _pixels(at_256, whole):
+    for i in range(len(at_256)):
+        whole[i] = (at_256[i] + HALF) >> 8
+
+
+def pixels(at_256: Ints) -> Ints:
+    """See `grid.fixed_point.pixels`."""
+    whole = np.empty(at_256.shape, np.int64)
+    _pixels(at_256.ravel(), whole.ravel())
+    return whole
+
+
+MASK = types.Array(types.boolean, 2, "C", readonly=True)
+WHOLE = types.int64
+
+
+@compiled(types.Tuple((WHOLE, types.boolean))(MASK, WHOLE, WHOLE, types.boolean, types.boolean, WHOLE))
+def _on_border(inside, row, column, up, left, at):
+    """Place among the squares that meet at a border: the first that is set, else the last in the frame, else `at`."""
+    for j in (row, row - 1) if up else (row, row):
+        for i in (column, column - 1) if left else (column, column):
+            if 0 <= j < inside.shape[0] and 0 <= i < inside.shape[1]:
+                at = j * inside.shape[1] + i
+                if inside[j, i]:
+                    return at, True
+    return at, False
+
+
+@compiled(types.void(MASK, *[WHOLE] * 6, types.int64[:, ::1], types.boolean[:, ::1]))
+def _inverse_mapped(inside, first_x, first_y, c, s, unit_x, unit_y, found, held):
+    h, w = np.uint64(inside.shape[0]), np.uint64(inside.shape[1])
+    along_x, over_x, along_y, over_y = c // unit_x, c % unit_x, -s // unit_y, -s % unit_y
+    for y in range(found.shape[0]):
+        column, x_rest = (first_x + y * s) // unit_x, (first_x + y * s) % unit_x
+        row, y_rest = (first_y + y * c) // unit_y, (first_y + y * c) % unit_y
+        for x in range(found.shape[1]):
+            at, is_held = -1, False
+            j, i = np.uint64(row), np.uint64(column)  # negative numbers become very large
+            if j < h and i < w:
+                at, is_held = np.int64(j * w + i), inside[j, i]
+            if not is_held and (x_rest == 0 or y_rest == 0):
+                at, is_held = _on_border(inside, row, column, y_rest == 0, x_rest == 0, at)
+            found[y, x], held[y, x] = at, is_held
+            column, x_rest = column + along_x, x_rest + over_x
+            if x_rest >= unit_x:
+                column, x_rest = column + 1, x_rest - unit_x
+            row, y_rest = row + along_y, y_rest + over_y
+            if y_rest >= unit_y:
+                row, y_rest = row + 1, y_rest - unit_y
+
+
+def resample(
+    inside: Bools, size_wh: tuple[int, int], first: tuple[int, int], step: tuple[int, int], unit: tuple[int, int]
+) -> tuple[Ints, Bools]:
+    """See `scene.sprite.resample`; it divides once a row, not once a pixel."""
+    width, height = size_wh
+    found, held = np.empty((height, width), np.int64), np.empty((height, width), np.bool_)
+    _inverse_mapped(inside, *first, *step, *unit, found, held)
+    return found, held
+
+
+@compiled(types.UniTuple(WHOLE, 5)(types.Array(types.boolean, 2, "A", readonly=True)))
+def _sides_of(mask):
+    height, width = mask.shape
+    x_min, y_min, x_max, y_max, count = width, height, -1, -1, 0
+    for y in range(height):
+        for x in range(width):
+            if mask[y, x]:
+                count += 1
+                x_min, x_max = min(x_min, x), max(x_max, x)
+                y_min, y_max = min(y_min, y), y
+    return x_min, y_min, x_max, y_max, count
+
+
+def sides_of(mask: Bools) -> tuple[Box, int]:
+    """See `scene.sprite.sides_of`."""
+    *box, count = _sides_of(mask)
+    return (tuple(box) if count else (0, 0, -1, -1)), count
+
+
+@compiled()
+def place(
+    ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
+) -> bool:
+    """Place items at new positions; return whether that was done; see `grid.fixed_point.place`."""
+    last = -1
+    for i in range(len(ids)):
+        item = ids[i]
+        if item <= last or item >= count:
+            return False
+        if not (abs(xy[i, 0]) <= POSITION_MAX and abs(xy[i, 1]) <= POSITION_MAX and alive[item] != 0):
+            return False
+        last = item
+    for i in range(len(ids)):
+        item = ids[i]
+        for axis in range(2):
+            now = np.int64(np.rint(xy[i, axis] * SUB))
+            position_256[item, axis] = now
+            for side in (axis, axis + 2):
+                before[i, side] = box[item, side]
+                after[i, side] = (now + edge[item, side]) >> 8
+                box[item, side] = after[i, side]
+    return True
+
+
+@compiled()
+def paint(labels: Labels, x: int, y: int, dirty: Ints, places: Ints, masks: Bools) -> None:
+    """Redraw boxes of a label plane, back to front; see `bits.label_plane.paint`."""
+    for d in range(len(dirty)):
+        left, top, right, low = dirty[d, 0], dirty[d, 1], dirty[d, 2], dirty[d, 3]
+        labels[top - y : low - y + 1, left - x : right - x + 1] = 0
+        for rank in range(len(places) - 1, -1, -1):
+            place = places[rank]
+            if place[0] <= right and place[2] >= left and place[1] <= low and place[3] >= top:
+                paint_item(labels, x, y, left, top, right, low, place, masks)
+
+
+@compiled()
+def paint_item(
+    labels: Labels, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
+) -> None:
+    """Draw the part of an item that lies in a box over what is drawn there."""
+    zero, one = labels.dtype.type(0), labels.dtype.type(1)
+    code = labels.dtype.type(place[5])
+    width = place[2] - place[0] + 1
+    x0, x1, y0, y1 = max(left, place[0]), min(right, place[2]), max(top, place[1]), min(low, place[3])
+    begin = place[4] + (y0 - place[1]) * width + x0 - place[0]
+    n = x1 - x0 + 1
+    for row in range(y0 - y, y1 - y + 1):
+        part, mask = labels[row, x0 - x : x1 - x + 1], masks[begin : begin + n]
+        for i in range(n):
+            old = part[i]
+            new = code + one if old != zero else code
+            part[i] = new if mask[i] else old
+        begin += width
+
+
+@compiled()
+def follow_all(labels: Labels, x: int, y: int, rank: Ints, now: Ints, places: Ints, near: Ints, masks: Bools) -> int:
+    """Move many items; see `bits.label_plane.follow_all`."""
+    pixels = 0
+    for i in range(len(rank)):
+        pixels += follow(labels, x, y, rank[i], now[i, 0], now[i, 1], now[i, 2], now[i, 3], places, near, masks)
+    return pixels
+
+
+@compiled()
+def follow(
+    labels: Labels, x: int, y: int, rank: int, left: int, top: int, right: int, low: int, places: Ints, near: Ints,
+    masks: Bools,
+) -> int:  # fmt: skip
+    """Move one item to another box, and redraw what that changes; see `bits.label_plane.follow`."""
+    edge = x, y, x + labels.shape[1] - 1, y + labels.shape[0] - 1
+    old = _cut(places[rank, 0], places[rank, 1], places[rank, 2], places[rank, 3], edge)
+    new = _cut(left, top, right, low, edge)
+    places[rank, 0], places[rank, 1], places[rank, 2], places[rank, 3] = left, top, right, low
+    was, there = _step_pixels(old), _step_pixels(new)
+    near[rank] = _fields(new[0] - x, new[1] - y, new[2] - x, new[3] - y) if there else NOWHERE
+    around = min(old[0], new[0]), min(old[1], new[1]), max(old[2], new[2]), max(old[3], new[3])
+    if was and there and _step_pixels(around) <= was + there:
+        _draw(labels, x, y, around, places, near, masks)
+        return was + there
+    if was:
+        _draw(labels, x, y, old, places, near, masks)
+    if there:
+        _draw(labels, x, y, new, places, near, masks)
+    return was + there
+
+
+@njit(inline="always")
+def _cut(x: Any, y: Any, x_max: Any, y_max: Any, edge: Any) -> Any:
+    """Intersection of two boxes; it ends before it begins if it is empty."""
+    return max(x, edge[0]), max(y, edge[1]), min(x_max, edge[2]), min(y_max, edge[3])
+
+
+@njit(inline="always")
+def _step_pixels(box: Any) -> Any:
+    """Pixels of a box; 0 if it ends before it begins."""
+    return max(box[2] - box[0] + 1, 0) * max(box[3] - box[1] + 1, 0)
+
+
+@njit(inline="always")
+def _fields(x: Any, y: Any, x_max: Any, y_max: Any) -> Any:
+    """Four numbers of pixels of the plane as fields."""
+    return x >> 2 | y >> 2 << 15 | (FIELD - (x_max >> 2)) << 30 | (FIELD - (y_max >> 2)) << 45
+
+
+@compiled()
+def _draw(labels: Labels, x: int, y: int, box: Any, places: Ints, near: Ints, masks: Bools) -> None:
+    """Redraw a box with the items near it, back to front."""
+    left, top, right, low = box
+    labels[top - y : low - y + 1, left - x : right - x + 1] = 0
+    limits = _fields(right - x, low - y, left - x, top - y) | GUARDS
+    found, count = np.empty(len(near), np.int64), 0
+    for rank in range(len(near)):
+        if (limits - near[rank]) & GUARDS == GUARDS:
+            found[count] = rank
+            count += 1
+    for i in range(count - 1, -1, -1):
+        paint_item(labels, x, y, left, top, right, low, places[found[i]], masks)
+
+
+CELLS = types.Array(types.boolean, 2, "C", readonly=True)
+BITS = np.uint64(CELL_BITS)
+
+
+# house: hit rule of areas
+@compiled(
+    *(
+        types.int64(
+            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
+        )
+        for kind in (types.uint16, types.uint32)
+    )
+)  # fmt: skip
+def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
+    count = 0
+    high, wide, coarse = np.uint64(labels.shape[0]), np.uint64(labels.shape[1]), cells.size > 0
+    for i in range(len(at_256)):
+        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
+        column, row = np.uint64(x - left), np.uint64(y - top)  # negative numbers become very large
+        if (column >= wide) | (row >= high):
+            continue
+        if coarse and not cells[row >> BITS, column >> BITS]:
+            continue
+        front = np.int64(labels[row, column] >> 1)  # always written; the next one overwrites it if it is no hit
+        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
+        count += objects[front]
+    return count
+
+
+NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
+
+
+def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
+    """See `bits.label_plane.front_at`."""
+    place, item = np.empty((2, len(at_256)), np.int64)
+    xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
+    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
+    return Front(place[:count], item[:count], xy[:count])
+
+
+# house: hit rule of areas
+@compiled(types.int64(*[BOXES] * 2, INTS, INTS, FLAGS, FLAGS, types.UniTuple(types.int64, 4), OUT, OUT, ROWS_OUT))
+def _front_of(at_256, box, offset, width, masks, occluder, bounds, place, rank, xy):
+    count = 0
+    for i in range(len(at_256)):
+        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
+        if x < bounds[0] or y < bounds[1] or x > bounds[2] or y > bounds[3]:
+            continue
+        for item in range(len(box)):
+            across = (box[item, 0] <= x) & (box[item, 2] >= x)
+            if not (across & (box[item, 1] <= y) & (box[item, 3] >= y)):
+                continue
+            if masks[offset[item] + (y - box[item, 1]) * width[item] + x - box[item, 0]]:
+                place[count], rank[count], xy[count, 0], xy[count, 1] = i, item, x, y
+                count += not occluder[item]
+                break
+    return count
+
+
+def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
+    """See `bits.label_plane.front_of`."""
+    place, rank = np.empty((2, len(at_256)), np.int64)
+    xy = np.empty(at_256.shape, np.int64)
+    what = stack.box_xyxy, stack.offset, stack.width, stack.masks, stack.occluder
+    count = _front_of(at_256, *what, EVERYWHERE if bounds is None else bounds, place, rank, xy)
+    return Front(place[:count], stack.ids.take(rank[:count]), xy[:count])
+
+
+ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)
+PELLETS = types.Array(types.int64, 2, "A", readonly=True)
+SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
+
+AT_ONCE = 256
+"""Least number of pellets that are drawn at a time; those of a round are drawn together."""
+
+
+@njit(inline="always")
+def _mixed(z):
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@compiled(types.void(types.int64, types.int64, types.uint64, SEEDS, ANY_INTS, ANY_INTS, PELLETS, types.int64[:, ::1]))
+def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
+    rows, pellets = pellet.shape
+    room = max(AT_ONCE, pellets)
+    state, drawn, place = np.empty(room, np.uint64), np.empty(room, np.uint64), np.empty(room, np.int64)
+    row = 0
+    while row < rows:
+        count = 0
+        while row < rows and count + pellets <= room:
+            turn = _mixed(seed[row])
+            turn = _mixed((turn ^ np.uint64(shot[row])) + GOLDEN)
+            turn = _mixed((turn ^ np.uint64(round_[row])) + GOLDEN)
+            for k in range(pellets):
+                state[count + k] = _mixed((turn ^ np.uint64(pellet[row, k])) + GOLDEN)
+                place[count + k] = row * pellets + k
+            count += pellets
+            row += 1
+        while count:
+            for i in range(count):  # without a branch, several at a time
+                state[i] += GOLDEN
+                drawn[i] = _mixed(state[i])
+            rest = 0
+            for i in range(count):  # offsets outside the disc are overwritten later
+                x = np.int64(drawn[i] & bits) - reach
+                y = np.int64((drawn[i] >> np.uint64(32)) & bits) - reach
+                offsets[place[i], 0], offsets[place[i], 1] = x, y
+                state[rest], place[rest] = state[i], place[i]
+                rest += SUB * SUB * (x * x + y * y) > radius2
+            count = rest
+
+
+def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
+    """See `kinds.placements.disc_offsets`."""
+    seed, reach = np.asarray(seed, np.uint64), radius_256 // SUB
+    shape = np.broadcast_shapes(*(word.shape for word in (seed, shot, round_, pellet)))
+    wide = shape if len(shape) > 1 else (*shape, 1)
+    *turns, pellets = (np.broadcast_to(word, shape).reshape(wide) for word in (seed, shot, round_, pellet))
+    offsets = np.empty((*pellets.shape, 2), np.int64)
+    bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
+    _disc_offsets(reach, radius_256**2, bits, *(word[:, 0] for word in turns), pellets, offsets.reshape(-1, 2))
+    return offsets.reshape(*shape, 2)

@@ -1,0 +1,429 @@
+"""The history of a scene by tick, each tick readable as a scene; and a clock with a fixed time step.
+
+A column, a list or a whole moment that did not change between two recorded ticks is stored once. A moment never
+changes, so neither does a scene made of it.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+import threading
+import warnings
+from bisect import bisect
+from collections.abc import Mapping
+from typing import Any, NamedTuple, NoReturn, TypeVar
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from ..common.checks import Bools, InputError, Ints, flag, integer, real, shown, within
+from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
+from ..grid.fixed_point import quarter_turns, rounded_div
+from ..grid.spans import Box
+from .items import ARRANGEMENTS, COLUMNS, NEVER, NO_BOXES, UNARRANGED, Items, MaskAtlas
+from .scene import Scene
+from .sprite import variant_of
+
+T = TypeVar("T")
+
+RUNS_SHOWN = 8
+"""Most runs of ticks that an error lists; of more it gives only the number."""
+
+PART_BITS = 31
+"""A step between two ticks is cut into fewer than 2**31 parts: the square of their number stays inside int64."""
+
+
+class PastItems(Items):
+    """An immutable copy of the items of a scene at one moment.
+
+    Parameters
+    ----------
+    items : the present items; if too many of their masks are unused, the copy gets an atlas without those
+    earlier : the moment before, with which everything unchanged is shared
+    """
+
+    def __init__(self, items: Items, earlier: PastItems | None) -> None:
+        super().__init__()
+        before = Items() if earlier is None else earlier
+        self.count = items.count
+        self.version = self._forgotten = items.version
+        self._bounds, self._tiles = items._bounds, items._tiles  # these are by mask, not by item
+        with items._lock:  # a thread that reads the stack may rebuild the atlas
+            if items.atlas.wasteful:
+                items._compact()
+            kept = before.arrangement == items.arrangement
+            for name in COLUMNS:
+                changed = not kept or name in UNARRANGED
+                now = getattr(items, name)[: self.count] if changed else getattr(before, name)
+                setattr(self, name, _column(now, getattr(before, name)) if changed else now)
+            flat, self.arrangement = items.atlas.flat, items.arrangement
+            if items._stack is not None:
+                self._stack = (NEVER, items._stack[1].placed(NO_BOXES))  # only the order is kept
+        self.atlas = before.atlas if flat is before.atlas.flat else _full(flat)
+        if kept:
+            self.sprites, self.names, self.angles = before.sprites, before.names, before.angles
+            self.variants, self.forms = before.variants, before.forms
+            return
+        self.sprites = _shared(items.sprites, before.sprites)
+        self.names = _shared(items.names, before.names)
+        self.angles = _shared(items.angles, before.angles)
+        self.variants = _shared(items.variants, before.variants)
+        self.forms = before.forms if self.variants is before.variants else list(items.forms)
+
+    def _allot(self) -> None:
+        """Do nothing: the columns are the recorded ones."""
+
+    def between(self, after: PastItems, part: int, parts: int) -> PastItems:
+        """Interpolate between these items and those of a later moment; see `History`.
+
+        Parameters
+        ----------
+        part, parts : fraction of the time that has passed, 0 < part < parts
+        """
+        if after is self:
+            return self
+        out = PastItems(self, self)
+        both = np.flatnonzero(after.alive[: self.count])  # a removed item does not come back
+        step = after.position_256[both] - self.position_256[both]
+        if step.any():
+            position = self.position_256.copy()
+            position[both] += _part_of(step, part, parts)
+            out.position_256 = _sealed(position)
+        if self.angles is not after.angles:
+            differ = [i for i in both.tolist() if self.angles[i] != after.angles[i]]
+            turns = {i: _short_turn(self.angles[i], after.angles[i]) for i in differ}
+            out._turn({i: self.angles[i] + turn * (part / parts) for i, turn in turns.items() if turn})
+        return out
+
+    def _boxes_in_order(self, ids: Ints) -> Ints:
+        return self.boxes(ids)
+
+    def _turn(self, angles: Mapping[int, float]) -> None:
+        """Set the angles of items, and their masks."""
+        if not angles:
+            return
+        self.arrangement = next(ARRANGEMENTS)
+        for name in COLUMNS:
+            setattr(self, name, getattr(self, name).copy())
+        self.atlas = _full(self.atlas.flat)
+        self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
+        for item, angle in angles.items():
+            quarter, c, s = quarter_turns(angle)
+            form = self.forms[item]._replace(quarter=quarter, c=c, s=s)
+            with within(f"object {item} at {angle:.15g} degrees"):
+                variant = variant_of(self.sprites[item], form)
+            self.angles[item], self.forms[item], self.variants[item] = angle, form, variant
+            self._use([item], [variant])
+        for name in COLUMNS:
+            _sealed(getattr(self, name))
+
+
+class Moment(NamedTuple):
+    """The record of a scene at one tick; `pickled` holds its weapons and shots."""
+
+    name: str
+    categories: tuple[str, ...]
+    bounds: Box | None
+    pickled: bytes
+    items: PastItems
+
+
+class PastScene(Scene):
+    """A read-only scene as it was at a tick, made by `History.at`.
+
+    Parameters
+    ----------
+    moment : the recorded or interpolated moment
+    tick : its tick; between two recorded ticks a multiple of 1/256
+
+    Attributes
+    ----------
+    tick : as given
+    """
+
+    def __init__(self, moment: Moment, tick: float) -> None:
+        super().__init__()
+        self.tick = tick
+        self.name, self.categories, self._bounds, pickled, self.items = moment
+        try:
+            self.weapons, self.shots = pickle.loads(pickled)
+        except Exception as error:
+            raise _not_plain(error) from error
+
+    def add(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past has what it had."""
+        self._refuse()
+
+    def remove(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past has what it had."""
+        self._refuse()
+
+    def move(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past is as it was."""
+        self._refuse()
+
+    def set(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past is as it was."""
+        self._refuse()
+
+    def _refuse(self) -> NoReturn:
+        raise InputError(f"scene: expected the present one, got that of tick {self.tick:.15g}, which is read-only")
+
+
+class History:
+    """The last ticks of a scene, for shots at its past.
+
+    At a tick between two recorded ticks a < b the fraction (tick - a) / (b - a) of the time has passed. It is rounded
+    down to a multiple of 2**-30 if a and b are more than 2**22 ticks apart. By this fraction
+
+    - positions move straight, rounded once, half to even, to 1/256 px;
+    - angles turn the shorter way, a half turn clockwise;
+    - everything else is as at a, including objects that exist at only one of the two.
+
+    Several threads may record and read at once; none may change the scene during a recording.
+
+    Parameters
+    ----------
+    scene : the scene to record
+    ticks : most ticks that are kept
+    interpolate : whether `at` takes ticks between the recorded ones
+
+    Raises
+    ------
+    InputError
+        If an argument is not valid.
+    """
+
+    def __init__(self, scene: Scene, ticks: int = 64, interpolate: bool = False) -> None:
+        if not isinstance(scene, Scene):
+            raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+        self.scene = scene
+        self._most = integer("ticks", ticks, 1, HISTORY_TICKS_MAX)
+        self._interpolate = flag("interpolate", interpolate)
+        self._moments: dict[int, Moment] = {}
+        self._views: WeakValueDictionary[float, PastScene] = WeakValueDictionary()
+        self._read: PastScene | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def ticks(self) -> list[int]:
+        """Ticks that can be read, rising."""
+        with self._lock:
+            return list(self._moments)
+
+    def record(self, tick: int | None = None) -> int:
+        """Record the present scene, and forget the oldest tick if there are too many.
+
+        Parameters
+        ----------
+        tick : number of the tick, greater than the last; by default the last plus 1, beginning at 0
+
+        Returns
+        -------
+        number of the tick
+
+        Raises
+        ------
+        InputError
+            If the tick is not whole, or not greater than the last; or if the scene's weapons or shots cannot be kept.
+        """
+        with self._lock:
+            last = next(reversed(self._moments), None)
+            first, lowest = (0, -TICK_MAX) if last is None else (last + 1, last + 1)
+            number = integer("tick", first if tick is None else tick, lowest, TICK_MAX)
+            self._moments[number] = self._now(None if last is None else self._moments[last])
+            if len(self._moments) > self._most:
+                del self._moments[next(iter(self._moments))]
+            return number
+
+    def at(self, tick: float) -> PastScene:
+        """The scene as it was at a tick.
+
+        The same object is returned while it is referenced, and the last one is kept: its indexes and planes serve
+        further shots.
+
+        Parameters
+        ----------
+        tick : one of `ticks`; if the history interpolates, any number from the first to the last of them, rounded to
+            1/256, half to even
+
+        Raises
+        ------
+        InputError
+            If the tick is not recorded; the message lists the recorded ones.
+        """
+        with self._lock:
+            at = self._checked(tick)
+            scene = self._views.get(at)
+            if scene is None:
+                scene = self._views[at] = PastScene(self._moment(at), int(at) if at.is_integer() else at)
+            self._read = scene
+            return scene
+
+    def _now(self, last: Moment | None) -> Moment:
+        """The moment of the present scene; it shares everything unchanged with the last one."""
+        scene, items = self.scene, self.scene.items
+        before = None if last is None else last.items
+        if before is None or (before.version, before.count) != (items.version, items.count):
+            before = PastItems(items, before)
+        try:
+            pickled = pickle.dumps((scene.weapons, scene.shots))
+        except Exception as error:  # an object that cannot be pickled may raise anything
+            raise _not_plain(error) from error
+        moment = Moment(scene.name, scene.categories, scene.bounds, pickled, before)
+        return last if last is not None and moment == last else moment
+
+    def _checked(self, tick: object) -> float:
+        """Check that a tick can be read."""
+        at = real("tick", tick, -TICK_MAX, TICK_MAX)
+        if self._interpolate:
+            at = round(SUB * at) / SUB
+        if at in self._moments:
+            return at
+        ticks = list(self._moments)
+        if not ticks:
+            raise InputError(f"tick: expected one that is recorded, got {shown(tick)}: none is yet")
+        if not self._interpolate:
+            raise InputError(f"tick: expected one of {_runs(ticks)}, got {shown(tick)}")
+        if not ticks[0] < at < ticks[-1]:
+            raise InputError(f"tick: expected a number from {ticks[0]} to {ticks[-1]}, got {shown(tick)}")
+        return at
+
+    def _moment(self, at: float) -> Moment:
+        """The recorded moment of a tick, or an interpolated one."""
+        if at in self._moments:
+            return self._moments[int(at)]
+        ticks = list(self._moments)
+        place = bisect(ticks, at)
+        first, last = ticks[place - 1], ticks[place]
+        before, after = self._moments[first], self._moments[last]
+        part, parts = int(SUB * (at - first)), SUB * (last - first)
+        spare = max(parts.bit_length() - PART_BITS, 0)
+        return before._replace(items=before.items.between(after.items, part >> spare, parts >> spare))
+
+
+def _not_plain(error: Exception) -> InputError:
+    """The error for weapons or shots that cannot be pickled."""
+    return InputError(f"scene: expected weapons and shots of plain JSON, got a value that cannot be kept: {error}")
+
+
+def _column(now: Ints, before: Ints) -> Ints:
+    """The earlier column if it is equal, else a copy."""
+    if now.shape == before.shape and (now == before).all():
+        return before
+    return _sealed(now.copy())
+
+
+def _shared(now: list[T], before: list[T]) -> list[T]:
+    """The earlier list if it is equal, else a copy."""
+    return before if now == before else list(now)
+
+
+def _sealed(column: Ints) -> Ints:
+    column.flags.writeable = False
+    return column
+
+
+def _full(flat: Bools) -> MaskAtlas:
+    """An atlas without spare room: adding a mask to it makes a new array."""
+    return MaskAtlas(flat, len(flat), len(flat))
+
+
+def _part_of(step: Ints, part: int, parts: int) -> Ints:
+    """Compute step * part / parts, rounded half to even, for |step| up to 2**49 and parts below 2**PART_BITS."""
+    whole, rest = np.divmod(step, parts)
+    odd = whole * part & 1
+    return np.asarray(whole * part - odd + rounded_div(rest * part + odd * parts, parts))
+
+
+def _short_turn(before: float, after: float) -> float:
+    """Degrees from one angle to another the shorter way, in (-180, 180]."""
+    turn = math.fmod(math.fmod(after, 360) - math.fmod(before, 360), 360)
+    return turn + 360 if turn <= -180 else turn - 360 if turn > 180 else turn
+
+
+def _runs(ticks: list[int]) -> str:
+    """Text for rising numbers, as runs."""
+    breaks = [i for i in range(1, len(ticks)) if ticks[i] > ticks[i - 1] + 1]
+    if len(breaks) >= RUNS_SHOWN:
+        return f"the {len(ticks)} recorded from {ticks[0]} to {ticks[-1]}"
+    ends = zip([0, *breaks], [*breaks, len(ticks)], strict=True)
+    return ", ".join(str(ticks[i]) if j == i + 1 else f"{ticks[i]} to {ticks[j - 1]}" for i, j in ends)
+
+
+NANOSECONDS = 10**9
+"""Nanoseconds in a second: time is a whole number of them, and a step has as many whole parts."""
+
+ELAPSED_MAX = 10**6
+"""Longest time between two calls, s (12 days): in nanoseconds it is whole in float64, with bits to spare."""
+
+
+class FixedStep:
+    """A clock that turns the time between pictures into whole steps of a simulation.
+
+    The number of steps depends only on the sum of the times, each rounded to whole nanoseconds: a simulation runs the
+    same at 30 pictures a second and at 144.
+
+        clock = FixedStep(240)
+        while playing:
+            for tick in clock.advance(seconds_since_last_picture):
+                simulate(tick)  # 1 / 240 s
+            draw(clock.fraction)  # so far from the last step to the next
+
+    Parameters
+    ----------
+    rate_hz : steps a second, a whole number
+    most : most steps of one call; None for all that are due. Without a limit a simulation that is slower than the
+        time it simulates falls ever further behind. With one it runs slower instead: whole steps beyond the limit are
+        dropped with a RuntimeWarning that says how many, and counted in `dropped`
+
+    Attributes
+    ----------
+    tick : steps given so far
+    dropped : steps dropped so far
+
+    Raises
+    ------
+    InputError
+        If an argument is not valid.
+
+    References
+    ----------
+    Fiedler, "Fix your timestep!" (2004).
+    """
+
+    def __init__(self, rate_hz: int, *, most: int | None = None) -> None:
+        self.rate_hz = integer("rate_hz", rate_hz, 1, NANOSECONDS)
+        self.most = None if most is None else integer("most", most, 1, ELAPSED_MAX * NANOSECONDS)
+        self.tick = 0
+        self.dropped = 0
+        self._rest = 0
+
+    def advance(self, elapsed_s: float) -> range:
+        """Let time pass, and return the ticks of the steps that are due; the first tick is 0.
+
+        Parameters
+        ----------
+        elapsed_s : time since the last call, s
+
+        Raises
+        ------
+        InputError
+            If the time is not finite, is negative, or is longer than 12 days.
+        """
+        passed = round(real("elapsed_s", elapsed_s, 0, ELAPSED_MAX) * NANOSECONDS)
+        due, self._rest = divmod(self._rest + passed * self.rate_hz, NANOSECONDS)
+        steps = due if self.most is None else min(due, self.most)
+        first = self.tick
+        self.tick += steps
+        if steps < due:
+            self.dropped += due - steps
+            message = f"FixedStep: dropped {due - steps} of {due} steps that were due at tick {self.tick}"
+            warnings.warn(message, RuntimeWarning, stacklevel=2)
+        return range(first, self.tick)
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of a step, in [0, 1), that has passed since the last one; it interpolates between two states."""
+        return self._rest / NANOSECONDS

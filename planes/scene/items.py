@@ -1,0 +1,572 @@
+"""The items of a scene as columns, the stack of those that decide hits, front to back, and the journal of changes."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import threading
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from struct import Struct
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import late
+from ..common.backend import kernels_of
+from ..common.checks import Bools, Floats, InputError, Ints, choice
+from ..common.limits import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
+from ..grid import fixed_point
+from ..grid.fixed_point import boxes_at, pixel
+from ..grid.spans import Box
+from .sprite import Sprite, Transform, Variant, variant_of
+
+if TYPE_CHECKING:
+    from ..bits.tiles import TileAtlas, Tiles
+    from ..volumes.fit import Bounds, Kind
+    from ..volumes.volumes import Volumes
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The items of one version of a scene that decide hits, front to back, as columns.
+
+    Parameters
+    ----------
+    ids, categories, owner : (M,) int64
+    occluder : (M,) bool
+    box_xyxy : (M, 4) int64, inclusive, px
+    offset : (M,) start of the item's mask in `masks`, row by row
+    masks : flat booleans of all masks in use
+    layered : whether the items lie on more than one layer
+    forms : number of the arrangement: stacks of the same number differ only in boxes
+    count : number of ids of the scene, including those that are not in the stack
+    """
+
+    ids: Ints
+    occluder: Bools
+    categories: Ints
+    owner: Ints
+    box_xyxy: Ints
+    offset: Ints
+    masks: Bools
+    layered: bool
+    forms: int
+    count: int
+
+    def placed(self, box_xyxy: Ints) -> Stack:
+        """A stack of the same items in the same order at other places; both share the other columns."""
+        return self._with(("sizes",), box_xyxy=box_xyxy)
+
+    def reformed(self, forms: int, box_xyxy: Ints, offset: Ints, masks: Bools, categories: Ints, owner: Ints) -> Stack:
+        """A stack of the same ids in the same order with other masks, categories or owners."""
+        return self._with(
+            ("sizes", "width", "has_unmet"), forms=forms, box_xyxy=box_xyxy, offset=offset, masks=masks,
+            categories=categories, owner=owner,
+        )  # fmt: skip
+
+    def _with(self, stale: tuple[str, ...], **columns: object) -> Stack:
+        """A stack with some columns replaced; it shares the rest and all cached properties that are not stale."""
+        stack = object.__new__(Stack)
+        vars(stack).update(vars(self))
+        for name in stale:
+            vars(stack).pop(name, None)
+        vars(stack).update(columns)
+        return stack
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns, without the masks, which belong to the scene."""
+        columns = (self.ids, self.occluder, self.categories, self.owner, self.box_xyxy, self.offset)
+        return sum(column.nbytes for column in columns)
+
+    @cached_property
+    def rank_of(self) -> Ints:
+        """Rank in the stack of each id of the scene (count,), 0 in front; -1 for ids that are not in it."""
+        ranks = np.full(self.count, -1)
+        ranks[self.ids] = np.arange(len(self.ids))
+        ranks.flags.writeable = False
+        return ranks
+
+    @cached_property
+    def rank_by_code(self) -> Ints:
+        """Rank in the stack of each label, which is an id + 1; 0 for labels of no item."""
+        ranks = np.zeros(int(self.ids.max(initial=-1)) + 2, np.int64)
+        ranks[self.ids + 1] = np.arange(len(self.ids))
+        ranks.flags.writeable = False
+        return ranks
+
+    @cached_property
+    def is_object(self) -> Bools:
+        """Whether each label (count + 1,), which is an id + 1, is of an item that can be hit; label 0 is of no item."""
+        objects = np.zeros(self.count + 1, np.bool_)
+        objects[self.ids[~self.occluder] + 1] = True
+        objects.flags.writeable = False
+        return objects
+
+    @cached_property
+    def has_occluders(self) -> bool:
+        """Whether any item is an occluder."""
+        return bool(self.occluder.any())
+
+    @cached_property
+    def has_unmet(self) -> bool:
+        """Whether any item has no category; every shot refuses such an item."""
+        return not self.categories.all()
+
+    @cached_property
+    def width(self) -> Ints:
+        """Width of each mask, px."""
+        return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    @cached_property
+    def sizes(self) -> tuple[Floats, Floats]:
+        """Mean width and height of the items, and width and height of the box around all of them, px."""
+        x, y, x_max, y_max = np.ascontiguousarray(self.box_xyxy.T)
+        mean = np.array([(x_max - x).mean(), (y_max - y).mean()]) + 1
+        return mean, np.array([x_max.max() - x.min(), y_max.max() - y.min()], np.float64) + 1
+
+    def mask(self, rank: int) -> Bools:
+        """Mask (h, w) of the item at a rank, 0 in front."""
+        x, y, x_max, y_max = self.box_xyxy[rank].tolist()
+        size = (x_max - x + 1) * (y_max - y + 1)
+        return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
+
+
+def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
+    """Clip inclusive boxes (n, 4) to a box; those outside get x_max < x_min or y_max < y_min."""
+    low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
+    return np.concatenate([low, high], axis=1)
+
+
+class Role(Enum):
+    """Role of an object; only HITTABLE and OCCLUDER decide hits, the others are only drawn."""
+
+    BACKGROUND = "background"
+    HITTABLE = "hittable"
+    MOVER = "mover"
+    OCCLUDER = "occluder"
+    HUD = "hud"
+
+
+ROLES = tuple(Role)
+DECIDING = Role.HITTABLE, Role.OCCLUDER
+HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
+NOWHERE = (0, 0, -1, -1)
+Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
+"""A version, the items that it changed, and their deciding boxes before and after; plain numbers for a single item."""
+
+NEVER = -1
+"""A version before all others."""
+
+PLACE, BOX = Struct("=2q"), Struct("=4q")
+"""Layouts of a row of positions and of a row of boxes, to read and write a single item without an array."""
+
+NOTHING = Sprite(frames=())
+"""Sprite of an id without an object: a removed one, or one that never was."""
+
+NO_TRANSFORM = Transform()
+"""Transform of an id without an object."""
+
+NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)
+"""Mask of an id without an object."""
+
+NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
+
+ARRANGEMENTS = itertools.count(1)
+"""Source of numbers of arrangements; each arrangement of items of any scene has its own."""
+
+
+def boxes_in(field: str, name: object) -> int | None:
+    """Number of boxes in a name like "4 boxes"; None for any other name."""
+    counted = re.fullmatch(r"([0-9]{1,4}) box(?:es)?", name) if isinstance(name, str) else None
+    if counted is None:
+        return None
+    k = int(counted[1])
+    if not 1 <= k <= BOXES_MAX:
+        raise InputError(f"{field}: expected 1 to {BOXES_MAX} boxes, got {k}")
+    return k
+
+
+@dataclass
+class MaskAtlas:
+    """All masks in use in one flat array; a mask that several items use is stored once."""
+
+    flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
+    used: int = 0
+    live: int = 0
+    offsets: dict[int, int] = field(default_factory=dict)
+    users: dict[int, int] = field(default_factory=dict)
+
+    def take(self, variant: Variant) -> int:
+        """Count one more user of a mask, store it if it is new, and return its offset."""
+        users = self.users[variant.uid] = self.users.get(variant.uid, 0) + 1
+        if users == 1:
+            self.live += variant.mask.size
+        offset = self.offsets.get(variant.uid)
+        return self._append(variant) if offset is None else offset
+
+    def drop(self, variant: Variant) -> None:
+        """Count one user less of a mask."""
+        users = self.users[variant.uid] = self.users[variant.uid] - 1
+        if not users:
+            del self.users[variant.uid]
+            self.live -= variant.mask.size
+
+    @property
+    def wasteful(self) -> bool:
+        """Whether more than half of the array, beyond some slack, is unused."""
+        return self.used > 2 * self.live + ATLAS_SLACK_BYTES
+
+    def _append(self, variant: Variant) -> int:
+        begin, end = self.used, self.used + variant.mask.size
+        if end > len(self.flat):
+            grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
+            grown[:begin] = self.flat[:begin]
+            self.flat = grown  # a stack that was handed out keeps the old array
+        self.flat[begin:end] = variant.mask.reshape(-1)
+        self.offsets[variant.uid], self.used = begin, end
+        return begin
+
+
+COLUMNS: dict[str, tuple[int, ...]] = {
+    "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
+    "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
+}  # fmt: skip
+
+UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))
+"""Columns whose change leaves the arrangement as it is."""
+
+ORDERING = frozenset(("alive", "role", "layer"))
+"""Columns whose change may reorder the items, or change which of them decide hits."""
+
+
+class Items:
+    """The items of a scene as columns by id; ids count up from 0 and are never used again."""
+
+    alive: Ints
+    role: Ints
+    layer: Ints
+    categories: Ints
+    owner: Ints
+    cost: Ints
+    position_256: Ints
+    velocity_256: Ints
+    pivot_256: Ints
+    size_wh: Ints
+    offset: Ints
+    mask: Ints
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.living = 0
+        self.version = 0
+        self.atlas = MaskAtlas()
+        self.sprites: list[Sprite] = []
+        self.forms: list[Transform] = []
+        self.angles: list[float] = []
+        self.variants: list[Variant] = []
+        self.names: list[str] = []
+        self.arrangement = next(ARRANGEMENTS)
+        self._journal: deque[Change] = deque()
+        self._in_order = False  # whether the order of the last stack still holds
+        self._journal_rows = 0
+        self._forgotten = 0
+        self._stack: tuple[int, Stack] | None = None
+        self._bounds: dict[Kind, Bounds] = {}
+        self._tiles: list[TileAtlas] = []
+        self._imagery: tuple[int, list[Role]] | None = None
+        self._lock = threading.Lock()
+        self._allot()
+
+    def _allot(self) -> None:
+        for name, shape in COLUMNS.items():
+            setattr(self, name, np.zeros((16, *shape), np.int64))
+        self._box = np.tile(np.array(NOWHERE), (16, 1))
+        self._edge = np.zeros((16, 4), np.int64)  # from the position to the first and last pixel of the box, 1/256 px
+
+    def add(self, sprite: Sprite, form: Transform, angle: float, name: str, values: dict[str, object]) -> int:
+        """Append an item with its columns `values`, and return its id."""
+        item = self.count
+        if item >= ITEMS_MAX:
+            raise InputError(f"objects: expected at most {ITEMS_MAX} in the life of a scene, got one more")
+        variant = variant_of(sprite, form)
+        self._reserve(item + 1)
+        self.count += 1
+        self.sprites.append(sprite)
+        self.forms.append(form)
+        self.angles.append(angle)
+        self.variants.append(variant)
+        self.names.append(name)
+        for column, value in values.items():
+            getattr(self, column)[item] = value
+        self.alive[item] = 1
+        self.living += 1
+        self._use([item], [variant])
+        self.record(np.array([item]))
+        return item
+
+    def skip_to(self, item: int) -> None:
+        """Skip the ids below `item` as if their objects had been removed; objects of a scene file keep their ids."""
+        missing = item - self.count
+        if missing <= 0:
+            return
+        self._reserve(item)
+        self.sprites += [NOTHING] * missing
+        self.forms += [NO_TRANSFORM] * missing
+        self.angles += [0.0] * missing
+        self.variants += [NO_MASK] * missing
+        self.names += [""] * missing
+        self.count = item
+        self.arrangement = next(ARRANGEMENTS)
+        self._in_order = False
+
+    def remove(self, ids: Ints) -> None:
+        """Remove items; their ids are not used again, and their columns and names stay."""
+        self.alive[ids] = 0
+        self.living -= len(ids)
+        for item in ids.tolist():
+            self.atlas.drop(self.variants[item])
+            self.sprites[item], self.forms[item], self.variants[item] = NOTHING, NO_TRANSFORM, NO_MASK
+            self.angles[item] = 0.0
+        self.record(ids)
+        self._stack = None  # it would hold the masks until the next shot
+        if self.atlas.wasteful:
+            self._compact()
+
+    def reform(self, ids: Sequence[int], forms: Sequence[Transform]) -> None:
+        """Give items other transforms; all masks are made before any item changes."""
+        variants = [variant_of(self.sprites[item], form) for item, form in zip(ids, forms, strict=True)]
+        for item, form, variant in zip(ids, forms, variants, strict=True):
+            self.atlas.drop(self.variants[item])
+            self.forms[item], self.variants[item] = form, variant
+        self._use(ids, variants)
+
+    def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
+        """Update the boxes, arrangement and journal after some columns of items changed."""
+        before, after = self._box[ids], self.deciding_boxes(ids)
+        low = HALF - self.pivot_256[ids]
+        self._edge[ids] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
+        self._box[ids] = after
+        if not UNARRANGED.issuperset(columns):
+            self.arrangement = next(ARRANGEMENTS)
+            same = (before[:, 0] <= before[:, 2]) == (after[:, 0] <= after[:, 2])
+            self._in_order &= ORDERING.isdisjoint(columns) and bool(same.all())
+        self._note(ids, before, after, len(ids))
+
+    def move(self, ids: Ints, position_256: Ints) -> None:
+        """Move distinct items (n,) to new positions (n, 2); masks and order stay."""
+        before, after = self._box.take(ids, axis=0), boxes_at(position_256, self._edge.take(ids, axis=0))
+        self.position_256[ids], self._box[ids] = position_256, after
+        self._note(ids, before, after, len(ids))
+
+    def move_risen(self, ids: Ints, xy: Floats) -> bool:
+        """Move items of rising ids (n,) to positions (n, 2), px; if any is invalid do nothing and return False."""
+        before, after = np.empty((2, len(ids), 4), np.int64)
+        place = kernels_of(fixed_point).place
+        if not place(ids, xy, self.count, self.alive, self._edge, self.position_256, self._box, before, after):
+            return False
+        self._note(ids.copy(), before, after, len(ids))
+        return True
+
+    def move_one(self, item: int, x_256: int, y_256: int) -> bool:
+        """Move one item as `move` does; if it is not in the scene do nothing and return False."""
+        if not (0 <= item < self.count and self.alive.item(item)):
+            return False
+        before = x, y, x_max, y_max = BOX.unpack_from(self._box, BOX.size * item)  # type: ignore[arg-type]
+        variant = self.variants[item]
+        left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
+        after = (left, top, left + x_max - x, top + y_max - y)
+        PLACE.pack_into(self.position_256, PLACE.size * item, x_256, y_256)  # type: ignore[arg-type]
+        BOX.pack_into(self._box, BOX.size * item, *after)  # type: ignore[arg-type]
+        self._note(item, before, after, 1)
+        return True
+
+    def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
+        """Write n changes into the journal as a new version."""
+        self.version += 1
+        self._journal.append((self.version, ids, before, after))
+        self._journal_rows += n
+        most = min(JOURNAL_ROWS, JOURNAL_FEW + JOURNAL_EACH * self.living)
+        while self._journal_rows > most:
+            version, old, _, _ = self._journal.popleft()
+            self._journal_rows -= np.size(old)
+            self._forgotten = version
+
+    def changed_boxes(self, version: int) -> Ints | None:
+        """Boxes (n, 4), old and new, of deciding items that changed after a version; None if that is forgotten."""
+        changes = self.changes(version)
+        if changes is None:
+            return None
+        every = np.concatenate([NO_BOXES, *(np.reshape(box, (-1, 4)) for _, _, *both in changes for box in both)])
+        return every[every[:, 0] <= every[:, 2]]
+
+    def changed_ids(self, version: int) -> Ints | None:
+        """Sorted ids of the items that changed after a version; None if that is forgotten."""
+        changes = self.changes(version)
+        return None if changes is None else np.unique(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
+
+    def knows(self, version: int) -> bool:
+        """Whether the journal still has all changes after a version."""
+        return version >= self._forgotten
+
+    def changes(self, version: int) -> list[Change] | None:
+        """Changes after a version, the last first; None if that is forgotten."""
+        if version < self._forgotten:
+            return None
+        found = []
+        for change in reversed(self._journal):
+            if change[0] <= version:
+                break
+            found.append(change)
+        return found
+
+    def boxes(self, ids: Ints) -> Ints:
+        """Inclusive boxes (n, 4) of the masks of items; x_max < x_min for an empty mask."""
+        corner = pixel(self.position_256.take(ids, axis=0) - self.pivot_256.take(ids, axis=0))
+        size = self.size_wh.take(ids, axis=0)
+        boxes = np.concatenate([corner, corner + size - 1], axis=1)
+        boxes[(self.alive[ids] == 0) | (size[:, 0] == 0)] = NOWHERE
+        return boxes
+
+    def corner(self, item: int) -> tuple[int, int]:
+        """Top left pixel (x, y) of an item's mask."""
+        x, y = pixel(self.position_256[item] - self.pivot_256[item]).tolist()
+        return x, y
+
+    def deciding_boxes(self, ids: Ints) -> Ints:
+        """`boxes`, but empty for items that decide no hit: planes need not follow their changes."""
+        boxes = self.boxes(ids)
+        role = self.role[ids]
+        boxes[(role != HITTABLE) & (role != OCCLUDER)] = NOWHERE
+        return boxes
+
+    @property
+    def has_stack(self) -> bool:
+        """Whether the stack of the present version is cached."""
+        return self._stack is not None and self._stack[0] == self.version
+
+    def stack(self) -> Stack:
+        """Items that decide hits, front to back: by greater layer, then occluders before objects, then later added."""
+        known = self._stack
+        if known is not None and known[0] == self.version:
+            return known[1]
+        with self._lock:
+            if self._stack is None or self._stack[0] != self.version:
+                if self.atlas.wasteful:
+                    self._compact()
+                self._stack = (self.version, self._stack_after(None if self._stack is None else self._stack[1]))
+                self._in_order = True
+            return self._stack[1]
+
+    def _stack_after(self, last: Stack | None) -> Stack:
+        """The stack of the present version; it shares unchanged columns with the last one."""
+        if last is not None and last.forms == self.arrangement:
+            return last.placed(self._boxes_in_order(last.ids))
+        if last is None or not self._in_order:
+            return self.stack_of(*DECIDING)
+        ids = last.ids
+        columns = (column.take(ids) for column in (self.categories, self.owner))
+        return last.reformed(
+            self.arrangement, self._boxes_in_order(ids), self.offset.take(ids), self.atlas.flat, *columns
+        )
+
+    def _boxes_in_order(self, ids: Ints) -> Ints:
+        """Boxes of all items that decide hits."""
+        return self._box.take(ids, axis=0)
+
+    def stack_of(self, *roles: Role) -> Stack:
+        """Items of some roles, front to back."""
+        n = self.count
+        wanted = np.isin(self.role[:n], [ROLES.index(role) for role in roles])
+        ids = np.flatnonzero((self.alive[:n] == 1) & wanted & (self.size_wh[:n, 0] > 0))
+        occluder, layer = self.role[ids] == OCCLUDER, self.layer[ids]
+        layered = bool((layer[1:] != layer[:-1]).any())
+        keys = [-ids]
+        if occluder.any():
+            keys.append(~occluder)
+        if layered:
+            keys.append(-layer)
+        order = np.lexsort(keys)
+        ids, occluder = ids[order], occluder[order]
+        return Stack(
+            ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat,
+            layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
+        )  # fmt: skip
+
+    def imagery(self) -> list[Role]:
+        """Roles in use that decide no hit."""
+        known = self._imagery
+        if known is None or known[0] != self.arrangement:
+            count = np.bincount(self.role[: self.count], self.alive[: self.count], len(ROLES)).tolist()
+            drawn = [
+                role for role in ROLES if count[ROLES.index(role)] and ROLES.index(role) not in (HITTABLE, OCCLUDER)
+            ]
+            known = self._imagery = self.arrangement, drawn
+        return known[1]
+
+    def tiles(self) -> Tiles:
+        """Bit rows of the masks of the stack."""
+        stack = self.stack()
+        known = self._tiles[0].known(stack.forms) if self._tiles else None
+        if known is not None:
+            return known
+
+        if not self._tiles:
+            self._tiles.append(late.tiles.TileAtlas())
+        variants, ids = self.variants, stack.ids
+        return self._tiles[0].tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
+
+    def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
+        """Volumes of masks, px from the mask's pixel [0, 0], and the row for each item; no mask may be empty."""
+        bounds = self._bounds.setdefault(kind, late.fit.Bounds(kind))
+        return bounds.rows(self.mask[ids], self.sprites, self.variants, ids, len(self.stack()))
+
+    def volumes(self, name: str, ids: Ints) -> Volumes:
+        """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
+        k = boxes_in("kind", name)
+        choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
+        for item in ids[self.size_wh[ids, 0] == 0].tolist():
+            raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
+        if name == "box":
+            low, high = np.split(self.boxes(ids).astype(np.float64), 2, axis=1)
+            return late.volumes.Aabbs(low - 0.5, high + 0.5)
+        if not len(ids):
+            return late.volumes.Circles(np.zeros((0, 2)), 0.0)
+        volumes, row = self.bounding(late.fit.Kind(name) if k is None else late.fit.Kind(late.fit.KINDS[2], k), ids)
+        return late.fit.shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
+
+    def _use(self, ids: Sequence[int], variants: Sequence[Variant]) -> None:
+        """Enter the masks of items into their columns."""
+        take = self.atlas.take
+        rows = [(take(mask), mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
+        columns = np.array(rows, np.int64).reshape(-1, 6)
+        self.offset[ids], self.mask[ids] = columns[:, 0], columns[:, 1]
+        self.pivot_256[ids], self.size_wh[ids] = columns[:, 2:4], columns[:, 4:]
+
+    def _compact(self) -> None:
+        """Rebuild the atlas with only the masks in use."""
+        atlas, offset = MaskAtlas(), self.offset.copy()
+        for item in np.flatnonzero(self.alive[: self.count]).tolist():
+            offset[item] = atlas.take(self.variants[item])
+        self.atlas, self.offset = atlas, offset
+
+    def _reserve(self, count: int) -> None:
+        size = len(self.alive)
+        if count <= size:
+            return
+        more = max(count - size, size // 4)
+        self._box = np.concatenate([self._box, np.tile(np.array(NOWHERE), (more, 1))])
+        self._edge = np.concatenate([self._edge, np.zeros((more, 4), np.int64)])
+        for name in COLUMNS:
+            old: npt.NDArray[np.int64] = getattr(self, name)
+            grown = np.zeros((size + more, *old.shape[1:]), np.int64)
+            grown[:size] = old
+            setattr(self, name, grown)

@@ -1,0 +1,458 @@
+"""Exact geometric predicates on float64 inputs: float filters with an error bound, then integers.
+
+A predicate is the sign of a polynomial, which is evaluated in up to three stages:
+
+1. In floats, with one error bound for a chunk of rows, from its largest magnitudes.
+2. For rows still in doubt, with an error bound for each row.
+3. For rows still in doubt, in Python integers.
+
+Comparisons ask for certainty: with NaN they are false, so NaN is in doubt. Infinite inputs are never certain, and are
+refused in the last stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, shown
+from ..common.limits import (
+    BOUND_HUGE,
+    CHUNK_ROWS,
+    FLOAT_HUGE,
+    FLOAT_TINY,
+    LENGTH_TINY,
+    ORIENT2D_ERROR,
+    ORIENT3D_ERROR,
+    ROUNDING,
+)
+
+Signs = npt.NDArray[np.int8]
+Numbers = npt.NDArray[Any]
+Given = list[tuple[str, Floats]]
+"""Columns, each with the name of its argument."""
+
+NO_ROWS = np.zeros(0, np.int64)
+
+WORK_ROWS = 20
+"""Number of work arrays of a chunk that a predicate may use."""
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """A sign, computed in floats with an error bound, and in integers.
+
+    value : function of (columns, work) that returns the determinant, in a row of work, and magnitudes (n,) or (k, n)
+    bound : function of the largest of each magnitude that returns a bound of the error
+    exact : function of columns of Python integers that returns a number of that sign
+    signed : for each magnitude, whether it may be negative
+
+    All columns are lengths in one unit, and the sign does not depend on the unit.
+    """
+
+    value: Callable[[list[Floats], Floats], tuple[Floats, tuple[Floats, ...]]]
+    bound: Callable[..., Any]
+    exact: Callable[[list[Numbers]], Numbers]
+    signed: tuple[bool, ...]
+
+
+def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative: bool = False) -> Signs:
+    """Side of the line through a and b on which the point c lies.
+
+    Parameters
+    ----------
+    a, b, c : (..., 2) float, finite; leading axes broadcast
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: 1 when turning from +x towards +y, which is clockwise on the screen; 0 on the line; -1
+
+    Raises
+    ------
+    InputError
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
+
+    References
+    ----------
+    Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (1997).
+    """
+    return _signs(_ORIENT2D, [*_columns("a", a, 2), *_columns("b", b, 2), *_columns("c", c, 2)], conservative)
+
+
+def orient3d(
+    a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, d: npt.ArrayLike, conservative: bool = False
+) -> Signs:
+    """Side of the plane through a, b and c on which the point d lies: the sign of det(a - d, b - d, c - d).
+
+    Parameters
+    ----------
+    a, b, c, d : (..., 3) float, finite; leading axes broadcast
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: 1 where a, b, c turn from +x towards +y when seen from +z and d lies below them; 0 in the plane; -1
+
+    Raises
+    ------
+    InputError
+        If a point has not three coordinates, an argument is not finite, or leading axes do not broadcast.
+    """
+    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 3)]
+    return _signs(_ORIENT3D, columns, conservative)
+
+
+def circles_sign(
+    c1: npt.ArrayLike, r1: npt.ArrayLike, c2: npt.ArrayLike, r2: npt.ArrayLike, conservative: bool = False
+) -> Signs:
+    """Compare the distance of two centres with the sum of two radii.
+
+    Parameters
+    ----------
+    c1, c2 : (..., 2) or (..., 3) float, finite; leading axes broadcast
+    r1, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 where the circles share more than a point, 0 where they touch, 1 where they are apart
+
+    Raises
+    ------
+    InputError
+        If the points do not all have two, or all three, coordinates; or as in `orient2d`.
+    """
+    shape = _numbers("c1", c1).shape
+    if not shape or shape[-1] not in (2, 3):
+        raise InputError(f"c1: expected 2 or 3 coordinates on the last axis, got {shape}")
+    centers = [*_columns("c1", c1, shape[-1]), *_columns("c2", c2, shape[-1])]
+    columns = [*centers, ("r1", _numbers("r1", r1)), ("r2", _numbers("r2", r2))]
+    return _signs(_CIRCLES, columns, conservative)
+
+
+def point_segment_sign(
+    p: npt.ArrayLike,
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    r: npt.ArrayLike,
+    r2: npt.ArrayLike = 0.0,
+    conservative: bool = False,
+) -> Signs:
+    """Compare the distance from p to the segment ab with r + r2.
+
+    Parameters
+    ----------
+    p, a, b : (..., 2) float, finite; leading axes broadcast; a may equal b
+    r, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 nearer, 0 at that distance, 1 farther
+
+    Raises
+    ------
+    InputError
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
+
+    References
+    ----------
+    Ericson, *Real-Time Collision Detection* (2005), 5.1.2.
+    """
+    points = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2)]
+    return _signs(_POINT_SEGMENT, [*points, ("r", _numbers("r", r)), ("r2", _numbers("r2", r2))], conservative)
+
+
+def segment_segment_sign(
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    c: npt.ArrayLike,
+    d: npt.ArrayLike,
+    r: npt.ArrayLike,
+    r2: npt.ArrayLike = 0.0,
+    conservative: bool = False,
+) -> Signs:
+    """Compare the distance between the segments ab and cd with r + r2.
+
+    Parameters
+    ----------
+    a, b, c, d : (..., 2) float, finite; leading axes broadcast; segments may be single points
+    r, r2 : (...) float, 0 or more; their sum is taken exactly
+    conservative : skip the exact stage; rows in doubt are 0
+
+    Returns
+    -------
+    (...) int8: -1 nearer, 0 at that distance (with radii 0: they meet), 1 farther
+
+    Raises
+    ------
+    InputError
+        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
+    """
+    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 2)]
+    columns += [("r", _numbers("r", r)), ("r2", _numbers("r2", r2))]
+    sign = _signs(_ENDS, columns, conservative)
+    a, b, c, d = (np.asarray(v, np.float64) for v in (a, b, c, d))
+    grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
+    crossing = _cross(a, b, c, d, sign >= 0, conservative)
+    return np.asarray(np.where(crossing, np.minimum(sign, -grown.astype(np.int8)), sign), np.int8)
+
+
+def _cross(a: Floats, b: Floats, c: Floats, d: Floats, asked: Bools, conservative: bool) -> Bools:
+    """Whether two segments cross, in the rows asked for; if conservative, also True where floats cannot decide."""
+    boxes = asked
+    for k in range(2):
+        p, q, s, t = (v[..., k] for v in (a, b, c, d))
+        boxes = boxes & (np.minimum(p, q) <= np.maximum(s, t)) & (np.minimum(s, t) <= np.maximum(p, q))
+    crossing = np.zeros(boxes.shape, np.bool_)
+    if not boxes.any():
+        return crossing
+    a, b, c, d = (np.broadcast_to(v, (*boxes.shape, 2))[boxes] for v in (a, b, c, d))
+    sides = orient2d(a, b, c, conservative) * orient2d(a, b, d, conservative)
+    others = orient2d(c, d, a, conservative) * orient2d(c, d, b, conservative)
+    least = 0 if conservative else -1
+    crossing[boxes] = (sides <= least) & (others <= least)
+    return crossing
+
+
+def _numbers(field: str, values: npt.ArrayLike) -> Floats:
+    array = array_of(field, values)
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{field}: expected numbers, got {shown(values)}")
+    return array.astype(np.float64, copy=False)
+
+
+def _columns(field: str, points: npt.ArrayLike, d: int) -> Given:
+    array = _numbers(field, points)
+    if not array.ndim or array.shape[-1] != d:
+        raise InputError(f"{field}: expected {d} coordinates on the last axis, got {array.shape}")
+    return [(field, array[..., k]) for k in range(d)]
+
+
+def _signs(predicate: Predicate, given: Given, conservative: bool) -> Signs:
+    """Signs of the broadcast rows, a chunk at a time in the same memory, and then of the rows in doubt."""
+    quick = flag("conservative", conservative)
+    _refuse_axes(given)
+    work = np.empty((WORK_ROWS, CHUNK_ROWS))
+    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
+    modes: Any = [["readonly"]] * len(given) + [["writeonly", "allocate"]]
+    types: Any = [np.float64] * len(given) + [np.int8]
+    doubts, kept, done = [], [], 0
+    operands = [*(column for _, column in given), None]
+    chunks = np.nditer(operands, flags, modes, types, order="C", buffersize=CHUNK_ROWS)
+    with chunks, np.errstate(all="ignore"):
+        for *rows, signs in chunks:
+            if len(signs) and len(doubt := _chunk(predicate, rows, work[:, : len(signs)], signs)):
+                doubts.append(done + doubt)
+                kept.append([row[doubt] for row in rows])
+            done += len(signs)
+        found = np.asarray(chunks.operands[-1])
+        if doubts:
+            places, hard = np.concatenate(doubts), np.concatenate(kept, axis=1)
+            signs, left = _row_signs(predicate, list(hard))
+            if len(left):
+                hard = hard[:, left]
+                _refuse_infinite([name for name, _ in given], hard, places[left])
+                signs[left] = 0 if quick else _exact(predicate, hard)
+            found.reshape(-1)[places] = signs
+    return found
+
+
+def _refuse_axes(given: Given) -> None:
+    """Refuse columns whose axes do not broadcast; the error names the first that does not fit those before."""
+    shape: tuple[int, ...] = ()
+    for name, column in given:
+        if column.shape != shape:
+            try:
+                shape = np.broadcast_shapes(shape, column.shape)
+            except ValueError:
+                raise InputError(f"{name}: expected axes that broadcast with {shape}, got {column.shape}") from None
+
+
+def _refuse_infinite(names: list[str], columns: Floats, rows: Ints) -> None:
+    bad = np.argwhere(~np.isfinite(columns.T))
+    if len(bad):
+        i, k = bad[0].tolist()
+        raise InputError(f"{names[k]}: expected finite numbers, got {columns[k, i]} in row {rows[i]}")
+
+
+def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs) -> Ints:
+    """Fill in the signs of one chunk, and return the rows that one bound for all leaves in doubt."""
+    value, magnitudes = predicate.value(columns, work)
+    np.subtract((value > 0).view(np.int8), (value < 0).view(np.int8), out=signs)
+    bound = predicate.bound(*(max(m.max(), -m.min() if predicate.signed[i] else 0.0) for i, m in enumerate(magnitudes)))
+    size = np.abs(value, out=value)
+    if size.min() > bound and bound < BOUND_HUGE:
+        return NO_ROWS
+    return np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
+
+
+def _row_signs(predicate: Predicate, columns: list[Floats]) -> tuple[Signs, Ints]:
+    """Signs by a bound for each row, and the rows that are still in doubt."""
+    n = len(columns[0])
+    value, magnitudes = predicate.value(columns, np.empty((WORK_ROWS, n)))
+    bounds = predicate.bound(*(np.abs(m).reshape(-1, n).max(axis=0) for m in magnitudes))
+    size = np.abs(value)
+    return _sign(value), np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
+
+
+def _exact(predicate: Predicate, columns: Floats) -> Signs:
+    """Signs in integers; the lengths of each row are in units of its smallest power of two."""
+    mantissas, exponents = np.frexp(columns)
+    shifts = exponents - exponents.min(axis=0)
+    numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
+    return _sign(predicate.exact(list(numbers)))
+
+
+def _sign(value: Numbers) -> Signs:
+    return np.asarray((value > 0).astype(np.int8) - (value < 0).astype(np.int8))
+
+
+def _orient2d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    ax, ay, bx, by, cx, cy = columns
+    left, right, other = work[0], work[1], work[2]
+    np.multiply(np.subtract(ax, cx, out=left), np.subtract(by, cy, out=other), out=left)
+    np.multiply(np.subtract(ay, cy, out=right), np.subtract(bx, cx, out=other), out=right)
+    return np.subtract(left, right, out=other), (left, right)
+
+
+def _orient2d_bound(left: Any, right: Any) -> Any:
+    return ORIENT2D_ERROR * (left + right) + FLOAT_TINY
+
+
+def _orient2d_exact(columns: list[Numbers]) -> Numbers:
+    ax, ay, bx, by, cx, cy = columns
+    return np.asarray((ax - cx) * (by - cy) - (ay - cy) * (bx - cx))
+
+
+def _orient3d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    a, b, c = work[0:3], work[3:6], work[6:9]
+    for i in range(9):
+        np.subtract(columns[i], columns[9 + i % 3], out=work[i])
+    total, term, other = work[9], work[10], work[11]
+    total.fill(0)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.subtract(np.multiply(b[i], c[j], out=term), np.multiply(b[j], c[i], out=other), out=term)
+        np.add(total, np.multiply(a[k], term, out=term), out=total)
+    return total, (a, b, c)
+
+
+def _orient3d_bound(a: Any, b: Any, c: Any) -> Any:
+    """Bound of six terms, each at most a * b * c, including products that underflow before they are multiplied by a."""
+    return 6 * ORIENT3D_ERROR * a * (b * c + FLOAT_TINY) + FLOAT_TINY
+
+
+def _orient3d_exact(columns: list[Numbers]) -> Numbers:
+    d = columns[9:]
+    a, b, c = ([columns[3 * i + k] - d[k] for k in range(3)] for i in range(3))
+    terms = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    return np.asarray(sum(a[k] * (b[i] * c[j] - b[j] * c[i]) for i, j, k in terms))
+
+
+def _circles_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    *coordinates, r1, r2 = columns
+    d = len(coordinates) // 2
+    total, other = work[0], work[1]
+    np.square(np.subtract(coordinates[0], coordinates[d], out=total), out=total)
+    for k in range(1, d):
+        np.square(np.subtract(coordinates[k], coordinates[d + k], out=other), out=other)
+        np.add(total, other, out=total)
+    np.square(np.add(r1, r2, out=other), out=other)
+    return np.subtract(total, other, out=total), (other, total)
+
+
+def _circles_bound(radius2: Any, value: Any) -> Any:
+    """Bound of 9 roundings: where the sign is in doubt both squares are about equal. NaN for an infinite value."""
+    return 10 * ROUNDING * radius2 + FLOAT_TINY + 0 * value
+
+
+def _circles_exact(columns: list[Numbers]) -> Numbers:
+    *coordinates, r1, r2 = columns
+    d = len(coordinates) // 2
+    return np.asarray(sum((coordinates[k] - coordinates[d + k]) ** 2 for k in range(d)) - (r1 + r2) ** 2)
+
+
+def _point_segment_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    px, py, ax, ay, bx, by, r1, r2 = columns
+    f, d, (length2, radius, value, other) = work[0:2], work[2:4], work[4:8]
+    _way(ax, ay, px, py, f)
+    _squared(_way(ax, ay, bx, by, d), length2, other)
+    _distance2(f, d, length2, value, work[8:10])
+    np.square(np.add(r1, r2, out=radius), out=other)
+    return np.subtract(value, other, out=value), (f, radius, length2)
+
+
+def _ends_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+    """Least of the four distances from the ends of two segments to the other segment."""
+    ax, ay, bx, by, cx, cy, dx, dy, r1, r2 = columns
+    f, ab, cd, lengths2, (value, least, radius, other) = work[0:8], work[8:10], work[10:12], work[12:14], work[14:18]
+    _squared(_way(ax, ay, bx, by, ab), lengths2[0], other)
+    _squared(_way(cx, cy, dx, dy, cd), lengths2[1], other)
+    least.fill(np.inf)
+    for k, (px, py, qx, qy) in enumerate(((ax, ay, cx, cy), (ax, ay, dx, dy), (cx, cy, ax, ay), (cx, cy, bx, by))):
+        way = _way(px, py, qx, qy, f[2 * k : 2 * k + 2])
+        _distance2(way, ab if k < 2 else cd, lengths2[k // 2], value, work[18:20])
+        np.minimum(least, value, out=least)
+    np.square(np.add(r1, r2, out=radius), out=other)
+    return np.subtract(least, other, out=value), (f, radius, lengths2)
+
+
+def _way(ax: Floats, ay: Floats, bx: Floats, by: Floats, out: Floats) -> Floats:
+    np.subtract(bx, ax, out=out[0])
+    np.subtract(by, ay, out=out[1])
+    return out
+
+
+def _squared(d: Floats, out: Floats, other: Floats) -> None:
+    np.add(np.square(d[0], out=out), np.square(d[1], out=other), out=out)
+
+
+def _distance2(f: Floats, d: Floats, length2: Floats, out: Floats, work: Floats) -> None:
+    """Squared distance of a point to a segment; f leads from its start to the point, d from its start to its end."""
+    share, other = work
+    np.add(np.multiply(f[0], d[0], out=share), np.multiply(f[1], d[1], out=other), out=share)
+    np.divide(share, np.maximum(length2, FLOAT_TINY, out=other), out=share)
+    np.minimum(np.maximum(share, 0, out=share), 1, out=share)
+    np.square(np.subtract(f[0], np.multiply(share, d[0], out=out), out=out), out=out)
+    np.square(np.subtract(f[1], np.multiply(share, d[1], out=other), out=other), out=other)
+    np.add(out, other, out=out)
+
+
+def _point_segment_bound(f: Any, radius: Any, length2: Any) -> Any:
+    """Bound of a distance that errs by at most e: 14 roundings of |f|, which is at least its part along the segment.
+
+    A length whose square underflows is below LENGTH_TINY; one whose square is huge is left to integers.
+    """
+    e = 32 * ROUNDING * f + LENGTH_TINY
+    bound = e * (2 * radius + e) + 10 * ROUNDING * radius * radius
+    return np.where(length2 < FLOAT_HUGE, bound, np.inf)
+
+
+def _point_segment_exact(columns: list[Numbers]) -> Numbers:
+    px, py, ax, ay, bx, by, r1, r2 = columns
+    fx, fy, dx, dy = px - ax, py - ay, bx - ax, by - ay
+    share, length2, radius2 = fx * dx + fy * dy, dx * dx + dy * dy, (r1 + r2) ** 2
+    at_a = fx * fx + fy * fy - radius2
+    at_b = (px - bx) ** 2 + (py - by) ** 2 - radius2
+    between = (fx * dy - fy * dx) ** 2 - radius2 * length2
+    return np.asarray(np.where(share <= 0, at_a, np.where(share >= length2, at_b, between)))
+
+
+def _ends_exact(columns: list[Numbers]) -> Numbers:
+    """Least of four signs; the values have different degrees and cannot be compared."""
+    a, b, c, d = (columns[2 * k : 2 * k + 2] for k in range(4))
+    rows = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
+    values = [_point_segment_exact([*p, *q, *s, *columns[8:]]) for p, q, s in rows]
+    return np.asarray(np.minimum.reduce([_sign(v) for v in values]))
+
+
+_ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact, (True, True))
+_ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact, (True, True, True))
+_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact, (False, False))
+_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact, (True, True, False))
+_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact, (True, True, False))

@@ -1,0 +1,539 @@
+"""Polygons: exact convex hulls, convex parts of simple polygons, hulls of pixels, and the shortest way out of a union.
+
+Outlines and rings turn from +x toward +y. Points of hulls of pixels are in half pixels: the corners of pixel (x, y) are
+(2x +- 1, 2y +- 1). A line (a, b, c) bounds the half-plane a x + b y <= c.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import product
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import Bools, Floats, InputError, Ints
+from ..grid.spans import ragged
+from .exact import orient2d
+
+Numbers = npt.NDArray[Any]
+Corner = tuple[float, float]
+Whole = tuple[int, int]
+
+
+def rows_of(starts: Ints, total: int) -> tuple[Ints, Ints]:
+    """Length of each ragged row (N,), and row of each point (total,)."""
+    counts = np.diff(np.append(starts, total))
+    return counts, np.repeat(np.arange(len(starts)), counts)
+
+
+def starts_of(lengths: Ints | list[int]) -> Ints:
+    """Index of the first element of each ragged row, given the lengths."""
+    counts = np.asarray(lengths, np.int64)
+    return np.asarray(np.cumsum(counts) - counts)
+
+
+def neighbours(starts: Ints, total: int) -> tuple[Ints, Ints]:
+    """Indices of the points before and after each point (total,), around its ragged row."""
+    counts, row = rows_of(starts, total)
+    first, last = starts[row], (starts + counts - 1)[row]
+    place = np.arange(total)
+    return np.where(place == first, last, place - 1), np.where(place == last, first, place + 1)
+
+
+def rows_taken(values: Numbers, starts: Ints, rows: Ints) -> tuple[Numbers, Ints]:
+    """Selected ragged rows of values, and their starts."""
+    counts = rows_of(starts, len(values))[0][rows]
+    row, place = ragged(counts)
+    return values[starts[rows][row] + place], starts_of(counts)
+
+
+def convex_rows(points: Floats, starts: Ints) -> Ints:
+    """Turning sense of outlines of three points or more: 1 or -1 if convex, 0 if not convex or without area.
+
+    An outline is convex if all turns have one sense, and its edges change only once from rightward to leftward: a star
+    that winds twice changes twice. Points on an edge are allowed; equal neighbours must have been removed.
+    """
+    if not len(starts):
+        return np.zeros(0, np.int64)
+    _, after = neighbours(starts, len(points))
+    turns = orient2d(points, points[after], points[after[after]]).astype(np.int64)
+    rightward = points[after, 0] > points[:, 0]
+    changes = np.add.reduceat((rightward != rightward[after]).astype(np.int64), starts)
+    low, high = np.minimum.reduceat(turns, starts), np.maximum.reduceat(turns, starts)
+    return np.where(changes == 2, low + high, 0).clip(-1, 1)
+
+
+def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
+    """Hulls of ragged rows; rows that are convex are only brought to one turning sense.
+
+    Returns
+    -------
+    points, starts : the outlines; rows without area have one or two points
+    """
+    if not len(starts):
+        return points, starts
+    sense = _checked_sense(points, starts)
+    counts, row = rows_of(starts, len(points))
+    place = np.arange(len(points)) - starts[row]
+    points = points[np.where(sense[row] < 0, starts[row] + counts[row] - 1 - place, np.arange(len(points)))]
+    if sense.all():
+        return points, starts
+    parts = np.split(points, starts[1:])
+    for i in np.flatnonzero(sense == 0).tolist():
+        parts[i] = np.array(hull([(x, y) for x, y in parts[i].tolist()]))
+    return np.concatenate(parts), starts_of([len(part) for part in parts])
+
+
+def _checked_sense(points: Floats, starts: Ints) -> Ints:
+    """Turning sense of convex rows; also 0 for rows with equal neighbours, which would hide turns."""
+    _, after = neighbours(starts, len(points))
+    same: Bools = (points == points[after]).all(axis=1)
+    return np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
+
+
+def hull(points: list[Corner]) -> list[Corner]:
+    """Convex hull without points on its edges; one or two points if it has no area.
+
+    References
+    ----------
+    Andrew, *Another efficient algorithm for convex hulls in two dimensions* (1979).
+    """
+    distinct = sorted(set(points))
+    if len(distinct) < 3:
+        return distinct
+    whole = _whole(distinct)
+    given = dict(zip(whole, distinct, strict=True))
+    return [given[p] for run in (whole, whole[::-1]) for p in chain(run)[:-1]]
+
+
+def chain(points: list[Whole]) -> list[Whole]:
+    """Corners of one side of the hull of sorted points: Andrew's monotone chain."""
+    kept: list[Whole] = []
+    for point in points:
+        while len(kept) > 1 and turn(kept[-2], kept[-1], point) <= 0:
+            kept.pop()
+        kept.append(point)
+    return kept
+
+
+def convex_parts(points: list[Corner]) -> list[list[int]]:
+    """Cut a simple polygon into convex parts, as indices of its points; points on edges are allowed.
+
+    It is cut into triangles, and then diagonals that no part needs to be convex are removed. This gives at most four
+    times the least number of parts.
+
+    Raises
+    ------
+    InputError
+        If the polygon crosses or touches itself, or has no area.
+
+    References
+    ----------
+    Meisters, *Polygons have ears* (1975); Hertel and Mehlhorn, *Fast triangulation of simple polygons* (1983).
+    """
+    whole = _whole(points)
+    _refuse_crossing(whole)
+    parts = dict(enumerate(_triangles(whole)))
+    owner = {edge: i for i, part in parts.items() for edge in _edges(part)}
+    for u, v in list(owner):
+        i, j = owner[u, v], owner.get((v, u))
+        if j is None or j == i:
+            continue
+        merged = _merged(parts[i], parts[j], u, v, whole)
+        if merged:
+            parts[i] = merged
+            owner |= dict.fromkeys(_edges(parts.pop(j)), i)
+    return [_without_straight(part, whole) for part in parts.values()]
+
+
+def _edges(part: list[int]) -> list[tuple[int, int]]:
+    return list(zip(part, part[1:] + part[:1], strict=True))
+
+
+def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> list[int]:
+    """Join two parts at their common edge, uv in a and vu in b; empty if the result is not convex."""
+    k, m = a.index(v), b.index(u)
+    a, b = a[k:] + a[:k], b[m:] + b[:m]  # from v to u, and from u to v
+    for before, corner, after in ((a[-2], u, b[1]), (b[-2], v, a[1])):
+        if turn(whole[before], whole[corner], whole[after]) < 0:
+            return []
+    return a + b[1:-1]
+
+
+def _triangles(whole: list[Whole]) -> list[list[int]]:
+    n = len(whole)
+    twice_area = sum(whole[i - 1][0] * whole[i][1] - whole[i][0] * whole[i - 1][1] for i in range(n))
+    left = list(range(n)) if twice_area > 0 else list(range(n))[::-1]
+    found = []
+    while left := _without_straight(left, whole):
+        k = next(k for k in range(len(left)) if _is_ear(left, k, whole))
+        found.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        del left[k]
+    return found
+
+
+def _without_straight(left: list[int], whole: list[Whole]) -> list[int]:
+    """Remove points on edges; this turns no other corner."""
+    after = left[1:] + left[:1]
+    return [k for i, k in enumerate(left) if turn(whole[left[i - 1]], whole[k], whole[after[i]]) != 0]
+
+
+def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
+    """Whether a corner turns inward and no other point lies in its closed triangle."""
+    corner = (left[k - 1], left[k], left[(k + 1) % len(left)])
+    a, b, c = (whole[i] for i in corner)
+    if turn(a, b, c) <= 0:
+        return False
+    others = (whole[i] for i in left if i not in corner)
+    return not any(turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in others)
+
+
+def _refuse_crossing(whole: list[Whole]) -> None:
+    """Refuse a polygon in which edges touch, except neighbours in one point."""
+    n = len(whole)
+    if n < 3:
+        raise InputError(f"points: expected three or more, got {n}")
+    edges = [(whole[i], whole[(i + 1) % n]) for i in range(n)]
+    for i in range(n):
+        for j in range(i + 1, n):
+            (a, b), (c, d) = edges[i], edges[j]
+            if j == i + 1 or (i == 0 and j == n - 1):
+                p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
+                bad = turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
+            else:
+                bad = _meet(a, b, c, d)
+            if bad:
+                raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
+
+
+def _meet(a: Whole, b: Whole, c: Whole, d: Whole) -> bool:
+    turns = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
+    if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
+        return True
+    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+    return any(turn == 0 and _within(*end) for turn, end in zip(turns, ends, strict=True))
+
+
+def _within(a: Whole, b: Whole, p: Whole) -> bool:
+    """Whether a point on the line through a and b lies between them."""
+    return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in range(2))
+
+
+def turn(a: Whole, b: Whole, c: Whole) -> int:
+    """Twice the signed area of a triangle; positive if it turns from +x towards +y."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _whole(points: list[Corner]) -> list[Whole]:
+    """Points as integers in units of their smallest power of two."""
+    ratios = [(x.as_integer_ratio(), y.as_integer_ratio()) for x, y in points]
+    unit = max((max(x[1], y[1]) for x, y in ratios), default=1)
+    return [(x[0] * (unit // x[1]), y[0] * (unit // y[1])) for x, y in ratios]
+
+
+Point = tuple[int, int]
+Line = tuple[int, int, int]
+Extents = tuple[Ints, Ints, Ints]
+"""Rows with pixels, rising, and the first and last column of each."""
+
+
+def extents(mask: Bools) -> Extents:
+    """Rows of a mask with pixels, and the first and last column of each."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    filled = mask if len(rows) == len(mask) else mask[rows]
+    return rows, filled.argmax(axis=1), mask.shape[1] - 1 - filled[:, ::-1].argmax(axis=1)
+
+
+def hull_points(extents: Extents) -> list[Point]:
+    """Corners of the hull of pixel squares, given by rows and their ends; no three are on one line.
+
+    Only the ends of rows can be corners, so the monotone chain takes O(rows).
+
+    References
+    ----------
+    Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979).
+    """
+    rows, first, last = extents
+    place = rows - rows[0]
+    left = np.full(int(place[-1]) + 2, last.max() + 1)
+    right = np.full(len(left), first.min() - 1)
+    left[place], right[place] = first, last
+    left[place + 1] = np.minimum(left[place + 1], first)
+    right[place + 1] = np.maximum(right[place + 1], last)
+    borders = np.flatnonzero(left <= right)
+    y = 2 * (borders + rows[0]) - 1
+    down = zip((2 * right[borders] + 1).tolist(), y.tolist(), strict=True)
+    up = zip((2 * left[borders] - 1)[::-1].tolist(), y[::-1].tolist(), strict=True)
+    return chain(list(down)) + chain(list(up))
+
+
+def edge_lines(ring: list[Point]) -> list[Line]:
+    """Lines of the edges of a ring, with its inside on the <= side; edge i begins at point i."""
+    lines = []
+    for (x, y), (x_next, y_next) in zip(ring, ring[1:] + ring[:1], strict=True):
+        a, b = y_next - y, x - x_next
+        lines.append((a, b, a * x + b * y))
+    return lines
+
+
+def _cross(one: Line, other: Line) -> int:
+    return one[0] * other[1] - one[1] * other[0]
+
+
+def fewer_lines(lines: list[Line], n: int) -> list[Line]:
+    """Remove edges of a convex polygon until n >= 4 are left, each time the edge whose removal adds the least area.
+
+    Four edges can always be reached: of five outer angles, two neighbours always sum to less than half a turn.
+    """
+    lines = list(lines)
+    costs = [_added(lines, i) for i in range(len(lines))]
+    while len(lines) > n:
+        i = costs.index(min(costs))
+        del lines[i], costs[i]
+        for near in (i - 1, i % len(lines)):
+            costs[near] = _added(lines, near)
+    return lines
+
+
+def _added(lines: list[Line], i: int) -> float:
+    """Area of the triangle that removing line i adds, in square half pixels; infinite if its neighbours do not meet."""
+    before, line, after = lines[i - 1], lines[i], lines[(i + 1) % len(lines)]
+    if _cross(before, after) <= 0:
+        return math.inf
+    whole = before[2] * _cross(line, after) - line[2] * _cross(before, after) + after[2] * _cross(before, line)
+    return whole * whole / (2 * _cross(before, line) * _cross(line, after) * _cross(before, after))
+
+
+def outward_corners(lines: list[Line]) -> Floats:
+    """Corners (n, 2) in px of a convex polygon of lines, stored so that their hull contains it.
+
+    Corners that float64 holds exactly are kept. Otherwise the lines move out by one unit in the last place of the
+    largest coordinate; rounding takes back at most half a unit on each axis, 0.71 of a unit along any normal.
+    """
+    pairs = list(zip(lines[-1:] + lines[:-1], lines, strict=True))
+    exact = [_crossing(one, other) for one, other in pairs]
+    corners = [(x / (2 * d), y / (2 * d)) for x, y, d in exact]
+    if all(_is(u, x, 2 * d) and _is(v, y, 2 * d) for (u, v), (x, y, d) in zip(corners, exact, strict=True)):
+        return np.array(corners)
+    bits = 1 - math.frexp(math.ulp(2 * max(map(abs, itertools.chain(*corners)))))[1]
+    moved = [(a, b, (c << bits) + 2 * (math.isqrt(a * a + b * b) + 1)) for a, b, c in lines]
+    met = [_crossing(one, other) for one, other in zip(moved[-1:] + moved[:-1], moved, strict=True)]
+    return np.array([(x / (d << bits + 1), y / (d << bits + 1)) for x, y, d in met])
+
+
+def _crossing(one: Line, other: Line) -> tuple[int, int, int]:
+    """Point where two lines meet; (x, y, d) stands for (x / d, y / d)."""
+    (a, b, c), (p, q, r) = one, other
+    return c * q - r * b, a * r - p * c, a * q - p * b
+
+
+def _is(value: float, numerator: int, denominator: int) -> bool:
+    top, bottom = value.as_integer_ratio()
+    return top * denominator == numerator * bottom
+
+
+EDGES = 6
+"""Most edges of a polygon of a union: those of a square swept along a segment."""
+
+GAP = 2.0**-30
+"""Widest gap between two shapes that is ignored, px; floats resolve wider ones for segments of up to 2**20 px."""
+
+PARALLEL = 2.0**-40
+"""Largest sine of the angle between edges that count as parallel: they cross beyond any shift of interest."""
+
+CUSP = 2.0**-12
+"""Distance that is looked along two boundaries that touch from outside at an angle of at most this, px."""
+
+TOUCHING = 1 + 2.0**-40
+"""Largest ratio of two distances that count as equal."""
+
+FEW = 24
+"""Most edges in a square of shifts of which all pairs are tried."""
+
+SMALL = 2.0**-10
+"""Half the side of a square of shifts that is not cut further, px."""
+
+AT_A_TIME = 2**19
+"""Comparisons, or pairs of boundaries, worked on at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexUnion:
+    """A union of closed convex polygons and of discs.
+
+    Parameters
+    ----------
+    normal, offset : (P, EDGES, 2) and (P, EDGES); polygon p is the points s with normal . s <= offset for all edges.
+        Normals have length 1; an offset of inf stands for no edge
+    centre, radius : (D, 2) centres and common radius of the discs
+    """
+
+    normal: Floats
+    offset: Floats
+    centre: Floats
+    radius: float
+
+    def around(self, middle: Floats, half: float) -> ConvexUnion | None:
+        """The shapes that may touch a square with a small margin; None if one of them contains it."""
+        reach = half + 2 * CUSP
+        wide = np.abs(self.normal).sum(axis=2) * reach
+        at = self.normal[..., 0] * middle[0] + self.normal[..., 1] * middle[1] - self.offset
+        x, y = np.abs(self.centre - middle).T
+        far2, near2 = (np.maximum(x + k, 0) ** 2 + np.maximum(y + k, 0) ** 2 for k in (reach, -reach))
+        if (at + wide <= 0).all(axis=1).any() or (far2 <= self.radius**2).any():
+            return None
+        met = (at - wide <= 0).all(axis=1)
+        return ConvexUnion(self.normal[met], self.offset[met], self.centre[near2 <= self.radius**2], self.radius)
+
+    def boundaries(self, middle: Floats, half: float) -> tuple[Floats, Floats]:
+        """Boundaries that pass through a square: edges (n, 3) as normal and offset, and centres of circles (m, 2)."""
+        normal, offset = self.normal.reshape(-1, 2), self.offset.ravel()
+        passes = np.abs(normal[:, 0] * middle[0] + normal[:, 1] * middle[1] - offset) <= np.abs(normal).sum(axis=1) * (
+            half + GAP
+        )
+        apart = np.sqrt(((self.centre - middle) ** 2).sum(axis=1))
+        lines = np.concatenate([normal[passes], offset[passes, None]], axis=1)
+        return np.unique(lines, axis=0), self.centre[np.abs(apart - self.radius) <= 2 * (half + GAP)]
+
+    def lacks(self, s: Floats) -> Bools:
+        """Whether points (n, 2) lie in none of the shapes."""
+        out = np.ones(len(s), np.bool_)
+        step = max(1, AT_A_TIME // (EDGES * len(self.offset) + 2 * len(self.centre) + 1))
+        for first in range(0, len(s), step):
+            x, y = s[first : first + step].T[:, :, None]
+            beyond = np.zeros((len(x), len(self.offset)), np.bool_)
+            for edge in range(EDGES):
+                beyond |= self.normal[:, edge, 0] * x + self.normal[:, edge, 1] * y > self.offset[:, edge]
+            apart = (x - self.centre[:, 0]) ** 2 + (y - self.centre[:, 1]) ** 2 > self.radius**2
+            out[first : first + step] = beyond.all(axis=1) & apart.all(axis=1)
+        return out
+
+
+def escape_distance(union: ConvexUnion, most: float) -> tuple[float, float] | None:
+    """Find the shortest shift, up to `most` px, to a point on the edge of a union with free space just beyond it.
+
+    Of equal shifts the first by (y, x) is returned. The candidates are the nearest points of edges and arcs, and the
+    points where two of these cross. Squares of shifts are searched from the nearest on: a square inside a single shape
+    has no way out, and one with many edges is cut into four.
+    """
+    best: tuple[float, float] | None = None
+    squares = [(0.0, 0.0, 0.0, most, union)]
+    while squares:
+        near, y, x, half, shapes = heappop(squares)
+        if near > (most if best is None else _length(best)):
+            break
+        here = np.array([x, y])
+        local = shapes.around(here, half)
+        if local is None:
+            continue
+        lines, circles = local.boundaries(here, half)
+        if len(lines) + len(circles) > FEW and half > SMALL:
+            half /= 2
+            for j, i in product((y - half, y + half), (x - half, x + half)):
+                least = max(abs(i) - half, 0.0), max(abs(j) - half, 0.0)
+                heappush(squares, (_length(least), j, i, half, local))
+            continue
+        for at, outward in (_feet(lines, circles, union.radius), *_crossings(lines, circles, union.radius)):
+            inside = (np.abs(at - here) <= half + GAP).all(axis=1)
+            best = _first_out(local, at[inside], outward[inside], best, most)
+    return best
+
+
+def _length(s: tuple[float, float]) -> float:
+    return float(np.sqrt(s[0] ** 2 + s[1] ** 2))
+
+
+def _first_out(
+    union: ConvexUnion, at: Floats, outward: Floats, best: tuple[float, float] | None, most: float
+) -> tuple[float, float] | None:
+    """The first by (length, y, x) of the best so far and the points with free space just beyond them."""
+    length = np.sqrt((at**2).sum(axis=1))
+    near = np.flatnonzero(length <= (most if best is None else _length(best)))
+    near = near[np.lexsort((at[near, 0], at[near, 1], length[near]))]
+    step = 64
+    while len(near):
+        rows, near = near[:step], near[step:]
+        free = rows[union.lacks(at[rows] + GAP * outward[rows])]
+        if len(free):
+            found = float(at[free[0], 0]) + 0.0, float(at[free[0], 1]) + 0.0
+            order = [(_length(s), s[1], s[0], s) for s in (found, best) if s is not None]
+            return min(order)[3]
+        step *= 2
+    return best
+
+
+def _feet(lines: Floats, circles: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Nearest points of boundaries to 0, and the directions out of their shapes."""
+    foot = lines[:, :2] * lines[:, 2:]
+    apart = np.sqrt((circles**2).sum(axis=1))
+    off_centre = apart > 0
+    ways = [-circles[off_centre] / apart[off_centre, None]]
+    middles = [circles[off_centre]]
+    if not off_centre.all():  # 0 is a centre: all directions are equally short
+        ways.append(np.array([[0.0, -1.0], [-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        middles.append(np.zeros((4, 2)))
+    way, middle = np.concatenate(ways), np.concatenate(middles)
+    return np.concatenate([foot, middle + radius * way]), np.concatenate([lines[:, :2], way])
+
+
+def _crossings(lines: Floats, circles: Floats, radius: float) -> Iterator[tuple[Floats, Floats]]:
+    """Points where two boundaries cross, and the mean of the directions out of both shapes."""
+    step = max(1, AT_A_TIME // (4 * max(len(lines) + len(circles), 1)))
+    for first in range(0, len(lines), step):
+        yield _line_line(lines[first : first + step], lines)
+        if len(circles):
+            yield _line_circle(lines[first : first + step], circles, radius)
+    for first in range(0, len(circles), step):
+        yield _circle_circle(circles[first : first + step], circles, radius)
+
+
+def _line_line(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    first, second = (index.ravel() for index in np.indices((len(a), len(b))))
+    det = a[first, 0] * b[second, 1] - a[first, 1] * b[second, 0]
+    mask = np.abs(det) > PARALLEL
+    one, other, det = a[first[mask]], b[second[mask]], det[mask]
+    x = (one[:, 2] * other[:, 1] - other[:, 2] * one[:, 1]) / det
+    y = (one[:, 0] * other[:, 2] - other[:, 0] * one[:, 2]) / det
+    return np.stack([x, y], axis=1), _unit(one[:, :2] + other[:, :2])
+
+
+def _line_circle(lines: Floats, circles: Floats, radius: float) -> tuple[Floats, Floats]:
+    line, circle = (index.ravel() for index in np.indices((len(lines), len(circles))))
+    normal, middle = lines[line, :2], circles[circle]
+    across = lines[line, 2] - (normal * middle).sum(axis=1)
+    mask = np.abs(across) <= radius * TOUCHING
+    normal, middle, across = normal[mask], middle[mask], across[mask, None]
+    return _both_sides(middle + normal * across, normal, np.sqrt(np.maximum(radius**2 - across**2, 0)), middle, None)
+
+
+def _circle_circle(a: Floats, b: Floats, radius: float) -> tuple[Floats, Floats]:
+    first, second = (index.ravel() for index in np.indices((len(a), len(b))))
+    apart2 = ((b[second] - a[first]) ** 2).sum(axis=1)
+    mask = (apart2 > 0) & (apart2 <= 4 * radius**2 * TOUCHING)
+    one, other, apart2 = a[first[mask]], b[second[mask]], apart2[mask, None]
+    along = (other - one) / np.sqrt(apart2)
+    return _both_sides((one + other) / 2, along, np.sqrt(np.maximum(radius**2 - apart2 / 4, 0)), one, other)
+
+
+def _both_sides(
+    foot: Floats, along: Floats, aside: Floats, middle: Floats, other: Floats | None
+) -> tuple[Floats, Floats]:
+    """Points of a circle on both sides of a foot, across a direction, and the directions out of both boundaries."""
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    at = np.concatenate([foot + across * aside, foot - across * aside])
+    second = np.tile(along, (2, 1)) if other is None else _unit(at - np.tile(other, (2, 1)))
+    between = _unit(at - np.tile(middle, (2, 1))) + second
+    cusp = (between**2).sum(axis=1) < CUSP**2
+    outward = np.where(cusp[:, None], np.concatenate([across, -across]) * (CUSP / GAP), _unit(between))
+    return at, outward
+
+
+def _unit(ways: Floats) -> Floats:
+    length = np.sqrt((ways**2).sum(axis=1, keepdims=True))
+    return np.asarray(ways / np.where(length > 0, length, 1))

@@ -1,0 +1,550 @@
+"""The command `hitplanes`. Each subcommand is a function that parses, calls the library and prints."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NoReturn, TextIO
+
+from hitplanes.planes.common.checks import InputError, integer, printable, real, within
+from hitplanes.planes.common.limits import SEED_MAX
+from hitplanes.planes.files.png import check_output, write_png, write_text
+from hitplanes.planes.files.scene_folder import FILE_NAME, load_scene, scene_folder
+from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.hits import Hits
+from ..fire.plan import PlanSum, plan_lines
+from ..kinds.areas import arsenal_of
+from ..replay.shot_log import ShotRequest, fire_order, order_from_json, orders_of
+from ..replay.stream import Progress, fire_log
+from ..report.differences import differences
+from ..report.picture import picture_of_difference, picture_of_report
+from ..report.report import report_of
+from .schemas import read_report
+from .starter import write_starter
+
+DESCRIPTION = "Find out what a shot hits in a 2-D scene, pixel by pixel and exactly, and see why."
+
+REPORT_HELP = """\
+Fire shots at a scene and draw a picture that shows what was hit and why. --json writes the same facts as JSON.
+By default the shots in scene.json are fired. With --weapon and --at, one shot of your own is fired instead.
+"""
+
+REPORT_EXAMPLES = """\
+examples:
+  hitplanes report fixtures/gallery
+  hitplanes report fixtures/gallery -o report.png --json report.json
+  hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
+  hitplanes report fixtures/gallery --weapon beam --at 100,167 --aim -4.5
+"""
+
+FIRE_HELP = """\
+Fire a log of shots of any length, in little memory. Each line of the log gives one line of hits, in the same order.
+
+A line of SHOTS.jsonl is a shot as in scene.json: {"weapon": "point", "at": [62, 86]}, and aim or toward, accept,
+exclude, seed. Shots are numbered by their line, from 0, unless they have "shot". Empty lines are refused.
+
+The first line of HITS.jsonl names the scene, the weapons, the columns of a row and the objects by id. Each line after
+it answers one shot: {"shot": 0, "of": CRC-32 of its line in the log, "rows": [[object, ...], ...],
+"verdicts": [empty, hit, ...], "crc": CRC-32 of all bytes of HITS.jsonl before it}.
+
+Answers are written to HITS.jsonl.part, which is renamed when it is complete. If a run stops early (an interrupt, a full
+disk, a bad line that you then correct), run the same command again: it continues after the last intact answer.
+"""
+
+FIRE_EXAMPLES = """\
+examples:
+  hitplanes fire fixtures/gallery shots.jsonl -o hits.jsonl
+  zcat shots.jsonl.gz | hitplanes fire fixtures/gallery /dev/stdin -o hits.jsonl
+  hitplanes fire fixtures/gallery shots.jsonl --plan
+"""
+
+NEW_HELP = """\
+Write a small example scene: scene.json and the images that it names. FOLDER must be new or empty.
+"""
+
+NEW_EXAMPLES = """\
+examples:
+  hitplanes new range
+  hitplanes report range
+"""
+
+COMPARE_HELP = """\
+Print the differences between two reports. With -o, also draw the reports side by side, with what was hit in the first
+only, in the second only, and in both. Versions and plans are not compared.
+
+Exit code: 0 no difference, 1 a difference, 2 bad input.
+"""
+
+DEMO_HELP = """\
+Animate a broad phase. Objects move, its cells split and merge, and a query first finds the cells that it touches, then
+tests the objects in them. The number of tests is shown beside that of brute force.
+"""
+
+DEMO_EXAMPLES = """\
+examples:
+  hitplanes demo quadtree
+  hitplanes demo grid -o grid.gif
+  hitplanes demo bvh -o frames
+"""
+
+STABILITY_HELP = """\
+Count wrong decisions on geometry that is hard to decide: almost touching, far away, thin, tied, tiny and huge shapes.
+Compared are hitplanes, textbook formulas in float64, and those of shapely, pymunk and pygame-ce that are installed.
+Exact rational arithmetic gives the right answers.
+
+Writes stability.json, stability.md and, if matplotlib is installed, stability.png. An interrupted run writes what it
+has counted.
+
+Exit code: 0 hitplanes made no wrong decision, 1 it made one, 2 bad input.
+"""
+
+STABILITY_EXAMPLES = """\
+examples:
+  hitplanes stability --quick
+  hitplanes stability -o stability/ --seed 7
+"""
+
+REPLAY_HELP = """\
+Fire the shots of a record again and print how the first different result differs. A game writes a record by firing
+with hitplanes.ShotRecord.
+
+If a line of the record was changed, lost, doubled or moved, the record is bad input, and the error names the line. If a
+record was not closed (the game crashed), its shots are fired, and a note says that some may be missing.
+
+Exit code: 0 all results are the same, 1 one differs, 2 bad input.
+"""
+
+REPLAY_EXAMPLES = """\
+examples:
+  hitplanes replay fixtures/gallery match.jsonl
+"""
+
+STUDY_HELP = """\
+Measure the error and the run time of every method, and name the fastest that is accurate enough. The methods are pixel
+planes at several scales, volumes, pre-filters, broad phases, sampled rays, fast movers in substeps, spread by pellets,
+and those of pymunk, pygame and shapely that are installed. They are tested on the hittable objects of SCENE, by default
+on one shape of each kind.
+
+Writes study.json, study.csv, study.md and a diagram for each question (needs pip install 'hitplanes[study]').
+An interrupted run writes what it has measured.
+"""
+
+STUDY_EXAMPLES = """\
+examples:
+  hitplanes study --quick
+  hitplanes study fixtures/gallery -o study --error 0.05
+"""
+
+COMPARE_EXAMPLES = """\
+examples:
+  hitplanes report fixtures/gallery --json before.json
+  hitplanes compare before.json after.json
+  hitplanes compare before.json after.json -o diff.png --scene fixtures/gallery
+  hitplanes compare before.json after.json -o diff.png --scene level/old --scene level/new
+"""
+
+
+NAMED = 8
+"""Most objects that a line of output names."""
+
+USAGE_MAX = 300
+"""Longest usage error, characters."""
+
+SHOWN = ("quadtree", "grid", "bvh")
+"""Structures that the demo can show."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; exit codes: 0 done, 1 something differs or is wrong, 2 bad input, 130 interrupted."""
+    open_streams()
+    try:
+        try:
+            return _ran(argv)
+        finally:
+            _flush()
+    except InputError as error:
+        _complain(" ".join(str(error).split()))
+        return 2
+    except OSError as error:  # the system's: the library reports those of its arguments as InputError
+        _complain(f"{error.filename or 'system'}: {error.strerror or error}")
+        return 2
+    except KeyboardInterrupt as interrupt:
+        _complain(": ".join(["interrupted", *map(str, interrupt.args)]))
+        return 130
+    finally:
+        _let_go(sys.stderr)
+
+
+def _ran(argv: Sequence[str] | None) -> int:
+    arguments = parser().parse_args(argv)
+    return arguments.run(arguments) or 0
+
+
+def open_streams() -> None:
+    """Open stdout and stderr if they were closed, or the next file that is opened would take their number."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_WRONLY)
+            if null > number and not _is_open(number):
+                os.dup2(null, number)
+            setattr(sys, name, os.fdopen(null, "w", encoding="utf-8", closefd=False))
+
+
+def _is_open(number: int) -> bool:
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
+
+
+def _flush() -> None:
+    """Flush stdout."""
+    with _printing():
+        sys.stdout.flush()
+
+
+@contextmanager
+def _printing() -> Iterator[None]:
+    """Report errors of stdout; a closed pipe is no error, as its reader wants no more."""
+    try:
+        yield
+    except BrokenPipeError:
+        _let_go(sys.stdout)
+    except OSError as error:
+        _let_go(sys.stdout)
+        raise InputError(f"output: cannot write what is printed: {error.strerror}") from error
+
+
+def _let_go(stream: TextIO) -> None:
+    """Send a stream that cannot be written to the null device, or Python would try again at exit."""
+    try:
+        stream.flush()
+    except OSError:
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)
+
+
+def _complain(message: str) -> None:
+    """Print an error as one line; a stderr that cannot be written is ignored."""
+    with suppress(OSError):
+        print(f"hitplanes: {printable(message)}", file=sys.stderr)
+
+
+def _say(line: str) -> None:
+    """Print a line, with escapes for control characters and those that the terminal cannot show."""
+    encoding = sys.stdout.encoding or "utf-8"
+    with _printing():
+        print(printable(line).encode(encoding, "backslashreplace").decode(encoding))
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser that prints errors as one line, like all errors of the command."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print what is wrong with the arguments, and exit with 2."""
+        if message.endswith("expected one argument"):
+            message += "; one that begins with a minus is written --at=-5,3"
+        text = printable(" ".join(message.split()))
+        text = text if len(text) <= USAGE_MAX else text[:USAGE_MAX] + "..."
+        self.exit(2, f"hitplanes: {text} (see {self.prog} --help)\n")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help, and report errors of stdout, which argparse would ignore."""
+        if file is not sys.stdout:
+            super()._print_message(message, file)
+            return
+        with _printing():
+            file.write(message)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command and of its subcommands."""
+    top = OneLineParser(prog="hitplanes", description=DESCRIPTION)
+    top.add_argument("--version", action="version", version=f"hitplanes {version('hitplanes')}")
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+
+    _add_report(commands)
+    sub = _command(commands, fire, "fire a log of shots, and write the hits of each", FIRE_HELP, FIRE_EXAMPLES)
+    sub.add_argument("shots", type=Path, metavar="SHOTS.jsonl", help="log with one shot a line")
+    text = "where to write the hits; the name ends in .jsonl (default: hits.jsonl)"
+    sub.add_argument("-o", "--output", type=Path, default=Path("hits.jsonl"), metavar="HITS.jsonl", help=text)
+    text = "print the total cost of each stage, and the stages that were skipped"
+    sub.add_argument("--plan", action="store_true", help=text)
+    sub = _command(commands, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
+    sub.add_argument("folder", type=Path, metavar="FOLDER", help="folder to create; its parent must exist")
+    sub = _command(commands, compare, "print and draw how two reports differ", COMPARE_HELP, COMPARE_EXAMPLES)
+    sub.add_argument("expected", type=Path, metavar="A.json", help="first report, written by report --json")
+    sub.add_argument("got", type=Path, metavar="B.json", help="second report")
+    sub.add_argument("-o", "--output", type=Path, metavar="PNG", help="draw both reports to this file")
+    text = "scene folder of a report, to draw it on; give it twice if the reports have different scenes"
+    sub.add_argument("--scene", type=Path, metavar="SCENE", action="append", help=text)
+    sub = _command(commands, replay, "fire a record of shots again, and compare", REPLAY_HELP, REPLAY_EXAMPLES)
+    sub.add_argument("record", type=Path, metavar="RECORD.jsonl", help="file that hitplanes.ShotRecord wrote")
+    _add_measurements(commands)
+    sub = _command(commands, demo, "animate a quadtree, a grid or a BVH", DEMO_HELP, DEMO_EXAMPLES)
+    sub.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
+    text = "a file that ends in .gif, or a new folder for PNG files (default: demo.gif)"
+    sub.add_argument("-o", "--output", type=Path, default=Path("demo.gif"), metavar="GIF", help=text)
+    return top
+
+
+def _add_measurements(commands: Any) -> None:
+    sub = _command(commands, study, "measure error and run time of all methods", STUDY_HELP, STUDY_EXAMPLES)
+    text = "folder with scene.json and its images (default: one shape of each kind)"
+    sub.add_argument("scene", type=Path, metavar="SCENE", nargs="?", help=text)
+    text = "a new folder, or that of an earlier study, which is replaced (default: study)"
+    sub.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="FOLDER", help=text)
+    text = "largest accepted error: wrong decisions per shot, or error of a share (default: 0.01)"
+    sub.add_argument("--error", type=float, default=0.01, metavar="E", help=text)
+    sub.add_argument("--quick", action="store_true", help="fewer shots and runs: under half a minute")
+    sub.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the shots (default: 0)")
+    sub = _command(commands, stability, "count wrong decisions on hard geometry", STABILITY_HELP, STABILITY_EXAMPLES)
+    text = "a new folder, or that of an earlier run, which is replaced (default: stability)"
+    sub.add_argument("-o", "--output", type=Path, default=Path("stability"), metavar="FOLDER", help=text)
+    text = "a few hundred questions for each cell of the table: seconds instead of half an hour"
+    sub.add_argument("--quick", action="store_true", help=text)
+    sub.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the questions (default: 0)")
+
+
+def _add_report(commands: Any) -> None:
+    sub = _command(commands, report, "fire at a scene and draw what was hit", REPORT_HELP, REPORT_EXAMPLES)
+    sub.add_argument("--weapon", metavar="NAME", help="fire one shot with this weapon of the scene; needs --at")
+    sub.add_argument("--at", metavar="X,Y", help="position of the shot, px (write --at=-5,3 if X is negative)")
+    sub.add_argument("--aim", type=float, metavar="DEG", help="direction in degrees: 0 is right, 90 is down")
+    sub.add_argument("--toward", metavar="X,Y", help="point to aim at, px, instead of --aim")
+    sub.add_argument("--seed", type=int, metavar="N", help="random seed of the pellets")
+    text = "file of the picture (default: report.png)"
+    sub.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help=text)
+    sub.add_argument("--json", type=Path, metavar="JSON", help="also write the facts to this file")
+    text = (
+        "test bounding volumes first, and draw them: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon"
+        " or swept"
+    )
+    sub.add_argument("--prefilter", metavar="NAME", help=text)
+    text = "find objects with this structure, and draw its cells: grid, quadtree or bvh"
+    sub.add_argument("--broadphase", metavar="NAME", help=text)
+    text = "print the cost of each stage of a shot, and why stages were skipped"
+    sub.add_argument("--plan", action="store_true", help=text)
+
+
+def _command(
+    commands: Any, run: Callable[[argparse.Namespace], int | None], summary: str, text: str, examples: str
+) -> argparse.ArgumentParser:
+    """Add a subcommand named like its function; those that fire take a scene first."""
+    raw = argparse.RawDescriptionHelpFormatter
+    sub: argparse.ArgumentParser = commands.add_parser(
+        run.__name__, help=summary, description=text, epilog=examples, formatter_class=raw
+    )
+    sub.set_defaults(run=run)
+    if run in (report, fire, replay):
+        sub.add_argument("scene", type=Path, metavar="SCENE", help="folder with scene.json and its images")
+    return sub
+
+
+def report(arguments: argparse.Namespace) -> None:
+    """Fire the shots of the scene, or the one of the command line, and write the picture and the facts."""
+    _check_outputs(arguments.output, arguments.json)
+    scene = load_scene(arguments.scene)
+    _check_not_of_scene(scene, arguments.scene, arguments.output, arguments.json)
+    _note_empty(scene)
+    orders = _orders(arguments, scene)
+    how = {"prefilter": arguments.prefilter, "broadphase": arguments.broadphase}
+    asked = {name: value for name, value in how.items() if value is not None}
+    fired = [fire_order(scene, order, **asked) for order in orders]
+    facts = report_of(scene, fired, [order.name for order in orders], **asked)
+    write_png(arguments.output, picture_of_report(facts, scene))
+    if arguments.json is not None:
+        write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
+    _print_hits(facts, fired if arguments.plan else [])
+
+
+def _orders(arguments: argparse.Namespace, scene: Scene) -> list[ShotRequest]:
+    """Return the shots of the scene's file, or the one of the command line."""
+    with within(str(scene_folder(arguments.scene) / FILE_NAME)):
+        arsenal = arsenal_of(scene)
+        if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "toward", "seed")):
+            return orders_of(scene, arsenal)
+    if arguments.weapon is None:
+        given = next(name for name in ("at", "aim", "toward", "seed") if getattr(arguments, name) is not None)
+        raise InputError(f"--{given}: expected only together with --weapon, got no weapon")
+    return [order_from_json(_shot(arguments), scene, arsenal, "command line")]
+
+
+def _print_hits(facts: Mapping[str, Any], planned: Sequence[Hits]) -> None:
+    """Print what each shot hit, or how many shots of a batch hit, and the plans of the hits in `planned`."""
+    batch = facts["batch"]
+    if batch:
+        _say(f"{batch['shots']} shots, {batch['shots_that_hit']} hit something")
+    elif not facts["shots"]:
+        _say(f"{facts['scene']['name']}: no shots in its scene.json; name one with --weapon and --at")
+    for i, shot in enumerate(facts["shots"]):
+        hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
+        if len(shot["rows"]) > NAMED:
+            hit += f" and {len(shot['rows']) - NAMED} more"
+        _say(f"{shot['weapon']} at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}: {hit}")
+        if planned:
+            _print_plan(planned[i].plan.timed())
+    if batch and planned:
+        done = PlanSum()
+        for hits in planned:
+            done.add(hits.plan)
+        _print_plan(done.timed(), done.calls)
+
+
+def fire(arguments: argparse.Namespace) -> None:
+    """Fire a log of shots, and write the hits of each."""
+    check_output(arguments.output)
+    scene = load_scene(arguments.scene)
+    with within(str(scene_folder(arguments.scene) / FILE_NAME)):
+        arsenal_of(scene)
+    done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
+    _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
+    if arguments.plan:
+        _print_plan(done.plan.timed(), done.plan.calls)
+
+
+def study(arguments: argparse.Namespace) -> None:
+    """Measure all methods, and print the fastest that is accurate enough for each question."""
+    from ..lab.study.area_questions import kinds_scene  # heavy imports that only this subcommand needs
+    from ..lab.study.study import NO_DIAGRAMS, Effort, verdict, write_study
+
+    error, seed = real("--error", arguments.error, 0, 1), integer("--seed", arguments.seed, 0, SEED_MAX)
+    scene = kinds_scene() if arguments.scene is None else load_scene(arguments.scene)
+    effort = Effort.quick() if arguments.quick else Effort()
+    done, drawn = write_study(scene, arguments.output, seed, effort, error, Progress(sys.stderr))
+    for question in done["questions"]:
+        _say(f"{question['name']}: {question['asks']} Truth: {question['truth']}")
+    for line in verdict(done, error):
+        _say(line)
+    _say(f"{'tables and diagrams are' if drawn else 'the tables are'} in {arguments.output}")
+    if not drawn:
+        _say(NO_DIAGRAMS)
+
+
+def new(arguments: argparse.Namespace) -> None:
+    """Write a scene to start from, and print the next command to try."""
+    write_starter(arguments.folder)
+    _say(f"a scene is in {arguments.folder}; now try: hitplanes report {shlex.quote(str(arguments.folder))}")
+
+
+def _print_plan(plan: Mapping[str, Sequence[Mapping[str, Any]]], calls: int = 1) -> None:
+    for line in plan_lines(plan, calls):
+        _say(f"  {line}")
+
+
+def _check_outputs(picture: Path, facts: Path | None) -> None:
+    check_output(picture)
+    if picture.suffix.lower() != ".png":
+        raise InputError(f"--output: expected a name that ends in .png, got {picture.name!r}")
+    if facts is not None:
+        check_output(facts)
+        if _real(facts) == _real(picture):
+            raise InputError(f"--json: expected another file than --output, got {str(facts)!r} for both")
+
+
+def _check_not_of_scene(scene: Scene, folder: Path, *outputs: Path | None) -> None:
+    """Refuse an output that would overwrite a file of the scene."""
+    folder = scene_folder(folder)
+    images = {str((sprite.source or {}).get("image", "")) for sprite in scene.items.sprites}
+    own = {_real(folder / name) for name in {FILE_NAME, *images}}
+    for output in outputs:
+        if output is not None and _real(output) in own:
+            raise InputError(f"output: expected another file than those of the scene, got {output}")
+
+
+def _real(path: Path) -> str:
+    """Resolve a path; unlike Path.resolve, this accepts a link to itself."""
+    try:
+        return os.path.realpath(path)
+    except OSError as error:
+        raise InputError(f"output: cannot find {path}: the folder that we are in is not there any more") from error
+
+
+def _note_empty(scene: Scene) -> None:
+    """Print a note for each object that has no pixels, so that nothing can hit it."""
+    for item in (*scene.ids(Role.HITTABLE).tolist(), *scene.ids(Role.OCCLUDER).tolist()):
+        if not scene.mask(item)[0].any():
+            _say(f"note: {scene.name_of(item)} has no pixel: nothing hits it, it blocks nothing")
+
+
+def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the shot of the command line in the form of scene.json."""
+    if arguments.at is None:
+        raise InputError("--at: expected X,Y with --weapon, got nothing")
+    shot: dict[str, Any] = {"weapon": arguments.weapon, "at": _point("at", arguments.at)}
+    if arguments.toward is not None:
+        shot["toward"] = _point("toward", arguments.toward)
+    return shot | {name: getattr(arguments, name) for name in ("aim", "seed") if getattr(arguments, name) is not None}
+
+
+def _point(name: str, text: str) -> list[float]:
+    """Parse two numbers of the command line."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"--{name}: expected two numbers X,Y, got {text!r}") from error
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    """Print the differences of two reports, and draw them if asked; return 1 if there are any."""
+    if arguments.output is not None:
+        _check_outputs(arguments.output, None)
+    expected, got = read_report(arguments.expected), read_report(arguments.got)
+    hashes = expected["scene"]["hash"], got["scene"]["hash"]
+    scenes = {scene.content_hash(): scene for scene in map(load_scene, arguments.scene or ())}
+    for other in scenes.keys() - set(hashes):
+        raise InputError(f"--scene: expected that of a report, {' or '.join(hashes)}, got {other}")
+    if arguments.output is not None:
+        write_png(
+            arguments.output, picture_of_difference(expected, got, (scenes.get(hashes[0]), scenes.get(hashes[1])))
+        )
+    lines = differences(expected, got)
+    for line in lines or ["no difference"]:
+        _say(line)
+    return 1 if lines else 0
+
+
+def replay(arguments: argparse.Namespace) -> int:
+    """Print the first shot of a record whose result differs; return 1 if there is one."""
+    from ..replay.record import NO_END, replayed  # only this subcommand needs it
+
+    found, endless = replayed(arguments.record, load_scene(arguments.scene))
+    if found is None:
+        _say("all shots do the same again")
+    else:
+        for text in found.told:
+            _say(f"{arguments.record} line {found.line}, shot {found.shot}: {text}")
+    if endless:
+        _say(f"note: {arguments.record} {NO_END}")
+    return 0 if found is None else 1
+
+
+def demo(arguments: argparse.Namespace) -> None:
+    """Write the animation of a broad phase, and print its path."""
+    from ..lab.demo import KINDS, write_demo  # only this subcommand needs all structures
+
+    _say(f"a {KINDS[arguments.kind].name} in motion is in {write_demo(arguments.kind, arguments.output)}")
+
+
+def stability(arguments: argparse.Namespace) -> int:
+    """Count wrong decisions; return 1 if hitplanes made one."""
+    from ..lab.stability.stability import FILES, run_stability, summary  # heavy, and only for this subcommand
+
+    seed = integer("--seed", arguments.seed, 0, SEED_MAX)
+    study = run_stability(arguments.output, seed, arguments.quick, sys.stderr)
+    for line in summary(study):
+        _say(line)
+    note = "" if (arguments.output / FILES[-1]).exists() else ", without a picture: matplotlib is not installed"
+    _say(f"the table, and the rest, is in {arguments.output}{note}")
+    return 0 if study.right else 1

@@ -1,0 +1,285 @@
+"""JSON Schemas of scene files, shots and reports, generated from the tables that validate them, and a report's table.
+
+`python -m hitplanes.weapons.cli.schemas` writes the schemas to `weapons/schemas/`, which is part of the package.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
+from hitplanes.planes.common.checks import InputError, path_of, within
+from hitplanes.planes.common.limits import (
+    ITEMS_MAX,
+    MARGIN_PX,
+    POSITION_MAX,
+    REACH_MAX,
+    SEED_MAX,
+    STRUCTURES,
+    TICK_MAX,
+    VIEW_MAX,
+)
+from hitplanes.planes.common.tables import (
+    Const,
+    Flag,
+    Keys,
+    Mapped,
+    Names,
+    Number,
+    Numbers,
+    Optional,
+    Ref,
+    Rows,
+    Text,
+    Value,
+    Whole,
+    Wholes,
+    Within,
+    Word,
+    json_of,
+)
+from hitplanes.planes.files.png import read_text, write_text
+from hitplanes.planes.files.scene_folder import OBJECT, SCENE
+
+from ..explain.samples import REASONS
+from ..kinds.areas import KINDS, AreaWeapon, weapon_from_json
+from ..kinds.rays import RayWeapon
+from ..kinds.weapon import Weapon
+from ..rays.contacts import Reason
+from ..replay.shot_log import SHOT
+from ..report.report import FORMAT
+
+FOLDER = Path(__file__).parent.parent / "schemas"
+
+FARTHEST = POSITION_MAX + 2 * REACH_MAX
+"""Largest coordinate of a pixel of a pattern, px."""
+
+COUNT = Whole(0, 2**62)
+PIXEL = Wholes((2,), -FARTHEST, FARTHEST)
+BOX = Wholes((4,), -FARTHEST, FARTHEST)
+RUNS = Wholes((None, 3), -FARTHEST, FARTHEST)
+SHARE = Number(0, 1)
+ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
+VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
+COUNTS = Within(Keys(dict(VERDICTS), tuple(verdict.name.lower() for verdict in OF_PATTERNS)))
+STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
+
+
+class WeaponJson(Ref):
+    """A weapon as JSON, validated by the table of its kind."""
+
+    def check(self, name: str, value: object) -> object:
+        """Check that the value describes a weapon, and return it."""
+        weapon_from_json(value, name)
+        return value
+
+
+def _all(keys: dict[str, Value]) -> Within:
+    """Return the form of an object in which every key is required."""
+    return Within(Keys(keys, tuple(keys)))
+
+
+RAN = Keys({**STAGE, "bytes": COUNT, "pairs": Wholes((2,), 0, 2**62)}, ("stage", "why", "bytes"))
+PLAN = _all({"ran": Rows(Within(RAN)), "left_out": Rows(_all(STAGE))})
+ROW_TOLD: dict[str, Value] = {
+    **ITEM,
+    "round": COUNT,
+    "samples": COUNT,
+    "pixels": COUNT,
+    "weight": COUNT,
+    "pellets": COUNT,
+    "first_xy": PIXEL,
+    "distance2": COUNT,
+    "runs": RUNS,
+}
+SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE})
+MARGIN = _all({"distance": Number(0, MARGIN_PX), "shift_xy": Numbers((2,), MARGIN_PX)})
+ROW = Within(Keys({**ROW_TOLD, "shares": SHARES, "margin": MARGIN}, tuple(ROW_TOLD)))
+WHY_NOT: dict[str, Value] = {
+    **ITEM,
+    "reason": Word(REASONS),
+    "samples": COUNT,
+    "by": Rows(_all({**ITEM, "samples": COUNT})),
+    "distance": Number(0),
+}
+POINT = Numbers((2,), FARTHEST)
+NORMAL = Wholes((2,), -(2**10), 2**10)
+PASS = _all(
+    {
+        **ITEM,
+        "order": COUNT,
+        "entry_xy": PIXEL,
+        "exit_xy": PIXEL,
+        **dict.fromkeys(("entry_px", "exit_px", "material"), Number(0)),
+        **dict.fromkeys(("entry", "exit"), Number(0, 1)),
+        "point": POINT,
+        "normal": NORMAL,
+        "weight": COUNT,
+    }
+)
+STOP = _all(
+    {
+        "reason": Word(tuple(reason.name.lower() for reason in Reason)),
+        "item": Optional(_all(dict(ITEM))),
+        "cell_xy": PIXEL,
+        "point": POINT,
+        "distance": Number(0),
+        "fraction": Number(0, 1),
+        "normal": NORMAL,
+    }
+)
+RAY = _all({"round": COUNT, "pellet": COUNT, "start": POINT, "end": POINT, "stop": STOP, "passes": Rows(PASS)})
+MISS = _all({**ITEM, "distance": Number(0), "ray_xy": POINT, "object_xy": POINT})
+RAYS: dict[str, Value] = {"radius": Number(0, REACH_MAX), "rays": Rows(RAY), "nearest_miss": Optional(MISS)}
+"""Further keys of a shot of rays."""
+
+TESTED = _all(
+    {
+        "objects": Wholes((None,), 0, ITEMS_MAX - 1),
+        "of": COUNT,
+        "opened": COUNT,
+        "patterns": Rows(_all({"points": Numbers((None, 2), FARTHEST)})),
+    }
+)
+SHOT_TOLD: dict[str, Value] = {
+    "shot": Whole(0, 2**63 - 1),
+    "weapon": Text(),
+    "at": Numbers((2,), POSITION_MAX),
+    "at_xy": PIXEL,
+    "aim": Optional(Number(-180, 180)),
+    "seed": Whole(0, SEED_MAX),
+    "accept": Optional(Names()),
+    "exclude": Rows(_all({"owner": COUNT, "name": Text()})),
+    "verdicts": COUNTS,
+    "rows": Rows(ROW),
+    "why_not": Rows(Within(Keys({**WHY_NOT, "margin": MARGIN}, tuple(WHY_NOT)))),
+    "blockers": Rows(
+        _all({**ITEM, "samples": COUNT, "blocked": Rows(_all({**ITEM, "samples": COUNT, "at_xy": PIXEL}))})
+    ),
+    "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))),
+    "plan": PLAN,
+}
+TOLD = Within(Keys({**SHOT_TOLD, **RAYS, "tested": TESTED}, tuple(SHOT_TOLD)))
+FILTER = _all(
+    {
+        "prefilter": Text(),
+        "broadphase": Word(tuple(STRUCTURES)),
+        "cells": Rows(_all({"box_xyxy": Numbers((4,), FARTHEST), "opened": Flag()})),
+    }
+)
+HEAT = _all(
+    {
+        "cell": Whole(1, VIEW_MAX),
+        "origin_xy": PIXEL,
+        "beyond": COUNT,
+        "counts": Within(Keys(dict.fromkeys(VERDICTS, Wholes((None, 4), 0, 2**62)))),
+    }
+)
+BATCH = _all(
+    {
+        "shots": COUNT,
+        "shots_that_hit": COUNT,
+        "verdicts": COUNTS,
+        "objects": Rows(_all({**ITEM, "shots": COUNT, "pixels": COUNT, "weight": COUNT})),
+        "columns": Names(),
+        "rows": Wholes((None, 10), -FARTHEST, 2**62),
+        "heat": HEAT,
+        "plan": Rows(PLAN),
+    }
+)
+KEYS: dict[str, Value] = {
+    "format": Const(FORMAT),
+    "version": Text(),
+    "scene": _all(
+        {
+            "name": Text(),
+            "hash": Text(),
+            "version": COUNT,
+            "bounds_xyxy": Optional(BOX),
+            "hittable": COUNT,
+            "occluders": COUNT,
+        }
+    ),
+    "view_xyxy": BOX,
+    "weapons": Mapped(WeaponJson("weapon")),
+    "shots": Rows(TOLD),
+    "batch": Optional(BATCH),
+}
+NOW = _all(
+    {
+        "tick": Optional(Number(-TICK_MAX, TICK_MAX)),
+        "hash": Text(),
+        "moved": Rows(_all({**ITEM, "runs": RUNS, "from_xy": POINT, "to_xy": POINT})),
+        "gone": Rows(_all(dict(ITEM))),
+        "new": Rows(_all(dict(ITEM))),
+        "shots": Rows(Optional(Rows(_all({**ITEM, "pixels": COUNT})))),
+    }
+)
+REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))
+"""Table that validates a report."""
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """Read and validate a report.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the row and the field.
+    """
+    path = path_of("report", path)
+    with within(str(path)):
+        found = json_of(read_text(path))
+        REPORT.check("report", found)
+        for verdict, runs in (found["batch"] or {"heat": {"counts": {}}})["heat"]["counts"].items():
+            if any(run[3] < 1 for run in runs):
+                raise InputError(f"batch: heat: counts: {verdict}: expected counts from 1, got 0")
+        x, y, x_max, y_max = found["view_xyxy"]
+        if not (0 <= x_max - x <= 2 * VIEW_MAX and 0 <= y_max - y <= 2 * VIEW_MAX):
+            raise InputError(f"view_xyxy: expected a box of at most {2 * VIEW_MAX} px a side, got {found['view_xyxy']}")
+        return dict(found)
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """Return the JSON Schemas "scene", "shot" and "report" by name."""
+    weapons = {
+        "weapon": {"anyOf": [Ref("single").schema(), _kind("rounds")]},
+        "single": {"anyOf": [Ref("pellet").schema(), _kind("spread"), _kind("sweep")]},
+        "pellet": {"anyOf": [Ref("ray").schema(), *_kinds(AreaWeapon)]},
+        "ray": {"anyOf": _kinds(RayWeapon)},
+    }
+    shot, objects = SHOT.schema(), {"anyOf": [keys.schema() for keys in OBJECT.values()]}
+    return {
+        "scene": _document("A scene of hitplanes", SCENE, {"object": objects, "shot": shot, **weapons}),
+        "shot": _document("A shot, a line of a log of shots", SHOT, {}),
+        "report": _document("What shots hit, and why", REPORT, weapons),
+    }
+
+
+def write_schemas(folder: Path = FOLDER) -> None:
+    """Write every schema to a folder."""
+    for name, schema in schemas().items():
+        write_text(folder / f"{name}.json", json.dumps(schema, indent=1) + "\n")
+
+
+def _document(title: str, table: Keys, definitions: dict[str, Any]) -> dict[str, Any]:
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, "title": title, **table.schema(), **({"$defs": definitions} if definitions else {})}
+
+
+def _kinds(base: type[Weapon]) -> list[dict[str, Any]]:
+    return [_kind(name) for name, kind in KINDS.items() if issubclass(kind, base)]
+
+
+def _kind(name: str) -> dict[str, Any]:
+    """Return the schema of one kind of weapon."""
+    kind: type[Weapon] = KINDS[name]
+    needed = [field.name for field in fields(kind) if field.default is MISSING]
+    return Keys({"kind": Const(name), **kind.table}, ("kind", *needed)).schema()
+
+
+if __name__ == "__main__":
+    write_schemas()

@@ -1,0 +1,389 @@
+"""Explanations of shots of area weapons: samples, shares, blockers, why not, and margins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
+from hitplanes.planes.common.checks import Bools, InputError, Ints
+from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
+from hitplanes.planes.grid.spans import Box, Spans, each_pixel
+from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.plan import Plan
+from ..fire.prefilter import Candidates, pairs_of, refused
+from ..fire.spans import QueryContext, direct
+from ..kinds.areas import pierces
+from ..kinds.placements import Placements, Shots, placements_for
+from ..kinds.weapon import Weapon
+
+
+class Samples(NamedTuple):
+    """Every sample of a shot, ordered by (round, pellet, y, x).
+
+    `item` is the object that was hit first, the occluder that ended the walk, or the first item that was skipped;
+    -1 where there is none.
+    """
+
+    xy: Ints
+    round: Ints
+    pellet: Ints
+    verdict: Ints
+    item: Ints
+
+
+class Share(NamedTuple):
+    """Fraction of the round's samples that hit, and fractions of the object's visible and of all its pixels."""
+
+    of_pattern: float
+    of_visible: float
+    of_mask: float
+
+
+class Behind(NamedTuple):
+    """An object behind an occluder: number of its samples that the occluder ended, and the one nearest their mean."""
+
+    object: int
+    samples: int
+    at_xy: tuple[int, int]
+
+
+class Blocked(NamedTuple):
+    """An occluder, the samples whose walk it ended, and the accepted objects behind it on those samples."""
+
+    occluder: int
+    samples: int
+    behind: tuple[Behind, ...]
+
+
+REASONS = ("missed", "category", "excluded", "behind", "outside", "inside", "tunnelled", "budget")
+
+
+class WhyNot(NamedTuple):
+    """Why an object near the shot was not hit.
+
+    `samples` counts the samples on the object, `by` those that each item ended, as {id: samples}, and `distance` is the
+    distance from the pattern, px, 0 if a sample lies on the object. `reason` is one of:
+
+    - "missed": no sample lies on it
+    - "category", "excluded": the filter refuses it
+    - "behind": every sample on it ended in front of it
+    - "outside": it lies out of bounds
+    - "inside": the ray starts in it and ignores that
+    - "tunnelled": a projectile went through it between two tests
+    - "budget": the ray had a budget of 0
+    """
+
+    object: int
+    reason: str
+    samples: int
+    by: dict[int, int]
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Detail:
+    """Samples of one walk of shots.
+
+    Parameters
+    ----------
+    stack, shots, volley : the items, the shots and their placements
+    runs : runs of pixels
+    run, x : run and column of each sample
+    hit : runs that hit an object; all of them if the weapon pierces
+    verdict : verdict of each sample
+    rank, ended : ranks of the items that decided the verdict and that ended the walk of each sample, -1 for none
+    """
+
+    stack: Stack
+    shots: Shots
+    volley: Placements
+    runs: Runs
+    run: Ints
+    x: Ints
+    hit: Events
+    verdict: Ints
+    rank: Ints
+    ended: Ints
+
+    @cached_property
+    def start(self) -> Ints:
+        """Index of the sample at x = 0 of each run, even if the run does not contain x = 0."""
+        return np.asarray(np.cumsum(self.runs.lengths) - self.runs.lengths - self.runs.x_first)
+
+    def on(self, rank: int) -> Ints:
+        """Samples that lie on an item of the stack."""
+        x0, y0, x1, y1 = self.stack.box_xyxy[rank].tolist()
+        runs = self.runs
+        first, last = np.maximum(runs.x_first, x0), np.minimum(runs.x_last, x1)
+        meets = np.flatnonzero((first <= last) & (runs.y >= y0) & (runs.y <= y1))
+        piece, x = each_pixel(first[meets], last[meets])
+        run = meets[piece]
+        return np.asarray((self.start[run] + x)[self.stack.mask(rank)[runs.y[run] - y0, x - x0]])
+
+
+def samples_of(detail: Detail) -> Samples:
+    """All samples of one shot."""
+    volley = detail.volley
+    placement = detail.runs.placement[detail.run]
+    ids = np.append(detail.stack.ids, -1)
+    xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
+    return Samples(xy, volley.round[placement], volley.pellet[placement], detail.verdict, ids[detail.rank])
+
+
+def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
+    """Distinct pixels that each round hit of each object, as {(round, object): pixels}."""
+    under = detail.runs.take(detail.hit.run)
+    found: dict[tuple[int, int], Spans] = {}
+    keys = np.stack([detail.volley.round[under.placement], detail.stack.ids[detail.hit.rank]], axis=1)
+    order = np.lexsort(keys.T[::-1])
+    begins = np.flatnonzero((np.diff(keys[order], axis=0, prepend=-1) != 0).any(axis=1)).tolist()
+    for first, last in pairwise([*begins, len(order)]):
+        own = order[first:last]
+        round_, item = keys[own[0]].tolist()
+        found[round_, item] = Spans.from_runs(under.y[own], detail.hit.x_first[own], detail.hit.x_last[own])
+    return found
+
+
+def blockers_of(detail: Detail) -> list[Blocked]:
+    """Occluders that ended samples, by falling number of samples, then by id, with the objects behind them."""
+    stack, ended = detail.stack, detail.ended
+    blocked = np.where((ended >= 0) & stack.occluder[ended], ended, -1) if len(stack) else ended
+    ranks, counts = np.unique(blocked[blocked >= 0], return_counts=True)
+    if not len(ranks):
+        return []
+    behind: dict[int, list[Behind]] = {rank: [] for rank in ranks.tolist()}
+    every = np.unique(pairs_of(detail.volley.boxes, detail.volley.shot, detail.shots, stack).rank)
+    refuses = refused(stack, every, detail.shots, np.zeros(len(every), np.int64))
+    for rank in every[~refuses & ~stack.occluder[every]].tolist():
+        on = detail.on(rank)
+        on = on[(blocked[on] >= 0) & (blocked[on] < rank)]
+        for front in np.unique(blocked[on]).tolist():
+            behind[front].append(_behind(detail, rank, on[blocked[on] == front]))
+    found = [
+        Blocked(int(stack.ids[rank]), count, tuple(sorted(behind[rank], key=lambda b: (-b.samples, b.object))))
+        for rank, count in zip(ranks.tolist(), counts.tolist(), strict=True)
+    ]
+    return sorted(found, key=lambda b: (-b.samples, b.occluder))
+
+
+def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
+    x, y = detail.x[samples], detail.runs.y[detail.run[samples]]
+    dx, dy = (v - v.min() - int((v - v.min()).sum()) // len(v) for v in (x, y))  # relative to the pixel of their mean
+    nearest = int(np.lexsort((x, y, dx**2 + dy**2))[0])
+    return Behind(int(detail.stack.ids[rank]), len(samples), (int(x[nearest]), int(y[nearest])))
+
+
+def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
+    """Share of each row; the visible pixels of an object are counted once for each filter."""
+    stack = scene.items.stack()
+    visible: dict[tuple[object, ...], int] = {}
+    shares = []
+    in_round: dict[int, Ints] = {}
+    for row in rows:
+        rank = int(stack.rank_of[row.object])
+        key = (rank, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
+        if key not in visible:
+            visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
+        if row.shot not in in_round:
+            volley = placements_for(weapon, shots.take(row.shot, row.shot + 1))
+            in_round[row.shot] = np.bincount(volley.round, volley.count).astype(np.int64)
+        fired = int(in_round[row.shot][row.round])
+        shares.append(
+            Share(row.samples / fired, row.pixels / visible[key], row.pixels / scene.items.variants[row.object].area)
+        )
+    return shares
+
+
+def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
+    """Objects within NEAR_PX of the pattern of one shot that were not hit, nearest first, then by id."""
+    stack, volley = detail.stack, detail.volley
+    boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
+    near = np.unique(pairs_of(boxes, volley.shot, detail.shots, stack).rank)
+    found = []
+    for rank in near.tolist():
+        if stack.occluder[rank] or int(stack.ids[rank]) in hit:
+            continue
+        distance = math.sqrt(_distance2(detail.runs, stack, rank))
+        if distance <= NEAR_PX:
+            found.append(_why(detail, rank, distance))
+    return sorted(found, key=lambda w: (w.distance, w.object))
+
+
+# house: hit rule of areas
+def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
+    """Walk every sample of shots and record its verdict and the items that decided it."""
+    stack, bounds = scene.items.stack(), scene.bounds
+    volley = placements_for(weapon, shots)
+    if int(volley.count.sum()) > DETAIL_SAMPLES_MAX:
+        got = int(volley.count.sum())
+        raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
+    runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
+    run, x = each_pixel(runs.x_first, runs.x_last)
+    pairs = pairs_of(volley.boxes, volley.shot, shots, stack)
+    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
+    rank = np.full(len(x), -1, np.int64)
+    start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    ended = rank.copy()
+    for kind in (SKIP, BLOCK, HIT):  # the first of a kind counts; a hit outranks a block, a block a skip
+        told = events.take(np.flatnonzero(events.kind == kind)[::-1])
+        event, column = each_pixel(told.x_first, told.x_last)
+        rank[start[told.run][event] + column] = told.rank[event]
+        if kind == BLOCK or (kind == HIT and not pierces(weapon)):
+            ended[start[told.run][event] + column] = told.rank[event]
+    verdict = VERDICT_OF[state]
+    if bounds is not None:
+        y = runs.y[run]
+        outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
+        verdict = np.where(outside, Verdict.OUTSIDE, verdict)
+        rank[outside] = ended[outside] = -1
+    hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
+    return Detail(stack, shots, volley, runs, run, x, hit, verdict, rank, ended)
+
+
+def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
+    """Events cut to the bounds."""
+    if bounds is None:
+        return events
+    y = runs.y[events.run]
+    first, last = np.maximum(events.x_first, bounds[0]), np.minimum(events.x_last, bounds[2])
+    some = (first <= last) & (y >= bounds[1]) & (y <= bounds[3])
+    return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(some))
+
+
+def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
+    """Why one object was not hit."""
+    stack, shot = detail.stack, detail.shots
+    item, on = int(stack.ids[rank]), detail.on(rank)
+    ended = detail.ended[on]
+    by_rank = np.unique(ended[ended >= 0], return_counts=True)
+    by = {int(stack.ids[p]): int(n) for p, n in zip(*by_rank, strict=True)}
+    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
+        foreign = not int(stack.categories[rank]) & int(shot.accept[0])
+        return WhyNot(item, "category" if foreign else "excluded", len(on), by, distance)
+    if not len(on):
+        return WhyNot(item, "missed", 0, {}, distance)
+    outside = (detail.verdict[on] == Verdict.OUTSIDE).all()
+    return WhyNot(item, "outside" if outside else "behind", len(on), by, distance)
+
+
+def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
+    """Least squared distance between the pixels of a pattern and an item, px^2; not exact beyond NEAR_PX."""
+    x, y, x_max, y_max = stack.box_xyxy[rank].tolist()
+    spans = Spans.from_mask(stack.mask(rank), (x, y))
+    near = (runs.y >= y - NEAR_PX) & (runs.y <= y_max + NEAR_PX)
+    near &= (runs.x_last >= x - NEAR_PX) & (runs.x_first <= x_max + NEAR_PX)
+    runs = runs.take(near)
+    least = (2 * NEAR_PX) ** 2
+    step = max(1, CHUNK_SAMPLES // len(spans))
+    for first in range(0, len(runs), step):
+        part = runs.take(slice(first, first + step))
+        gap = np.maximum(part.x_first[:, None] - spans.x_last, spans.x_first - part.x_last[:, None])
+        apart = np.maximum(gap, 0) ** 2 + (part.y[:, None] - spans.y) ** 2
+        least = min(least, int(apart.min()))
+    return least
+
+
+def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
+    """Number of pixels of an object that a pattern covering everything would hit."""
+    stack, bounds = scene.items.stack(), scene.bounds
+    x, y = stack.box_xyxy[rank, :2].tolist()
+    spans = Spans.from_mask(stack.mask(rank), (x, y))
+    zero = np.zeros(len(spans), np.int64)
+    runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
+    if bounds is not None:
+        first, last = np.maximum(spans.x_first, bounds[0]), np.minimum(spans.x_last, bounds[2])
+        some = (first <= last) & (spans.y >= bounds[1]) & (spans.y <= bounds[3])
+        runs = Runs(zero, spans.y, first, last, zero).take(some)
+    box = stack.box_xyxy[rank][None]
+    pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack)
+    events, _ = walk(runs, pairs, stack, pierce, HIT)
+    own = events.rank == rank
+    return int((events.x_last - events.x_first + 1)[own].sum())
+
+
+class Margin(NamedTuple):
+    """Shortest shift of a shot that changes whether it hits an object.
+
+    `hit` says whether the shot as fired hits the object; `distance` is the length of `shift_xy`, px. The shift is the
+    first by (y, x) of equally short ones; for patterns it is in whole pixels.
+    """
+
+    shot: int
+    object: int
+    hit: bool
+    distance: float
+    shift_xy: tuple[float, float]
+
+    @property
+    def fragile(self) -> bool:
+        """Whether a shift of one pixel is enough."""
+        return self.distance <= FRAGILE_PX
+
+
+def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
+    """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
+
+    Parameters
+    ----------
+    first_shot : number of the first shot
+
+    Returns
+    -------
+    margins, sorted by (shot, object)
+    """
+    stack = scene.items.stack()
+    context = QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
+    found = []
+    for row in range(len(shots) if len(stack) else 0):
+        still, flips = _flips(placements_for(weapon, shots.take(row, row + 1)), shots.take(row, row + 1), context)
+        for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):
+            dx, dy = SHIFTS[flips[rank]].tolist()
+            length = math.sqrt(dx * dx + dy * dy)
+            found.append(Margin(first_shot + row, int(stack.ids[rank]), bool(still[rank]), length, (dx, dy)))
+    return found
+
+
+def _shifts() -> Ints:
+    """Whole-pixel shifts (n, 2) of at most MARGIN_PX, sorted by (length, y, x); the first is (0, 0)."""
+    side = np.arange(-MARGIN_PX, MARGIN_PX + 1)
+    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
+    length2 = x * x + y * y
+    order = np.lexsort((x, y, length2))
+    return np.stack([x, y], axis=1)[order[length2[order] <= MARGIN_PX**2]]
+
+
+SHIFTS = _shifts()
+
+
+def _flips(volley: Placements, shot: Shots, context: QueryContext) -> tuple[Bools, Ints]:
+    """Whether a shot hits each item of the stack, and the number of the first shift that changes this, -1 for none."""
+    n, placements = len(context.stack), len(volley)
+    still, flips = np.zeros(n, np.bool_), np.full(n, -1)
+    step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
+    edges = [0, 1, *range(1 + step, len(SHIFTS), step), len(SHIFTS)]
+    for first, last in pairwise(edges):
+        met = direct(_shifted(volley, SHIFTS[first:last]), shot, context)
+        hit = np.zeros((last - first, n), np.bool_)
+        hit[met.placement // placements, met.rank] = True
+        if not first:
+            still = hit[0]
+        turned = hit != still
+        flips = np.where((flips < 0) & turned.any(axis=0), first + turned.argmax(axis=0), flips)
+    return still, flips
+
+
+def _shifted(volley: Placements, shift: Ints) -> Placements:
+    """Placements repeated for each shift, all as placements of shot 0."""
+    n = len(shift)
+    xy = np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley), axis=0)
+    turn_xy = np.tile(volley.turn_xy, (n, 1))
+    return Placements(volley.table, np.tile(volley.pattern, n), xy, turn_xy, volley.rounds, volley.pellets, shot=0)

@@ -1,0 +1,164 @@
+"""The call `fire`: check the arguments, and hand the shots to the areas or to the rays.
+
+scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hitplanes.planes.common.backend import keep_arena, news
+from hitplanes.planes.common.checks import InputError, Ints, choice, each, reals, shown
+from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.scene.scene import Scene
+
+from .. import late
+from ..kinds.areas import ray_parts_of
+from ..kinds.placements import Shots, checked_shots
+from ..kinds.weapon import Weapon
+from .areas import fired_by_bits, fired_by_runs, traits_of
+from .hits import Hits
+from .plan import Plan, read_stack
+from .prefilter import prefilter_of
+from .strategy import BROADPHASES, STRATEGIES
+
+if TYPE_CHECKING:
+    from hitplanes.planes.scene.history import History
+
+
+def fire(
+    scene: Scene | History,
+    weapon: Weapon,
+    at: object,
+    *,
+    aim: object = None,
+    toward: object = None,
+    accept: object = ALL,
+    exclude: object = None,
+    seed: object = 0,
+    shot: object = None,
+    tick: object = None,
+    prefilter: str = "auto",
+    broadphase: str = "auto",
+    strategy: str = "auto",
+) -> Hits:
+    """Decide what shots hit.
+
+    Parameters
+    ----------
+    scene : the Scene that is fired at, or a History, fired at the given ticks
+    weapon : one weapon for all shots
+    at : (2,) position of one shot, or (N, 2) of a batch, px
+    aim : angle in degrees, 0 along +x, clockwise on the screen
+    toward : (2,) or (N, 2) point that the weapon is aimed at, px; it replaces `aim`
+    accept : category names or bits of the items that may be hit or may block; all by default
+    exclude : owners whose items are skipped, such as the shooter: a number, or for one shot a list (K,); for a batch
+        (N,), (N, K), or (1, K) for all shots, padded with -1
+    seed : seed of the pellets, 0 .. 2**64 - 1
+    shot : numbers of the shots, 0 .. N-1 by default; a shot fired again alone under its number has the same pellets
+    tick : time of each shot, if `scene` is a History
+    prefilter : "auto", "none", "box", "circle", "oriented box", "4 boxes" (1 to 64), "polygon", "swept": the test
+        before the pixels; it changes no row
+    broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row, and
+        needs a pre-filter
+    strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row. "composed" serves
+
+        - thin rays that end at their first hit
+        - patterns with falloff, or beyond 2048 px, if the scene has bounds
+        - other patterns; shots that accept different items are answered direct, and the plan says so
+
+    Each of aim, toward, accept, exclude, seed, shot and tick is one value for all shots, or one for each.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid; the text names the argument and the row.
+    """
+    plan = Plan()
+    _check_words(prefilter, broadphase, strategy)
+    present = scene if isinstance(scene, Scene) else _history(scene).scene
+    shots = checked_shots(weapon, at, aim, toward, category_bits(present, accept), exclude, seed, shot)
+    plan.run("shots", f"{len(shots)} checked", shots.nbytes)
+    if not isinstance(scene, Scene):
+        return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
+    if tick is not None:
+        raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
+    return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+
+
+def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:
+    """Refuse names that are not strings; the functions that read them check which strings are known."""
+    if not (isinstance(prefilter, str) and isinstance(broadphase, str) and isinstance(strategy, str)):
+        prefilter_of(prefilter)
+        choice("broadphase", broadphase, BROADPHASES)
+        choice("strategy", strategy, STRATEGIES)
+
+
+def _fired_at_moments(
+    history: History, tick: object, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
+) -> Hits:
+    """Fire shots at the scenes of their ticks; `how` is (pre-filter, broad phase, strategy)."""
+    moments = moments_of(history, tick, len(shots))
+    plan.run("past", f"{len(moments)} scenes of it")
+    parts: list[Hits] = []
+    for past, rows in moments:
+        parts.append(fired(past, weapon, shots.pick(rows), *how, Plan() if parts else plan))
+    if len(parts) == 1:
+        return parts[0]
+    hits = parts[0].gathered(parts, [rows for _, rows in moments], shots)
+    hits.plan.run("rows", "", hits.nbytes)
+    return hits
+
+
+def _history(scene: object) -> History:
+    from hitplanes.planes.scene.history import History
+
+    if not isinstance(scene, History):
+        raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
+    return scene
+
+
+def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
+    """Past scenes that shots are fired at, each with the rows of its shots."""
+    if tick is None:
+        raise InputError("tick: expected one, or one for each shot, as it is a History that is fired at, got none")
+    ticks = reals("tick", each("tick", tick, n), (n,))
+    if not n:
+        return [(history.at(history.ticks[-1]) if history.ticks else history.scene, np.arange(0))]
+    distinct, which = np.unique(ticks, return_inverse=True)
+    moments: list[tuple[Scene, Ints]] = []
+    for k, time in enumerate(distinct.tolist()):
+        rows = np.flatnonzero(which == k)
+        try:
+            moments.append((history.at(int(time) if time.is_integer() else time), rows))
+        except InputError as error:
+            raise InputError(str(error).replace("tick:", f"tick[{rows[0]}]:", 1) if n > 1 else str(error)) from error
+    return moments
+
+
+def fired(
+    scene: Scene, weapon: Weapon, shots: Shots, prefilter: str, broadphase: str, strategy: str, plan: Plan | None = None
+) -> Hits:
+    """Decide what checked shots hit; the other arguments are those of `fire`, and a plan to continue."""
+    plan = plan or Plan()
+    if len(shots) > 1:
+        keep_arena()
+    parts = ray_parts_of(weapon)
+    if parts is not None:
+        hits: Hits = late.ray_call.fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
+    else:
+        stack = read_stack(scene, plan)
+        fired_by = fired_by_bits if traits_of(weapon).counted else fired_by_runs
+        hits = fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
+    if texts := news():
+        plan.run("kernels", "; ".join(texts))
+    return hits
+
+
+def category_bits(scene: Scene, accept: object) -> object:
+    """Category bits of a list of names; any other value unchanged."""
+    if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
+        return scene.category_bits(*accept)
+    return accept

@@ -1,0 +1,432 @@
+"""Hits, the answer of a call: a row for each object that a round of a shot hit, verdict counts, and explanations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hitplanes.planes.bits.span_walk import Verdict
+from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.checks import InputError, Ints, integer
+from hitplanes.planes.common.limits import WEIGHT_FULL
+from hitplanes.planes.grid.spans import Spans, merged_runs
+from hitplanes.planes.scene.scene import Scene
+
+from .. import late
+from ..kinds.placements import ONES, ZEROS, Columns, Placements, Shots
+from ..kinds.weapon import Weapon
+from .plan import Plan
+from .spans import SpanHits
+
+if TYPE_CHECKING:
+    from ..explain.samples import Blocked, Detail, Margin, Samples, Share, WhyNot
+
+
+class HitRow(NamedTuple):
+    """One object hit by one round of one shot.
+
+    `shot` counts within the batch; `samples` counts pixels of all pellets, `pixels` each pixel once; `weight` adds
+    whole weights (65,535 a sample at full strength); `pellets` counts those that hit; `first_xy` is the hit pixel
+    nearest to the round's pixel and `distance2` its squared distance, px^2.
+    """
+
+    shot: int
+    round: int
+    object: int
+    samples: int
+    pixels: int
+    weight: int
+    pellets: int
+    first_xy: tuple[int, int]
+    distance2: int
+
+
+class OwnerRow(NamedTuple):
+    """One owner hit by one shot: the sum of the rows of all its objects and all rounds."""
+
+    shot: int
+    owner: int
+    samples: int
+    pixels: int
+    weight: int
+    objects: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Rows(Columns):
+    """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack).
+
+    A column that is not given is made from DEFAULTS when it is read.
+    """
+
+    round: Ints
+    object: Ints
+    samples: Ints
+    pixels: Ints
+    weight: Ints
+    pellets: Ints
+    first_xy: Ints
+    distance2: Ints
+
+    def __init__(
+        self,
+        shot: Ints,
+        round: Ints | None,  # noqa: A002
+        object: Ints,  # noqa: A002
+        samples: Ints | None,
+        pixels: Ints | None,
+        weight: Ints | None,
+        pellets: Ints | None,
+        first_xy: Ints,
+        distance2: Ints | None,
+    ) -> None:
+        columns = vars(self)
+        columns["shot"], columns["object"], columns["first_xy"] = shot, object, first_xy
+        rest = round, samples, pixels, weight, pellets, distance2
+        for name, column in zip(DEFAULTS, rest, strict=True):
+            if column is not None:
+                columns[name] = column
+
+    @classmethod
+    def of(cls, columns: dict[str, Ints]) -> Rows:
+        """Rows with the given columns; those of DEFAULTS may be missing."""
+        rows = object.__new__(cls)
+        vars(rows).update(columns)
+        return rows
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a column that was not given."""
+        if name not in DEFAULTS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        column = vars(self)[name] = DEFAULTS[name](self)
+        return column
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns that were given or made."""
+        return 8 * len(self.shot) * (len(vars(self)) + 1)  # `first_xy` has two numbers a row
+
+    def take(self, rows: Ints | slice) -> Rows:
+        """Some of the rows."""
+        return Rows.of({name: column[rows] for name, column in vars(self).items()})
+
+    def later(self, shots: int) -> Rows:
+        """The same rows, with `shots` added to each shot number."""
+        return Rows.of({**vars(self), "shot": self.shot + shots}) if shots else self
+
+    @classmethod
+    def joined(cls, parts: Sequence[Rows]) -> Rows:
+        """Rows of several parts, one after another."""
+        if len(parts) == 1:
+            return parts[0]
+        given = [name for name in HitRow._fields if any(name in vars(part) for part in parts)]
+        columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in given}
+        return cls.of(columns) if parts else cls.none()
+
+    @classmethod
+    def none(cls) -> Rows:
+        """No rows."""
+        none = np.zeros(0, np.int64)
+        return cls.of({"shot": none, "object": none, "first_xy": np.zeros((0, 2), np.int64)})
+
+
+DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
+    "round": lambda rows: ZEROS[: len(rows)],
+    "samples": lambda rows: ONES[: len(rows)],
+    "pixels": lambda rows: rows.samples,
+    "weight": lambda rows: rows.samples * WEIGHT_FULL,
+    "pellets": lambda rows: ONES[: len(rows)],
+    "distance2": lambda rows: ZEROS[: len(rows)],
+}
+"""Columns that may be missing, and how each is made: round 0, one sample, full weight, one pellet, distance 0."""
+
+
+def _column(name: str, told: str) -> cached_attribute[Ints]:
+    """A column of hits, read-only."""
+
+    def made(hits: Hits) -> Ints:
+        rows = hits._rows
+        given: Ints | None = vars(rows).get(name)
+        column = DEFAULTS[name](rows) if given is None else given
+        column.flags.writeable = False
+        return column
+
+    made.__doc__ = told
+    return cached_attribute(made)
+
+
+class Hits:
+    """What a call of `fire` hit.
+
+    Its columns (`shot`, `round`, `object`, `samples`, `pixels`, `weight`, `pellets`, `first_xy`, `distance2`) are
+    arrays with one entry a row, in a total order. It has a length (rows), is true if anything was hit, and yields named
+    rows. Two are equal when their rows and verdict counts are equal; plan and version are not compared.
+
+    Parameters
+    ----------
+    starts : (N + 1,) the rows of shot i are starts[i] .. starts[i + 1] - 1
+    verdicts : (N, 5), of rays (N, 6): samples of each shot by verdict, in the order of `Verdict`
+    fired : (N,) samples of each shot
+    plan : what ran and what was left out
+    scene, version : the scene, and its version when it was fired at; the first scene, if there are several ticks
+    weapon, shots : the weapon, and the checked shots
+    """
+
+    shot = _column("shot", "Number of the shot in the batch.")
+    round = _column("round", "Number of the round in its burst.")
+    object = _column("object", "Id of the object that was hit.")
+    samples = _column("samples", "Hit pixels of all pellets; of rays hit cells.")
+    pixels = _column("pixels", "Hit pixels, each once.")
+    weight = _column("weight", "Sum of whole weights: 65,535 a sample at full strength.")
+    pellets = _column("pellets", "Pellets that hit.")
+    first_xy = _column("first_xy", "Hit pixel (n, 2) nearest to the round's pixel; of rays the first cell.")
+    distance2 = _column("distance2", "Squared distance of `first_xy` from the round's pixel, px^2.")
+    _scenes: list[Scene] | None = None
+    _walked: tuple[int, Any] | None = None
+
+    def __init__(
+        self, rows: Rows, counted: Callable[[], Ints], scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+    ) -> None:
+        self._keep(rows, scene, weapon, shots, plan)
+        self._counted = counted
+
+    def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
+        self._rows, self.weapon, self.shots, self.plan = rows, weapon, shots, plan
+        self.scene, self.version = scene, scene.items.version
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return self._rows.nbytes
+
+    @cached_attribute
+    def starts(self) -> Ints:
+        """The rows of shot i are starts[i] .. starts[i + 1] - 1."""
+        starts = np.concatenate([[0], np.cumsum(np.bincount(self.shot, minlength=len(self.shots)))])
+        starts.flags.writeable = False
+        return starts
+
+    @cached_attribute
+    def verdicts(self) -> Ints:
+        """Samples of each shot by verdict, counted when they are first asked for."""
+        verdicts = self._counted()
+        verdicts.flags.writeable = False
+        return verdicts
+
+    @property
+    def fired(self) -> Ints:
+        """Samples of each shot."""
+        fired = np.asarray(self.verdicts.sum(axis=1))
+        fired.flags.writeable = False
+        return fired
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __bool__(self) -> bool:
+        return len(self._rows) > 0
+
+    def __iter__(self) -> Iterator[HitRow]:
+        columns = [getattr(self, name).tolist() for name in HitRow._fields]
+        for row in zip(*columns, strict=True):
+            yield _named(row)
+
+    def __eq__(self, other: Any) -> bool:
+        if not isinstance(other, Hits):
+            return NotImplemented
+        names = (*HitRow._fields, "verdicts")
+        return all(np.array_equal(getattr(self, n), getattr(other, n)) for n in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<Hits: {len(self)} rows of {len(self.shots)} shots, {self.verdict_counts()}>"
+
+    def of(self, shot: int) -> list[HitRow]:
+        """Rows of one shot."""
+        row = self._checked(shot)
+        first, last = self.starts[row], self.starts[row + 1]
+        columns = [getattr(self, name)[first:last].tolist() for name in HitRow._fields]
+        return [_named(row) for row in zip(*columns, strict=True)]
+
+    def verdict_counts(self, shot: int | None = None) -> dict[str, int]:
+        """Samples by verdict, of one shot or of all; they add up to the samples fired."""
+        counts = self.verdicts.sum(axis=0) if shot is None else self.verdicts[self._checked(shot)]
+        return {verdict.name.lower(): n for verdict, n in zip(Verdict, counts.tolist(), strict=False)}
+
+    def by_owner(self) -> list[OwnerRow]:
+        """Sum of the rows of each shot and owner, ordered by (shot, first row of the owner)."""
+        bodies: dict[tuple[int, int], list[HitRow]] = {}
+        if self._scenes is None:
+            self.scene_of(0)  # raises if the scene has changed, also if there are no rows
+        for row in self:
+            owner = int(self.scene_of(row.shot).items.owner[row.object])
+            bodies.setdefault((row.shot, owner), []).append(row)
+        return [
+            OwnerRow(
+                shot, owner, sum(r.samples for r in rows), sum(r.pixels for r in rows), sum(r.weight for r in rows),
+                tuple(dict.fromkeys(r.object for r in rows)),
+            )
+            for (shot, owner), rows in bodies.items()
+        ]  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows and verdict counts as JSON."""
+        rows = [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]
+        return {
+            "rows": rows,
+            "verdicts": [self.verdict_counts(shot) for shot in range(len(self.shots))],
+            "plan": self.plan.to_dict(),
+        }
+
+    def samples_at(self, shot: int = 0) -> Samples:
+        """All samples of one shot: pixel, pellet, verdict, and the item that decided it."""
+        return late.samples.samples_of(self._detail(shot))
+
+    def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
+        """Pixels that each round of one shot hit of each object, as {(round, object): pixels}."""
+        return late.samples.hit_spans(self._detail(shot))
+
+    def shares(self, shot: int | None = None) -> list[Share]:
+        """Samples of each row as shares of the pattern, of the visible object and of its mask; for a shot, or all."""
+        if self._scenes is None:
+            return late.samples.shares_of(
+                self.scene_of(0), self.weapon, self.shots, list(self) if shot is None else self.of(shot)
+            )
+        numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
+        return [
+            share
+            for i in numbers
+            for share in late.samples.shares_of(self.scene_of(i), self.weapon, self.shots, self.of(i))
+        ]
+
+    def why_not(self, shot: int = 0) -> list[WhyNot]:
+        """Objects within 32 px of one shot that it did not hit, and why."""
+        hit = {row.object for row in self.of(shot)}
+        return late.samples.why_not_of(self._detail(shot), hit)
+
+    def blockers(self, shot: int = 0) -> list[Blocked]:
+        """Occluders that ended samples of one shot, most samples first, and the objects behind them there."""
+        return late.samples.blockers_of(self._detail(shot))
+
+    def margins(self, shot: int | None = None) -> list[Margin]:
+        """How far the verdicts of one shot, or of all, are from flipping, by (shot, object).
+
+        A margin is the shortest whole-pixel shift of the pattern, up to 8 px, that turns an object from hit to not
+        hit or back. A margin of 1 px is fragile.
+        """
+        if self._scenes is None and shot is None:
+            return late.samples.margins_of(self.scene_of(0), self.weapon, self.shots)
+        numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
+        return [
+            margin
+            for i in numbers
+            for margin in late.samples.margins_of(self.scene_of(i), self.weapon, self._one(i), i)
+        ]
+
+    @property
+    def has_margins(self) -> bool:
+        """Whether margins can be computed; some rays have none."""
+        return True
+
+    def _detail(self, shot: int) -> Detail:
+        """One shot, sample by sample; the last one asked for is kept."""
+        scene, row = self.scene_of(shot), self._checked(shot)
+        if self._walked is None or self._walked[0] != row:
+            self._walked = row, late.samples.detail_of(scene, self.weapon, self.shots.take(row, row + 1))
+        return self._walked[1]
+
+    def _one(self, shot: int) -> Shots:
+        row = self._checked(shot)
+        return self.shots.take(row, row + 1)
+
+    def _checked(self, shot: int) -> int:
+        return integer("shot", shot, 0, len(self.shots) - 1)
+
+    def scene_of(self, shot: int) -> Scene:
+        """The scene that a shot was fired at; an InputError if the scene has changed since."""
+        if self._scenes is not None:
+            return self._scenes[self._checked(shot)]  # of the past, which does not change
+        if self.scene.version != self.version:
+            now = self.scene.version
+            raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
+        return self.scene
+
+    @property
+    def one_scene(self) -> bool:
+        """Whether all shots were fired at one scene, at one tick."""
+        return self._scenes is None or len(set(map(id, self._scenes))) == 1
+
+    @classmethod
+    def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> Hits:
+        """Hits of shots that were fired at several ticks, in the order of the shots.
+
+        Parameters
+        ----------
+        parts, rows : hits of each tick, and the numbers of its shots
+        """
+        order = np.argsort(np.concatenate(rows))
+        found = cls(
+            cls._gathered_rows(parts, rows),
+            lambda: np.concatenate([part.verdicts for part in parts])[order],
+            parts[0].scene,
+            parts[0].weapon,
+            shots,
+            Plan.joined([part.plan for part in parts]),
+        )
+        found._remember(parts, rows)
+        return found
+
+    @staticmethod
+    def _gathered_rows(parts: Sequence[Hits], rows: Sequence[Ints]) -> Rows:
+        return Rows.gathered([part._rows for part in parts], rows)
+
+    def _remember(self, parts: Sequence[Hits], rows: Sequence[Ints]) -> None:
+        """Keep the scene of each shot."""
+        scene_of = {row: part.scene for part, own in zip(parts, rows, strict=True) for row in own.tolist()}
+        self._scenes = [scene_of[row] for row in range(len(self.shots))]
+
+
+def _named(row: tuple[Any, ...]) -> HitRow:
+    return HitRow._make((*row[:7], tuple(row[7]), row[8]))
+
+
+# house: row order
+def rows_of_span_hits(met: SpanHits, volley: Placements, ids: Ints, first_shot: int) -> Rows:
+    """Add runs of hit pixels up to rows; a pixel hit by several pellets counts once in `pixels`."""
+    rounds = int(volley.round.max(initial=0)) + 1
+    group = (volley.shot[met.placement] * rounds + volley.round[met.placement]) * max(len(ids), 1) + met.rank
+    origin = volley.origin_xy[met.placement]
+    x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
+    distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
+    order = np.lexsort((x, met.y, distance2, group))
+    group, distance2 = group[order], distance2[order]
+    first = np.flatnonzero(np.diff(group, prepend=-1))
+    best = order[first]
+    lengths = (met.x_last - met.x_first + 1)[order]
+    samples = np.add.reduceat(lengths, first) if len(first) else lengths
+    weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
+    pellets, pixels = np.ones_like(samples), samples
+    if int(volley.pellet.max(initial=0)):
+        pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
+    placement, rank = met.placement[best], met.rank[best]
+    columns = (volley.shot[placement], volley.round[placement], distance2[first], met.y[best], x[best], rank)
+    sort = np.lexsort(columns[::-1])
+    first_xy = np.stack([x[best], met.y[best]], axis=1)
+    return Rows(
+        volley.shot[placement][sort] + first_shot, volley.round[placement][sort], ids[rank][sort], samples[sort],
+        pixels[sort], weight[sort], pellets[sort], first_xy[sort], distance2[first][sort],
+    )  # fmt: skip
+
+
+def _distinct(met: SpanHits, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
+    """Pellets that hit, and pixels counted once, of each group."""
+    pairs = np.unique(np.stack([group, met.placement[order]]), axis=1)
+    y = met.y[order] - met.y.min(initial=0)
+    rows = int(y.max(initial=0)) + 1
+    which, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
+    pixels = np.bincount(group[which], x_last - x_first + 1, groups).astype(np.int64)
+    return np.bincount(pairs[0], minlength=groups), pixels

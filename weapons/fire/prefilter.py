@@ -1,0 +1,246 @@
+"""The pre-filter: it finds the items that a placed pattern may touch, and those that the shot refuses.
+
+1. Boxes: one by one, or by a broad phase (grid, quadtree, BVH) that follows the scene.
+2. Volumes: the item's and the pattern's (circle, oriented box, k boxes, polygon, swept), about the pattern's origin.
+
+It may keep too many items, but never drops a hit: each volume contains the squares of its pixels. Most calls are
+served best by boxes alone; volumes are loaded by the call that needs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, NamedTuple
+from weakref import ref
+
+import numpy as np
+
+from hitplanes.planes import late
+from hitplanes.planes.bits import cells
+from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, Kinds, Pairs
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.checks import Bools, Ints, choice
+from hitplanes.planes.common.limits import (
+    BOUNDING_BYTES,
+    BOUNDING_CACHE_BYTES,
+    BOXES_MAX,
+    CORNERS,
+    GROWN_PX,
+    PAIRS_AT_ONCE,
+    SUB,
+)
+from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.grid.spans import meets
+from hitplanes.planes.scene.items import Items, Stack, boxes_in
+
+from ..kinds.placements import Placements, Shots
+from ..kinds.weapon import Pattern, Swept
+
+if TYPE_CHECKING:
+    from hitplanes.planes.broadphase.boxes import Index
+    from hitplanes.planes.volumes.fit import Kind
+    from hitplanes.planes.volumes.volumes import Capsules, Volumes
+
+
+PREFILTERS = ("auto", "none", "box", "circle", "oriented box", "4 boxes", "polygon", "swept")
+"""Names of pre-filters; "k boxes" is one for each k up to BOXES_MAX."""
+
+
+class Prefilter(NamedTuple):
+    """The test before the pixels.
+
+    Parameters
+    ----------
+    name : one of PREFILTERS
+    volume : the items' kind of volume, one of `hitplanes.planes.volumes.fit.KINDS`; "" for boxes alone, or for none
+    k : the most boxes of "boxes"
+    """
+
+    name: str
+    volume: str = ""
+    k: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.k} boxes" if self.name == "boxes" else self.name
+
+
+BOX = Prefilter("box")
+
+
+def prefilter_of(name: object) -> Prefilter:
+    """Read the name of a pre-filter: one of PREFILTERS, with any number of boxes."""
+    return _known(name) if isinstance(name, str) else _named(name)
+
+
+@lru_cache(maxsize=len(PREFILTERS) + BOXES_MAX)
+def _known(name: str) -> Prefilter:
+    return _named(name)
+
+
+def _named(name: object) -> Prefilter:
+    k = boxes_in("prefilter", name)
+    if k is not None:
+        return Prefilter("boxes", "boxes", k)
+    known = choice("prefilter", name, PREFILTERS)
+    if known in PREFILTERS[:3]:
+        return Prefilter(known)
+    return Prefilter(known, "circle" if known == "swept" else known)
+
+
+def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
+    """Pairs of placements and items whose boxes share a pixel, front to back.
+
+    Parameters
+    ----------
+    boxes_xyxy : (P, 4) inclusive boxes of the placements
+    shot : (P,) shot of each placement
+    """
+    placement, rank = np.nonzero(meets(boxes_xyxy[:, None], stack.box_xyxy[None]))
+    return Pairs(placement, rank, kinds(stack, rank, refused(stack, rank, shots, shot[placement])))
+
+
+def may_refuse(stack: Stack, shots: Shots) -> bool:
+    """Whether any shot may refuse any item."""
+    return shots.choosy or stack.has_unmet
+
+
+def kinds(stack: Stack, rank: Ints, refuses: Bools | None) -> Kinds:
+    """What items do to samples: SKIP if the shot refuses the item, else BLOCK of an occluder, else HIT."""
+    kind = np.full(len(rank), HIT, np.uint8)
+    if stack.has_occluders:
+        kind[stack.occluder[rank]] = BLOCK
+    if refuses is not None:
+        kind[refuses] = SKIP
+    return kind
+
+
+def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
+    """Whether shots refuse items: those without a category in `accept`, and those of an excluded owner."""
+    foreign = (stack.categories[rank] & shots.accept[shot]) == 0
+    if not shots.exclude.shape[1]:
+        return np.asarray(foreign)
+    return np.asarray(foreign | (stack.owner[rank][:, None] == shots.exclude[shot]).any(axis=1))
+
+
+@dataclass
+class Candidates:
+    """The pre-filter of one call.
+
+    Parameters
+    ----------
+    items, stack : the items, and their order
+    prefilter : the test before the pixels
+    index : the broad phase; None compares all boxes
+    why, why_unindexed : reason of this pre-filter, and of no broad phase
+    met : number of pairs of boxes that met so far
+    """
+
+    items: Items
+    stack: Stack
+    prefilter: Prefilter = BOX
+    index: Index | None = None
+    why: str = "boxes that share a pixel"
+    why_unindexed: str = "as asked for"
+    met: int = 0
+
+    def meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """Pairs of boxes (P, 4) and items that share a pixel, as (row, rank); all pairs without a pre-filter."""
+        if self.prefilter.name == "none":
+            return self.every(len(boxes_xyxy))
+        row, rank = self._meeting(boxes_xyxy)
+        self.met += len(rank)
+        return row, rank
+
+    def every(self, n: int) -> tuple[Ints, Ints]:
+        """All pairs of n boxes and the items, as (row, rank)."""
+        m = len(self.stack)
+        self.met += n * m
+        return np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
+
+    def _meeting(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        if self.index is None:
+            found: tuple[Ints, Ints] = kernels_of(cells).met_boxes(boxes_xyxy, self.stack.box_xyxy)
+            return found
+        m = len(self.stack)
+        rows = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
+        row, item = self.index.query(self.items, boxes_xyxy[rows])
+        row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_of[item]), m)
+        return row, rank
+
+    def near(self, volley: Placements, placement: Ints, rank: Ints) -> Bools:
+        """Whether the volumes of pattern and item may meet, for pairs whose boxes do."""
+        kind = late.fit.Kind(self.prefilter.volume, self.prefilter.k)
+        found = volley.count[placement] > 0  # the box of an empty pattern lies within others
+        found[found] = near(self.prefilter.name, kind, self.items, self.stack, volley, placement[found], rank[found])
+        return found
+
+
+_kept: LruCache[tuple[ref[Pattern], str], Volumes] = LruCache(
+    BOUNDING_CACHE_BYTES, lambda volume: volume.core().points.nbytes + BOUNDING_BYTES
+)
+"""Volumes of patterns; the key is a weak reference, so the patterns are not kept alive."""
+
+
+def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Placements, placement: Ints, rank: Ints) -> Bools:
+    """Which pairs of placements and items may touch: their volumes meet, or floats cannot decide.
+
+    Parameters
+    ----------
+    name : the pre-filter, which chooses the patterns' volumes
+    kind : kind of the items' volumes
+    placement, rank : (P,) placements, none with an empty pattern, and ranks of items
+    """
+    if not len(rank):
+        return np.zeros(0, np.bool_)
+    fired, of_pattern = np.unique(volley.pattern[placement], return_inverse=True)
+    patterns = pattern_volumes(name, [volley.table.patterns[i] for i in fired.tolist()])
+    shift = stack.box_xyxy[rank, :2] - volley.xy[placement]
+    return _meet(kind, items, stack.ids[rank], shift, patterns, of_pattern)
+
+
+def near_rays(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, lines: Lines) -> Bools:
+    """Which pairs of a ray and an item may touch: the capsule around the ray meets the item's volume.
+
+    Parameters
+    ----------
+    corner_xy : (P, 2) corners of the items' masks, about the origin of the ray
+    """
+    if not len(ids):
+        return np.zeros(0, np.bool_)
+    capsules = late.volumes.Capsules(lines.start / SUB, (lines.start + lines.step) / SUB, lines.radius / SUB)
+    return _meet(kind, items, ids, corner_xy, capsules, np.arange(len(ids)))
+
+
+def _meet(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
+    """Which volumes of items, placed by the corners of their masks, meet other volumes."""
+    volumes, row = items.bounding(kind, ids)
+    found = np.zeros(len(ids), np.bool_)
+    for first in range(0, len(ids), PAIRS_AT_ONCE):
+        part = slice(first, first + PAIRS_AT_ONCE)
+        here = volumes.take(row[part]).translated(corner_xy[part])
+        found[part] = late.overlap.overlap(here, others.take(of_other[part]), conservative=True)
+    return found
+
+
+def pattern_volumes(name: str, patterns: Sequence[Pattern]) -> Volumes:
+    """Volumes of one or more patterns, none empty, for a pre-filter; each contains the squares of its pixels."""
+    return late.volumes.joined(
+        [_kept.get((ref(pattern), name), partial(_fitted, name, pattern)) for pattern in patterns]
+    )
+
+
+def _fitted(name: str, pattern: Pattern) -> Volumes:
+    if name == "swept":
+        return late.fit.capsule(pattern.spans) if pattern.swept is None else _along(pattern.swept)
+    if name == "circle":
+        return late.fit.least_circle(pattern.spans)
+    return late.fit.oriented_box(pattern.spans) if name == "oriented box" else late.fit.convex(pattern.spans, CORNERS)
+
+
+def _along(swept: Swept) -> Capsules:
+    """Capsule around the pixel squares whose centres lie within the radius of a segment, or that meet it."""
+    a, b, radius = swept
+    return late.volumes.Capsules(a[None] / SUB, b[None] / SUB, max(radius / SUB, GROWN_PX) + GROWN_PX)

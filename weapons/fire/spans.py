@@ -1,0 +1,239 @@
+"""The reference of areas: spans of placed patterns walk the stack (direct) or read the label plane (composed)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hitplanes.planes.bits.label_plane import area
+from hitplanes.planes.bits.span_walk import (
+    HIT,
+    LIVE,
+    OF_PATTERNS,
+    SKIP,
+    VERDICT_OF,
+    Events,
+    Kinds,
+    Pairs,
+    Runs,
+    Verdict,
+    read_labels,
+    walk,
+)
+from hitplanes.planes.common.checks import Ints, Labels
+from hitplanes.planes.common.limits import CHUNK_SAMPLES
+from hitplanes.planes.grid.spans import Box, merged_runs, pieces
+from hitplanes.planes.scene.items import Stack, clipped
+
+from ..kinds.placements import Placements, Shots
+from .plan import Plan
+from .prefilter import Candidates, kinds, may_refuse, refused
+
+SPARSE = 4
+"""If items fill less than 1 / SPARSE of the box around them, spans are cut to each item's box, not to that one."""
+
+
+@dataclass(eq=False, slots=True)
+class QueryContext:
+    """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan."""
+
+    stack: Stack
+    bounds: Box | None
+    pierce: bool
+    candidates: Candidates
+    plan: Plan
+
+
+@dataclass(frozen=True, eq=False)
+class SpanHits:
+    """Runs of pixels that hit an object, and the verdict counts of each placement.
+
+    Parameters
+    ----------
+    placement, rank, y, x_first, x_last, weight : (n,) rank of the object in the stack; sum of the pixels' weights
+    counts : (P, 5) samples by verdict
+    """
+
+    placement: Ints
+    rank: Ints
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+    weight: Ints
+    counts: Ints
+
+
+# house: way of areas
+def direct(volley: Placements, shots: Shots, context: QueryContext) -> SpanHits:
+    """Walk the stack under every placement, but only where an item may be."""
+    boxes = volley.boxes
+    counts = _inside(volley, boxes, context)
+    if not len(context.stack):
+        return _met(volley, Runs.joined([]), [], counts, context.plan)
+    pairs = _candidates(volley, np.arange(len(boxes)), boxes, shots, context)
+    runs = _under_items(volley, pairs, context)
+    context.plan.run("samples", "runs where items may be", runs.nbytes)
+    return _met(volley, runs, _walked(runs, pairs, context, counts), counts, context.plan)
+
+
+# house: way of areas
+# house: hit rule of areas
+def composed(volley: Placements, shots: Shots, context: QueryContext, labels: Labels, plane_xyxy: Box) -> SpanHits:
+    """Read the front item under every sample; walk the stack only where a shot looks behind it."""
+    counts = _inside(volley, volley.boxes, context)
+    plan, stack = context.plan, context.stack
+    every = np.arange(len(volley.shot))
+    runs = _laid(volley, every, np.broadcast_to(np.array(plane_xyxy), (len(every), 4)))
+    plan.run("samples", "runs inside the bounds", runs.nbytes)
+    plan.run("read", "one code for each sample", stack.rank_by_code.nbytes)
+    events, behind = [], []
+    for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
+        part = runs.take(strip)
+        run, x_first, x_last, code = read_labels(part, labels, plane_xyxy)
+        rank = stack.rank_by_code[code >> 1]
+        plan.run("read", "", int(part.lengths.sum()) * labels.itemsize + 5 * rank.nbytes)
+        kind = _kinds(rank, volley.shot[part.placement[run]], shots, context)
+        more = (code & 1 == 1) & ((kind == SKIP) | (context.pierce & (kind == HIT)))
+        _count(counts, part.placement[run[~more]], kind[~more], (x_last - x_first + 1)[~more])
+        plan.run("verdicts", "")
+        hit = ~more & (kind == HIT)
+        events.append(Events(kind[hit], rank[hit], run[hit] + strip.start, x_first[hit], x_last[hit]))
+        seen = part.take(run[more])
+        behind.append(Runs(seen.placement, seen.y, x_first[more], x_last[more], seen.ordinal))
+        plan.run("read", "", events[-1].nbytes + behind[-1].nbytes)
+    front = _met(volley, runs, events, counts, plan)
+    rest = Runs.joined(behind)
+    return _joined(front, _look_behind(volley, rest, shots, context, counts)) if len(rest) else front
+
+
+def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Runs:
+    """Runs of placements, clipped to the items that they are paired with."""
+    busy, first = np.unique(pairs.placement, return_index=True)
+    if not len(busy):
+        return Runs.joined([])
+    items = context.stack.box_xyxy[pairs.rank]
+    low = np.minimum.reduceat(items[:, :2], first, axis=0)
+    hull = np.concatenate([low, np.maximum.reduceat(items[:, 2:], first, axis=0)], axis=1)
+    if area(hull) <= SPARSE * area(items):
+        return _laid(volley, busy, hull if context.bounds is None else clipped(hull, context.bounds))
+    runs = _laid(volley, pairs.placement, items if context.bounds is None else clipped(items, context.bounds))
+    y = runs.y - runs.y.min(initial=0)
+    rows = int(y.max(initial=0)) + 1
+    which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
+    runs = runs.take(which)
+    return Runs(runs.placement, runs.y, x_first, x_last, runs.ordinal)
+
+
+def _look_behind(volley: Placements, runs: Runs, shots: Shots, context: QueryContext, counts: Ints) -> SpanHits:
+    """Walk the stack under the samples that the label plane could not answer."""
+    busy, first = np.unique(runs.placement, return_index=True)
+    last = np.append(first[1:], len(runs)) - 1
+    left, right = np.minimum.reduceat(runs.x_first, first), np.maximum.reduceat(runs.x_last, first)
+    boxes = np.stack([left, runs.y[first], right, runs.y[last]], axis=1)
+    pairs = _candidates(volley, busy, boxes, shots, context)
+    return _met(volley, runs, _walked(runs, pairs, context, counts), counts, context.plan)
+
+
+def _candidates(volley: Placements, placements: Ints, boxes: Ints, shots: Shots, context: QueryContext) -> Pairs:
+    """Items that placements may touch, and what they do to samples."""
+    placement, rank = near_pairs(volley, placements, boxes, context)
+    return Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, context))
+
+
+def near_pairs(volley: Placements, placements: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
+    """Pairs of placements and ranks of the items that they may touch, sorted; the plan records how they were found."""
+    candidates, plan = context.candidates, context.plan
+    row, rank = candidates.meeting(boxes)
+    placement = placements[row]
+    made = row.nbytes + rank.nbytes + placement.nbytes
+    if index := candidates.index:
+        plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew", made)
+        made = 0
+    if candidates.prefilter.volume:
+        plan.run("pre-filter", candidates.why, made)
+        near, met = candidates.near(volley, placement, rank), len(rank)
+        placement, rank = placement[near], rank[near]
+        plan.run("volumes", str(candidates.prefilter), near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
+        made = 0
+    plan.run("pre-filter", candidates.why, made, (len(rank), len(placements) * len(context.stack)))
+    return placement, rank
+
+
+def _kinds(rank: Ints, shot: Ints, shots: Shots, context: QueryContext) -> Kinds:
+    """What items do to samples of shots; filters and occluders are looked up only if there are any."""
+    stack, plan, refuses = context.stack, context.plan, None
+    if may_refuse(stack, shots):
+        refuses = refused(stack, rank, shots, shot)
+        plan.run("filter", "categories and owners", refuses.nbytes, (int((~refuses).sum()), len(rank)))
+    kind = kinds(stack, rank, refuses)
+    if stack.has_occluders:
+        plan.run("occluders", "looked up of what is met", kind.nbytes)
+    return kind
+
+
+def _walked(runs: Runs, pairs: Pairs, context: QueryContext, counts: Ints) -> list[Events]:
+    """Walk runs strip by strip, and add to the counts."""
+    found, plan = [], context.plan
+    for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
+        part = runs.take(strip)
+        near = slice(*np.searchsorted(pairs.placement, [part.placement[0], part.placement[-1] + 1]).tolist())
+        here = Pairs(pairs.placement[near], pairs.rank[near], pairs.kind[near])
+        events, state = walk(part, here, context.stack, context.pierce, HIT)
+        found.append(Events(events.kind, events.rank, events.run + strip.start, events.x_first, events.x_last))
+        plan.run("walk", "samples through the stack, front to back", state.nbytes + events.nbytes)
+        met = state != LIVE
+        _count(counts, np.repeat(part.placement, part.lengths)[met], state[met], None)
+        plan.run("verdicts", "")
+    return found
+
+
+def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> None:
+    """Move samples from EMPTY to the verdicts of their states."""
+    column = placement * len(OF_PATTERNS) + VERDICT_OF[state]
+    added = np.bincount(column, samples, counts.size).astype(np.int64).reshape(counts.shape)
+    counts += added
+    counts[:, Verdict.EMPTY] -= added.sum(axis=1)
+
+
+def _inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
+    """Counts (P, 5) before the walk: samples inside the bounds are EMPTY, the others OUTSIDE."""
+    counts = np.zeros((len(boxes), len(OF_PATTERNS)), np.int64)
+    counts[:, Verdict.EMPTY] = volley.count
+    context.plan.run("verdicts", "counted for each placement", counts.nbytes)
+    if context.bounds is None:
+        return counts
+    x, y, x_max, y_max = bounds = context.bounds
+    over = np.flatnonzero((boxes[:, :2] < (x, y)).any(axis=1) | (boxes[:, 2:] > (x_max, y_max)).any(axis=1))
+    if not len(over):
+        context.plan.run("outside", "no placement reaches over the bounds")
+        return counts
+    runs = _laid(volley, over, np.broadcast_to(np.array(bounds), (len(over), 4)))
+    inside = np.bincount(runs.placement, runs.lengths, len(boxes)).astype(np.int64)[over]
+    counts[over, Verdict.OUTSIDE] = counts[over, Verdict.EMPTY] - inside
+    counts[over, Verdict.EMPTY] = inside
+    context.plan.run("outside", "some placements reach over the bounds", runs.nbytes)
+    return counts
+
+
+def _laid(volley: Placements, placements: Ints, boxes: Ints) -> Runs:
+    """Runs of some of the placements, each clipped to a box."""
+    x, y = volley.xy[placements].T
+    runs = volley.table.laid(volley.pattern[placements], x, y, boxes)
+    return Runs(placements[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
+
+
+def _met(volley: Placements, runs: Runs, events: list[Events], counts: Ints, plan: Plan) -> SpanHits:
+    hit = Events.joined(events)
+    under = runs.take(hit.run)
+    plan.run("rows", "hit pixels, gathered by object", hit.nbytes + under.nbytes)
+    weight = volley.table.weight(under.ordinal, hit.x_first, hit.x_last)
+    if volley.table.prefix is not None:
+        plan.run("weights", "", weight.nbytes)
+    return SpanHits(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)
+
+
+def _joined(a: SpanHits, b: SpanHits) -> SpanHits:
+    """Hits of samples in front and of those behind; both hold the same counts."""
+    names = ("placement", "rank", "y", "x_first", "x_last", "weight")
+    return SpanHits(**{n: np.concatenate([getattr(a, n), getattr(b, n)]) for n in names}, counts=a.counts)

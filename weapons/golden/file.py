@@ -1,0 +1,338 @@
+"""Read, compare and write goldens: the hits that a test accepted.
+
+A golden is `<name>.json` (the report), `<name>.npz` (whole planes) and `<name>.png` (the picture without text).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hitplanes.planes.common.checks import Bools, Image, InputError, array_of, printable
+from hitplanes.planes.common.tables import Text
+from hitplanes.planes.files.png import read_png, write_bytes, write_png, write_text
+from hitplanes.planes.files.scene_folder import laid_out
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.hits import Hits
+from ..report.differences import decisive, differences
+from ..report.picture import picture_of_report
+from ..report.report import report_of
+
+FORMAT = "hitplanes-golden/1"
+
+PLANES_AREA_MAX = 4 * 2**20
+"""Largest scene whose planes are stored, px; two compressed planes of this size take some tens of kB."""
+
+SCENE_PLANES = ("hittable", "occluders")
+"""Planes of a scene that decide hits."""
+
+CHANGED_MAX = 8
+"""Most changed objects that a line names."""
+
+LINE_DEPTH = 5
+"""Depth from which JSON stays on one line: a row, a blocker or the samples of a verdict."""
+
+DAMAGE = (
+    OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError, SyntaxError,
+    struct.error, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""Errors that reading a damaged archive of arrays may raise."""
+
+Plane = npt.NDArray[Any]
+
+
+class DamagedGoldenError(InputError):
+    """A golden cannot be read; an update replaces it."""
+
+
+class ForeignGoldenError(InputError):
+    """The file was written by a newer hitplanes or is no golden; it is never overwritten."""
+
+
+@dataclass(frozen=True, eq=False)
+class Golden:
+    """Hits as a golden stores them.
+
+    Parameters
+    ----------
+    test : node id of the test, from its file's name on
+    name : given in the test, if it has several goldens
+    report : report of the hits, without the parts that a comparison ignores
+    planes : planes (h, w) or (h, w, channels) by name: those of the scene, then the user's
+    origin_xy : pixel of the world at [0, 0] of the scene's planes
+    left_out : why the scene's planes are not stored, or None
+    picture : (h, w, 3 or 4) bytes, without text
+    scene : scene that was fired at, for texts and pictures; not stored
+    """
+
+    test: str
+    name: str | None
+    report: dict[str, Any]
+    planes: dict[str, Plane]
+    origin_xy: tuple[int, int]
+    left_out: str | None
+    picture: Image
+    scene: Scene | None = None
+
+    def text(self) -> str:
+        """Return the JSON, laid out so that texts compare well."""
+        arrays = [{"name": k, "dtype": v.dtype.str[1:], "shape": list(v.shape)} for k, v in self.planes.items()]
+        data = {
+            "format": FORMAT,
+            "test": self.test,
+            "name": self.name,
+            "planes": arrays,
+            "origin_xy": list(self.origin_xy),
+            "left_out": self.left_out,
+            "report": self.report,
+        }
+        return laid_out(data, whole=LINE_DEPTH) + "\n"
+
+    def write(self, base: Path, changed: Unlike | None = None) -> None:
+        """Write the files whose parts have changed, by default all; the JSON is written last."""
+        if changed is None or changed.planes:
+            _write_planes(_file(base, "npz"), self.planes)
+        if changed is None or changed.picture:
+            write_png(_file(base, "png"), self.picture)
+        text, path = self.text(), _file(base, "json")
+        if changed is None or not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+
+
+@dataclass(frozen=True)
+class Unlike:
+    """Differences between a golden and the hits got, as lines about the hits, each plane and the picture."""
+
+    hits: list[str] = field(default_factory=list)
+    planes: dict[str, list[str]] = field(default_factory=dict)
+    picture: list[str] = field(default_factory=list)
+
+    @property
+    def lines(self) -> list[str]:
+        """All lines in printable form, hits first."""
+        every = [*self.hits, *(line for lines in self.planes.values() for line in lines), *self.picture]
+        return list(map(printable, every))
+
+
+def golden_of(hits: object, planes: object, test: str, name: str | None) -> Golden:
+    """Make a golden of hits and the user's planes.
+
+    Raises
+    ------
+    InputError
+        If `hits` or a plane is of a wrong type, or the scene has changed since the shots.
+    """
+    if not isinstance(hits, Hits):
+        raise InputError(f"hits: expected Hits, as fire returns them, got {type(hits).__name__}")
+    scene = hits.scene
+    report = report_of(scene, [hits])
+    kept, origin_xy, left_out = _scene_planes(scene)
+    return Golden(
+        test,
+        name,
+        json.loads(json.dumps(decisive(report))),
+        kept | _own_planes(planes),
+        origin_xy,
+        left_out,
+        picture_of_report(report, scene, text=False),
+        scene,
+    )
+
+
+def read_golden(base: Path) -> Golden | None:
+    """Read a golden; None if there is none.
+
+    Raises
+    ------
+    DamagedGoldenError, ForeignGoldenError
+        Naming the file.
+    """
+    path = _file(base, "json")
+    if not path.exists():
+        return None
+    data = _checked(path)
+    try:
+        planes = _read_planes(_file(base, "npz"), data["planes"]) if data["planes"] else {}
+        return Golden(
+            data["test"],
+            data["name"],
+            dict(data["report"]),
+            planes,
+            (int(data["origin_xy"][0]), int(data["origin_xy"][1])),
+            data["left_out"],
+            _read_picture(_file(base, "png")),
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        if isinstance(error, DamagedGoldenError):
+            raise
+        raise DamagedGoldenError(f"{path}: expected a golden, got one that is damaged: {error!r:.80}") from error
+
+
+def unlike(expected: Golden, got: Golden) -> Unlike:
+    """Compare two goldens exactly."""
+    planes: dict[str, list[str]] = {}
+    if expected.left_out != got.left_out:
+        planes["scene"] = [f"planes of the scene: {got.left_out or 'kept'}, was {expected.left_out or 'kept'}"]
+    if expected.origin_xy != got.origin_xy:
+        planes["origin"] = [f"planes of the scene begin at {got.origin_xy}, was {expected.origin_xy}"]
+    for name in dict.fromkeys([*expected.planes, *got.planes]):
+        lines = _plane_lines(name, expected.planes.get(name), got)
+        if lines:
+            planes[name] = lines
+    return Unlike(differences(expected.report, got.report), planes, _picture_lines(expected.picture, got.picture))
+
+
+def pixels_unlike(was: Plane, now: Plane) -> Bools:
+    """Return where two arrays of one shape differ, as (h, w); NaN equals NaN."""
+    differ = (was != now) & ~((was != was) & (now != now))
+    return np.asarray(differ.any(axis=2) if differ.ndim == 3 else differ)
+
+
+def _plane_lines(name: str, was: Plane | None, got: Golden) -> list[str]:
+    now = got.planes.get(name)
+    if was is None or now is None:
+        return [f"plane {name!r} is {'new' if was is None else 'missing'}"]
+    lines = []
+    if was.dtype.str[1:] != now.dtype.str[1:]:
+        lines.append(f"plane {name!r}: dtype {now.dtype}, was {was.dtype}")
+    if was.shape != now.shape:
+        return [*lines, f"plane {name!r}: shape {now.shape}, was {was.shape}"]
+    differ = pixels_unlike(was, now)
+    if differ.any():
+        y, x = np.argwhere(differ)[0].tolist()
+        after, before = ((_called(name, side[y, x], got.scene)) for side in (now, was))
+        if name in SCENE_PLANES:
+            x, y = x + got.origin_xy[0], y + got.origin_xy[1]
+        lines.append(f"plane {name!r}: pixels differ: {differ.sum()}, first at ({x}, {y}): {after}, was {before}")
+        labels = np.union1d(was[differ], now[differ])
+        texts = [_called(name, label, got.scene) for label in labels[labels > 0]] if name in SCENE_PLANES else []
+        if len(texts) > 1:
+            more = f" and {len(texts) - CHANGED_MAX} more" if len(texts) > CHANGED_MAX else ""
+            lines.append(f"plane {name!r}: changed: {', '.join(texts[:CHANGED_MAX])}{more}")
+    return lines
+
+
+def _called(plane: str, value: Any, scene: Scene | None) -> str:
+    """Return the text of a plane's value; in a plane of the scene it is an object."""
+    if plane not in SCENE_PLANES:
+        return str(value.tolist())
+    item = int(value) - 1
+    if item < 0:
+        return "nothing"
+    known = scene is not None and item < scene.items.count
+    return f"object {item}" + (f" {json.dumps(scene.name_of(item), ensure_ascii=False)}" if known else "")  # type: ignore[union-attr]
+
+
+def _picture_lines(was: Image, now: Image) -> list[str]:
+    was, now = (opaque(picture) for picture in (was, now))
+    if was.shape != now.shape:
+        return [f"picture: {now.shape[1]} x {now.shape[0]} px, was {was.shape[1]} x {was.shape[0]}"]
+    differ = pixels_unlike(was, now)
+    if not differ.any():
+        return []
+    y, x = np.nonzero(differ)
+    box = f"({x.min()}, {y.min()}) to ({x.max()}, {y.max()})"
+    return [f"picture: pixels differ: {len(x)}, in the box {box} of the picture; 0 may"]
+
+
+def opaque(picture: Image) -> Image:
+    """Return a picture with an alpha channel; a picture without one is opaque."""
+    return picture if picture.shape[2] == 4 else np.pad(picture, ((0, 0), (0, 0), (0, 1)), constant_values=255)
+
+
+def _scene_planes(scene: Scene) -> tuple[dict[str, Plane], tuple[int, int], str | None]:
+    """Return the planes that decide hits, their origin, and why they are left out, or None."""
+    x, y, x_max, y_max = scene.extent()
+    width, height = x_max - x + 1, y_max - y + 1
+    if width * height > PLANES_AREA_MAX:
+        return {}, (x, y), f"left out: {width} x {height} px are more than {PLANES_AREA_MAX}"
+    planes = scene.planes()
+    return {name: getattr(planes, name) for name in SCENE_PLANES}, planes.origin_xy, None
+
+
+def _own_planes(planes: object) -> dict[str, Plane]:
+    """Check and copy the user's planes."""
+    if not isinstance(planes, Mapping):
+        raise InputError(f"planes: expected arrays by name, got {type(planes).__name__}")
+    kept = {}
+    for key, value in planes.items():
+        name = Text().check("planes", key)
+        array = array_of(f"planes[{name!r}]", value)
+        if name in SCENE_PLANES:
+            raise InputError(f"planes: expected a name other than {' and '.join(SCENE_PLANES)}, got {name!r}")
+        if array.dtype.kind not in "biuf" or array.ndim not in (2, 3) or not array.size:
+            got = f"shape {array.shape} of {array.dtype}"
+            raise InputError(f"planes[{name!r}]: expected numbers (h, w) or (h, w, channels), got {got}")
+        kept[name] = array.copy()
+    return kept
+
+
+def _file(base: Path, kind: str) -> Path:
+    return base.with_name(f"{base.name}.{kind}")
+
+
+def _checked(path: Path) -> dict[str, Any]:
+    """Read the JSON of a golden, and check its format."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise DamagedGoldenError(f"{path}: expected a golden, got no JSON: {error}") from error
+    written = data.get("format") if isinstance(data, dict) else None
+    if written == FORMAT:
+        return dict(data)
+    if isinstance(written, str) and re.fullmatch(r"hitplanes-golden/\d+", written):
+        raise ForeignGoldenError(
+            f"{path}: expected {FORMAT!r}, got {written!r}: made by a newer hitplanes; it is left alone"
+        )
+    raise ForeignGoldenError(f"{path}: expected {FORMAT!r}, got format {written!r:.60}: no golden; it is left alone")
+
+
+def _read_planes(path: Path, listed: list[dict[str, Any]]) -> dict[str, Plane]:
+    planes: dict[str, Plane] = {}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for entry in listed:
+                data = io.BytesIO(archive.read(f"{entry['name']}.npy"))
+                planes[entry["name"]] = np.lib.format.read_array(data, allow_pickle=False)
+    except DAMAGE as error:
+        raise DamagedGoldenError(
+            f"{path}: expected the planes of a golden, got a file that is damaged: {error}"
+        ) from error
+    return planes
+
+
+def _write_planes(path: Path, planes: Mapping[str, Plane]) -> None:
+    """Write arrays as an npz archive; numpy.savez cannot store the name "file". Without arrays, delete the archive."""
+    if not planes:
+        with suppress(FileNotFoundError):
+            path.unlink()
+        return
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, plane in planes.items():
+            data = io.BytesIO()
+            np.lib.format.write_array(data, np.ascontiguousarray(plane), allow_pickle=False)
+            entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980: the same bytes at any time
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, data.getvalue())
+    write_bytes(path, whole.getvalue())
+
+
+def _read_picture(path: Path) -> Image:
+    try:
+        return read_png(path, "picture")
+    except InputError as error:
+        raise DamagedGoldenError(f"{path}: {error}") from error

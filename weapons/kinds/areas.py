@@ -1,0 +1,429 @@
+"""Area weapons and their patterns, pellets and bursts, and all weapons from JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cached_property
+from typing import Any, ClassVar
+from weakref import ref
+
+import numpy as np
+
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
+from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
+from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
+from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned, unit
+from hitplanes.planes.grid.rasterize import beam, cone, disc, polygon, ring
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.scene.scene import Scene
+from hitplanes.planes.scene.sprite import Sprite, Transform, rows_of, variant_of
+
+from .rays import Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
+from .weapon import FALLOFFS, LENGTH, Part, Pattern, Swept, Weapon, make_pattern
+
+ORIGIN = np.zeros(2, np.int64)
+RING = Numbers((None, 2), REACH_MAX / 2, least=3)
+
+
+@dataclass(frozen=True, eq=False)
+class AreaWeapon(Weapon):
+    """A weapon of one pattern.
+
+    Parameters
+    ----------
+    pierce : whether samples go on through the objects that they hit, up to an occluder
+    falloff : None (full weight everywhere), "linear" or "smooth", from the shot's pixel to the end of the reach
+    """
+
+    table: ClassVar[dict[str, Value]] = {"pierce": Flag(), "falloff": Optional(Word(FALLOFFS))}
+    directed: ClassVar[bool] = False
+    pierce: bool = field(default=False, kw_only=True)
+    falloff: str | None = field(default=None, kw_only=True)
+
+    @property
+    def reach_256(self) -> int:
+        """Where falloff ends, in 1/256 px from the shot's pixel."""
+        return 0
+
+    def spans(self, c: int, s: int) -> Spans:
+        """Pixels about the shot's pixel, aimed along the direction (c, s) of length 2**30."""
+        raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+
+    def swept(self, c: int, s: int) -> Swept | None:
+        """The segment that the pattern lies along, if it has one, and how far from it centres may lie."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Point(AreaWeapon):
+    """One pixel."""
+
+    kind: ClassVar[str] = "point"
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The shot's pixel."""
+        return disc(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Disc(AreaWeapon):
+    """All pixels whose centres are at most `radius` px away: a blast."""
+
+    kind: ClassVar[str] = "disc"
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"radius": LENGTH}
+    radius: float
+
+    @property
+    def reach_256(self) -> int:
+        """The radius."""
+        return _snapped(self.radius)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed disc."""
+        return disc(_snapped(self.radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Ring(AreaWeapon):
+    """All pixels whose centres are `inner_radius` to `outer_radius` px away: a shock wave."""
+
+    kind: ClassVar[str] = "ring"
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"inner_radius": LENGTH, "outer_radius": LENGTH}
+    inner_radius: float
+    outer_radius: float
+
+    def __post_init__(self) -> None:
+        """Check that the inner radius is not the larger one."""
+        super().__post_init__()
+        if self.inner_radius > self.outer_radius:
+            raise InputError(f"inner_radius: expected at most {self.outer_radius}, got {self.inner_radius}")
+
+    @property
+    def reach_256(self) -> int:
+        """The outer radius."""
+        return _snapped(self.outer_radius)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed ring."""
+        return ring(_snapped(self.inner_radius), _snapped(self.outer_radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Box(AreaWeapon):
+    """A box of `width` x `height` px, turned with the aim; an even side is centred right of, or below, the pixel."""
+
+    kind: ClassVar[str] = "box"
+    directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"width": Whole(1, REACH_MAX), "height": Whole(1, REACH_MAX)}
+    width: int
+    height: int
+
+    @property
+    def reach_256(self) -> int:
+        """Distance of the farthest corner."""
+        return _farthest(self._corners())
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed rectangle whose edges lie between the pixels."""
+        return polygon([turned(self._corners(), c, s)])
+
+    def _corners(self) -> Ints:
+        sides = [(HALF * (1 - n % 2), HALF * n) for n in (int(self.width), int(self.height))]
+        (left, right), (top, low) = ((center - half, center + half) for center, half in sides)
+        return np.array([(left, top), (right, top), (right, low), (left, low)], np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon(AreaWeapon):
+    """A polygon about the shot, turned with the aim; convex or not, with holes, filled by the even-odd rule.
+
+    Parameters
+    ----------
+    points : (n, 2) corners, px; the last is joined to the first
+    holes : more rings (n, 2)
+    """
+
+    kind: ClassVar[str] = "polygon"
+    directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"points": RING, "holes": Rows(RING)}
+    points: Sequence[Sequence[float]]
+    holes: Sequence[Sequence[Sequence[float]]] = ()
+
+    @cached_property
+    def reach_256(self) -> int:
+        """Distance of the farthest point."""
+        return _farthest(np.concatenate(self._rings()))
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The filled rings."""
+        return polygon([turned(ring, c, s) for ring in self._rings()])
+
+    def _rings(self) -> list[Ints]:
+        return [snap(ring) for ring in (self.points, *self.holes)]
+
+
+@dataclass(frozen=True, eq=False)
+class Cone(AreaWeapon):
+    """All pixels whose centres are at most `reach` px away and at most `angle` / 2 degrees off the aim: a flame.
+
+    The supercover of the axis belongs to it, so it has no gap near the muzzle.
+    """
+
+    kind: ClassVar[str] = "cone"
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"reach": LENGTH, "angle": Number(0, 360)}
+    directed: ClassVar[bool] = True
+    reach: float
+    angle: float
+
+    @property
+    def reach_256(self) -> int:
+        """The reach."""
+        return _snapped(self.reach)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A closed sector."""
+        c_half, s_half = unit(self.angle / 2)
+        return cone(_snapped(self.reach), c, s, int(c_half), int(s_half))
+
+
+@dataclass(frozen=True, eq=False)
+class Beam(AreaWeapon):
+    """Pixels whose centres are at most `width` / 2 px from a segment of `length` px, and the segment's supercover."""
+
+    kind: ClassVar[str] = "beam"
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {"length": LENGTH, "width": LENGTH}
+    directed: ClassVar[bool] = True
+    length: float
+    width: float
+
+    @property
+    def reach_256(self) -> int:
+        """The length and half the width."""
+        return _snapped(self.length) + _snapped(self.width / 2)
+
+    def spans(self, c: int, s: int) -> Spans:
+        """A segment with round ends."""
+        return beam(*self.swept(c, s))
+
+    def swept(self, c: int, s: int) -> Swept:
+        """The segment from the shot's pixel along the aim, and half the width."""
+        return ORIGIN, turned(np.array([_snapped(self.length), 0]), c, s), _snapped(self.width / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Stencil(AreaWeapon):
+    """A mask as the pattern, turned with the aim like a sprite.
+
+    Parameters
+    ----------
+    mask : (h, w) booleans, or rows of '#' and '.'
+    pivot_xy : pixel of the mask that lies on the shot; by default its centre
+    """
+
+    kind: ClassVar[str] = "stencil"
+    directed: ClassVar[bool] = True
+    table: ClassVar[dict[str, Value]] = AreaWeapon.table | {
+        "mask": Mask(),
+        "pivot_xy": Optional(Numbers((2,), MASK_SIDE_MAX)),
+    }
+    mask: Any
+    pivot_xy: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        """Keep the mask as a tuple of rows, which is read-only."""
+        super().__post_init__()
+        self._keep("mask", tuple(rows_of(self.mask)))
+
+    @cached_property
+    def _sprite(self) -> Sprite:
+        return Sprite.from_mask(Mask().check("mask", self.mask), pivot_xy=self.pivot_xy)
+
+    @cached_property
+    def reach_256(self) -> int:
+        """Distance of the farthest pixel, unturned."""
+        return _farthest(SUB * self.spans(1 << 30, 0).pixels())
+
+    def spans(self, c: int, s: int) -> Spans:
+        """The turned mask."""
+        quarter, c, s = quarters(c, s)
+        variant = variant_of(self._sprite, Transform(quarter=quarter, c=c, s=s))
+        x, y = pixel(np.array([-variant.pivot_x, -variant.pivot_y])).tolist()
+        return Spans.from_mask(variant.mask, (x, y))
+
+
+@dataclass(frozen=True, eq=False)
+class Spread(Weapon):
+    """A shotgun: `count` pellets of a weapon, with offsets uniform over a disc of `radius` px.
+
+    If the pellet is a ray, its far end is offset: all pellets start at the muzzle.
+    """
+
+    kind: ClassVar[str] = "spread"
+    table: ClassVar[dict[str, Value]] = {
+        "pellet": Part("pellet", (AreaWeapon, RayWeapon), "a weapon of one pattern or ray"),
+        "count": Whole(1, PELLETS_MAX),
+        "radius": LENGTH,
+    }
+    pellet: AreaWeapon | RayWeapon
+    count: int
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds(Weapon):
+    """A burst: `count` rounds of a weapon, each shifted and turned by the recoil of those before it.
+
+    Parameters
+    ----------
+    recoil_xy : shift of each round from the one before, px
+    recoil_deg : turn of the aim from the round before, degrees
+    """
+
+    kind: ClassVar[str] = "rounds"
+    table: ClassVar[dict[str, Value]] = {
+        "weapon": Part("single", (AreaWeapon, RayWeapon, Spread, Sweep), "a weapon other than rounds"),
+        "count": Whole(1, PELLETS_MAX),
+        "recoil_xy": Numbers((2,), REACH_MAX),
+        "recoil_deg": Number(-360, 360),
+    }
+    weapon: AreaWeapon | RayWeapon | Spread | Sweep
+    count: int
+    recoil_xy: Sequence[float] = (0.0, 0.0)
+    recoil_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check that all rounds together do not have too many pellets."""
+        super().__post_init__()
+        if isinstance(self.weapon, Spread | Sweep):
+            integer("count", self.count, 1, PELLETS_MAX // self.weapon.count)
+
+
+Parts = tuple[
+    tuple[Rounds | None, Spread | None, AreaWeapon] | None,
+    tuple[Rounds | None, Spread | Sweep | None, RayWeapon] | None,
+]
+"""Burst, spread and pattern of an area weapon, or None; burst, spread or sweep, and ray of a ray weapon, or None."""
+
+KINDS: dict[str, type[Weapon]] = {
+    kind.kind: kind
+    for kind in (
+        Point, Disc, Ring, Box, Polygon, Cone, Beam, Stencil, Pistol, Rifle, Laser, Projectile, Spread, Sweep, Rounds,
+    )
+}  # fmt: skip
+
+
+def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, AreaWeapon]:
+    """Burst, spread and pattern of an area weapon."""
+    parts = _parts_of(weapon)[0]
+    if parts is None:
+        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+    return parts
+
+
+def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, RayWeapon] | None:
+    """Burst, spread or sweep, and ray of a ray weapon; None for other weapons."""
+    return _parts_of(weapon)[1]
+
+
+def _parts_of(weapon: object) -> Parts:
+    """Parts of a weapon; they are not kept with it, as the weapon may be one of them: a reference cycle."""
+    if not isinstance(weapon, Weapon):
+        return None, None
+    burst = weapon if isinstance(weapon, Rounds) else None
+    inner: Weapon = burst.weapon if burst else weapon
+    several = inner if isinstance(inner, Spread | Sweep) else None
+    plain: Weapon = inner.pellet if isinstance(inner, Spread) else inner.ray if isinstance(inner, Sweep) else inner
+    if KINDS.get(getattr(plain, "kind", "")) is not type(plain):
+        return None, None
+    if isinstance(plain, AreaWeapon):
+        return (burst, several if isinstance(several, Spread) else None, plain), None
+    return None, (burst, several, plain) if isinstance(plain, RayWeapon) else None
+
+
+def has_no_range(weapon: Weapon) -> bool:
+    """Whether a weapon is a ray that ends at the point that it is aimed at, so that it needs `toward`."""
+    parts = ray_parts_of(weapon)
+    return parts is not None and parts[2].length_256 is None
+
+
+def pierces(weapon: Weapon) -> bool:
+    """Whether the samples of a weapon go on through objects."""
+    return parts_of(weapon)[2].pierce
+
+
+_kept: LruCache[tuple[str, int, int], Pattern] = LruCache(
+    PATTERN_CACHE_BYTES, lambda pattern: pattern.nbytes, lambda key: len(key[0])
+)
+
+
+def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
+    """Pattern of a weapon aimed along a direction of length 2**30; the last ones asked for are kept.
+
+    The weapon refers to its straight pattern, the only one of a weapon that is not directed.
+    """
+    straight = s == 0 and c == ONE
+    found: Pattern | None = vars(weapon)["_straight"]() if straight and "_straight" in vars(weapon) else None
+    if found is not None:
+        return found
+
+    def make() -> Pattern:
+        return make_pattern(weapon.spans(c, s), weapon.falloff, weapon.reach_256, weapon.swept(c, s))
+
+    pattern = _kept.get((weapon.text, c, s), make)  # the weapon itself may hold much more
+    if straight:
+        weapon._keep("_straight", ref(pattern))  # no longer than others are kept
+    return pattern
+
+
+def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:
+    """Make a weapon from its JSON.
+
+    Parameters
+    ----------
+    data : an object with a kind and the fields of that kind
+    name : name of the weapon in error texts
+    kinds : classes that it may be of; a burst may not be part of a burst
+
+    Raises
+    ------
+    InputError
+        If a kind or key is unknown, a field missing or a value out of range; it names the weapon and the field.
+    """
+    with within(name):
+        if not isinstance(data, Mapping):
+            raise InputError(f"expected an object with a kind, got {shown(data)}")
+        known_kinds = [kind for kind, made in KINDS.items() if issubclass(made, kinds)]
+        kind = KINDS[choice("kind", data.get("kind"), known_kinds)]
+        known = {f.name: f for f in fields(kind)}
+        for key in data:
+            choice("key", key, ("kind", *known))
+        missing = [key for key, f in known.items() if f.default is MISSING and key not in data]
+        if missing:
+            raise InputError(f"{missing[0]}: expected a value, got nothing")
+        values = {key: value for key, value in data.items() if key != "kind"}
+        for key, part in kind.table.items():
+            if isinstance(part, Part):
+                values[key] = weapon_from_json(values[key], key, part.kinds)
+        return kind(**values)
+
+
+def arsenal_of(scene: Scene) -> dict[str, Weapon]:
+    """Weapons of a scene's file, by name."""
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    weapons = typed("weapons", scene.weapons, dict)
+    return {name: weapon_from_json(data, f"weapons.{name}") for name, data in weapons.items()}
+
+
+def _snapped(length: float) -> int:
+    """Like `snap`, for one Python number."""
+    return round(SUB * length)
+
+
+def _farthest(points_256: Ints) -> int:
+    if not len(points_256):
+        return 0
+    return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())

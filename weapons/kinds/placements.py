@@ -1,0 +1,532 @@
+"""Checked shots, and their placements: the pattern and pixel of each pellet of each round, by seeded draws.
+
+No state is kept, so any shot of a batch can be fired again alone, in any order, on any machine.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
+from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
+from hitplanes.planes.grid import fixed_point
+from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, unit_toward
+from hitplanes.planes.scene.scene import one_place, points
+
+from .areas import AreaWeapon, has_no_range, parts_of, pattern_of
+from .weapon import PatternTable, Weapon
+
+C = TypeVar("C", bound="Columns")
+
+ZEROS, ONES = (np.broadcast_to(np.int64(value), 2**48) for value in (0, 1))
+"""Constants whose slices are columns of one value that take no memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of equal length; the first is `shot`."""
+
+    shot: Ints
+
+    def __len__(self) -> int:
+        return len(self.shot)
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(column.nbytes) for column in vars(self).values())
+
+    def take(self: C, rows: Ints | slice) -> C:
+        """Some of the rows."""
+        return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    def of_shot(self: C, shot: int) -> C:
+        """Rows of one shot."""
+        return self.take(slice(*np.searchsorted(self.shot, [shot, shot + 1]).tolist()))
+
+    def to_rows(self) -> list[dict[str, Any]]:
+        """Rows as JSON."""
+        names = [f.name for f in fields(self)]
+        columns = [getattr(self, name).tolist() for name in names]
+        return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
+    @classmethod
+    def joined(cls: type[C], parts: Sequence[C]) -> C:
+        """Rows of one or more parts, one after another."""
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+    # house: row order
+    @classmethod
+    def gathered(cls: type[C], parts: Sequence[C], shots: Sequence[Ints]) -> C:
+        """Rows of several parts in the order of shots; `shots` are the shot numbers of each part."""
+        every = cls.joined([replace(part, shot=own[part.shot]) for part, own in zip(parts, shots, strict=True)])
+        return every.take(np.argsort(every.shot, kind="stable"))
+
+
+Words = npt.NDArray[np.uint64]
+
+ROWS_AT_ONCE = 2**15
+"""Draws made at a time: 256 KB for each of their arrays; with fewer, the calls of numpy take longer."""
+
+
+def mix64(words: Words) -> Words:
+    """Mix 64 bits: the finaliser of splitmix64 (Steele, Lea, Flood 2014; constants by Stafford, variant 13)."""
+    z = np.atleast_1d(np.asarray(words, np.uint64)).copy()
+    _mix(z)
+    return z
+
+
+def _mix(z: Words) -> None:
+    """Mix words in place."""
+    z ^= z >> np.uint64(30)
+    z *= np.uint64(0xBF58476D1CE4E5B9)
+    z ^= z >> np.uint64(27)
+    z *= np.uint64(0x94D049BB133111EB)
+    z ^= z >> np.uint64(31)
+
+
+def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
+    """Whole-pixel offsets (n, 2), uniform over the centres of a disc, by rejection on integers.
+
+    Parameters
+    ----------
+    radius_256 : radius in 1/256 px
+    seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
+    shot, round_, pellet : (n,) int64; a row depends only on its seed and its own three numbers. They may broadcast:
+        seeds, shots and rounds (n, 1) and pellets (k,) give offsets (n, k, 2)
+    """
+    words = np.asarray(seed, np.uint64), *(np.asarray(word).astype(np.uint64) for word in (shot, round_, pellet))
+    shape = np.broadcast_shapes(*(word.shape for word in words))
+    offsets = np.empty((*shape, 2), np.int64)
+    at_once = max(ROWS_AT_ONCE // max(shape[-1], 1), 1) if len(shape) > 1 else ROWS_AT_ONCE
+    for first in range(0, shape[0], at_once):
+        now = slice(first, first + at_once)
+        key, *rest = (word[now] if word.shape[:1] == shape[:1] and word.ndim == len(shape) else word for word in words)
+        key = mix64(key)
+        for word in rest:
+            key = key ^ word  # pellets broadcast to more columns
+            key += GOLDEN
+            _mix(key)
+        offsets[now] = _in_disc(key.reshape(-1), reach=radius_256 // SUB, radius2=radius_256**2).reshape(*key.shape, 2)
+    return offsets
+
+
+def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
+    """Offsets (n, 2) within a disc; each state is drawn again until its offset lies inside."""
+    bits, high = np.uint64((1 << (2 * reach).bit_length()) - 1), np.uint64(32)
+    offsets = np.empty((len(state), 2), np.int64)
+    pending = np.arange(len(state))
+    while len(pending):
+        state += GOLDEN
+        drawn = mix64(state)
+        x, y = (drawn & bits).view(np.int64), ((drawn >> high) & bits).view(np.int64)
+        x -= reach
+        y -= reach
+        distance2 = x * x
+        distance2 += y * y
+        within = distance2 <= radius2 // SUB**2
+        good, rest = within.nonzero()[0], np.logical_not(within).nonzero()[0]
+        row = pending.take(good)
+        offsets[row, 0], offsets[row, 1] = x.take(good), y.take(good)
+        pending, state = pending.take(rest), state.take(rest)
+    return offsets
+
+
+OWNER_MAX = 2**31
+STRAIGHT = (ONE, 0)
+
+
+class Shots:
+    """A checked batch of shots. A value that all shots share is given once; its column is made when it is read.
+
+    Parameters
+    ----------
+    at_256 : (N, 2) positions in 1/256 px
+    direction : (N, 2) cos and sin of the aim times 2**30, or one pair; None if shots are aimed at points
+    toward_256 : (N, 2) offsets to the points that shots are aimed at, in 1/256 px; None if they have an angle
+    accept : (N,) category bits, or one value
+    exclude : (N, K) owners, -1 for none, or one row
+    number : (N,) shot numbers for the draws, or the first of a range
+    seed : (N,) uint64 seeds of the draws, or one value
+    row : (N,) places in the call, for error texts, or the first of a range
+    """
+
+    def __init__(
+        self,
+        at_256: Ints,
+        direction: Ints | tuple[int, int] | None,
+        toward_256: Ints | None,
+        accept: Ints | int,
+        exclude: Ints | tuple[int, ...],
+        number: Ints | int,
+        seed: Words | int,
+        row: Ints | int,
+    ) -> None:
+        self.at_256, self.toward_256 = at_256, toward_256
+        self._direction, self._accept, self._exclude = direction, accept, exclude
+        self._number, self._seed, self._row = number, seed, row
+
+    def __len__(self) -> int:
+        return len(self.at_256)
+
+    @cached_attribute
+    def xy(self) -> Ints:
+        """Whole pixels (N, 2) of the positions."""
+        xy: Ints = kernels_of(fixed_point).pixels(self.at_256)
+        return xy
+
+    @property
+    def one_direction(self) -> tuple[int, int] | None:
+        """The direction of all shots, if one was given for all; else None."""
+        return self._direction if isinstance(self._direction, tuple) else None
+
+    @cached_attribute
+    def direction(self) -> Ints:
+        """Cosine and sine (N, 2) of the aims, times 2**30."""
+        if self._direction is None and self.toward_256 is not None:
+            return np.stack(unit_toward(self.toward_256[:, 0], self.toward_256[:, 1]), axis=1)
+        return _spread(self._direction, len(self))
+
+    @cached_attribute
+    def accept(self) -> Ints:
+        """Category bits (N,)."""
+        return _spread(self._accept, len(self))
+
+    @cached_attribute
+    def exclude(self) -> Ints:
+        """Owners (N, K) that are passed over, -1 for none."""
+        return _spread(self._exclude, len(self))
+
+    @cached_attribute
+    def number(self) -> Ints:
+        """Shot numbers (N,), for the draws."""
+        return self._number + np.arange(len(self)) if isinstance(self._number, int) else self._number
+
+    @cached_attribute
+    def seed(self) -> Words:
+        """Seeds (N,) of the draws."""
+        return np.broadcast_to(np.uint64(self._seed), len(self)) if isinstance(self._seed, int) else self._seed
+
+    @cached_attribute
+    def row(self) -> Ints:
+        """Places (N,) in the call."""
+        return self._row + np.arange(len(self)) if isinstance(self._row, int) else self._row
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns; values that all shots share do not count."""
+        columns = self.toward_256, self._direction, self._accept, self._exclude, self._number, self._seed, self._row
+        return self.at_256.nbytes + sum([column.nbytes for column in columns if isinstance(column, np.ndarray)])
+
+    @cached_attribute
+    def choosy(self) -> bool:
+        """Whether any shot may refuse an item."""
+        if isinstance(self._accept, int) and isinstance(self._exclude, tuple):
+            return self._accept != ALL or bool(self._exclude)
+        return bool((self.accept != ALL).any() or self.exclude.shape[1])
+
+    def aimed(self, direction: Ints) -> Shots:
+        """The same shots in other directions (N, 2)."""
+        rest = self._accept, self._exclude, self._number, self._seed, self._row
+        return Shots(self.at_256, direction, self.toward_256, *rest)
+
+    def take(self, first: int, last: int) -> Shots:
+        """Shots first .. last - 1."""
+        return self if first == 0 and last >= len(self) else self.pick(slice(first, last))
+
+    def pick(self, rows: Ints | slice) -> Shots:
+        """Shots of rows (n,), or of a slice with a start."""
+        begin = rows.start if isinstance(rows, slice) else rows
+
+        def picked(column: Any) -> Any:
+            return column[rows] if isinstance(column, np.ndarray) else column
+
+        def counted(column: Ints | int) -> Ints | int:
+            return column[rows] if isinstance(column, np.ndarray) else column + begin
+
+        return Shots(
+            self.at_256[rows], picked(self._direction), picked(self.toward_256), picked(self._accept),
+            picked(self._exclude), counted(self._number), picked(self._seed), counted(self._row),
+        )  # fmt: skip
+
+
+class Placements:
+    """Placed patterns, sorted by (shot, round, pellet), as columns.
+
+    Parameters
+    ----------
+    table : the distinct patterns
+    pattern : (P,) pattern of each placement; None if all have the first
+    xy : (P, 2) whole pixel that the pattern is placed on
+    turn_xy : (T, 2) whole pixel of each round of each shot; distances are counted from it
+    rounds, pellets : rounds of a shot, and pellets of a round
+    shot : number of the shot, if all are placements of the same one
+    """
+
+    def __init__(
+        self,
+        table: PatternTable,
+        pattern: Ints | None,
+        xy: Ints,
+        turn_xy: Ints,
+        rounds: int = 1,
+        pellets: int = 1,
+        shot: int | None = None,
+    ) -> None:
+        self.table, self.xy, self.turn_xy, self.rounds, self.pellets = table, xy, turn_xy, rounds, pellets
+        self._pattern, self._shot = pattern, shot
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+    @cached_attribute
+    def pattern(self) -> Ints:
+        """Pattern (P,) of each placement."""
+        return ZEROS[: len(self.xy)] if self._pattern is None else self._pattern
+
+    @cached_attribute
+    def shot(self) -> Ints:
+        """Shot (P,) of each, counted from 0 within the batch."""
+        return self.turn_of(np.arange(len(self.xy)))[0]
+
+    @cached_attribute
+    def round(self) -> Ints:
+        """Round (P,) of each."""
+        round_ = self.turn_of(np.arange(len(self.xy)))[1]
+        return ZEROS[: len(self.xy)] if round_ is None else round_
+
+    @cached_attribute
+    def pellet(self) -> Ints:
+        """Pellet (P,) of each."""
+        return ZEROS[: len(self.xy)] if self.pellets == 1 else np.arange(len(self.xy)) % self.pellets
+
+    @cached_attribute
+    def origin_xy(self) -> Ints:
+        """Whole pixel (P, 2) of the round of each."""
+        return self.turn_xy if self.pellets == 1 else self.turn_xy.repeat(self.pellets, axis=0)
+
+    def turn_of(self, placement: Ints) -> tuple[Ints, Ints | None]:
+        """Shots and rounds of placements (n,); the rounds are None if each shot has one."""
+        return self.shot_of(placement if self.pellets == 1 else placement // self.pellets)
+
+    def shot_of(self, turn: Ints) -> tuple[Ints, Ints | None]:
+        """Shots and rounds of turns (n,), which number the rounds of all shots; no rounds if each shot has one."""
+        round_ = None
+        if self.rounds > 1:
+            turn, round_ = np.divmod(turn, self.rounds)
+        return turn if self._shot is None else np.full_like(turn, self._shot), round_
+
+    @property
+    def boxes(self) -> Ints:
+        """Inclusive boxes (P, 4); an empty pattern has x_max < x_min."""
+        boxes = np.concatenate([self.xy, self.xy], axis=1)
+        boxes += self.table.box_xyxy if self._pattern is None else self.table.box_xyxy[self._pattern]
+        return boxes
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the table and of the columns."""
+        words = self.xy.size + (0 if self._pattern is None else self._pattern.size)
+        return self.table.nbytes + 8 * (words + (self.turn_xy.size if self.scattered else 0))
+
+    @property
+    def count(self) -> Ints:
+        """Samples (P,) of each."""
+        return self.table.count[self.pattern]
+
+    @property
+    def scattered(self) -> bool:
+        """Whether pellets are placed off the pixel of their round."""
+        return self.xy is not self.turn_xy
+
+
+def checked_shots(
+    weapon: Weapon,
+    at: object,
+    aim: object,
+    toward: object,
+    accept: object,
+    exclude: object,
+    seed: object,
+    shot: object,
+) -> Shots:
+    """Check the arguments of `fire`; each of them is one for all shots or one for each."""
+    at_256, single = _places(at)
+    n = len(at_256)
+    offset = None if toward is None else _offsets(at_256, aim, toward)
+    check_aimed(weapon, offset)
+    return Shots(
+        at_256,
+        _directions(n, aim) if offset is None else None,
+        offset,
+        _accepted(accept, n),
+        _owners(exclude, n, single),
+        0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
+        _seeds(seed, n),
+        0,
+    )
+
+
+def _places(at: object) -> tuple[Ints, bool]:
+    """Positions (N, 2) in 1/256 px, and whether one position (2,) was given."""
+    if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
+        many: Ints | None = kernels_of(fixed_point).snapped(at)
+        if many is not None:
+            return many, False
+    one = one_place(at)
+    if one is not None:
+        return np.array((one,), np.int64), True
+    single = array_of("at", at).shape == (2,)
+    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+
+
+def _accepted(accept: object, n: int) -> Ints | int:
+    """Category bits (n,), or one value for all shots."""
+    if type(accept) is int and 0 <= accept <= ALL:
+        return accept
+    return integers("accept", each("accept", accept, n), (n,), 0, ALL)
+
+
+def _spread(column: Ints | int | tuple[int, ...] | None, n: int) -> Ints:
+    """A column unchanged; or one value, or row of values, broadcast to n shots."""
+    if isinstance(column, np.ndarray):
+        return column
+    value = np.array(column, np.int64)
+    return np.broadcast_to(value, (n, *value.shape))
+
+
+def placements_of(weapon: Weapon) -> int:
+    """Number of placements of one shot: the pellets of all rounds."""
+    burst, spread, _ = parts_of(weapon)
+    return (burst.count if burst else 1) * (spread.count if spread else 1)
+
+
+def placements_for(weapon: Weapon, shots: Shots) -> Placements:
+    """Place every pellet of every round of every shot."""
+    burst, spread, plain = parts_of(weapon)
+    if not burst and not spread:
+        return Placements(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
+    rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
+    shot, round_ = np.repeat(np.arange(len(shots)), rounds), np.tile(np.arange(rounds), len(shots))
+    direction: Ints | tuple[int, int] = STRAIGHT
+    if plain.directed:
+        direction = recoiled(shots.direction[shot], round_, burst.recoil_deg if burst else 0)
+    table, pattern = _patterns(plain, direction)
+    turn_xy = pixel(shots.at_256[shot] + round_[:, None] * snap(burst.recoil_xy)) if burst else shots.xy
+    if not spread:
+        return Placements(table, pattern, turn_xy, turn_xy, rounds)
+    turns = (column[shot, None] for column in (shots.seed, shots.number))
+    xy = kernels_of(sys.modules[__name__]).disc_offsets(
+        int(snap(spread.radius)), *turns, round_[:, None], np.arange(pellets)
+    )
+    xy += turn_xy[:, None]
+    pattern = None if pattern is None else pattern.repeat(pellets)
+    return Placements(table, pattern, xy.reshape(-1, 2), turn_xy, rounds, pellets)
+
+
+def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:
+    """Distinct patterns of directions (P, 2), or of one, and the pattern of each direction; None if there is one."""
+    if not plain.directed or not len(direction):
+        direction = STRAIGHT
+    elif not isinstance(direction, tuple) and (direction == direction[0]).all():
+        c, s = direction[0].tolist()
+        direction = c, s
+    if isinstance(direction, tuple):
+        return pattern_of(plain, *direction).table, None
+    number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
+    c = (number + 2 * ONE) // (4 * ONE)
+    pairs = zip(c.tolist(), (number - c * (4 * ONE)).tolist(), strict=True)
+    return PatternTable([pattern_of(plain, c, s) for c, s in pairs]), which
+
+
+def _directions(n: int, aim: object) -> Ints | tuple[int, int]:
+    """Directions (n, 2) of aims, or one for all shots."""
+    if aim is None:
+        return STRAIGHT
+    if isinstance(aim, int | float):
+        c, s = unit(reals("aim", aim, ()))
+        return int(c), int(s)
+    return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
+
+
+def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
+    """Offsets (N, 2) from shots to the points that they are aimed at, in 1/256 px."""
+    if aim is not None:
+        raise InputError("aim: expected aim or toward, got both")
+    targets = points("toward", toward, len(at_256))
+    offset = snap(targets) - at_256
+    same = np.flatnonzero((offset == 0).all(axis=1))
+    if len(same):
+        got = targets[same[0]].tolist()
+        raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
+    return offset
+
+
+def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
+    """Check that a ray without a range is aimed at a point within reach."""
+    if not has_no_range(weapon):
+        return
+    if offset is None:
+        raise InputError("toward: expected a point, as the weapon has no range, got none")
+    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
+    if len(far):
+        got = (offset[far[0]] / SUB).tolist()
+        raise InputError(
+            f"toward[{far[0]}]: expected a point within {REACH_MAX} px of the shot, got one at {got} of it"
+        )
+
+
+def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
+    """Directions, or other vectors, turned by the recoil of all earlier rounds."""
+    if not degrees:
+        return direction
+    c, s = unit(degrees * np.arange(int(round_.max(initial=0)) + 1))
+    return turned(direction, c[round_], s[round_])
+
+
+def _seeds(seed: object, n: int) -> Words | int:
+    """Seeds (n,), or one value for all shots."""
+    if type(seed) is int and 0 <= seed <= SEED_MAX:
+        return seed
+    # As objects: numpy would turn a list with numbers on both sides of 2**63 into float64, and lose their last bits.
+    given = seed if isinstance(seed, np.ndarray) else array_of("seed", seed, dtype=object)
+    if given.ndim == 0:
+        return integer("seed", given.item(), 0, SEED_MAX)
+    if given.shape != (n,):
+        raise InputError(f"seed: expected one, or one for each of {n} shots, got shape {given.shape}")
+    if given.dtype.kind != "u":
+        given = np.array([integer(f"seed[{i}]", v, 0, SEED_MAX) for i, v in enumerate(given.tolist())], np.uint64)
+    return given.astype(np.uint64)
+
+
+def _owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, ...]:
+    """Owners (n, K): a number, one for each shot (n,), or several for all (1, K) or for each (n, K); -1 for none."""
+    if exclude is None:
+        return ()
+    if type(exclude) is int and -1 <= exclude <= OWNER_MAX:
+        return (exclude,)
+    array = array_of("exclude", exclude)
+    if array.ndim == 0:
+        array = np.broadcast_to(array, (n, 1))
+    elif array.ndim == 1:
+        array = array[None] if single else array[:, None]
+    if array.ndim == 2 and len(array) == 1:
+        array = np.broadcast_to(array, (n, array.shape[1]))
+    return integers("exclude", array, (n, None), -1, OWNER_MAX)

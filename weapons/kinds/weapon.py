@@ -1,0 +1,397 @@
+"""The base of all weapons, whose fields are checked by a table, and patterns of pixels, as spans and as bit rows."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, fields
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+from weakref import ref
+
+import numpy as np
+
+from hitplanes.planes.bits.bit_rows import BESIDE_REACH, WORD, PatternBits, Words
+from hitplanes.planes.bits.span_walk import Runs
+from hitplanes.planes.bits.tiles import BigPattern, big_pattern
+from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.checks import InputError, Ints, shown
+from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
+from hitplanes.planes.common.tables import Number, Ref, Value
+from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+
+LENGTH = Number(0, REACH_MAX)
+"""A length that a weapon may have, px."""
+
+
+@dataclass(frozen=True)
+class Part(Ref):
+    """A field that holds a weapon, already made from its JSON."""
+
+    kinds: tuple[type, ...]
+    told: str
+
+    def check(self, name: str, value: object) -> object:
+        """Check that the value is a weapon of one of the kinds."""
+        if not isinstance(value, self.kinds):
+            raise InputError(f"{name}: expected {self.told}, got {shown(value)}")
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class Weapon:
+    """The base of all weapons; two weapons are equal when their JSON is equal."""
+
+    kind: ClassVar[str]
+    table: ClassVar[dict[str, Value]]
+
+    def __post_init__(self) -> None:
+        """Check every field by the table, and keep plain Python values."""
+        for name, value in self.table.items():
+            self._keep(name, value.check(name, getattr(self, name)))
+
+    @cached_property
+    def text(self) -> str:
+        """The weapon as JSON text; equal weapons have equal text."""
+        return json.dumps(self.to_json(), sort_keys=True)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Weapon) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    def _keep(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, for copies; a copy computes its cached values anew."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def to_json(self) -> dict[str, Any]:
+        """The weapon as a scene file has it; fields at their defaults are left out."""
+        shown: dict[str, Any] = {"kind": self.kind}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.default is MISSING or value != f.default:
+                shown[f.name] = _plain_json(value)
+        return shown
+
+
+def _plain_json(value: object) -> Any:
+    if isinstance(value, Weapon):
+        return value.to_json()
+    if isinstance(value, tuple | list):
+        return [_plain_json(v) for v in value]
+    return value
+
+
+Swept = tuple[Ints, Ints, int]
+"""Ends (2,) of a segment and a radius, in 1/256 px."""
+
+FALLOFFS = ("linear", "smooth")
+
+PATTERN_BYTES = 2048
+"""Memory of a pattern beside its columns, bytes."""
+
+_DOUBT = 2.0**-30  # the float is exact to 2**-34; if it is nearer than this to a whole number, integers decide
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A set of pixels about the origin, and prefix sums of their weights in span order (None: all at full weight).
+
+    `swept` is the segment that the pixels lie along, if the weapon has one: each pixel's centre lies within the radius
+    of the segment, or its square meets it.
+    """
+
+    spans: Spans
+    prefix: Ints | None
+    swept: Swept | None = None
+
+    @cached_property
+    def window_bytes(self) -> int:
+        """Memory of its bit rows, bytes."""
+        x, y, x_max, y_max = self.spans.box_xyxy or (0, 0, -1, -1)
+        return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
+
+    @cached_property
+    def strip(self) -> Strip:
+        """The strip between two parallel lines that its pixels lie in."""
+        return strip_of(self.spans)
+
+    @property
+    def table(self) -> PatternTable:
+        """A table of this one pattern.
+
+        The pattern keeps the table's columns, not the table: a reference cycle would outlive its place in a cache.
+        """
+        return PatternTable((self,))
+
+    @cached_property
+    def sizes(self) -> tuple[Ints, Ints]:
+        """Pixel count (1,) and box (1, 4), as columns of a table."""
+        return _sizes([self.spans])
+
+    @cached_property
+    def columns(self) -> TableSpans:
+        """Spans, as columns of a table."""
+        return _columns([self.spans], 0)
+
+    @cached_property
+    def is_disc(self) -> bool:
+        """Whether it is a small disc: it has all pixels that are at most as far as its farthest one."""
+        if not self.spans.count or max(map(abs, self.spans.box_xyxy or ())) > BESIDE_REACH:
+            return False
+        farthest = int((self.spans.pixels() ** 2).sum(axis=1).max())
+        x = np.array([math.isqrt(farthest - y * y) for y in range(math.isqrt(farthest) + 1)])
+        row = 2 * x + 1
+        return self.spans.count == int(row[0] + 2 * row[1:].sum())
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it holds, including values computed later: two more columns of spans, and small objects."""
+        return 5 * self.spans.y.nbytes + (0 if self.prefix is None else self.prefix.nbytes) + PATTERN_BYTES
+
+
+def make_pattern(spans: Spans, falloff: str | None, reach_256: int, swept: Swept | None = None) -> Pattern:
+    """Make a pattern; with a falloff its pixels are weighted by their distance from the origin."""
+    if falloff is None:
+        return Pattern(spans, None, swept)
+    if spans.count > MASK_AREA_MAX:
+        raise InputError(f"falloff: expected a pattern of at most {MASK_AREA_MAX} px, got {spans.count}")
+    weights = falloff_weights((spans.pixels() ** 2).sum(axis=1), falloff, reach_256)
+    return Pattern(spans, np.concatenate([[0], np.cumsum(weights)]), swept)
+
+
+def falloff_weights(distance2: Ints, falloff: str, reach_256: int) -> Ints:
+    """Whole weights from 65,535 at the origin to 0 at the reach.
+
+    Parameters
+    ----------
+    distance2 : squared distances from the origin, px^2, whole numbers
+    falloff : "linear", or "smooth": 3 t^2 - 2 t^3 of the linear weight t (Perlin's smoothstep)
+    reach_256 : distance at which the weight is 0, in 1/256 px
+    """
+    distance2 = np.asarray(distance2, np.int64)
+    if reach_256 == 0:
+        return np.where(distance2 == 0, WEIGHT_FULL, 0)
+    lost = np.sqrt(distance2.astype(np.float64)) * (WEIGHT_FULL * SUB) / reach_256
+    whole = np.floor(lost).astype(np.int64)
+    for i in np.flatnonzero(np.abs(lost - np.rint(lost)) < _DOUBT):
+        near = round(float(lost[i]))
+        reached = (near * reach_256) ** 2 <= int(distance2[i]) * (WEIGHT_FULL * SUB) ** 2
+        whole[i] = near if reached else near - 1
+    return smoothed(np.maximum(WEIGHT_FULL - whole, 0), falloff)
+
+
+def smoothed(linear: Ints, falloff: str) -> Ints:
+    """Weights of a falloff, from those of the linear one."""
+    if falloff == "smooth":
+        return linear * linear * (3 * WEIGHT_FULL - 2 * linear) // WEIGHT_FULL**2
+    return linear
+
+
+class TableSpans(NamedTuple):
+    """Spans of several patterns, one after another, as columns.
+
+    Parameters
+    ----------
+    y, x_first, x_last : (n,) the spans
+    ordinal : (n,) number of the span's first pixel in the prefix sums, minus its `x_first`
+    row : (n,) a number that rises with (pattern, y); a search in it finds the spans of a range of rows
+    top, rows : the least y, and the number of rows
+    """
+
+    y: Ints
+    x_first: Ints
+    x_last: Ints
+    ordinal: Ints
+    row: Ints
+    top: int
+    rows: int
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return 5 * self.y.nbytes
+
+
+class PatternTable:
+    """The distinct patterns of a call; their spans are joined when they are first read.
+
+    Parameters
+    ----------
+    patterns : n patterns
+    count : (n,) pixels of each
+    box_xyxy : (n, 4) inclusive; x_max < x_min for an empty pattern
+    """
+
+    def __init__(self, patterns: Sequence[Pattern]) -> None:
+        self.patterns = patterns
+        one = len(patterns) == 1
+        self.count, self.box_xyxy = patterns[0].sizes if one else _sizes([p.spans for p in patterns])
+
+    @property
+    def runs(self) -> int:
+        """Number of spans of all patterns."""
+        return sum(len(p.spans) for p in self.patterns)
+
+    @cached_property
+    def prefix(self) -> Ints | None:
+        """Prefix sums of the weights of all patterns; None if all have full weight."""
+        prefixes = [p.prefix for p in self.patterns if p.prefix is not None]
+        return _joined(prefixes) if prefixes else None
+
+    @cached_property
+    def spans(self) -> TableSpans:
+        """Spans of all patterns."""
+        if len(self.patterns) == 1:
+            return self.patterns[0].columns
+        return _columns([p.spans for p in self.patterns], 0 if self.prefix is None else 1)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns of patterns, without spans and weights."""
+        return self.count.nbytes + self.box_xyxy.nbytes
+
+    def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
+        """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""
+        spans, rows = self.spans, self.spans.rows
+        low, high = (np.clip(boxes_xyxy[:, side] - y - spans.top, -1, rows) for side in (1, 3))
+        first = np.searchsorted(spans.row, pattern * (rows + 2) + low)
+        last = np.searchsorted(spans.row, pattern * (rows + 2) + high, side="right")
+        owner, place = ragged(np.maximum(last - first, 0))
+        span = first[owner] + place
+        box = boxes_xyxy[owner]
+        x_first = np.maximum(spans.x_first[span] + x[owner], box[:, 0])
+        x_last = np.minimum(spans.x_last[span] + x[owner], box[:, 2])
+        mask = x_first <= x_last
+        row = spans.y[span] + y[owner]
+        ordinal = spans.ordinal[span] - x[owner]
+        return Runs(owner[mask], row[mask], x_first[mask], x_last[mask], ordinal[mask])
+
+    def weight(self, ordinal: Ints, x_first: Ints, x_last: Ints) -> Ints:
+        """Sum of the weights of runs."""
+        if self.prefix is None:
+            return (x_last - x_first + 1) * WEIGHT_FULL
+        return np.asarray(self.prefix[ordinal + x_last + 1] - self.prefix[ordinal + x_first])
+
+
+def _joined(columns: Sequence[Ints]) -> Ints:
+    """Columns one after another; a single one is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+def _sizes(spans: Sequence[Spans]) -> tuple[Ints, Ints]:
+    """Pixels (n,) and boxes (n, 4) of patterns."""
+    boxes = [s.box_xyxy or (0, 0, -1, -1) for s in spans]
+    return np.array([s.count for s in spans], np.int64), np.array(boxes, np.int64)
+
+
+def _columns(spans: Sequence[Spans], first: int) -> TableSpans:
+    """Spans of patterns, one after another; the prefix sums of each pattern begin with `first` zeros."""
+    y, x_first, x_last = (_joined([getattr(s, side) for s in spans]) for side in ("y", "x_first", "x_last"))
+    pattern = np.repeat(np.arange(len(spans)), [len(s) for s in spans])
+    lengths = x_last - x_first + 1
+    ordinal = np.cumsum(lengths) - lengths - x_first + first * pattern
+    top = int(y.min(initial=0))
+    rows = int(y.max(initial=0)) - top + 1
+    return TableSpans(y, x_first, x_last, ordinal, pattern * (rows + 2) + y - top, top, rows)
+
+
+TABLE_BYTES_MOST = 2**22
+"""Largest table of all 64 shifts of a pattern, bytes; in a larger one each read misses the processor's cache."""
+
+PATTERN_BYTES_MOST = 2**22
+"""Largest bit rows of a pattern, bytes; larger patterns are counted by spans."""
+
+PATTERNS_BYTES_MOST = 2**26
+"""Largest bit rows of all patterns of a call, bytes."""
+
+OFTEN = 64
+"""Placements of a pattern, over all calls, after which the table of its shifts is made."""
+
+WINDOW_CACHE_BYTES = 2**26
+"""Size of the caches of bit rows, of their columns of words, and of integer rows, bytes each."""
+
+ENTRY_BYTES = 1024
+"""Memory of a cache entry beside its arrays, bytes."""
+
+KEY_BYTES = 128
+"""Memory of a pattern in a cache key, bytes; it is a weak reference, so the pattern may go first."""
+
+
+def _bytes(windows: PatternBits) -> int:
+    return ENTRY_BYTES + sum(column.nbytes for column in windows if isinstance(column, np.ndarray))
+
+
+_kept: LruCache[tuple[tuple[ref[Pattern], ...], bool], PatternBits] = LruCache(
+    WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key[0])
+)
+
+_kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lambda words: words.nbytes + ENTRY_BYTES)
+
+_kept_bigs: LruCache[ref[Pattern], BigPattern] = LruCache(WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES)
+
+_FULL = np.uint64(2**64 - 1)
+
+
+def fits(patterns: Sequence[Pattern]) -> bool:
+    """Whether the bit rows of patterns are small enough to be made together."""
+    sizes = [pattern.window_bytes for pattern in patterns]
+    return max(sizes, default=0) <= PATTERN_BYTES_MOST and sum(sizes) <= PATTERNS_BYTES_MOST
+
+
+def pattern_bits_of(patterns: Sequence[Pattern], placements: int) -> PatternBits:
+    """Bit rows of patterns; those of the last calls are kept.
+
+    Parameters
+    ----------
+    placements : placements that a table of all shifts would serve; 0 if there is no use for it
+    """
+    often = bool(placements) and len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
+    if often:
+        attributes = vars(patterns[0])
+        attributes["placed"] = placed = attributes.get("placed", 0) + placements
+        often = placed > OFTEN
+    return _kept.get((tuple(map(ref, patterns)), often), lambda: _made(patterns, often))
+
+
+def big_of(pattern: Pattern) -> BigPattern:
+    """A pattern as integer rows; those of the last calls are kept."""
+    return _kept_bigs.get(ref(pattern), lambda: big_pattern(pattern.spans))
+
+
+def _made(patterns: Sequence[Pattern], often: bool) -> PatternBits:
+    boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
+    strips = strips_of([pattern.strip for pattern in patterns], boxes)
+    columns = [_pattern_words(pattern) for pattern in patterns]
+    rows = np.array([words.shape[1] for words in columns])
+    if often:
+        words = columns[0]
+        shifts = np.arange(WORD, dtype=np.uint64)[:, None]
+        table = (words[:-1, None] >> shifts) | (words[1:, None] << (np.uint64(WORD) - shifts))
+        return PatternBits(boxes, np.array([WORD]), WORD * rows, table.reshape(-1), words.shape[1], strips)
+    first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
+    return PatternBits(boxes, first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0, strips)
+
+
+def _pattern_words(pattern: Pattern) -> Words:
+    """`columns_of` a pattern, kept for calls that have it together with other patterns."""
+    return _kept_columns.get(ref(pattern), lambda: columns_of(pattern.spans))
+
+
+def columns_of(spans: Spans) -> Words:
+    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows around it."""
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
+    columns = (WORD - 2 + x_max - x + 1) // WORD + 2
+    made = np.zeros((columns, y_max - y + 1 + 2 * WORD), np.uint64)
+    column = x - (WORD - 1) + WORD * np.arange(columns)
+    first, last = (np.clip(end[:, None] - column, 0, WORD).view(np.uint64) for end in (spans.x_first, spans.x_last + 1))
+    row = np.flatnonzero(np.diff(spans.y, prepend=y - 1))
+    if len(row):
+        runs = (_FULL << first) & ~(_FULL << last)  # by 64 all is shifted out
+        made[:, spans.y[row] - y + WORD] = np.bitwise_or.reduceat(runs, row, axis=0).T
+    return made

@@ -1,0 +1,420 @@
+"""Textbook formulas in plain float64, and installed libraries, to compare with hitplanes.
+
+Each function takes the columns of the exact predicate, and returns which rows meet; touching counts if the formula can
+decide it. No epsilon is added, as it would only move the errors. pymunk and pygame are called row by row.
+
+Left out are pygame's rectangles, which exclude two of their sides by design, and `pygame.FRect.clipline`, which does
+not return for some rays far from the origin. pymunk's circles and capsules take part although touching is a miss there.
+
+References
+----------
+Ericson, *Real-Time Collision Detection* (2005); Franklin, *PNPOLY*; Moller, *A Fast Triangle-Triangle Intersection
+Test* (1997); Amanatides and Woo, *A Fast Voxel Traversal Algorithm* (1987); Kay and Kajiya, *Ray Tracing Complex
+Scenes* (1986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hitplanes.planes.common.checks import Bools, Floats
+
+from ..study.peers import module_of
+
+Array = npt.NDArray[Any]
+
+
+def circles(center_a: Floats, radius_a: Floats, center_b: Floats, radius_b: Floats) -> Bools:
+    """Compare the squared distance with the squared sum of the radii."""
+    d, r = center_a - center_b, radius_a + radius_b
+    return np.asarray((d * d).sum(axis=1) <= r * r)
+
+
+def boxes(low_a: Floats, high_a: Floats, low_b: Floats, high_b: Floats) -> Bools:
+    """Compare the ends of intervals (Ericson 4.2.1), without rounding."""
+    return np.asarray(((low_a <= high_b) & (low_b <= high_a)).all(axis=1))
+
+
+def _distance2(p: Floats, a: Floats, b: Floats) -> Floats:
+    """Return the squared distance to a segment, by the clamped projection on it."""
+    along, reach = b - a, p - a
+    length2 = (along * along).sum(axis=-1)
+    share = (reach * along).sum(axis=-1) / np.where(length2 > 0, length2, 1)
+    off = p - (a + np.clip(share, 0, 1)[..., None] * along)
+    return np.asarray((off * off).sum(axis=-1))
+
+
+def capsule_circle(a: Floats, b: Floats, radius: Floats, center: Floats, radius_c: Floats) -> Bools:
+    """Compare the distance of the centre from the segment."""
+    r = radius + radius_c
+    return np.asarray(_distance2(center, a, b) <= r * r)
+
+
+def point_polygon(rings: Floats, points: Floats) -> Bools:
+    """Count crossings of a ray to +x (PNPOLY)."""
+    inside = np.zeros(len(points), np.bool_)
+    x, y = points.T
+    for k in range(rings.shape[1]):
+        (x0, y0), (x1, y1) = rings[:, k - 1].T, rings[:, k].T
+        inside ^= ((y1 > y) != (y0 > y)) & (x < (x0 - x1) * (y - y1) / (y0 - y1) + x1)
+    return inside
+
+
+def circle_polygon(rings: Floats, center: Floats, radius: Floats) -> Bools:
+    """Test the centre by crossings, and the distance of each side."""
+    found = point_polygon(rings, center)
+    for k in range(rings.shape[1]):
+        found |= _distance2(center, rings[:, k - 1], rings[:, k]) <= radius * radius
+    return found
+
+
+def polygons(a: Floats, b: Floats) -> Bools:
+    """Project both on the normal of each side (separating axes)."""
+    return _projected(a, b, range(a.shape[1])) & _projected(b, a, range(b.shape[1]))
+
+
+def oriented_boxes(a: Floats, b: Floats) -> Bools:
+    """Project both on the two axes of each box (separating axes)."""
+    return _projected(a, b, range(2)) & _projected(b, a, range(2))
+
+
+def _projected(a: Floats, b: Floats, sides: range) -> Bools:
+    found = np.ones(len(a), np.bool_)
+    for k in sides:
+        side = a[:, (k + 1) % a.shape[1]] - a[:, k]
+        normal = np.stack([-side[:, 1], side[:, 0]], axis=1)[:, None]
+        on_a, on_b = (a * normal).sum(axis=2), (b * normal).sum(axis=2)
+        found &= (on_a.max(axis=1) >= on_b.min(axis=1)) & (on_b.max(axis=1) >= on_a.min(axis=1))
+    return found
+
+
+# Triangles in space
+
+
+def triangles(a: Floats, b: Floats) -> Bools:
+    """Compare the intervals on the line of both planes; coplanar triangles by sides and corners (Moller)."""
+    (normal_a, at_a), (normal_b, at_b) = _plane(a), _plane(b)
+    side_a = (a * normal_b[:, None]).sum(axis=2) + at_b[:, None]
+    side_b = (b * normal_a[:, None]).sum(axis=2) + at_a[:, None]
+    apart = [(side > 0).all(axis=1) | (side < 0).all(axis=1) for side in (side_a, side_b)]
+    along = np.abs(_cross3(normal_a, normal_b)).argmax(axis=1)
+    rows = np.arange(len(a))
+    (low_a, high_a), (low_b, high_b) = _interval(a[rows, :, along], side_a), _interval(b[rows, :, along], side_b)
+    meet = (low_a <= high_b) & (low_b <= high_a) & ~apart[0] & ~apart[1]
+    same = (side_a == 0).all(axis=1) | (side_b == 0).all(axis=1)
+    meet[same] = _coplanar(a[same], b[same], normal_a[same])
+    return np.asarray(meet)
+
+
+def _cross3(p: Floats, q: Floats) -> Floats:
+    return np.stack([p[:, k - 2] * q[:, k - 1] - p[:, k - 1] * q[:, k - 2] for k in range(3)], axis=1)
+
+
+def _plane(t: Floats) -> tuple[Floats, Floats]:
+    normal = _cross3(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    return normal, -(normal * t[:, 0]).sum(axis=1)
+
+
+def _interval(at: Floats, side: Floats) -> tuple[Floats, Floats]:
+    """Return the interval on an axis in which the triangle crosses the other plane."""
+    low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)
+    for k in range(3):
+        p, q, here, there = at[:, k - 1], at[:, k], side[:, k - 1], side[:, k]
+        place = p + (q - p) * here / (here - there)
+        for crossed, value in (((here > 0) != (there > 0), place), (there == 0, q)):
+            low = np.where(crossed, np.fmin(low, value), low)
+            high = np.where(crossed, np.fmax(high, value), high)
+    return low, high
+
+
+def _coplanar(a: Floats, b: Floats, normal: Floats) -> Bools:
+    """Test for crossing sides or a corner in the other, with the largest axis of the normal dropped."""
+    drop = np.abs(normal).argmax(axis=1)
+    kept = np.array([(1, 2), (0, 2), (0, 1)])[drop]
+    p, q = (np.take_along_axis(t, kept[:, None], axis=2) for t in (a, b))
+    found = point_polygon(q, p[:, 0]) | point_polygon(p, q[:, 0])
+    for i in range(3):
+        for j in range(3):
+            found |= _sides_cross(p[:, i - 1], p[:, i], q[:, j - 1], q[:, j])
+    return found
+
+
+def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
+    return np.asarray((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+
+
+def _sides_cross(a: Floats, b: Floats, c: Floats, d: Floats) -> Bools:
+    sides, others = _turn(a, b, c) * _turn(a, b, d), _turn(c, d, a) * _turn(c, d, b)
+    return np.asarray((sides <= 0) & (others <= 0))
+
+
+# Rays and patterns, in px
+
+
+def _px(*values: Array) -> list[Floats]:
+    return [value / 256.0 for value in values]
+
+
+def ray_targets(start: Array, end: Array, cells: Array) -> Bools:
+    """Clip the ray to the slabs of the box (Kay and Kajiya)."""
+    a, b = _px(start, end)
+    return _slabs(a, b - a, cells)
+
+
+def _slabs(a: Floats, step: Floats, cells: Array) -> Bools:
+    low, high = (cells - 0.5 - a) / step, (cells + 0.5 - a) / step
+    entry, leave = np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)
+    return np.asarray(np.maximum(entry, 0) <= np.minimum(leave, 1))
+
+
+def ray_cells(start: Array, end: Array, cells: Array) -> Bools:
+    """Walk from cell to cell across the nearest wall, up to the last cell (Amanatides and Woo)."""
+    a, b = _px(start, end)
+    step = b - a
+    at, last = np.floor(a + 0.5), np.floor(b + 0.5)
+    sign = np.sign(step)
+    each = np.abs(1 / step)
+    following = np.where(sign == 0, np.inf, (at + sign * 0.5 - a) / step)
+    found = (at == cells).all(axis=1)
+    for _ in range(int(np.abs(last - at).sum(axis=1).max(initial=0))):
+        going = (at != last).any(axis=1)
+        across = following[:, 1] < following[:, 0]
+        for axis, moves in ((0, going & ~across), (1, going & across)):
+            at[moves, axis] += sign[moves, axis]
+            following[moves, axis] += each[moves, axis]
+        found |= (at == cells).all(axis=1)
+    return np.asarray(found)
+
+
+def flights(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
+    """Move the centre by the relative step; test its distance from the pixel's centre, and the slabs of the pixel."""
+    a, step, r = _px(start, unit * times[:, None] - velocity, radius)
+    return np.asarray((_distance2(cells.astype(np.float64), a, a + step) <= r * r) | _slabs(a, step, cells))
+
+
+def disc_pixels(radius: Array, cells: Array, places: Array) -> Bools:
+    """Compare the distance in the world with the radius."""
+    off = (cells + places).astype(np.float64) - places
+    return np.asarray(np.sqrt((off * off).sum(axis=1)) <= radius / 256)
+
+
+def beam_pixels(unit: Array, times: Array, radius: Array, cells: Array, places: Array) -> Bools:
+    """Compare the distance from the beam in the world, and test the slabs of the pixel."""
+    angle = np.arctan2(unit[:, 1], unit[:, 0])
+    length = np.sqrt((unit * unit).sum(axis=1)) * times / 256
+    step = np.stack([np.cos(angle) * length, np.sin(angle) * length], axis=1)
+    a, p = places.astype(np.float64), (cells + places).astype(np.float64)
+    return np.asarray((_distance2(p, a, a + step) <= (radius / 256) ** 2) | _slabs(a, step, cells + places))
+
+
+def pattern_pixels(rings: Array, cells: Array, places: Array) -> Bools:
+    """Count crossings of a ray to +x in the world."""
+    return point_polygon(rings / 256.0 + places[:, None], (cells + places).astype(np.float64))
+
+
+Method = Callable[..., Bools]
+
+PEERS = ("shapely", "pymunk", "pygame-ce")
+"""Names of the packages that provide the libraries."""
+
+
+def installed(peer: str) -> bool:
+    """Whether a library is installed."""
+    if peer == "pymunk" and not __debug__:
+        return False  # without assertions it cannot report a missing contact
+    try:
+        return bool(version(peer))
+    except PackageNotFoundError:
+        return False
+
+
+def of_peer(peer: str, predicate: str) -> Method | None:
+    """Return the function by which a library decides a predicate; None if it has none."""
+    return TABLE[peer].get(predicate)
+
+
+# shapely: whole columns
+
+
+def _shapely_circles(center_a: Array, radius_a: Array, center_b: Array, radius_b: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.dwithin(s.points(center_a), s.points(center_b), radius_a + radius_b))
+
+
+def _shapely_boxes(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.intersects(s.box(*low_a.T, *high_a.T), s.box(*low_b.T, *high_b.T)))
+
+
+def _shapely_capsule(a: Array, b: Array, radius: Array, center: Array, radius_c: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.dwithin(s.linestrings(np.stack([a, b], axis=1)), s.points(center), radius + radius_c))
+
+
+def _shapely_point_polygon(rings: Array, points: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.intersects(_shapely_polygons(rings), s.points(points)))
+
+
+def _shapely_circle_polygon(rings: Array, center: Array, radius: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.dwithin(_shapely_polygons(rings), s.points(center), radius))
+
+
+def _shapely_polygon_pair(a: Array, b: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.intersects(_shapely_polygons(a), _shapely_polygons(b)))
+
+
+def _shapely_polygons(rings: Array) -> Any:
+    s = module_of("shapely")
+    return s.polygons(s.linearrings(rings))
+
+
+def _shapely_ray(start: Array, end: Array, cells: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.intersects(_shapely_lines(start / 256, end / 256), _shapely_squares(cells)))
+
+
+def _shapely_lines(a: Array, b: Array) -> Any:
+    return module_of("shapely").linestrings(np.stack([a, b], axis=1))
+
+
+def _shapely_squares(cells: Array) -> Any:
+    return module_of("shapely").box(*(cells - 0.5).T, *(cells + 0.5).T)
+
+
+def _shapely_flight(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
+    s = module_of("shapely")
+    lines = _shapely_lines(start / 256, (start + unit * times[:, None] - velocity) / 256)
+    near = s.dwithin(lines, s.points(cells.astype(float)), radius / 256)
+    return np.asarray(near | s.intersects(lines, _shapely_squares(cells)))
+
+
+def _shapely_disc(radius: Array, cells: Array, places: Array) -> Bools:
+    s = module_of("shapely")
+    return np.asarray(s.dwithin(s.points(places.astype(float)), s.points((cells + places).astype(float)), radius / 256))
+
+
+def _shapely_beam(unit: Array, times: Array, radius: Array, cells: Array, places: Array) -> Bools:
+    s = module_of("shapely")
+    lines = _shapely_lines(places.astype(float), places + unit * times[:, None] / 256)
+    at = cells + places
+    near = s.dwithin(lines, s.points(at.astype(float)), radius / 256)
+    return np.asarray(near | s.intersects(lines, _shapely_squares(at)))
+
+
+def _shapely_pattern(rings: Array, cells: Array, places: Array) -> Bools:
+    return _shapely_point_polygon(rings / 256 + places[:, None], (cells + places).astype(float))
+
+
+# pymunk: row by row
+
+
+def _rows(columns: tuple[Array, ...]) -> Any:
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _pymunk_pairs(make_a: Callable[..., Any], make_b: Callable[..., Any], taken: int) -> Method:
+    """Make two shapes per row, from the first columns and from the rest."""
+
+    def method(*columns: Array) -> Bools:
+        body = module_of("pymunk").Body(body_type=module_of("pymunk").Body.STATIC)
+        found = []
+        for row in _rows(columns):
+            a, b = make_a(body, *row[:taken]), make_b(body, *row[taken:])
+            a.cache_bb()
+            b.cache_bb()
+            found.append(_collide(a, b))
+        return np.array(found, np.bool_)
+
+    return method
+
+
+def _collide(a: Any, b: Any) -> bool:
+    """Whether two shapes are in contact; pymunk 7 raises AssertionError if not."""
+    try:
+        return len(a.shapes_collide(b).points) > 0
+    except AssertionError:
+        return False
+
+
+def _pymunk_circle(body: Any, center: Any, radius: float) -> Any:
+    return module_of("pymunk").Circle(body, radius, tuple(center))
+
+
+def _pymunk_segment(body: Any, a: Any, b: Any, radius: float) -> Any:
+    return module_of("pymunk").Segment(body, tuple(a), tuple(b), radius)
+
+
+def _pymunk_poly(body: Any, ring: Any) -> Any:
+    return module_of("pymunk").Poly(body, [tuple(p) for p in ring])
+
+
+def _pymunk_boxes(*columns: Array) -> Bools:
+    box = module_of("pymunk").BB
+    return np.array([box(*a, *b).intersects(box(*c, *d)) for a, b, c, d in _rows(columns)], np.bool_)
+
+
+def _pymunk_square(body: Any, cell: Any) -> Any:
+    x, y = cell
+    return _pymunk_poly(body, [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5)])
+
+
+def _pymunk_ray(start: Array, end: Array, cells: Array) -> Bools:
+    body = module_of("pymunk").Body(body_type=module_of("pymunk").Body.STATIC)
+    found = []
+    for a, b, cell in _rows((start / 256, end / 256, cells)):
+        square = _pymunk_square(body, cell)
+        square.cache_bb()
+        inside = square.point_query(tuple(a)).distance <= 0  # segment_query misses a shape around the start
+        found.append(inside or square.segment_query(tuple(a), tuple(b), 0) is not None)
+    return np.array(found, np.bool_)
+
+
+# pygame-ce: row by row
+
+
+def _pygame_circles(*columns: Array) -> Bools:
+    circle = module_of("pygame.geometry").Circle
+    found = []
+    for a, ra, b, rb in _rows(columns):
+        try:
+            found.append(bool(circle(a, ra).collidecircle(circle(b, rb))))
+        except ValueError:  # a radius of 0
+            found.append(False)
+    return np.array(found, np.bool_)
+
+
+TABLE: dict[str, dict[str, Method]] = {
+    "shapely": {
+        "circles": _shapely_circles,
+        "boxes": _shapely_boxes,
+        "capsule, circle": _shapely_capsule,
+        "point in polygon": _shapely_point_polygon,
+        "circle, polygon": _shapely_circle_polygon,
+        "polygons": _shapely_polygon_pair,
+        "oriented boxes": _shapely_polygon_pair,
+        "ray's pixels": _shapely_ray,
+        "ray, 1-px target": _shapely_ray,
+        "projectile, 1-px target": _shapely_flight,
+        "disc's pixels": _shapely_disc,
+        "beam's pixels": _shapely_beam,
+        "polygon's pixels": _shapely_pattern,
+    },
+    "pymunk": {
+        "circles": _pymunk_pairs(_pymunk_circle, _pymunk_circle, 2),
+        "boxes": _pymunk_boxes,
+        "capsule, circle": _pymunk_pairs(_pymunk_segment, _pymunk_circle, 3),
+        "circle, polygon": _pymunk_pairs(_pymunk_poly, _pymunk_circle, 1),
+        "polygons": _pymunk_pairs(_pymunk_poly, _pymunk_poly, 1),
+        "oriented boxes": _pymunk_pairs(_pymunk_poly, _pymunk_poly, 1),
+        "ray, 1-px target": _pymunk_ray,
+    },
+    "pygame-ce": {"circles": _pygame_circles},
+}

@@ -1,0 +1,305 @@
+"""The study's methods for discs (pixel planes at several scales, volumes of every kind), and kinds of shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from hitplanes.planes.common.checks import Bools, Floats, Ints
+from hitplanes.planes.common.limits import SUB, TRIG_BITS
+from hitplanes.planes.files.png import cv2
+from hitplanes.planes.scene.scene import Scene
+from hitplanes.planes.scene.sprite import Sprite, variant_of
+from hitplanes.planes.volumes import fit
+from hitplanes.planes.volumes.fit import shifted
+from hitplanes.planes.volumes.overlap import overlap
+from hitplanes.planes.volumes.polygons import convex_parts, starts_of
+from hitplanes.planes.volumes.volumes import Aabbs, Circles, ConcavePolygons, Parts, Polygons, Volumes, joined
+
+from ...fire.call import fire
+from ...fire.hits import Hits
+from ...kinds.areas import Disc, Stencil
+from .methods import Curve, Decisions, Method, copied, enlarged, fired_method, scaled, unscaled
+from .peers import Discs
+
+SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
+PREFILTERS = ("none", "box", "circle", "oriented box", "4 boxes", "polygon")
+BROADPHASES = ("none", "grid", "quadtree", "bvh")
+
+Fired = list[tuple[Hits, Ints]]
+"""Hits, and the ids of the objects that were fired at."""
+
+
+def plane_curves(discs: Discs) -> list[Curve]:
+    """Return the curves of all methods that test pixels."""
+    scales = tuple(Method(s, partial(_at_scale, discs, s), partial(_decided_by_planes, scale=s)) for s in SCALES)
+    before = tuple(_at_full_scale(discs, word, prefilter=word) for word in PREFILTERS)
+    broad = tuple(_at_full_scale(discs, word, broadphase=word) for word in BROADPHASES)
+    return [
+        Curve("pixel planes", "scale", scales),
+        Curve("pixels, pre-filter", "pre-filter", before, "at full scale"),
+        Curve("pixels, broad phase", "broad phase", broad, "at full scale"),
+    ]
+
+
+def _at_full_scale(discs: Discs, word: str, **how: str) -> Method:
+    """Return a method that fires with a pre-filter or a broad phase."""
+    every, weapon = np.arange(len(discs.scene)), Disc(discs.radius, pierce=True)
+    return fired_method(
+        word, discs.scene, weapon, lambda hits: _decided_by_planes([(hits, every)], 1), at=discs.at, **how
+    )
+
+
+def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
+    """Return a run at a scale.
+
+    Shapes are drawn at that scale. A mask has no finer detail, so above full scale its pixels and those of the disc
+    become squares of pixels.
+    """
+    exact = discs.exact | (scale <= 1)
+    drawn, squares = np.flatnonzero(exact), np.flatnonzero(~exact)
+    runs: list[Callable[[], tuple[Hits, Ints]]] = []
+    if len(drawn) or not len(squares):
+        alone, disc = copied(discs.scene, drawn, scale), Disc(discs.radius * scale, pierce=True)
+        at = scaled(discs.at, scale)
+        runs.append(lambda: (fire(alone, disc, at), drawn))
+    if len(squares):
+        k = int(scale)
+        pixels = np.array(Disc(discs.radius).spans(1 << TRIG_BITS, 0).to_mask()[0])
+        middle = k * len(pixels) // 2
+        stencil = Stencil(np.kron(pixels, np.ones((k, k), np.bool_)), pivot_xy=(middle, middle), pierce=True)
+        big, center = enlarged(discs.scene, squares, k), k * (np.floor(discs.at + 0.5) - len(pixels) // 2) + middle
+        runs.append(lambda: (fire(big, stencil, center), squares))
+    return lambda: [run() for run in runs]
+
+
+def _decided_by_planes(fired: Fired, scale: float) -> Decisions:
+    """Convert hits to decisions with the first pixel and the part of the disc's pixels that hit."""
+    return Decisions.joined(
+        [
+            Decisions(
+                hits.shot,
+                ids[hits.object],
+                unscaled(hits.first_xy.astype(np.float64), scale),
+                hits.samples / hits.verdicts.sum(axis=1)[hits.shot],
+            )
+            for hits, ids in fired
+        ]
+    )
+
+
+BOXES = (1, 2, 4, 8, 16, 32, 64)
+CORNERS = (4, 5, 6, 8, 12, 16, 24)
+TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
+
+POINTS_AT_ONCE = 1 << 16
+"""Points that are tested against volumes at a time."""
+
+FINEST = 12
+"""Largest radius at which every pixel is tested for the share, px; larger discs use a coarser lattice."""
+
+Make = Callable[[Scene], list[Volumes]]
+"""Function that returns the volumes of a scene's objects in the world, with one row per object."""
+
+
+def volume_curves(discs: Discs) -> list[Curve]:
+    """Return the curves of all kinds of volumes."""
+
+    def curve(name: str, setting: str, makes: Mapping[float | None, Make]) -> Curve:
+        return Curve(name, setting, tuple(_method(discs, value, make) for value, make in makes.items()))
+
+    return [
+        curve("circle", "", {None: _fit(fit.least_circle)}),
+        curve("circle about the pivot", "", {None: _pivot_circles}),
+        curve("box, re-boxed", "", {None: _reboxed}),
+        curve("box, refitted", "", {None: _fit(fit.box)}),
+        curve("oriented box", "", {None: _fit(fit.oriented_box)}),
+        curve("boxes", "for an object", {k: _fit(partial(fit.boxes, k=k)) for k in BOXES}),
+        curve("convex polygon", "corners", {n: _fit(partial(fit.convex, n=n)) for n in CORNERS}),
+        curve("hull", "", {None: _fit(fit.hull)}),
+        curve("polygon", "px of tolerance", {t: _fit(partial(_concave, tolerance=t)) for t in TOLERANCES}),
+        curve("triangles", "px of tolerance", {t: _fit(partial(_triangles, tolerance=t)) for t in TOLERANCES}),
+    ]
+
+
+def _fit(make: Callable[[Bools], Volumes]) -> Make:
+    """Fit volumes to masks, once for equal masks, and move them so that they hold the pixel squares of each object."""
+
+    def fitted(scene: Scene) -> list[Volumes]:
+        made: dict[int, Volumes] = {}
+        placed = []
+        for item, variant in enumerate(scene.items.variants):
+            if variant.uid not in made:
+                made[variant.uid] = make(variant.mask)
+            placed.append(shifted(made[variant.uid], np.array([scene.mask(item)[1]])))
+        return placed
+
+    return fitted
+
+
+def _concave(mask: Bools, tolerance: float) -> Volumes:
+    return ConcavePolygons(fit.concave(mask, tolerance), [0])
+
+
+def _triangles(mask: Bools, tolerance: float) -> Volumes:
+    """Cut the outline into convex parts, and each into a fan of triangles."""
+    points = fit.concave(mask, tolerance)
+    parts = convex_parts([(x, y) for x, y in points.tolist()])
+    fans = [[part[0], part[k], part[k + 1]] for part in parts for k in range(1, len(part) - 1)]
+    return Parts(Polygons(points[np.array(fans).ravel()], starts_of([3] * len(fans))), [0])
+
+
+def _pivot_circles(scene: Scene) -> list[Volumes]:
+    """Fit circles around the pivots before rotation, which they do not need to follow."""
+    unturned = [_unturned(scene, item) for item in range(len(scene))]
+    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in unturned]
+
+
+def _reboxed(scene: Scene) -> list[Volumes]:
+    """Rotate boxes of the unrotated masks, and return the bounds of their corners."""
+    boxes: list[Volumes] = []
+    for item in range(len(scene)):
+        mask, pivot_xy, corner_xy = _unturned(scene, item)
+        boxes.append(fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy))
+    return boxes
+
+
+def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
+    """Return the mask of an object before rotation, its pivot in the mask, and the position of the mask, px."""
+    items = scene.items
+    variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
+    pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
+    return variant.mask, pivot, items.position_256[item] / SUB - pivot
+
+
+def _method(discs: Discs, setting: float | None, make: Make) -> Method:
+    """Return a method with a volume for each object; a run tests the bounding boxes first, then the volumes."""
+
+    def prepare() -> Callable[[], tuple[Volumes, Ints, Ints]]:
+        alone = copied(discs.scene, np.arange(len(discs.scene)))
+        made = make(alone)
+        volumes = joined(made) if made else Circles(np.zeros((0, 2)), 0.0)
+        box = volumes.bounds()
+        return lambda: (volumes, *_touched(volumes, box.min, box.max, discs))
+
+    return Method(setting, prepare, lambda found: _decided(discs, *found), lambda found: _stored(found[0]))
+
+
+def _stored(volumes: Volumes) -> int:
+    """Return the bytes of the arrays of volumes."""
+    if isinstance(volumes, Parts):
+        return _stored(volumes.parts) + volumes.starts.nbytes
+    if isinstance(volumes, Aabbs):
+        return volumes.min.nbytes + volumes.max.nbytes
+    core = volumes.core()
+    return core.points.nbytes + core.radius.nbytes * isinstance(volumes, Circles)
+
+
+def _touched(volumes: Volumes, low: Floats, high: Floats, discs: Discs) -> tuple[Ints, Ints]:
+    """Return the pairs (shots, objects) whose disc and volume touch; `low` and `high` are corners of bounding boxes."""
+    near = np.ones((len(discs.at), len(low)), np.bool_)
+    for axis in range(2):
+        place = discs.at[:, axis, None]
+        near &= (place + discs.radius >= low[:, axis]) & (place - discs.radius <= high[:, axis])
+    shot, item = np.nonzero(near)
+    touching = overlap(volumes.take(item), Circles(discs.at[shot], discs.radius))
+    return shot[touching], item[touching]
+
+
+def _decided(discs: Discs, volumes: Volumes, shot: Ints, item: Ints) -> Decisions:
+    """Return decisions of a volume; shares and nearest places come from sampled pixel centres of the disc."""
+    off = _looked_at(discs.radius)
+    share, xy = np.zeros(len(shot)), np.full((len(shot), 2), np.nan)
+    step = max(1, POINTS_AT_ONCE // len(off))
+    for first in range(0, len(shot), step):
+        part = slice(first, first + step)
+        points = discs.at[shot[part], None] + off
+        rows = np.repeat(item[part], len(off))
+        met = overlap(volumes.take(rows), Circles(points.reshape(-1, 2), 0.0), conservative=True)
+        on: Bools = met.reshape(-1, len(off))
+        share[part] = on.mean(axis=1)
+        nearest = points[np.arange(len(on)), on.argmax(axis=1)]
+        xy[part] = np.where((share[part] > 0)[:, None], nearest, np.nan)
+    return Decisions(shot, item, xy, share)
+
+
+def _looked_at(radius: float) -> Floats:
+    """Return pixel centres (n, 2) of a disc, nearest first; for a large disc only those of a coarser lattice."""
+    xy = Disc(radius).spans(1 << TRIG_BITS, 0).pixels()
+    x, y = xy[(xy % max(1, round(radius / FINEST)) == 0).all(axis=1)].T
+    return np.stack([x, y], axis=1)[np.lexsort((x, y, x * x + y * y))].astype(np.float64)
+
+
+ROUND, LONG, HOLE, CONCAVE, PARTS, TURNED, COMPACT = (
+    "round", "long and thin", "with a hole", "concave", "several parts", "turned", "compact",
+)  # fmt: skip
+
+ROUND_LEAST = 0.85
+"""Least part of its enclosing circle that a round mask fills."""
+
+LONG_LEAST = 3.0
+"""Least ratio of the sides of the oriented box of a long and thin mask."""
+
+CONCAVE_MOST = 0.85
+"""Part of its hull below which a mask is concave."""
+
+TURNED_DEG = 15.0
+"""Least angle to the axes of a turned object, degrees."""
+
+
+def kind_of(scene: Scene, item: int) -> str:
+    """Classify the shape of an object that has pixels; the first kind that applies is returned."""
+    mask, _ = scene.mask(item)
+    off = abs((scene.items.angles[item] + 45) % 90 - 45)
+    sides, radius = _oriented_sides(mask), float(fit.least_circle(mask).radius[0])
+    if _regions(mask, diagonal=True) > 1:
+        return PARTS
+    if _regions(~np.pad(mask, 1), diagonal=False) > 1:
+        return HOLE
+    if mask.sum() >= ROUND_LEAST * math.pi * radius**2:
+        return ROUND
+    if off >= TURNED_DEG:
+        return TURNED
+    if max(sides) >= LONG_LEAST * min(sides):
+        return LONG
+    return CONCAVE if mask.sum() < CONCAVE_MOST * _hull_area(mask) else COMPACT
+
+
+def kinds_scene() -> Scene:
+    """Return a scene with one exact shape of each kind, at positions between pixels."""
+    scene = Scene(size_wh=(480, 320), name="shapes by kind")
+    star = [(r * math.sin(a), -r * math.cos(a)) for r, a in ((30 - 18 * (k % 2), k * math.pi / 5) for k in range(10))]
+    octagon = [(math.cos((k + 0.5) * math.pi / 4), math.sin((k + 0.5) * math.pi / 4)) for k in range(8)]
+    ring = [[(30 * x, 30 * y) for x, y in octagon], [(19 * x, 19 * y) for x, y in octagon]]
+    bars = [
+        [(x - 6, y - 22), (x + 6, y - 22), (x + 6, y + 22), (x - 6, y + 22)] for x, y in ((-22, 4), (0, -4), (22, 4))
+    ]
+    for name, sprite, at, angle in (
+        (ROUND, Sprite.circle(24), (80.3, 80.6), 0),
+        (LONG, Sprite.box(92, 7), (240.7, 80.2), 0),
+        (HOLE, Sprite.polygon(ring[0], holes=ring[1:]), (400.4, 80.9), 0),
+        (CONCAVE, Sprite.polygon(star), (80.8, 230.3), 0),
+        (PARTS, Sprite.polygon(bars[0], holes=bars[1:]), (240.1, 230.7), 0),
+        (TURNED, Sprite.box(68, 22), (400.6, 230.4), 45),
+    ):
+        scene.add(sprite, at, angle=angle, name=name)
+    return scene
+
+
+def _regions(mask: Bools, diagonal: bool) -> int:
+    """Number of connected regions of set pixels."""
+    return int(cv2.connectedComponents(mask.astype(np.uint8), connectivity=8 if diagonal else 4)[0]) - 1
+
+
+def _oriented_sides(mask: Bools) -> tuple[float, float]:
+    corners = fit.oriented_box(mask).points
+    first, second = corners[1] - corners[0], corners[2] - corners[1]
+    return math.sqrt(float((first**2).sum())), math.sqrt(float((second**2).sum()))
+
+
+def _hull_area(mask: Bools) -> float:
+    x, y = fit.hull(mask).points.T
+    return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2

@@ -1,0 +1,507 @@
+"""Measure the error and the run time of every method on a scene, and write the results as text, tables and files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hitplanes.planes.common.checks import InputError, Ints, path_of, printable
+from hitplanes.planes.files.png import write_text
+from hitplanes.planes.files.scene_folder import cleared, own_folder
+from hitplanes.planes.scene.scene import Scene
+
+from ...fire.call import fire
+from ...fire.plan import plan_lines
+from ...kinds.areas import Disc
+from ...replay.stream import Progress
+from .area_questions import kind_of, plane_curves, volume_curves
+from .methods import Cost, Curve, Errors, Method, Question, copied, errors_of, measured
+from .peers import Discs, area_peer_curves, areas_question, discs_at
+from .ray_questions import movers_question, rays_question, spread_question
+
+FORMAT = "hitplanes-study/1"
+
+SPREAD_PART = 5
+"""Factor by which blasts are fewer than other shots, as thousands of pellets take long."""
+
+Show = Callable[[str, int, int], None]
+"""Function of the next measurement's name, the number of points done, and the number of all points."""
+
+Keep = Callable[[dict[str, Any]], None]
+"""Function that stores the unfinished study, given as JSON."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Size of a study: shots of a question, least runs and seconds of a method, and most objects."""
+
+    shots: int = 4000
+    runs: int = 7
+    seconds: float = 0.25
+    objects: int = 400
+
+    @classmethod
+    def quick(cls) -> Effort:
+        """Return the effort for a first look."""
+        return cls(shots=300, runs=3, seconds=0.0, objects=40)
+
+
+def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -> dict[str, Any]:
+    """Measure all methods on the hittable objects of a scene.
+
+    Parameters
+    ----------
+    seed : random seed of the shots; equal seeds give equal decisions
+    show : called before each point
+    keep : called with the study after each point and at the end
+
+    Returns
+    -------
+    the study as JSON; its `complete` is false until the end
+    """
+    ids = scene.ids("hittable")
+    ids = ids[scene.items.size_wh[ids, 0] > 0]
+    chosen = _spread_over(ids, effort.objects)
+    alone = copied(scene, chosen)
+    discs = discs_at(alone, effort.shots, seed)
+    questions = _questions(alone, discs, effort.shots, seed)
+    kinds = [kind_of(alone, item) for item in range(len(alone))]
+    study: dict[str, Any] = {
+        "format": FORMAT,
+        "complete": False,
+        "scene": {"name": scene.name, "hash": scene.content_hash(), "objects": len(chosen), "of": len(ids)},
+        "seed": seed,
+        "versions": _versions(),
+        "kinds": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
+        "plan": {"shots": effort.shots, **_plan(scene, discs)},
+        "questions": [_progress_text(question) for question in questions],
+    }
+    _measure(study, questions, kinds, effort, show, keep)
+    study["complete"] = True
+    keep(study)
+    return study
+
+
+def _spread_over(ids: Ints, most: int) -> Ints:
+    """Choose at most `most` ids, evenly from the first to the last."""
+    return ids[np.linspace(0, len(ids) - 1, most).astype(np.int64)] if len(ids) > most else ids
+
+
+def _measure(
+    study: dict[str, Any], questions: Sequence[Question], kinds: Sequence[str], effort: Effort, show: Show, keep: Keep
+) -> None:
+    """Add the points of all curves to a study; a setting that meets a limit is left out, with a note."""
+    points = sum(len(curve.methods) for question in questions for curve in question.curves)
+    done = 0
+    for question, record in zip(questions, study["questions"], strict=True):
+        for curve in question.curves:
+            row = _curve(curve)
+            record["curves"].append(row)
+            for method in curve.methods:
+                show(f"{question.name}: {curve.name}", done, points)
+                done += 1
+                try:
+                    answer, cost = measured(method, effort.runs, effort.seconds)
+                except InputError as error:
+                    _leave_out(row, method, error)
+                else:
+                    errors = errors_of(method.read(answer), question.truth)
+                    row["points"].append(_point(method, question, errors, cost, kinds))
+                keep(study)
+            if not row["points"] and not row["left_out"]:
+                row["left_out"], row["note"] = row["note"], ""
+
+
+def _leave_out(row: dict[str, Any], method: Method, error: InputError) -> None:
+    """Add the setting that met a limit to the note of its curve."""
+    setting = "" if method.setting is None else f"{row['setting']} {method.setting} is left out: "
+    row["note"] = "; ".join([*filter(None, [row["note"]]), f"{setting}{error}"])
+
+
+def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
+    return [
+        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *area_peer_curves(discs)]),
+        rays_question(alone, shots, seed),
+        movers_question(alone, shots, seed),
+        spread_question(alone, max(1, shots // SPREAD_PART), seed),
+    ]
+
+
+def _plan(scene: Scene, discs: Discs) -> dict[str, Any]:
+    """Return the plan of the discs in the original scene: the cost of each stage; measured after a warm-up call."""
+    weapon = Disc(discs.radius)
+    fire(scene, weapon, discs.at)
+    return fire(scene, weapon, discs.at).plan.timed()
+
+
+def _progress_text(question: Question) -> dict[str, Any]:
+    return {
+        "name": question.name,
+        "asks": question.asks,
+        "truth": question.truth_told,
+        "shots": question.shots,
+        "hits": len(question.truth),
+        "error": "share" if question.by_share else "wrong",
+        "curves": [],
+    }
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    return {"name": curve.name, "setting": curve.setting, "note": curve.note, "left_out": curve.left_out, "points": []}
+
+
+def _point(method: Method, question: Question, errors: Errors, cost: Cost, kinds: Sequence[str]) -> dict[str, Any]:
+    """Return the errors and the cost of a method at one setting, as JSON."""
+    shots = max(question.shots, 1)
+    us = {name: 1e6 * getattr(cost, name) / shots for name in ("least", "median", "most")}
+    return {
+        "setting": method.setting,
+        "missed": errors.missed,
+        "false": errors.false,
+        "wrong_per_shot": errors.wrong / shots,
+        "share_error": errors.share,
+        "position_error_px": errors.position,
+        "wrong_per_shot_by_kind": _by_kind(errors.objects, question.aimed, kinds),
+        "us_per_shot": us,
+        "runs": cost.runs,
+        "setup_ms": 1e3 * cost.setup,
+        "kept_bytes": cost.kept_bytes,
+        "run_bytes": cost.run_bytes,
+    }
+
+
+def _by_kind(wrong: Ints, aimed: Ints | None, kinds: Sequence[str]) -> dict[str, float]:
+    """Return wrong decisions per shot near an object, by kind of object, without kinds that no shot is near."""
+    if aimed is None or not len(aimed):
+        return {}
+    of, count = np.bincount(wrong, minlength=len(kinds)), np.bincount(aimed, minlength=len(kinds))
+    rows = {kind: np.array([k == kind for k in kinds]) for kind in dict.fromkeys(kinds)}
+    return {kind: float(of[mask].sum() / count[mask].sum()) for kind, mask in rows.items() if count[mask].any()}
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions of all libraries that take part and are installed."""
+    found = {"python": platform.python_version()}
+    for name in ("hitplanes", "numpy", "opencv-python-headless", "pymunk", "shapely", "pygame-ce"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+Json = Mapping[str, Any]
+
+RANKED = {"circle": "circle", "axis-aligned box": "box, refitted", "bounding box, oriented": "oriented box"}
+"""The three volumes that textbooks rank, and the names of their curves."""
+
+SHOWN_BY_KIND = (
+    ("pixel planes", 1), ("circle", None), ("circle about the pivot", None), ("box, re-boxed", None),
+    ("box, refitted", None), ("oriented box", None), ("boxes", 4), ("boxes", 16), ("boxes", 64), ("hull", None),
+    ("polygon", 2.0), ("triangles", 2.0),
+)  # fmt: skip
+
+COLUMNS = (
+    "question", "method", "setting", "shots", "missed", "false", "wrong_per_shot", "share_error", "position_error_px",
+    "us_per_shot_least", "us_per_shot_median", "us_per_shot_most", "runs", "setup_ms", "kept_bytes", "run_bytes",
+)  # fmt: skip
+
+
+class Place(NamedTuple):
+    """A point of a diagram: curve, setting, error, microseconds per shot, its JSON, and the unit of the setting."""
+
+    curve: str
+    setting: float | str | None
+    error: float
+    us: float
+    point: Json
+    unit: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the method with its setting and unit."""
+        if self.setting is None:
+            return self.curve
+        unit = f" ({self.unit})" if self.unit not in ("", self.curve) and not isinstance(self.setting, str) else ""
+        return f"{self.curve} {setting_text(self.setting)}{unit}"
+
+
+def setting_text(setting: float | str | None) -> str:
+    """Return the text of a setting, such as 1/8, 4 or grid."""
+    if not isinstance(setting, int | float):
+        return setting or ""
+    return f"1/{1 / setting:g}" if 0 < setting < 1 and (1 / setting).is_integer() else f"{setting:g}"
+
+
+def places(question: Json) -> list[Place]:
+    """Return all points of a question whose error is known."""
+    key = "share_error" if question["error"] == "share" else "wrong_per_shot"
+    return [
+        Place(curve["name"], point["setting"], point[key], point["us_per_shot"]["least"], point, curve["setting"])
+        for curve in question["curves"]
+        for point in curve["points"]
+        if point[key] is not None
+    ]
+
+
+def bound(question: Json) -> float:
+    """Return the upper bound (95 % confidence) of the error rate when no shot was wrong: 3 / shots.
+
+    References
+    ----------
+    Hanley and Lippman-Hand, "If nothing goes wrong, is everything all right?" (1983).
+    """
+    return 3 / max(int(question["shots"]), 1)
+
+
+def front(found: Sequence[Place]) -> list[Place]:
+    """Return the Pareto front, from fast to accurate: no other place is both faster and more accurate."""
+    kept: list[Place] = []
+    for place in sorted(found, key=lambda p: (p.us, p.error)):
+        if not kept or place.error < kept[-1].error:
+            kept.append(place)
+    return kept
+
+
+def verdict(study: Json, error: float) -> list[str]:
+    """Return a line for each question, which names the fastest method with at most this error."""
+    return [f"{question['name']}: {_verdict(question, error)}" for question in study["questions"]]
+
+
+def _verdict(question: Json, error: float) -> str:
+    found = places(question)
+    if not question["hits"]:
+        return "no shot hits anything in truth, so it tells nothing"
+    what = "of the share" if question["error"] == "share" else "wrong decisions a shot"
+    good = [place for place in found if place.error <= error]
+    if not found:
+        return "nothing was measured"
+    if not good:
+        best = min(found, key=lambda p: (p.error, p.us))
+        return f"no method has {error:g} {what} or less; the best is {best.name}, {_result(best, question)}"
+    best = min(good, key=lambda p: p.us)
+    text = f"the fastest with {error:g} {what} or less is {best.name}, {_result(best, question)}"
+    if bound(question) > error and question["error"] == "wrong":
+        text += f"; {question['shots']} shots cannot tell errors below {bound(question):.2g}"
+    return text
+
+
+def _result(place: Place, question: Json) -> str:
+    none = place.error == 0 and question["error"] == "wrong"
+    wrong = f"none wrong (under {bound(question):.2g})" if none else f"{place.error:.2g}"
+    return f"{place.us:.3g} us a shot, {wrong}"
+
+
+def ranks(study: Json, error: float) -> list[list[str]]:
+    """Rank circle, axis-aligned box and oriented box by speed and accuracy; list the kinds each is good enough for."""
+    found = {p.curve: p for q in study["questions"] if q["name"] == "areas" for p in places(q)}
+    rows = [(name, found[curve]) for name, curve in RANKED.items() if curve in found]
+    speed = sorted((place.us, name) for name, place in rows)
+    right = sorted((place.error, name) for name, place in rows)
+    table = []
+    for name, place in rows:
+        by_kind = place.point["wrong_per_shot_by_kind"]
+        good = [kind for kind, wrong in by_kind.items() if wrong <= error]
+        least = min(by_kind, key=lambda kind: by_kind[kind], default="")
+        enough = ", ".join(good) or (f"nothing; nearest: {least}, {by_kind[least]:.2g}" if least else "nothing")
+        fast, accurate = 1 + speed.index((place.us, name)), 1 + right.index((place.error, name))
+        table.append([name, f"{fast} ({place.us:.2g} us)", f"{accurate} ({place.error:.2g} wrong)", enough])
+    return table
+
+
+def markdown(study: Json, error: float, pictures: Sequence[str] = ()) -> str:
+    """Return the whole study as Markdown.
+
+    Parameters
+    ----------
+    pictures : names of the questions that have a diagram
+    """
+    return "\n".join(_lines(study, error, pictures)) + "\n"
+
+
+def _lines(study: Json, error: float, pictures: Sequence[str]) -> Iterator[str]:
+    scene, versions = study["scene"], study["versions"]
+    yield f"# Error against run time: {printable(scene['name']) or 'a scene'}"
+    yield ""
+    if not study["complete"]:
+        yield "**Not complete: it was interrupted.** What was measured is here."
+        yield ""
+    part = "" if scene["objects"] == scene["of"] else f" of {scene['of']}"
+    kinds = ", ".join(f"{count} {kind}" for kind, count in study["kinds"].items())
+    yield f"{scene['objects']}{part} objects ({kinds}), seed {study['seed']}."
+    yield f"Versions: {', '.join(f'{name} {number}' for name, number in versions.items())}."
+    yield ""
+    yield f"## The verdict, for an error of {error:g}"
+    yield ""
+    yield from (f"- {line}" for line in verdict(study, error))
+    yield ""
+    yield "Pixels, supercover, swept, every pixel and pellets are what `fire` does; volumes are tested by `overlap`."
+    yield ""
+    table = ranks(study, error)
+    if table:
+        yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:"
+        yield ""
+        yield from markdown_table(["", "fast", "accurate", "good enough for"], table)
+    for question in study["questions"]:
+        yield from _question(question, question["name"] in pictures)
+    for question in study["questions"]:
+        yield from _kinds(question)
+    yield "## What this scene pays for"
+    yield ""
+    yield f"{study['plan']['shots']} discs in one call at the scene as it is: what each stage cost, what was left out."
+    yield ""
+    yield "```text"
+    yield from plan_lines(study["plan"])
+    yield "```"
+
+
+def _question(question: Json, picture: bool) -> Iterator[str]:
+    yield f"## {question['name'].capitalize()}: {question['asks']}"
+    yield ""
+    yield f"{question['shots']} shots, {question['hits']} hits in truth. Truth: {question['truth']}."
+    yield ""
+    if picture:
+        yield f"![Error against time: {question['name']}]({question['name']}.png)"
+        yield ""
+    head = ["method", "setting", "wrong a shot", "missed", "false", "error of share", "of place, px", "us a shot"]
+    rows = [_row(curve, point, question) for curve in question["curves"] for point in curve["points"]]
+    yield from markdown_table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows, numbers=True)
+    yield "Of place: mean distance from where it truly hit. Us a shot: the least of all runs of a batch, then the"
+    yield "median and the most. Kept: what stays between runs; a run needs: the most at once."
+    yield ""
+    for curve in question["curves"]:
+        if curve["left_out"] or curve["note"]:
+            yield f"- {curve['name']}: {'left out: ' + curve['left_out'] if curve['left_out'] else curve['note']}"
+    yield ""
+
+
+def _row(curve: Json, point: Json, question: Json) -> list[str]:
+    us = point["us_per_shot"]
+    wrong = f"{point['wrong_per_shot']:.4f}" if point["wrong_per_shot"] else f"0 (< {bound(question):.2g})"
+    unit = f" {curve['setting']}" if isinstance(point["setting"], int | float) else ""
+    return [
+        curve["name"], setting_text(point["setting"]) + unit, wrong, str(point["missed"]), str(point["false"]),
+        _number(point["share_error"], ".4f"), _number(point["position_error_px"], ".3f"), f"{us['least']:.2f}",
+        f"{us['median']:.2f}, {us['most']:.2f}", f"{point['setup_ms']:.1f}", _bytes(point["kept_bytes"]),
+        _bytes(point["run_bytes"]),
+    ]  # fmt: skip
+
+
+def _kinds(question: Json) -> Iterator[str]:
+    """Yield the table of wrong decisions by kind of shape, for the common methods."""
+    points = {(curve["name"], point["setting"]): point for curve in question["curves"] for point in curve["points"]}
+    shown = [(key, points[key]["wrong_per_shot_by_kind"]) for key in SHOWN_BY_KIND if key in points]
+    kinds = list(dict.fromkeys(kind for _, by_kind in shown for kind in by_kind))
+    if not kinds:
+        return
+    yield "## Shapes by kind: wrong decisions for each shot near one"
+    yield ""
+    rows = [
+        [f"{name} {setting_text(setting)}".strip(), *(f"{by_kind[kind]:.3f}" for kind in kinds)]
+        for (name, setting), by_kind in shown
+    ]
+    yield from markdown_table(["", *kinds], rows)
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: bool = False) -> Iterator[str]:
+    """Yield the lines of a Markdown table and an empty line; `numbers` aligns all columns but the first right."""
+    yield f"| {' | '.join(head)} |"
+    yield "| --- |" + (" ---: |" if numbers else " --- |") * (len(head) - 1)
+    yield from (f"| {' | '.join(row)} |" for row in rows)
+    yield ""
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
+
+
+def _bytes(count: int) -> str:
+    """Return a number of bytes as text."""
+    for unit in ("B", "KB", "MB"):
+        if count < 1000 or unit == "MB":
+            break
+        count = round(count / 1000)
+    return f"{count} {unit}"
+
+
+def csv_of(study: Json) -> str:
+    """Return the study as CSV, with a row for each point."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for question in study["questions"]:
+        for curve in question["curves"]:
+            for point in curve["points"]:
+                flat = {**point, **{f"us_per_shot_{name}": us for name, us in point["us_per_shot"].items()}}
+                own = {"question": question["name"], "method": curve["name"], "shots": question["shots"]}
+                writer.writerow([own.get(name, flat.get(name)) for name in COLUMNS])
+    return text.getvalue()
+
+
+NO_DIAGRAMS = "the diagrams are left out: matplotlib is not installed (pip install 'hitplanes[study]')"
+QUESTIONS = ("areas", "rays", "movers", "spread")
+FILES = ("study.json", "study.csv", "study.md", *(f"{name}.png" for name in QUESTIONS))
+
+
+def write_study(
+    scene: Scene, folder: Path, seed: int, effort: Effort, error: float, progress: Progress
+) -> tuple[dict[str, Any], list[str]]:
+    """Run a study and write it to a new folder or that of an earlier study.
+
+    Returns
+    -------
+    the study as JSON, and the names of the questions that have a diagram
+
+    Raises
+    ------
+    InputError
+        If the folder holds other files, or cannot be written.
+    KeyboardInterrupt
+        After the points measured so far were written.
+    """
+    folder = path_of("output", folder)
+    own_folder(folder, FILES)
+    kept: dict[str, Any] = {}
+
+    def keep(study: dict[str, Any]) -> None:
+        if not kept:  # the first point replaces an earlier study
+            cleared(folder, FILES)
+        kept.update(study)
+        write_text(folder / FILES[0], json.dumps(study, indent=1) + "\n")
+
+    try:
+        run_study(scene, seed, effort, progress.step, keep)
+    except KeyboardInterrupt:
+        progress.clear()
+        if not kept:
+            raise
+        _write_tables(kept, folder, error)
+        raise KeyboardInterrupt(f"what was measured is in {folder}") from None
+    progress.clear()
+    return kept, _write_tables(kept, folder, error)
+
+
+def _write_tables(study: Mapping[str, Any], folder: Path, error: float) -> list[str]:
+    """Write the tables and, if matplotlib is installed, the diagrams; return the names of the diagrams."""
+    drawn: list[str] = []
+    write_text(folder / FILES[1], csv_of(study))
+    write_text(folder / FILES[2], markdown(study, error))
+    if find_spec("matplotlib") is not None:
+        from .figures import save_figure, work_precision
+
+        for question in study["questions"]:
+            if places(question):
+                save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
+                drawn.append(question["name"])
+                write_text(folder / FILES[2], markdown(study, error, drawn))
+    return drawn

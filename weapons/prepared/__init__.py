@@ -1,0 +1,1 @@
+"""Prepared weapons, which fire one shot a call at little cost."""

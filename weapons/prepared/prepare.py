@@ -1,0 +1,263 @@
+"""Prepared weapons, which fire one shot a call at little cost.
+
+scene, weapon -> rounds and position cache -> one look-up a shot -> hits
+"""
+
+from __future__ import annotations
+
+import threading
+from math import floor
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.call import category_bits, fire
+from ..fire.hits import Hits
+from ..kinds.areas import has_no_range, parts_of, ray_parts_of
+from ..kinds.placements import checked_shots
+from ..kinds.weapon import Weapon
+from . import position_cache
+from .one_shot import Answer, Filter, Frame, Present, Told, answer_of, frame_of, rounds_of
+from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
+
+AIMS_BYTES = 32 * 2**20
+"""Most memory of the patterns of aims and shot numbers, as integer rows, bytes."""
+
+AIM_BYTES = 200
+"""Memory of an aim or a shot number in addition to its patterns, bytes."""
+
+Looks = list[tuple[int, int, Look]]
+"""Each round of a shot: its pixel relative to the shot's, and the function that looks up what it hits."""
+
+PLAIN = float, int
+NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
+
+
+class Ready:
+    """A weapon that `prepare` made ready for a scene: `ready.fire(at)` equals `fire(scene, weapon, at)` at less cost.
+
+    A shot looks up data that is made once, when a shot first needs it:
+
+    - the pattern of each aim, and of each shot number of a `Spread`, as bits;
+    - the visible pixels of the objects near each square of 32 px of shot positions (see `position_cache`).
+
+    With compiled kernels there are no squares: one call of a kernel walks the items or, once it is made, the visible
+    set (see `compiled`).
+
+    Every shot compares versions. If the scene has changed, the squares near the old and new places of what changed are
+    discarded first (all squares, if the changes are not known), so that no answer is of an older scene. The choice
+    between numpy and compiled kernels is made at the same time.
+
+    Patterns of up to 96 px, and up to 1000 px in chunks, are looked up; thin rays that end at their first hit are cast
+    (see `prepared_ray`). These are left to `fire`:
+
+    - all other rays, larger patterns, and in numpy patterns near which there are many items
+    - bursts whose recoil is not a whole number of pixels
+    - batches and bad input
+
+    Threads may fire one Ready at a scene that none of them changes.
+    """
+
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter) -> None:
+        self.scene, self.weapon = scene, weapon
+        self._filter = kept
+
+    def fire(self, at: object, aim: object = None, toward: object = None, shot: object = None) -> Hits:
+        """Decide what one shot hits; the arguments are those of `fire`."""
+        kept = self._filter
+        exclude = kept.exclude if kept.exclude.size else None
+        return fire(
+            self.scene, self.weapon, at, aim=aim, toward=toward, accept=kept.accept, exclude=exclude, seed=kept.seed,
+            shot=shot,
+        )  # fmt: skip
+
+
+class ReadyPattern(Ready):
+    """Prepared weapon whose pattern is looked up."""
+
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, frame: Frame) -> None:
+        super().__init__(scene, weapon, kept)
+        _, spread, plain = parts_of(weapon)
+        self._frame, self._directed, self._drawn = frame, plain.directed, spread is not None
+        self._pierce, self._answer = plain.pierce, answer_of(weapon)[0]
+        self._items, self._version = scene.items, -1
+        self._lock = threading.Lock()
+        self._kernels: ModuleType | None = None
+        self._squares: Any
+        self._present: Present
+        self._aims: dict[object, Looks] = {}
+        self._told: dict[tuple[object, object], Looks] = {}
+        self._aims_bytes = 0
+        self._straight: Look
+        self._quick: Any = {}
+
+    def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
+        """Decide what one shot hits; the arguments are those of `fire`."""
+        if self._items.version != self._version:
+            self._follow()
+        try:
+            if type(at) is tuple:
+                x, y = at
+                kind = type(x)
+                if kind is type(y) and (kind is float or kind is int):
+                    if aim is None and toward is None and shot is None:
+                        hits, quick = self._answer(), self._quick
+                        hits._present, hits._at = self._present, at
+                        if quick is None:
+                            self._straight(x, y, hits)
+                            return hits
+                        column, row = floor(x + PIXEL), floor(y + PIXEL)
+                        if quick[column >> CELL_SHIFT][row >> CELL_SHIFT]:
+                            if x == ODD or y == ODD:  # its pixel would be wrong by one
+                                return self._looked_up(at, aim, toward, shot)
+                            self._straight(column, row, hits)
+                        return hits
+                    looks = self._known(aim, toward, shot)
+                    if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
+                        return self._told_of(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
+        except (KeyError, ValueError, OverflowError):  # not made yet, too far, or not a pair
+            pass
+        return self._looked_up(at, aim, toward, shot)
+
+    def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
+        """Fire with arguments that are not in the cache yet, or of unusual types."""
+        place = plain_pair(at)
+        looks = None if place is None else self._looks(place, aim, toward, shot)
+        if place is None or looks is None or max(map(abs, place)) > FARTHEST:
+            return super().fire(at, aim, toward, shot)
+        x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
+        told = aim, None if toward is None else plain_pair(toward), shot
+        try:
+            return self._told_of(place, told, x, y, looks)
+        except KeyError:  # too many items are near
+            return super().fire(at, aim, toward, shot)
+
+    def _told_of(self, at: tuple[float, float], told: Told, x: int, y: int, looks: Looks) -> Answer:
+        """Look up all rounds of a shot at a pixel."""
+        hits = self._answer()
+        hits._present, hits._at, hits._told = self._present, at, told
+        for dx, dy, look in looks:
+            look(x + dx, y + dy, hits)
+        return hits
+
+    def _known(self, aim: object, toward: object, shot: object) -> Looks:
+        """Looks of an aim and a shot number that were used before; KeyError if they were not."""
+        plain = toward is None and (type(aim) is float or aim is None or type(aim) is int)
+        if plain and (shot is None or type(shot) is int):  # True is refused, though it equals the key 1
+            return self._told[aim, shot]
+        raise KeyError
+
+    def _looks(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> Looks | None:
+        """Looks of a shot; None if an argument must be checked by `fire`."""
+        number, offset = 0, None
+        if shot is not None:
+            if type(shot) is not int or not 0 <= shot < 2**63:
+                return None
+            number = shot if self._drawn else 0
+        if toward is not None:
+            target = plain_pair(toward)
+            if target is None or aim is not None:
+                return None
+            offset = round(SUB * target[0]) - round(SUB * place[0]), round(SUB * target[1]) - round(SUB * place[1])
+            if offset == (0, 0):
+                return None
+        elif aim is not None and not (isinstance(aim, float | int) and type(aim) in PLAIN and abs(aim) <= POSITION_MAX):
+            return None
+        key = (number, aim, offset) if self._directed else number
+        looks = self._aims.get(key)
+        if looks is None:
+            looks = self._made_looks(key, aim, offset, number)
+        if looks and toward is None:
+            self._told[aim, shot] = looks
+            self._grow(AIM_BYTES)
+        return looks
+
+    def _made_looks(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> Looks:
+        """Make the looks of a shot; those of a shot without arguments are stored for the fastest path."""
+        shots = self._filter.shots(self.weapon, (0, 0), (aim, None, number))
+        looks: Looks = []
+        for one in rounds_of(self.weapon, shots, offset):
+            look, size = self._squares.look(one)
+            looks.append((one.x, one.y, look))
+            self._grow(size)
+        self._grow(AIM_BYTES)
+        self._aims[key] = looks
+        straight = (0, None, None) if self._directed else 0
+        if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0):
+            self._straight, self._quick = looks[0][2], self._squares.quick
+        return looks
+
+    def _grow(self, size: int) -> None:
+        """Count the memory of aims, and discard all of them if it exceeds AIMS_BYTES."""
+        with self._lock:
+            self._aims_bytes += size
+            if self._aims_bytes > AIMS_BYTES:
+                self._aims, self._told, self._aims_bytes = {}, {}, size
+
+    def _follow(self) -> None:
+        """Read the scene as it is now, and choose the kernels."""
+        with self._lock:
+            version = self._items.version
+            if version == self._version:
+                return
+            kernels = kernels_of(position_cache)
+            if kernels is not self._kernels:
+                self._kernels = kernels
+                self._squares = kernels.PositionCache(self.scene, self.weapon, self._pierce, self._filter, self._frame)
+                self._aims, self._told, self._quick = {}, {}, {}
+            stack = self._items.stack()
+            self._squares.follow(stack)
+            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
+            self._version = version
+
+
+def plain_pair(value: object) -> tuple[float, float] | None:
+    """Pair of Python numbers within the limits; None for anything that `fire` must check."""
+    if type(value) is tuple and len(value) == 2 and type(value[0]) is float is type(value[1]):
+        pair: Any = value
+    elif type(value) is np.ndarray and value.shape == (2,) and value.dtype.kind in "iuf" and value.itemsize <= 8:
+        pair = tuple(value.tolist())
+    elif type(value) in (tuple, list) and len(value) == 2:  # type: ignore[arg-type]
+        pair = tuple(v.item() if type(v) in NUMPY_NUMBERS else v for v in value)  # type: ignore[attr-defined]
+    else:
+        return None
+    for v in pair:
+        if type(v) not in PLAIN or not -POSITION_MAX <= v <= POSITION_MAX:
+            return None
+    x, y = pair
+    return x, y
+
+
+def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: object = None, seed: object = 0) -> Ready:
+    """Make a weapon ready to be fired at a scene one shot a call.
+
+    Parameters
+    ----------
+    scene : the scene that is fired at; it may change at any time, and each shot sees it as it is then
+    weapon, accept, exclude, seed : arguments of `fire`, the same for all shots; `exclude` is a number or a list (K,)
+
+    Raises
+    ------
+    InputError
+        Naming the argument.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    toward = (1, 0) if has_no_range(weapon) else None
+    shots = checked_shots(weapon, (0, 0), None, toward, category_bits(scene, accept), exclude, seed, None)
+    kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
+    parts = ray_parts_of(weapon)
+    if parts is not None:
+        from ..rays.first_hit import can_march
+        from .prepared_ray import ReadyRay
+
+        alone = parts[0] is None and parts[1] is None and can_march(parts[2])
+        return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
+    frame = frame_of(weapon)
+    return Ready(scene, weapon, kept) if frame is None else ReadyPattern(scene, weapon, kept, frame)

@@ -1,0 +1,1 @@
+"""Rays: their contacts with items, first hits, passes through objects, and ends."""

@@ -1,0 +1,191 @@
+"""Fire a ray weapon: the whole flow on one screen.
+
+scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
+                                 -> cast at all items, or march to the first pixel that is taken -> ends -> rows
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from hitplanes.planes.common.checks import Ints
+from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
+from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.hits import Rows
+from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
+from ..fire.prefilter import Candidates, may_refuse
+from ..fire.strategy import chosen_candidates
+from ..kinds.placements import Shots
+from ..kinds.rays import RayWeapon
+from ..kinds.weapon import Weapon
+from .contacts import Contacts, Parts, Rays, Terminations, rays_of
+from .first_hit import FirstHits, Way, can_march, chosen_way, ends_at_first, ends_by_cast
+from .ray_hits import Passes, RayHits, Stops, Told, passes_of, pixels_of, rows_of_passes, stops_of
+from .ray_walk import Range, expected_cells, trace
+
+RAYS_MOST = 1024
+"""Most rays of one chunk; larger chunks are not faster."""
+
+GROWTH = 4
+"""Largest ratio of the sizes of a chunk of rays and the chunk before it."""
+
+C = TypeVar("C", Passes, Stops)
+Choose = Callable[[int], Candidates]
+"""Function that chooses the pre-filter for a number of rays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Passes and stops of the rays of whole shots."""
+
+    passes: Passes
+    stops: Stops
+
+
+def fired_rays(
+    scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, how: tuple[str, str, str], plan: Plan
+) -> RayHits:
+    """Decide what shots of a ray weapon hit; `how` is (prefilter, broadphase, strategy) of `fire`."""
+    stack, ray = read_stack(scene, plan), parts[2]
+    burst, several, _ = parts
+    each = (burst.count if burst else 1) * (several.count if several else 1)
+    prefilter, broadphase, strategy = how
+    way = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
+    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack, False)
+    candidates = choose(0 if way.plane or way.casts else each * len(shots))
+    through = Range(scene.items, stack, scene.bounds, candidates, plan)
+    plan.run("plan", way.why if way.plane or way.casts else candidates.why)
+    step = max(1, CHUNK_ROWS // each)
+    rows: list[Rows] = []
+    found: list[tuple[int, Followed | FirstHits]] = []
+    for begin in range(0, max(len(shots), 1), step):
+        some = shots.take(begin, min(begin + step, len(shots)))
+        rays = rays_of(parts, some)
+        plan.run("rays", "both ends on the grid", rays.nbytes)
+        if ends_at_first(ray):
+            ends = _first_ends(rays, ray, some, through, way, choose)
+            first = FirstHits(rays, ray, ends, stack)
+            rows.append(first.rows(len(some)))
+            found.append((begin, first))
+            plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
+        else:
+            through_objects, stops, pixels = _followed(rays, ray, some, through)
+            rows.append(rows_of_passes(through_objects, pixels, rays))
+            found.append((begin, Followed(through_objects, stops)))
+            plan.run("rows", "passes, gathered by object", rows[-1].nbytes)
+        if begin:
+            rows[-1].shot[:] += begin
+    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
+    plan.run("rows", "")
+    _leave_out_unused(plan, scene, through, shots, ray, way)
+    plan.run("plan", "")
+    return hits
+
+
+def _told(found: list[tuple[int, Followed | FirstHits]]) -> Told:
+    """Functions that join the passes and the stops of chunks of shots, given with the number of their first shot."""
+    return (
+        lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
+        lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
+    )
+
+
+def _later(columns: C, first_shot: int) -> C:
+    return replace(columns, shot=columns.shot + first_shot) if first_shot else columns
+
+
+def _leave_out_unused(plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, way: Way) -> None:
+    """Add the stages that this scene and this weapon did not need to the plan."""
+    filtered = plan.has_run("pre-filter")
+    plan.leave_out_all(_unused, through.candidates.why_unindexed if filtered else None, ray, way)
+    choosy = may_refuse(through.stack, shots)
+    leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
+    leave_out_imagery(plan, scene)
+
+
+def _unused(why_unindexed: str | None, ray: RayWeapon, way: Way) -> Iterator[tuple[str, str]]:
+    """Stages that rays did not need, and why; `why_unindexed` is None unless some rays went through the pre-filter."""
+    idle = "no ray was left to walk"
+    for name in ("pre-filter", "walk", "stops"):
+        yield name, idle
+    yield "broad phase", why_unindexed or idle
+    if ends_at_first(ray):
+        yield "passes", "told when they are asked for, as the stops are"
+    if can_march(ray) and way.plane is None:
+        yield "jumps", way.why
+    if can_march(ray) and not way.casts:
+        yield "cast", way.why
+    yield "cells between items", "only those inside their boxes are looked at"
+    yield "verdicts", "counted when asked for"
+    yield "volumes", "boxes are the pre-filter"
+
+
+def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: Way, choose: Choose) -> Terminations:
+    """Ends of rays that end at their first hit, found as `way` says; the rays that it leaves over walk."""
+    if way.plane is not None:
+        from .first_hit import ends_by_march  # few calls need it
+
+        ends, left = ends_by_march(rays, ray, shots, through.items, through.stack, way.plane, through.plan)
+    elif way.casts:
+        ends, left = ends_by_cast(rays, ray, shots, through)
+    else:
+        return Terminations.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
+    if len(left):
+        walking, candidates = Way(None, way.plane is not None and way.casts, way.why), choose(len(left))
+        through.plan.run("plan", "")
+        ends.put(
+            left, _first_ends(rays.pick(left), ray, shots, replace(through, candidates=candidates), walking, choose)
+        )
+    return ends
+
+
+def _walked(
+    rays: Rays, ray: RayWeapon, shots: Shots, through: Range
+) -> Iterator[tuple[Rays, Contacts, Terminations, Lines, Lines]]:
+    """Follow rays to their ends, in chunks that are expected to touch at most CHUNK_CELLS cells.
+
+    Yields
+    ------
+    the rays of a chunk, and what `trace` returns for them
+    """
+    begin = cells = 0
+    most = RAYS_MOST
+    if through.candidates.prefilter.name == "none":
+        most = min(most, CHUNK_PAIRS // max(len(through.stack), 1))
+    step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, through.stack))))
+    while begin < max(len(rays), 1):
+        some = rays.take(begin, begin + step)
+        met, ends, lines, relative = trace(some, ray, shots, through)
+        through.plan.run("walk", "")
+        yield some, met, ends, lines, relative
+        begin, cells = begin + step, cells + len(met.x)
+        step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
+
+
+def _followed(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:
+    """Follow rays to their ends.
+
+    Returns
+    -------
+    passes, stops, and the pixels that were hit, as `pixels_of` returns them
+    """
+    stack, plan = through.stack, through.plan
+    passes: list[Passes] = []
+    stops: list[Stops] = []
+    pixels: list[Ints] = []
+    for some, met, ends, lines, relative in _walked(rays, ray, shots, through):
+        through_objects, walked = passes_of(met, ends, some, lines, relative, stack, ray.fades)
+        passes.append(through_objects)
+        plan.run("passes", "each ray through each object", through_objects.nbytes)
+        stops.append(stops_of(met, ends, some, lines, relative, stack))
+        plan.run("stops", "", stops[-1].nbytes)
+        pixels.append(pixels_of(through_objects, walked, some, rays))
+        plan.run("rows", "", pixels[-1].nbytes)
+    return Passes.joined(passes), Stops.joined(stops), np.concatenate(pixels)

@@ -1,0 +1,420 @@
+"""Hits of rays, the passes of each ray through objects, and the stop of each ray."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hitplanes.planes.bits.span_walk import Verdict
+from hitplanes.planes.common.checks import Floats, InputError, Ints
+from hitplanes.planes.common.limits import HALF, ITEMS_MAX, SUB, WEIGHT_FULL
+from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.scene import Scene
+
+from .. import late
+from ..fire.hits import HitRow, Hits, Rows
+from ..fire.plan import Plan
+from ..kinds.areas import ray_parts_of
+from ..kinds.placements import Columns, Shots
+from ..kinds.weapon import Weapon, smoothed
+from .contacts import Contacts, Parts, Rays, Reason, Terminations, last_of_each, stretches
+
+if TYPE_CHECKING:
+    from ..explain.ray_samples import Miss, RayDetail
+    from ..explain.samples import Blocked, Margin, Samples, Share, WhyNot
+
+
+SIDE = np.arange(-2, 3)
+GRADIENT_XY = np.stack(np.meshgrid(SIDE, SIDE), axis=-1).reshape(-1, 2)
+GRADIENT = -GRADIENT_XY * (3 - np.abs(GRADIENT_XY)).prod(axis=1, keepdims=True)
+"""Weights (25, 2) of the pixels around one, the nearer the greater; the weighted sum of a mask is its outward normal.
+On straight edges and circles its mean error is 4 degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Passes(Columns):
+    """Passes of rays through objects, sorted by (shot, round, pellet, order).
+
+    Parameters
+    ----------
+    shot, round, pellet, object : (n,) the ray, and the object
+    order : (n,) number of the object among those that the ray hit
+    entry_xy, exit_xy : (n, 2) first cell of the object, and the walked cell that the ray leaves last
+    entry, exit : (n,) times, as fractions of the ray; of a projectile as fractions of the frame
+    entry_px, exit_px : (n,) distances along the ray, px
+    material : (n,) length of the ray inside the object's pixel squares, px
+    normal_xy : (n, 2) outward normal at the entry, in whole numbers; (0, 0) only if the ray starts inside
+    weight : (n,) weight by falloff at the entry, up to 65,535
+    point_xy : (n, 2) point of the ray at the entry, px
+    samples : (n,) number of cells of the object that the ray walked
+    row : (n,) number of the row of the hits that lists the pass
+    """
+
+    round: Ints
+    pellet: Ints
+    object: Ints
+    order: Ints
+    entry_xy: Ints
+    exit_xy: Ints
+    entry: Floats
+    exit: Floats
+    entry_px: Floats
+    exit_px: Floats
+    material: Floats
+    normal_xy: Ints
+    weight: Ints
+    point_xy: Floats
+    samples: Ints
+    row: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Stops(Columns):
+    """Stops of rays, where a bullet hole goes, sorted by (shot, round, pellet).
+
+    Parameters
+    ----------
+    shot, round, pellet : (R,) the ray
+    reason : (R,) value of `Reason`: RANGE, OCCLUDER, HITS (the last object that it may hit), BUDGET
+    item : (R,) the occluder, or the object in which the ray ended; BUDGET: the object that took the last of it, even if
+        the ray leaves it there; -1 for RANGE, and for a budget of 0
+    cell_xy : (R, 2) pixel of the stop
+    fraction, distance : (R,) fraction of the ray, and distance along it, px
+    point_xy : (R, 2) point of the stop, px
+    normal_xy : (R, 2) outward normal of the item, in whole numbers; (0, 0) for RANGE and BUDGET
+    """
+
+    round: Ints
+    pellet: Ints
+    reason: Ints
+    item: Ints
+    cell_xy: Ints
+    fraction: Floats
+    distance: Floats
+    point_xy: Floats
+    normal_xy: Ints
+
+
+def passes_of(
+    met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack, falloff: str | None
+) -> tuple[Passes, Contacts]:
+    """Passes of rays through objects, and the cells of each pass.
+
+    Parameters
+    ----------
+    met : contacts with objects and occluders, also beyond the ends
+    lines, relative : the rays (R,); and the line of each pair of `met`, relative to the motion of its item
+    """
+    chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
+    objects = met.take(chosen)
+    keep = ends.walked(objects)
+    chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]
+    walked = objects.only(keep)
+    cell = walked.first
+    order = np.lexsort((walked.rank, walked.x[cell], walked.y[cell], walked.entry[cell], walked.ray))
+    walked, chosen = walked.take(order), chosen[order]
+    ray, rank, cell = walked.ray, walked.rank, walked.first
+    entry = walked.entry[cell]
+    out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
+    scale, length = lines.scale[ray], lines.length[ray]
+    first_part, last_part = entry / scale, np.minimum(walked.leave[out] / scale, ends.fraction[ray])
+    last_part = np.maximum(last_part, first_part)
+    at, sides = np.stack([walked.x, walked.y], axis=1), relative.entered_by(chosen, walked.x[cell], walked.y[cell])
+    origin = rays.origin_xy[ray]
+    entry_xy = at[cell] + origin
+    return (
+        Passes(
+            rays.shot[ray], rays.round[ray], rays.pellet[ray], stack.ids[rank],
+            np.arange(len(ray)) - np.searchsorted(ray, ray),
+            entry_xy, at[out] + origin, first_part, last_part, first_part * length, last_part * length,
+            _material(walked, ends, lines) * length,
+            normals_at(stack, rank, entry_xy, sides),
+            weights_at(entry, scale, falloff),
+            points_at(rays, ray, first_part),
+            walked.count,
+            np.zeros_like(ray),
+        ),
+        walked,
+    )  # fmt: skip
+
+
+def stops_of(met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack) -> Stops:
+    """Stops of rays; the parameters are those of `passes_of`."""
+    ends_at_once = (ends.reason == Reason.BUDGET) & (ends.rank < 0)
+    cell_xy = pixel(rays.start_256 + rays.step_256 * ~ends_at_once[:, None])
+    item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
+    stopped = np.flatnonzero(ends.rank >= 0)
+    here = np.stack([ends.x, ends.y], axis=1)[stopped]
+    cell_xy[stopped] = here + rays.origin_xy[stopped]
+    item[stopped] = stack.ids[ends.rank[stopped]]
+    hard = np.flatnonzero(ends.reason[stopped] != Reason.BUDGET)
+    row, (x, y) = stopped[hard], here[hard].T
+    key = met.ray * max(len(stack), 1) + met.rank
+    order = np.argsort(key)
+    pair = order[np.searchsorted(key[order], row * max(len(stack), 1) + ends.rank[row])] if len(row) else row
+    normal[row] = normals_at(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
+    return Stops(
+        rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, ends.fraction, ends.fraction * lines.length,
+        points_at(rays, np.arange(len(rays)), ends.fraction), normal,
+    )  # fmt: skip
+
+
+def points_at(rays: Rays, ray: Ints, part: Floats) -> Floats:
+    """Points of rays at fractions of their lengths, px."""
+    return np.asarray(rays.start_256[ray] / SUB + part[:, None] * (rays.step_256[ray] / SUB))
+
+
+def _material(walked: Contacts, ends: Terminations, lines: Lines) -> Floats:
+    """Fraction of the ray that lies inside the item of each pair, up to its end; overlapping cells count once."""
+    group, first, last = walked.pair, walked.entry, walked.leave
+    beside = (lines.step == 0) & ((lines.start & (SUB - 1)) == HALF)
+    if lines.radius or beside.any():  # the ray may be in several cells at once
+        group, first, last = stretches(group, first, last)
+    ray = walked.ray[group]
+    budget = ends.reason[ray] == Reason.BUDGET
+    scale = lines.scale[ray]
+    whole = ends.last_whole(lines.scale)[ray]
+    parts = np.maximum(np.minimum(last, whole) - first, 0)
+    total = np.zeros(len(walked))
+    if len(walked):
+        total = np.add.reduceat(parts, np.searchsorted(group, np.arange(len(walked)))) / lines.scale[walked.ray]
+    cut = np.flatnonzero(budget & (first <= whole) & (last > whole))
+    np.add.at(total, group[cut], np.maximum(ends.fraction[ray[cut]] - whole[cut] / scale[cut], 0))
+    return total
+
+
+def normals_at(stack: Stack, rank: Ints, xy: Ints, sides: Ints) -> Ints:
+    """Outward normals of items at their pixels (n, 2): gradients of the masks, or the given `sides` if these are 0."""
+    box = stack.box_xyxy[rank]
+    near = xy[:, None] + GRADIENT_XY
+    inside = ((near >= box[:, None, :2]) & (near <= box[:, None, 2:])).all(axis=2)
+    row, column = near[..., 1] - box[:, None, 1], near[..., 0] - box[:, None, 0]
+    texel = np.where(inside, stack.offset[rank][:, None] + row * stack.width[rank][:, None] + column, 0)
+    on = inside & stack.masks[texel]
+    normal = np.stack([np.where(on, GRADIENT[:, axis], 0).sum(axis=1) for axis in (0, 1)], axis=1)
+    return np.where((normal == 0).all(axis=1, keepdims=True), sides, normal)
+
+
+def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
+    """Whole weights from 65,535 at the muzzle to 0 at the end of the ray."""
+    if falloff is None:
+        return np.full(len(entry), WEIGHT_FULL)
+    lost = np.asarray(entry.astype(object) * WEIGHT_FULL // scale, np.int64)
+    return smoothed(WEIGHT_FULL - lost, falloff)
+
+
+C = TypeVar("C", Passes, Stops)
+Told = tuple[Callable[[], Passes], Callable[[], Stops]]
+"""Functions that make the passes and the stops of rays."""
+
+
+class RayHits(Hits):
+    """Hits of a call of `fire` with a ray weapon.
+
+    Rows are ordered by (shot, round, distance, pellet, order along the ray). `samples` counts the cells of all pellets;
+    `first_xy` is where the nearest pellet enters. Two are equal if their rows, passes and stops are.
+
+    Parameters
+    ----------
+    rays : number of rays that were fired
+    """
+
+    rays: int = 1
+
+    def __init__(
+        self, rows: Rows, told: Told, rays: int, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+    ) -> None:
+        self._keep(rows, scene, weapon, shots, plan)
+        self.rays, self._later = rays, told
+
+    @cached_property
+    def passes(self) -> Passes:
+        """Passes of all rays through objects."""
+        passes = self._later[0]()
+        return _unwritable(replace(passes, row=_rows_of(self._rows, passes)))
+
+    @cached_property
+    def stop(self) -> Stops:
+        """Stop of each ray, and its reason."""
+        return _unwritable(self._later[1]())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Hits):
+            return NotImplemented
+        if not isinstance(other, RayHits):
+            return False
+        same_rows = all(np.array_equal(getattr(self, n), getattr(other, n)) for n in HitRow._fields)
+        return same_rows and self.passes == other.passes and self.stop == other.stop
+
+    __hash__ = None
+
+    def __repr__(self) -> str:
+        return f"<RayHits: {len(self)} rows, {len(self.passes)} passes of {self.rays} rays>"
+
+    def passes_at(self, shot: int) -> Passes:
+        """Passes of the rays of one shot."""
+        return self.passes.of_shot(self._checked(shot))
+
+    def stops_at(self, shot: int) -> Stops:
+        """Stops of the rays of one shot."""
+        return self.stop.of_shot(self._checked(shot))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows, passes, stops and the plan as JSON."""
+        rows = {"rows": [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]}
+        return {**rows, "passes": self.passes.to_rows(), "stops": self.stop.to_rows(), "plan": self.plan.to_dict()}
+
+    def samples_at(self, shot: int = 0) -> Samples:
+        """Cells of the rays of one shot in the order of the walk, with their verdicts and the items that decided."""
+        return self._rays(shot).samples()
+
+    def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
+        """Pixels of objects that one shot hit, as {(round, object): pixels}."""
+        return late.ray_samples.pixels_of_rays(self._rays(shot))
+
+    def why_not(self, shot: int = 0) -> list[WhyNot]:
+        """Objects that one shot did not hit, and why: on the whole length of its rays, or within 32 px of their way."""
+        return late.ray_samples.ray_why_not(self._rays(shot), {row.object for row in self.of(shot)})
+
+    def blockers(self, shot: int = 0) -> list[Blocked]:
+        """Occluders that ended rays of one shot, and the objects behind them on those rays."""
+        return late.ray_samples.blocked_rays(self._rays(shot))
+
+    def nearest_miss(self, shot: int = 0) -> Miss | None:
+        """Accepted object that one shot missed by least, with the distance and the nearest points."""
+        return late.ray_samples.nearest_miss(self._rays(shot), {row.object for row in self.of(shot)})
+
+    def shares(self, shot: int | None = None) -> list[Share]:
+        """Raise InputError: rays have no shares."""
+        raise InputError("hits: expected those of a weapon with a pattern, got those of rays: their passes tell more")
+
+    def margins(self, shot: int | None = None) -> list[Margin]:
+        """Margins of one shot, or of all: the shortest shifts, up to 8 px, that change whether an object is hit.
+
+        All rays of a shot are shifted together. For an object that was hit they go on as far as they would if no object
+        ended them; for an object that was missed they end where they stopped.
+        """
+        if self._scenes is None:
+            self.scene_of(0)  # raises for an answer of an older scene, even an empty one
+        found: list[Margin] = []
+        for row in range(len(self.shots)) if shot is None else [self._checked(shot)]:
+            hit = {record.object for record in self.of(row)}
+            found += late.ray_margins.ray_margins(self._rays(row), self.scene_of(row), self._parts[2], row, hit)
+        return found
+
+    @property
+    def has_margins(self) -> bool:
+        """Whether margins are defined: not for a projectile tested in steps, nor for very many rays."""
+        return late.ray_margins.has_ray_margins(self._parts[2], self.rays // max(len(self.shots), 1))
+
+    def _rays(self, shot: int) -> RayDetail:
+        scene, row = self.scene_of(shot), self._checked(shot)
+        if self._walked is None or self._walked[0] != row:
+            self._walked = row, late.ray_samples.ray_detail(scene, self._parts, self.shots.take(row, row + 1))
+        found: RayDetail = self._walked[1]
+        return found
+
+    @property
+    def _parts(self) -> Parts:
+        parts = ray_parts_of(self.weapon)
+        assert parts is not None  # it was fired as one
+        return parts
+
+    @cached_property
+    def verdicts(self) -> Ints:
+        """Number of cells of each shot by verdict, counted when first asked for."""
+        none = np.zeros((0, len(Verdict)), np.int64)
+        verdicts = np.concatenate([none, *(self._rays(i).counts() for i in range(len(self.shots)))])
+        verdicts.flags.writeable = False
+        return verdicts
+
+    @classmethod
+    def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
+        """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
+        rays = [part for part in parts if isinstance(part, RayHits)]
+        found = cls(
+            cls._gathered_rows(parts, rows),
+            (
+                lambda: Passes.gathered([part.passes for part in rays], rows),
+                lambda: Stops.gathered([part.stop for part in rays], rows),
+            ),
+            sum(part.rays for part in rays),
+            parts[0].scene,
+            parts[0].weapon,
+            shots,
+            Plan.joined([part.plan for part in parts]),
+        )
+        found._remember(parts, rows)
+        return found
+
+
+def _unwritable(columns: C) -> C:
+    for f in fields(columns):
+        getattr(columns, f.name).flags.writeable = False
+    return columns
+
+
+def groups_of(of: Rows | Passes, rounds: int) -> Ints:
+    """Number that identifies the shot, the round and the object of each row or pass."""
+    return (of.shot * rounds + of.round) * ITEMS_MAX + of.object
+
+
+def _rows_of(rows: Rows, passes: Passes) -> Ints:
+    """Row of each pass: the one of its shot, round and object."""
+    rounds = int(rows.round.max(initial=0)) + 1
+    of_row, of_pass = groups_of(rows, rounds), groups_of(passes, rounds)
+    order = np.argsort(of_row)
+    return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
+
+
+def pixels_of(passes: Passes, cells: Contacts, some: Rays, rays: Rays) -> Ints:
+    """Pixels that rays `some` hit, as rows (group, x, y); none if no shot has several pellets.
+
+    Parameters
+    ----------
+    cells : cells of each pass
+    rays : all rays of the shots
+    """
+    if not rays.pellet.any():
+        return np.zeros((0, 3), np.int64)
+    group = groups_of(passes, int(rays.round.max(initial=0)) + 1)[cells.pair]
+    x, y = (np.stack([cells.x, cells.y], axis=1) + some.origin_xy[cells.ray[cells.pair]]).T
+    found = np.stack([group, x, y], axis=1)
+    return found if len(some) == len(rays) else np.unique(found, axis=0)
+
+
+# house: row order
+def rows_of_passes(passes: Passes, pixels: Ints, rays: Rays) -> Rows:
+    """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
+    rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
+    group = groups_of(passes, rounds)
+    order = np.lexsort((passes.order, passes.pellet, passes.entry_px, group))
+    begins = np.flatnonzero(np.diff(group[order], prepend=-1))
+    best = order[begins]
+    number = np.zeros(len(group), np.int64)
+    number[order] = np.cumsum(np.diff(group[order], prepend=-1) != 0) - 1
+    samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
+    weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
+    pellets = np.bincount(number, minlength=len(best))
+    distinct = samples if (pellets == 1).all() else _counted_once(pixels, group[best])
+    ray_of = passes.shot[best], passes.round[best]
+    sort = np.lexsort((passes.order[best], passes.pellet[best], passes.entry_px[best], *ray_of[::-1]))
+    best = best[sort]
+    ray = (passes.shot[best] * rounds + passes.round[best]) * pellets_fired + passes.pellet[best]
+    return Rows(
+        passes.shot[best], passes.round[best], passes.object[best], samples[sort], distinct[sort], weight[sort],
+        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - rays.origin_xy[ray]) ** 2).sum(axis=1),
+    )  # fmt: skip
+
+
+def _counted_once(pixels: Ints, groups: Ints) -> Ints:
+    """Number of distinct pixels of each group, for sorted groups."""
+    group = np.unique(pixels, axis=0)[:, 0]
+    return np.bincount(np.searchsorted(groups, group), minlength=len(groups))

@@ -1,0 +1,389 @@
+"""Read shots from JSON, and logs with one shot a line into checked columns."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import chain
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
+from hitplanes.planes.common.limits import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
+from hitplanes.planes.common.tables import (
+    Either,
+    Keys,
+    Names,
+    Number,
+    Numbers,
+    Optional,
+    Rows,
+    Text,
+    Whole,
+    distinct_keys,
+)
+from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.call import fire
+from ..fire.hits import Hits
+from ..kinds.areas import has_no_range
+from ..kinds.placements import Words
+from ..kinds.weapon import Weapon
+
+AIM_MAX = 10**9
+"""Largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle."""
+
+SHOT = Keys(
+    {
+        "weapon": Text(),
+        "at": Numbers((2,), POSITION_MAX),
+        "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
+        "toward": Optional(Numbers((2,), POSITION_MAX)),
+        "accept": Names(),
+        "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))),
+        "seed": Whole(0, SEED_MAX),
+        "shot": Whole(0, 2**63 - 1),
+    },
+    ("weapon", "at"),
+)
+"""Table that validates a shot."""
+
+
+@dataclass(frozen=True)
+class ShotRequest:
+    """One checked shot. `accept` holds names of categories, `exclude` ids of owners."""
+
+    name: str
+    weapon: Weapon
+    at: tuple[float, float]
+    aim: float | None = None
+    toward: tuple[float, float] | None = None
+    accept: tuple[str, ...] | None = None
+    exclude: tuple[int, ...] = ()
+    seed: int = 0
+    shot: int = 0
+    categories: int = ALL
+
+
+def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[ShotRequest]:
+    """Return the shots of a scene's file; a shot without a number gets its index."""
+    return [order_from_json(data, scene, arsenal, f"shots[{row}]", row) for row, data in enumerate(scene.shots)]
+
+
+def order_from_json(
+    data: object, scene: Scene, arsenal: Mapping[str, Weapon], place: str = "shot", number: int = 0
+) -> ShotRequest:
+    """Check one shot.
+
+    Parameters
+    ----------
+    data : JSON of the shot
+    place : prefix of errors
+    number : number of the shot if the JSON has none
+
+    Raises
+    ------
+    InputError
+        Naming the place and the field.
+    """
+    with within(place):
+        shot = SHOT.check("shot", data)
+        name = choice("weapon", shot["weapon"], arsenal)
+        if shot.get("aim") is not None and shot.get("toward") is not None:
+            raise InputError("aim: expected aim or toward, got both")
+        if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
+            raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
+        if shot.get("toward") is None and has_no_range(arsenal[name]):
+            raise InputError("toward: expected a point, as the weapon has no range, got none")
+        accept = shot.get("accept")
+        return ShotRequest(
+            name,
+            arsenal[name],
+            shot["at"],
+            shot.get("aim"),
+            shot.get("toward"),
+            None if accept is None else tuple(accept),
+            tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ()))),
+            shot.get("seed", 0),
+            shot.get("shot", number),
+            ALL if accept is None else scene.category_bits(*accept),
+        )
+
+
+def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
+    """Fire one shot; the pre-filter and the broad phase are those of `fire`."""
+    return fire(
+        scene,
+        order.weapon,
+        order.at,
+        aim=order.aim,
+        toward=order.toward,
+        accept=order.categories,
+        exclude=order.exclude or None,
+        seed=order.seed,
+        shot=[order.shot],
+        prefilter=prefilter,
+        broadphase=broadphase,
+    )
+
+
+def _owner(scene: Scene, value: object, row: int) -> int:
+    """Return the owner of a named object, or check the id of an owner."""
+    with within(f"exclude[{row}]"):
+        if isinstance(value, str):
+            return int(scene.items.owner[scene.find(value)])
+        return integer("owner", value, 0, scene.items.count - 1)
+
+
+LINE_MAX = 2**20
+"""Longest line of a log, bytes; enough for a shot that excludes thousands of objects by name."""
+
+CHUNK_BYTES = 2**22
+"""Bytes of lines that are read at a time; in memory they take about ten times as much."""
+
+FEW = 16
+"""Unusual lines are read one by one if there are at most this many; otherwise they are split into halves."""
+
+_decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
+
+
+@dataclass(frozen=True, eq=False)
+class Salvo:
+    """Checked shots of any weapons, as columns.
+
+    Parameters
+    ----------
+    name : names of the weapons
+    at : (n, 2) px
+    aim : (n,) degrees
+    toward : (n, 2) px; NaN for a shot that has an aim
+    accept : (n,) category bits
+    exclude : ids of owners, a tuple for each shot
+    seed, number : (n,) that select the random draws
+    """
+
+    name: list[str]
+    at: Floats
+    aim: Floats
+    toward: Floats
+    accept: Ints
+    exclude: list[tuple[int, ...]]
+    seed: Words
+    number: Ints
+
+    def __len__(self) -> int:
+        return len(self.name)
+
+    def groups(self) -> dict[tuple[str, bool, int], Ints]:
+        """Group shots that one call can fire: by weapon, kind of aim (angle or point) and number of excluded owners."""
+        found: dict[tuple[str, bool, int], list[int]] = {}
+        aimed = (~np.isnan(self.toward[:, 0])).tolist()
+        for row, key in enumerate(zip(self.name, aimed, map(len, self.exclude), strict=True)):
+            found.setdefault(key, []).append(row)
+        return {key: np.array(rows) for key, rows in found.items()}
+
+    def arguments(self, rows: Ints, toward: bool, owners: int) -> dict[str, Any]:
+        """Return the arguments of `fire` beside scene and weapon, for the shots of one group."""
+        return {
+            "at": self.at[rows],
+            "toward" if toward else "aim": self.toward[rows] if toward else self.aim[rows],
+            "accept": self.accept[rows],
+            "exclude": np.array([self.exclude[row] for row in rows.tolist()]) if owners else None,
+            "seed": self.seed[rows],
+            "shot": self.number[rows],
+        }
+
+    def take(self, row: int) -> Salvo:
+        """Return a salvo of one shot."""
+        part = slice(row, row + 1)
+        return Salvo(*(getattr(self, f.name)[part] for f in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Salvo]) -> Salvo:
+        """Join several salvos in order."""
+
+        def column(name: str) -> Any:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        return cls(
+            [name for part in parts for name in part.name],
+            column("at"),
+            column("aim"),
+            column("toward"),
+            column("accept"),
+            [owners for part in parts for owners in part.exclude],
+            column("seed"),
+            column("number"),
+        )
+
+    @classmethod
+    def of_orders(cls, orders: Sequence[ShotRequest]) -> Salvo:
+        """Return the columns of checked shots."""
+        return cls(
+            [order.name for order in orders],
+            np.array([order.at for order in orders], np.float64).reshape(-1, 2),
+            np.array([order.aim or 0.0 for order in orders], np.float64),
+            np.array([order.toward or NOWHERE for order in orders], np.float64).reshape(-1, 2),
+            np.array([order.categories for order in orders], np.int64),
+            [order.exclude for order in orders],
+            np.array([order.seed for order in orders], np.uint64),
+            np.array([order.shot for order in orders], np.int64),
+        )
+
+
+NOWHERE = (float("nan"), float("nan"))
+
+
+def read_lines(log: BinaryIO, count: int) -> list[bytes]:
+    """Read at most `count` further lines of a log; of a line that is too long only the beginning."""
+    lines: list[bytes] = []
+    size = 0
+    while len(lines) < count and size < CHUNK_BYTES and (line := log.readline(LINE_MAX + 3)):
+        lines.append(line)
+        size += len(line)
+    return lines
+
+
+def body_of(line: bytes) -> bytes:
+    """Strip the line break."""
+    return line.rstrip(b"\r\n")
+
+
+class ShotReader:
+    """Reader of the lines of a log for one scene and its arsenal.
+
+    Parameters
+    ----------
+    name : name of the log in errors
+    """
+
+    def __init__(self, scene: Scene, arsenal: Mapping[str, Weapon], name: str) -> None:
+        self.scene, self.arsenal, self._name = scene, arsenal, name
+        self._bits = {category: 1 << bit for bit, category in enumerate(scene.categories)}
+        self._owners: dict[int | str, int] = {item: item for item in range(scene.items.count)}
+        names = Counter(scene.items.names[item] for item in scene.ids().tolist())
+        for item in scene.ids().tolist():
+            if names[name_of := scene.items.names[item]] == 1:
+                self._owners[name_of] = int(scene.items.owner[item])
+
+    def place(self, line: int) -> str:
+        """Return the place of a line for errors; `line` counts from 0, the text from 1 as editors do."""
+        return f"{self._name} line {line + 1}"
+
+    def read(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
+        """Check lines.
+
+        Parameters
+        ----------
+        bodies : lines without line breaks
+        first : number of the first line, from 0
+
+        Returns
+        -------
+        the shots before the first bad line, and the error of that line or None
+        """
+        try:
+            return self._together(bodies, first), None
+        except (LookupError, TypeError, ValueError, OverflowError, RecursionError):
+            if len(bodies) <= FEW:
+                return self._one_by_one(bodies, first)
+        half = len(bodies) // 2
+        head, error = self.read(bodies[:half], first)
+        if error is not None:
+            return head, error
+        tail, error = self.read(bodies[half:], first + half)
+        return Salvo.joined([head, tail]), error
+
+    def _one_by_one(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
+        """Check each line by the rules for a scene's shots, which name the error."""
+        orders: list[ShotRequest] = []
+        for number, body in enumerate(bodies, first):
+            try:
+                with within(self.place(number)):
+                    data = _parsed(body)
+                orders.append(order_from_json(data, self.scene, self.arsenal, self.place(number), number))
+            except InputError as error:
+                return Salvo.of_orders(orders), error
+        return Salvo.of_orders(orders), None
+
+    def _together(self, bodies: list[bytes], first: int) -> Salvo:
+        """Check the types and ranges of whole columns at once; raise any error if a line is unusual."""
+        shots = _objects(bodies)
+        names = [shot["weapon"] for shot in shots]
+        _usual(set(names) <= self.arsenal.keys())
+        toward, aim = [shot.get("toward") for shot in shots], [shot.get("aim") for shot in shots]
+        _usual(all(t is None or a is None for t, a in zip(toward, aim, strict=True)))
+        aimed = np.array([point is not None for point in toward])
+        points = np.full((len(shots), 2), np.nan)
+        points[aimed] = _points([point for point in toward if point is not None])
+        return Salvo(
+            names,
+            _points([shot["at"] for shot in shots]),
+            _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
+            points,
+            np.array([self._accepted(shot["accept"]) if "accept" in shot else ALL for shot in shots], np.int64),
+            [self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots],
+            np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
+            np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
+        )
+
+    def _accepted(self, names: Any) -> int:
+        _usual(type(names) is list and len(set(names)) == len(names))
+        return sum(self._bits[name] for name in names)
+
+    def _passed_over(self, owners: Any) -> tuple[int, ...]:
+        _usual(type(owners) is list and {type(owner) for owner in owners} <= {int, str})
+        return tuple(self._owners[owner] for owner in owners)
+
+
+def _parsed(body: bytes) -> Any:
+    """Parse one line."""
+    if len(body) > LINE_MAX:
+        raise InputError(f"expected at most {LINE_MAX} bytes, got more")
+    if not body.strip():
+        raise InputError("expected a shot, got an empty line")
+    try:
+        return json.loads(body.decode(), object_pairs_hook=distinct_keys)
+    except json.JSONDecodeError as error:
+        raise InputError(f"expected JSON: {error.msg} at column {error.colno}") from error
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"expected JSON in UTF-8: {error}") from error
+
+
+def _objects(bodies: list[bytes]) -> list[dict[str, Any]]:
+    """Parse lines that must be JSON objects with known keys, without blanks around them."""
+    _usual(max(map(len, bodies)) <= LINE_MAX)
+    texts = b"\n".join(bodies).decode().split("\n")
+    decoded = [_decode(text) for text in texts]
+    _usual([end for _, end in decoded] == list(map(len, texts)))
+    shots = [shot for shot, _ in decoded]
+    _usual({type(shot) for shot in shots} == {dict} and set().union(*shots) <= set(SHOT.forms))
+    return shots
+
+
+def _points(values: list[Any]) -> Floats:
+    _usual({type(value) for value in values} <= {list} and {len(value) for value in values} <= {2})
+    return _numbers(list(chain.from_iterable(values)), POSITION_MAX).reshape(-1, 2)
+
+
+def _numbers(values: list[Any], limit: int) -> Floats:
+    _usual({type(value) for value in values} <= {int, float})
+    array = np.array(values, np.float64)
+    _usual(bool((np.abs(array) <= limit).all()))
+    return array
+
+
+def _whole(values: list[Any]) -> list[int]:
+    _usual({type(value) for value in values} == {int} and min(values) >= 0)
+    return values
+
+
+def _usual(condition: bool) -> None:
+    if not condition:
+        raise ValueError("not as usual")

@@ -1,0 +1,513 @@
+"""Canvas of a report: the scene, dimmed and enlarged, and the page around it with title, legend, cards and footer."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence, Set
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hitplanes.planes.bits.label_plane import label_plane
+from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
+from hitplanes.planes.files.png import cv2
+from hitplanes.planes.grid.spans import Box, Spans, each_pixel
+from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.render import GROUND, blend, draw_view
+from hitplanes.planes.scene.scene import Scene
+
+from .symbols import HEAT, LET_THROUGH, MARKS, SIGNS, SKETCH, TINT, Strokes, glyph, sign_mark, tiled_glyph
+
+WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
+"""Largest size of an enlarged view, px, and largest factor."""
+
+DIM = 125
+"""Brightness of the scene, of 255."""
+
+HATCH = (200, 212, 230)
+OUTLINES = {
+    "hit": ((255, 200, 40), 255),
+    "blocked": ((86, 180, 233), 255),
+    "other": ((240, 240, 240), 130),
+    "now": ((206, 156, 255), 255),
+}
+"""Colour and opacity of the outline of an object that was hit, of one that was only blocked, of any other, and of the
+present place of an object that has moved."""
+
+DASHED = ("blocked", "now")
+
+DASH = 5
+"""Length of the dashes of an outline, px."""
+
+SHADOW, SHADOW_ALPHA = (12, 14, 18), 170
+"""Colour and opacity, of 255, of the ground under the marks of hits, which keeps the gaps between them dark."""
+
+HEAT_ALPHA = 235
+"""Opacity of the heat of hits, of 255."""
+
+OUTLINES_MAX = 1000
+"""Most objects that are outlined in addition to those that were hit or blocked."""
+
+
+def factor_of(view: Box, width: int = WIDTH, height: int = HEIGHT) -> int:
+    """Greatest whole factor, up to LARGEST, by which a view fits a size."""
+    return max(1, min(width // (view[2] - view[0] + 1), height // (view[3] - view[1] + 1), LARGEST))
+
+
+class World:
+    """Enlarged picture of a view of the world; `painted` lists what was drawn on it, for the legend.
+
+    Parameters
+    ----------
+    scene : scene to draw; None draws the bounds alone
+    bounds : bounds of the world (x_min, y_min, x_max, y_max), or None
+    view : inclusive box of the world, px
+    factor : side of a pixel of the world in the picture, px
+    light : brightness of the scene, of 255
+    """
+
+    def __init__(
+        self, scene: Scene | None, bounds: Sequence[int] | None, view: Box, factor: int, light: int = DIM
+    ) -> None:
+        self.scene, self.view, self.factor = scene, view, factor
+        self.painted: set[str] = set()
+        shape = view[3] - view[1] + 1, view[2] - view[0] + 1
+        ground = np.full((*shape, 3), GROUND, np.uint8) if scene is None else _dimmed(scene, view, light)
+        if bounds is not None:
+            _shade_outside(ground, view, bounds)
+        self.image: Image = enlarged(ground, factor)
+        if bounds is not None and view != tuple(bounds):
+            _frame(self.image, view, bounds, factor)
+        if scene is not None and len(scene.ids(Role.OCCLUDER)):
+            self._hatch(np.isin(label_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1))
+
+    def placed(self, points: Floats) -> Floats:
+        """Points (n, 2) of the world in coordinates of the picture."""
+        return np.asarray((points - self.view[:2] + 0.5) * self.factor)
+
+    def mark_samples(self, shots: Sequence[Mapping[str, Any]], verdict: str) -> None:
+        """Mark the samples of one verdict, each with the verdict's shape."""
+        at = np.zeros((self.view[3] - self.view[1] + 1, self.view[2] - self.view[0] + 1), np.bool_)
+        for shot in shots:
+            fill_runs(at, self.view, shot["samples"].get(verdict, ()))
+        self.lay(at, verdict)
+
+    def lay(self, at: Bools, verdict: str) -> None:
+        """Mark the set pixels of a plane (h, w) of the view with the shape of a verdict."""
+        rows, columns = np.nonzero(at)
+        if not len(rows):
+            return
+        self.painted.add(verdict)
+        y0, x0 = int(rows.min()), int(columns.min())
+        part = enlarged(at[y0 : rows.max() + 1, x0 : columns.max() + 1], self.factor)
+        shape = tiled_glyph(verdict, self.factor, part.shape)
+        color, alpha = MARKS[verdict]
+        window = self.image[y0 * self.factor :, x0 * self.factor :]
+        if verdict == "hit":
+            _lay(window, part, SHADOW, SHADOW_ALPHA)
+        _lay(window, part, color, TINT)
+        _lay(window, part & shape, color, alpha)
+
+    def mark_heat(self, heat: Mapping[str, Any], verdict: str) -> None:
+        """Colour each cell by its number of samples of one verdict, on a logarithmic scale."""
+        most = max((run[3] for run in heat["counts"].get(verdict, ())), default=0)
+        steps = np.zeros((self.view[3] - self.view[1] + 1, self.view[2] - self.view[0] + 1), np.uint8)
+        for count, box in heat_boxes(heat, verdict):
+            fill(steps, self.view, box, 1 + heat_step(count, most))
+        if not steps.any():
+            return
+        self.painted.add(verdict)
+        there = enlarged(steps > 0, self.factor)
+        if verdict != "hit":
+            color, alpha = MARKS[verdict]
+            _lay(self.image, there & tiled_glyph(verdict, self.factor, there.shape), color, alpha // 2)
+            return
+        colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
+        blend(self.image, enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
+
+    def outline(self, item: int, kind: str) -> None:
+        """Draw the border of an object's mask inside its pixels: thick for "hit", thick and dashed for "blocked"."""
+        if self.scene is not None:
+            self._border(*self.scene.mask(item), kind)
+
+    def outline_pixels(self, spans: Spans, kind: str) -> None:
+        """Draw the border of a set of pixels."""
+        self._border(*spans.to_mask(), kind)
+
+    def outline_seen(self, items: Sequence[int]) -> None:
+        """Draw the borders of the visible parts of at most OUTLINES_MAX objects."""
+        if self.scene is None:
+            return
+        x, y = self.view[:2]
+        around = (x - 1, y - 1, self.view[2] + 1, self.view[3] + 1)  # an object may go on beyond the view
+        front = label_plane(self.scene.items.stack(), around)
+        for item in items[:OUTLINES_MAX]:
+            mask, (left, top) = self.scene.mask(item)
+            box = max(left, around[0]), max(top, around[1])
+            end = min(left + mask.shape[1], around[2] + 1), min(top + mask.shape[0], around[3] + 1)
+            if box[0] < end[0] and box[1] < end[1]:
+                rows, columns = slice(box[1] - y + 1, end[1] - y + 1), slice(box[0] - x + 1, end[0] - x + 1)
+                self._border(front[rows, columns] == item + 1, box, "other")
+
+    def _border(self, mask: Bools, corner: tuple[int, int], kind: str) -> None:
+        (x, y), (height, width), view, factor = corner, mask.shape, self.view, self.factor
+        left, top, right, low = (
+            max(x, view[0]),
+            max(y, view[1]),
+            min(x + width, view[2] + 1),
+            min(y + height, view[3] + 1),
+        )
+        if left >= right or top >= low:
+            return
+        inside = enlarged(np.pad(mask, 1)[top - y : low - y + 2, left - x : right - x + 2], factor)
+        core = _core(inside)
+        if kind != "other" and factor > 1:
+            core = _core(core)  # so that it stands out in grey, too
+        border = (inside & ~core)[factor:-factor, factor:-factor]
+        if not border.any():
+            return
+        self.painted.add(f"object {kind}")
+        if kind in DASHED:
+            rows, columns = np.ogrid[: border.shape[0], : border.shape[1]]
+            border &= (rows + columns) // DASH % 2 == 0
+        window = self.image[(top - view[1]) * factor : (low - view[1]) * factor]
+        _lay(window[:, (left - view[0]) * factor : (right - view[0]) * factor], border, *OUTLINES[kind])
+
+    def _hatch(self, occluding: Bools) -> None:
+        """Hatch the visible parts of the occluders."""
+        if not occluding.any():
+            return
+        self.painted.add("occluder")
+        y, x = np.ogrid[: self.image.shape[0], : self.image.shape[1]]
+        _lay(self.image, enlarged(occluding, self.factor) & ((x + y) % 12 < 2), HATCH, 80)
+
+
+def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box]]:
+    """Counts of one verdict, and the boxes of the world that have them."""
+    cell, (x, y) = heat["cell"], heat["origin_xy"]
+    for row, first, last, count in heat["counts"].get(verdict, ()):
+        yield count, (x + first * cell, y + row * cell, x + (last + 1) * cell - 1, y + (row + 1) * cell - 1)
+
+
+def fill(plane: npt.NDArray[Any], view: Box, box: Box, value: int = 1) -> None:
+    """Set the part of a box of the world that lies in a plane (h, w) of a view."""
+    x0, y0, x1, y1 = (max(v - low, -1) for v, low in zip(box, (view[0], view[1]) * 2, strict=True))
+    plane[max(y0, 0) : y1 + 1, max(x0, 0) : x1 + 1] = value
+
+
+def fill_runs(plane: Bools, view: Box, runs: Sequence[Sequence[int]] | Ints) -> None:
+    """Set the parts of runs [y, x_first, x_last] of the world that lie in a plane (h, w) of a view."""
+    y, first, last = np.array(runs, np.int64).reshape(-1, 3).T
+    seen = (y >= view[1]) & (y <= view[3])
+    first, last = np.maximum(first[seen], view[0]), np.minimum(last[seen], view[2])
+    run, x = each_pixel(first, np.maximum(last, first - 1))
+    plane[y[seen][run] - view[1], x - view[0]] = True
+
+
+def heat_step(count: int, most: int) -> int:
+    """Step of a count from 1 to `most` on the scale of heat, by its number of binary digits."""
+    return (count.bit_length() - 1) * (len(HEAT) - 1) // max(most.bit_length() - 1, 1)
+
+
+def _dimmed(scene: Scene, view: Box, light: int) -> Image:
+    """Picture of the scene, darker and a little greyer."""
+    plain = draw_view(scene.items, view, scene.extent()[:2]).astype(np.uint32)
+    grey = (plain * (54, 183, 19)).sum(axis=2, keepdims=True) // 256
+    return np.asarray((plain * 3 + grey * 2) // 5 * light // 255, np.uint8)
+
+
+def _shade_outside(picture: Image, view: Box, bounds: Sequence[int]) -> None:
+    """Darken the pixels out of bounds."""
+    y, x = np.ogrid[view[1] : view[3] + 1, view[0] : view[2] + 1]
+    outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
+    picture[outside] = (18, 19, 22)
+
+
+def _frame(world: Image, view: Box, bounds: Sequence[int], factor: int) -> None:
+    """Draw a line around the bounds."""
+    corners = [(v - low) * factor for v, low in zip(bounds, (view[0], view[1]) * 2, strict=True)]
+    x, y, x_max, y_max = np.clip(corners, -factor, max(world.shape) + factor).tolist()
+    cv2.rectangle(world, (x - 1, y - 1), (x_max + factor, y_max + factor), (120, 126, 136), 1)
+
+
+def _core(inside: Bools) -> Bools:
+    """Pixels of a set whose four neighbours belong to it."""
+    up, down = np.roll(inside, 1, axis=0), np.roll(inside, -1, axis=0)
+    return np.asarray(inside & up & down & np.roll(inside, 1, axis=1) & np.roll(inside, -1, axis=1))
+
+
+def enlarged(plane: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
+    """Enlarge a plane (h, w) or a picture (h, w, 3) by a whole factor."""
+    return np.repeat(np.repeat(plane, factor, axis=0), factor, axis=1)
+
+
+def _lay(world: Image, where: Bools, color: tuple[int, int, int], alpha: int) -> None:
+    """Blend one colour over the pixels of a mask."""
+    blend(world, color, np.where(where, alpha, 0).astype(np.uint8), 0, 0)
+
+
+WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0
+"""Arrow of an object that has moved: width, length of the dashes, length of the head, px."""
+
+FAR = 6.0
+"""Length of the shortest arrow that is drawn, px of the picture."""
+
+
+def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
+    """Draw the present outlines of objects that have moved, and arrows from their old places.
+
+    Returns
+    -------
+    mask (h, w) of the pixels that the arrows cover
+    """
+    strokes = Strokes(world.image.shape[:2])
+    for entry in report["now"]["moved"]:
+        runs = np.array(entry["runs"], np.int64).reshape(-1, 3)
+        world.outline_pixels(Spans(*runs.T), "now")
+        begin, end = ((np.array(entry[key]) - world.view[:2] + 0.5) * world.factor for key in ("from_xy", "to_xy"))
+        way = end - begin
+        length = float(np.sqrt((way**2).sum()))
+        if length > FAR:
+            strokes.line(begin, end, WAY_WIDTH, WAY_DASH)
+            strokes.head(end, way / length, min(HEAD, length))
+    strokes.lay(world.image, *OUTLINES["now"], grounded=True)
+    return np.asarray(strokes.ground > 0)
+
+
+Color = tuple[int, int, int]
+
+EDGE, TOP = 16, 44
+"""Left edge of the picture on the page, and its top, px."""
+
+LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12
+"""Height of a line, least width of a card, least width of a page, space between cards, px."""
+
+PAGE_GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
+
+LETTER, ENTRY_GAP = 8, 28
+"""About the width of a letter, and the space around an entry of the legend, px."""
+
+SIZE = 0.42
+"""Scale of OpenCV's font, about 8 px a letter."""
+
+
+NAMED_SIGNS = [name for name in SIGNS if name not in ("swept", "goes in", "comes out", "number")]
+"""Ray symbols that a legend lists."""
+
+
+class Text(NamedTuple):
+    """A line of text; (x, y) is the left end of its base line, px, or its right end or middle if these are set."""
+
+    x: int
+    y: int
+    text: str
+    color: Color = INK
+    bold: bool = False
+    right: bool = False
+    middle: bool = False
+
+
+class Drawn(Protocol):
+    """Protocol of a card: its height, and how it draws itself."""
+
+    @property
+    def height(self) -> int:
+        """Height, px."""
+
+    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
+        """Draw it with its top left at (x, y), and return its texts."""
+
+
+def page_of(
+    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Drawn]
+) -> tuple[Image, list[Text]]:
+    """Page around the enlarged world, and all texts, which are drawn later."""
+    image = world.image
+    width = max(image.shape[1] + 2 * EDGE, NARROWEST)
+    columns = max(1, (width - 2 * EDGE + GAP) // (COLUMN + GAP))
+    wide = (width - 2 * EDGE - GAP * (columns - 1)) // columns
+    legend = legend_of(report, world.painted, width)
+    bottoms = [TOP + image.shape[0] + 14 + legend.height] * columns
+    places = []
+    for card in cards:
+        column = bottoms.index(min(bottoms))
+        places.append((EDGE + column * (wide + GAP), bottoms[column]))
+        bottoms[column] += card.height + GAP
+    page = np.empty((max(bottoms) + 46, width, 3), np.uint8)
+    page[:] = PAGE_GROUND
+    left = (width - image.shape[1]) // 2
+    page[TOP : TOP + image.shape[0], left : left + image.shape[1]] = image
+    every = [text._replace(x=text.x + left, y=text.y + TOP) for text in texts]
+    every += [Text(EDGE, 28, clipped(report["scene"]["name"], width // 2), INK, bold=True), _summary(report, width)]
+    every += legend.draw(page, EDGE, TOP + image.shape[0] + 14)
+    for card, (x, y) in zip(cards, places, strict=True):
+        every += card.draw(page, x, y, wide)
+    return page, [*every, *_footer(report, width, page.shape[0])]
+
+
+def draw_texts(page: Image, texts: Sequence[Text]) -> None:
+    """Draw the text layer."""
+    for text in texts:
+        shown = plain(text.text)
+        x = text.x - text_width(shown) * (2 * text.right + text.middle) // 2
+        font = cv2.FONT_HERSHEY_DUPLEX if text.bold else cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(page, shown, (x, text.y), font, SIZE, text.color, 1, cv2.LINE_AA)
+
+
+def plain(text: str) -> str:
+    """Text on one line in the letters of the font: accents are dropped, unknown letters become question marks."""
+    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    return "".join(c if c.isprintable() else " " for c in bare).encode("ascii", "replace").decode()
+
+
+def text_width(text: str) -> int:
+    """Width of a text, px."""
+    return int(cv2.getTextSize(plain(text), cv2.FONT_HERSHEY_SIMPLEX, SIZE, 1)[0][0])
+
+
+def clipped(text: str, width: int) -> str:
+    """Shorten a text to a width, px."""
+    text = text[: max(width, 0)]  # a letter is at least one pixel wide
+    if text_width(text) <= width:
+        return text
+    while text and text_width(text + "...") > width:
+        text = text[:-1]
+    return text + "..."
+
+
+class Entry(NamedTuple):
+    """An entry of the legend: a word, and the picture (14, w, 3) of its mark."""
+
+    word: str
+    mark: Image
+
+
+class Legend:
+    """Entries side by side, in as many lines as needed; widths do not depend on the font, which differs."""
+
+    def __init__(self, entries: Sequence[Entry], width: int) -> None:
+        self.entries = entries
+        self.places: list[tuple[int, int]] = []
+        x, y = 0, 0
+        for entry in entries:
+            wide = entry.mark.shape[1] + LETTER * len(entry.word) + ENTRY_GAP
+            if x and x + wide > width - 2 * EDGE:
+                x, y = 0, y + 26
+            self.places.append((x, y))
+            x += wide
+        self.height = y + 26 + 8 if entries else 8
+
+    def draw(self, page: Image, x: int, y: int) -> list[Text]:
+        """Draw the marks and return the words."""
+        texts = []
+        for entry, (left, top) in zip(self.entries, self.places, strict=True):
+            wide = entry.mark.shape[1]
+            page[y + top : y + top + 14, x + left : x + left + wide] = entry.mark
+            texts.append(Text(x + left + wide + 6, y + top + 12, entry.word, FAINT))
+        return texts
+
+
+def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legend:
+    """Legend of what the picture contains."""
+    heat = report["batch"]["heat"]["counts"].get("hit", ()) if report["batch"] else ()
+    entries = [Entry(v, verdict_mark(v)) for v in reversed(MARKS) if v in painted and not (heat and v == "hit")]
+    if heat and "hit" in painted:
+        scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
+        entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{_per(report)}", np.repeat(scale, 5, axis=1)))
+    told = "other target" if painted & {"object hit", "object blocked"} else "target"
+    for kind, word in (
+        ("hit", "object hit"),
+        ("blocked", "object blocked"),
+        ("other", told),
+        ("now", "where it is now"),
+    ):
+        if f"object {kind}" in painted:
+            entries.append(Entry(word, _outlined(kind)))
+    for name, color in SKETCH.items():
+        if name in painted:
+            entries.append(Entry(name, _sketched(color, name)))
+    entries += sign_entries(painted)
+    if "occluder" in painted:
+        rows, columns = np.mgrid[:14, :14]
+        mark = _blank(14)
+        mark[(rows + columns) % 6 < 2] = HATCH
+        entries.append(Entry("occluder", mark))
+    return Legend(entries, width)
+
+
+def sign_entries(painted: Set[str]) -> list[Entry]:
+    """Legend entries of the ray symbols that a picture contains."""
+    return [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
+
+
+def _per(report: Mapping[str, Any]) -> str:
+    """Size of a cell of the heat map in words; empty for one pixel."""
+    cell = report["batch"]["heat"]["cell"]
+    return f" in {cell} x {cell} px" if cell > 1 else ""
+
+
+def verdict_mark(verdict: str, size: int = 14) -> Image:
+    """Mark (size, size, 3) of a verdict, for a legend."""
+    mark = _blank(size)
+    mark[glyph(verdict, size)] = MARKS[verdict][0]
+    return mark
+
+
+def _blank(size: int) -> Image:
+    mark = np.empty((size, size, 3), np.uint8)
+    mark[:] = (70, 74, 82)
+    return mark
+
+
+def _outlined(kind: str) -> Image:
+    mark, thick = _blank(14), 1 if kind == "other" else 2
+    border = np.ones((14, 14), np.bool_)
+    border[thick:-thick, thick:-thick] = False
+    rows, columns = np.ogrid[:14, :14]
+    mark[border & ((kind not in DASHED) | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
+    return mark
+
+
+def _sketched(color: Color, name: str) -> Image:
+    """Mark of a volume, a rhombus unlike the outline of an object; or of a cell, filled if it was opened."""
+    mark = _blank(14)
+    if name.startswith("cell"):
+        if name == "cell opened":
+            mark[:] = (np.array(color) + 2 * mark.astype(np.int64)) // 3
+        mark[[0, -1]] = mark[:, [0, -1]] = color
+        return mark
+    rows, columns = np.mgrid[:14, :14]
+    away = abs(2 * rows - 13) + abs(2 * columns - 13)
+    mark[(away <= 13) & (away > (7 if name == LET_THROUGH else 9))] = color
+    return mark
+
+
+def _of(batch: Mapping[str, Any] | None, key: str) -> Sequence[Any]:
+    found: Sequence[Any] = batch[key] if batch else ()
+    return found
+
+
+def _summary(report: Mapping[str, Any], width: int) -> Text:
+    shots, batch = report["shots"], report["batch"]
+    objects = {row["object"] for shot in shots for row in shot["rows"]} | {o["object"] for o in _of(batch, "objects")}
+    told = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
+    if report.get("now", {}).get("tick") is not None:
+        told = f"tick {report['now']['tick']:g}: {told}"
+    return Text(width - EDGE, 28, told, FAINT, right=True)
+
+
+def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
+    """Footer with scene, version and plan; the cards have weapons and seeds."""
+    scene = report["scene"]
+    plans = [shot["plan"] for shot in report["shots"]] + list(_of(report["batch"], "plan"))
+    ran = dict.fromkeys(stage["stage"] for plan in plans for stage in plan["ran"])
+    left = [s["stage"] for s in plans[0]["left_out"]] if plans else []
+    left = [name for name in left if all(name in [s["stage"] for s in plan["left_out"]] for plan in plans)]
+    told = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
+    plan = "; ".join(f"{word}: {', '.join(stages)}" for word, stages in (("ran", ran), ("left out", left)) if stages)
+    return [Text(EDGE, height - 30, told, FAINT), Text(EDGE, height - 12, clipped(plan, width - 2 * EDGE), FAINT)]
+
+
+def _counted(n: int, what: str) -> str:
+    return f"{n} {what}" + ("" if n == 1 else "s")

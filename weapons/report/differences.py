@@ -1,0 +1,460 @@
+"""Differences between two reports, as lines in the game's words.
+
+Each part that differs gets a line in words or, if there are no words for it, a line with its path; so no difference
+that matters is left out.
+"""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from hitplanes.planes.common.checks import printable
+
+from .phrases import (
+    ABSENT,
+    LINES_MAX,
+    Entry,
+    by_path,
+    entries,
+    first_of,
+    key_of,
+    pairs,
+    reason,
+    same,
+    shown,
+    text_of_json,
+    unquoted,
+)
+
+
+def ray_changes(was: Entry, now: Entry) -> list[str] | None:
+    """Lines about the changed rays of a shot, from any JSON; None if there are no words for the change."""
+    known = [*entries(was["rays"]), *entries(now["rays"])]
+    lines = []
+    for before, after in pairs(was["rays"], now["rays"], "round", "pellet"):
+        name = _ray_name(after or before or {}, known)
+        if before is None or after is None:
+            lines.append(f"{name} is {'new' if before is None else 'missing'}")
+        else:
+            lines += [f"{name}: {line}" for line in _changes(before, after)]
+    return first_of(lines) or None
+
+
+def _ray_name(ray: Entry, known: list[Entry]) -> str:
+    """Name of a ray, with its pellet and round if the shot has several."""
+    pellet, rounds = (any(not same(other.get(key), 0) for other in known) for key in ("pellet", "round"))
+    told = f"ray {shown(ray.get('pellet'))}" if pellet else "ray"
+    return f"{told} of round {shown(ray.get('round'))}" if rounds else told
+
+
+def _changes(was: Entry, now: Entry) -> list[str]:
+    lines = []
+    for key in dict.fromkeys(["stop", "passes", *was, *now]):
+        before, after = was.get(key, ABSENT), now.get(key, ABSENT)
+        if not same(before, after):
+            words = {"stop": _stop, "passes": _passes}.get(key)
+            lines += (words(before, after) if words else None) or first_of(by_path(key, before, after))
+    return lines
+
+
+def _stop(was: Any, now: Any) -> list[str] | None:
+    """Line about where and why a ray stopped; None if it would read the same."""
+    if not (isinstance(was, dict) and isinstance(now, dict)):
+        return None
+    (place, far, why), (old_place, old_far, old_why) = (
+        (_ray_at(stop.get("item")), _px(stop.get("distance")), unquoted(stop.get("reason"))) for stop in (now, was)
+    )
+    if (place, far, why) == (old_place, old_far, old_why):
+        return None
+    before = [old_place] if old_place and place != old_place else []
+    before += [] if far == old_far and before else [old_far]
+    reason = f" ({old_why})" if why != old_why else ""
+    return [f"stopped {place + ', ' if place else 'after '}{far} ({why}), was {', '.join(before)}{reason}"]
+
+
+def _passes(was: Any, now: Any) -> list[str] | None:
+    lines = []
+    for before, after in pairs(was, now, "object"):
+        told = after or before or {}
+        name = f"object {shown(told.get('object'))} {shown(told.get('name'))}"
+        if before is None or after is None:
+            lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(told)}")
+        elif _way(before) != _way(after):
+            lines.append(f"goes through {name}{_way(after)}, was{_way(before)}")
+        else:
+            lines += [f"in {name}: {line}" for line in first_of(by_path("", before, after))]
+    return first_of(lines) or None
+
+
+def _way(told: Entry) -> str:
+    return f" from {_px(told.get('entry_px'))} to {_px(told.get('exit_px'))}"
+
+
+def _ray_at(item: Any) -> str:
+    return "" if item is None else f"at {unquoted(item.get('name')) if isinstance(item, dict) else shown(item)}"
+
+
+def _px(value: Any) -> str:
+    """Distance to a tenth of a px, or any other value in its place."""
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:.1f} px" if plain else shown(value)
+
+
+PIXELS_NAMED = 2
+"""Most gained or lost pixels that a line names."""
+
+ABOUT = {
+    "report": ("version", "times", "filter"),
+    "scene": ("version", "hash"),
+    "shot": ("plan", "tested"),
+    "batch": ("plan", "times"),
+}
+"""Keys that say how a report was made; equality leaves them out."""
+
+SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (
+    ("at_xy", "samples", "nearest_miss"),
+    ("distance2", "shares", "margin"),
+    ("shots_that_hit", "objects", "heat"),
+)
+"""Keys of a shot, of a row and of a batch that follow from the rest; reported only if nothing else has changed."""
+
+BATCH_COLUMNS = ("shot", "round", "object", "samples", "pixels", "weight", "pellets", "x", "y", "distance2")
+
+
+def differences(expected: Entry, got: Entry) -> list[str]:
+    """Differences between two reports.
+
+    Parameters
+    ----------
+    expected, got : reports, as `report_of` makes them or as their JSON reads
+
+    Returns
+    -------
+    lines, empty if and only if all that decides is equal: plans, versions, the scene's hash and times do not count
+    """
+    was, now = decisive(expected), decisive(got)
+    return [] if same(was, now) else list(map(printable, _differences(was, now)))
+
+
+def _differences(was: Entry, now: Entry) -> list[str]:
+    words: dict[str, Words] = {"scene": _scene, "weapons": _weapons, "batch": _batch, "shots": _shots}
+    if _told_as(was) != _told_as(now):
+        return [f"{_told_as(now)}, was {_told_as(was)}"]
+    return _told(was, now, words) or list(by_path("", was, now))
+
+
+def decisive(report: Entry) -> dict[str, Any]:
+    """Copy of a report without the keys that equality leaves out."""
+    kept = _without(report, "report")
+    for key in ("scene", "batch"):
+        if isinstance(kept.get(key), dict):
+            kept[key] = _without(kept[key], key)
+    if isinstance(kept.get("shots"), list | tuple):
+        kept["shots"] = [_without(shot, "shot") if isinstance(shot, dict) else shot for shot in kept["shots"]]
+    return kept
+
+
+Words = Callable[[Entry, Entry], list[str] | None]
+"""Function (was, now) that returns lines about one part of both; None if there are no words for the change."""
+
+
+def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
+    """Lines about each part that differs: first those in words, then the others by their paths."""
+    lines = []
+    for key in dict.fromkeys([*words, *was, *now]):
+        before, after = was.get(key, ABSENT), now.get(key, ABSENT)
+        if same(before, after):
+            continue
+        told = words[key](was, now) if key in words and ABSENT not in (before, after) else None
+        lines += first_of(by_path(key, before, after)) if told is None else told
+    return lines
+
+
+def _scene(was: Entry, now: Entry) -> list[str] | None:
+    before, after = was["scene"], now["scene"]
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return None
+    return [f"scene: {line}" for line in _fields(before, after, dict.fromkeys([*before, *after]))]
+
+
+def _weapons(was: Entry, now: Entry) -> list[str] | None:
+    lines = []
+    before, after = was["weapons"], now["weapons"]
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return None
+    for name in dict.fromkeys([*before, *after]):
+        if name not in before or name not in after:
+            lines.append(f"weapon {shown(name)} is {'new' if name in after else 'gone'}")
+        else:
+            lines += [f"weapon {shown(name)}: {line}" for line in by_path("", before[name], after[name])]
+    return first_of(lines)
+
+
+def _shots(was: Entry, now: Entry) -> list[str] | None:
+    groups = []
+    numbers = {id(shot): number for side in (was, now) for number, shot in enumerate(entries(side["shots"]))}
+    for before, after in _paired_shots(entries(was["shots"]), entries(now["shots"])):
+        title = _title(after or before or {}, numbers)
+        if before is None or after is None:
+            groups.append([f"{title} is {'missing' if after is None else 'new'}"])
+        elif not same(before, after):
+            groups.append([f"{title}: {line}" for line in _shot(before, after)])
+    lines = [line for group in groups[:LINES_MAX] for line in group]
+    return lines + [f"and {len(groups) - LINES_MAX} more shots"] * (len(groups) > LINES_MAX) or None
+
+
+def _shot(was: Entry, now: Entry) -> list[str]:
+    words: dict[str, Words] = {
+        "at": _at, "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts,
+        "rays": ray_changes, "samples": _samples,
+    }  # fmt: skip
+    return _told(_chief(was), _chief(now), words) or _told(was, now, words)
+
+
+def _chief(shot: Entry) -> dict[str, Any]:
+    """Copy of a shot without the keys that follow from the rest."""
+    chief = {key: value for key, value in shot.items() if key not in SHOT_DERIVED}
+    for told in ("rows", "why_not"):
+        if isinstance(shot.get(told), list | tuple):
+            chief[told] = [
+                {k: v for k, v in row.items() if k not in ROW_DERIVED} if isinstance(row, dict) else row
+                for row in shot[told]
+            ]
+    return chief
+
+
+def _at(was: Entry, now: Entry) -> list[str]:
+    return [f"fired at {_place(now['at'])}, was {_place(was['at'])}"]
+
+
+def _verdicts(was: Entry, now: Entry) -> list[str] | None:
+    before, after = was["verdicts"], now["verdicts"]
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return None
+    told = []
+    for key in dict.fromkeys([*after, *before]):
+        had, has = before.get(key, ABSENT), after.get(key, ABSENT)
+        told += [] if same(had, has) else [f"{shown(has)} {key}, was {shown(had)}"]
+    return ["verdicts: " + "; ".join(told)]
+
+
+def _rows(was: Entry, now: Entry) -> list[str] | None:
+    rounds = any(row.get("round") != 0 for row in [*entries(was["rows"]), *entries(now["rows"])])
+    reasons = [{key_of(e, "object"): e for e in entries(shot.get("why_not"))} for shot in (was, now)]
+    lines = []
+    for before, after in pairs(was["rows"], now["rows"], "object", "round"):
+        row = after or before or {}
+        name = _name(row) + (f", round {shown(row.get('round'))}" if rounds else "")
+        why = reasons[after is None].get(key_of(row, "object"))
+        lines += _row(name, before, after, "" if why is None else reason(why))
+    return first_of(lines) or None
+
+
+def _row(name: str, was: Entry | None, now: Entry | None, why: str) -> list[str]:
+    """Line about a row that is new, missing or changed; `why` is the reason why its object is not, or was not, hit."""
+    if now is None:
+        return [f"{name} is no longer hit" + (f": {why}" if why else "")]
+    if was is None:
+        hit = f"{_count(now.get('pixels'))}, first at ({_place(now.get('first_xy'))})"
+        return [f"{name} is newly hit: {hit}" + (f"; was {why}" if why else "")]
+    if same(was, now):
+        return []
+    pixels = [row.get("pixels", ABSENT) for row in (was, now)]
+    parts = [] if same(*pixels) else [f"{_count(pixels[1])}, was {shown(pixels[0])}"]
+    parts += _gained_and_lost(was.get("runs"), now.get("runs"))
+    single = parts and all(same(row.get("samples"), row.get("pixels")) for row in (was, now))
+    follow = {"pixels", "runs", *(["samples"] if single else []), *(["weight", "distance2"] if parts else [])}
+    parts += _fields(was, now, [key for key in dict.fromkeys([*was, *now]) if key not in follow])
+    return [f"{name}: " + "; ".join(parts or by_path("", was, now))]
+
+
+def _blockers(was: Entry, now: Entry) -> list[str] | None:
+    lines = []
+    for before, after in pairs(was["blockers"], now["blockers"], "object"):
+        name = _name(after or before or {})
+        if after is None:
+            lines.append(f"{name} no longer blocks")
+        elif before is None:
+            lines.append(f"{name} newly blocks {_count(after.get('samples'), 'sample')}")
+        elif not same(before, after):
+            lines.append(f"{name} " + "; ".join(_blocker(before, after)))
+    return first_of(lines) or None
+
+
+def _blocker(was: Entry, now: Entry) -> list[str]:
+    parts = []
+    if not same(was.get("samples"), now.get("samples")):
+        parts = [f"ends {_count(now.get('samples'), 'sample')}, was {shown(was.get('samples'))}"]
+    for before, after in pairs(was.get("blocked"), now.get("blocked"), "object"):
+        counts = [0 if side is None else side.get("samples") for side in (before, after)]
+        if not same(*counts):
+            name = _name(after or before or {})
+            parts.append(f"in front of {name}: {_count(counts[1], 'sample')}, was {shown(counts[0])}")
+    return parts or [f"as a blocker: {line}" for line in first_of(by_path("", was, now))]
+
+
+def _why_not(was: Entry, now: Entry) -> list[str] | None:
+    """Lines about the objects near that were not hit, without those whose row is new or missing."""
+    hits = [{key_of(row, "object") for row in entries(shot.get("rows"))} for shot in (was, now)]
+    told = hits[0] ^ hits[1]
+    lines = []
+    for before, after in pairs(was["why_not"], now["why_not"], "object"):
+        entry = after or before or {}
+        if key_of(entry, "object") in told:
+            continue
+        if before is None or after is None:
+            lines.append(f"{_name(entry)} is {'newly' if before is None else 'no longer'} near: {reason(entry)}")
+        elif not same(before, after):
+            lines.append(f"{_name(after)}: " + "; ".join(_why_changed(before, after)))
+    return first_of(lines) if lines or told else None
+
+
+def _why_changed(was: Entry, now: Entry) -> list[str]:
+    before, after = reason(was), reason(now)
+    if before != after:
+        prefix = "missed by "
+        return [f"{after}, was {before.removeprefix(prefix) if after.startswith(prefix) else before}"]
+    return [f"{after}: {line}" for line in first_of(by_path("", was, now))]
+
+
+def _samples(was: Entry, now: Entry) -> list[str] | None:
+    before, after = was["samples"], now["samples"]
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return None
+    lines = []
+    for verdict in dict.fromkeys([*after, *before]):
+        told = _gained_and_lost(before.get(verdict, []), after.get(verdict, []))
+        lines += [f"{verdict} samples: " + "; ".join(told)] if told else []
+    return lines or None
+
+
+def _batch(was: Entry, now: Entry) -> list[str] | None:
+    """Lines about a batch; totals and heat only if nothing else has changed."""
+    before, after = was["batch"], now["batch"]
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return None
+    words: dict[str, Words] = {"rows": lambda *_: _batch_rows(before, after), "verdicts": _verdicts}
+    rest = [{key: v for key, v in batch.items() if key not in BATCH_DERIVED} for batch in (before, after)]
+    return [f"batch: {line}" for line in _told(rest[0], rest[1], words) or _told(before, after, {})]
+
+
+def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
+    rows = [batch["rows"] for batch in (was, now)]
+    if not all(isinstance(row, list | tuple) and len(row) == len(BATCH_COLUMNS) for side in rows for row in side):
+        return None
+    known = [{text_of_json(row) for row in side} for side in rows]
+    before, after = (
+        [_as_row(row, names) for row in batch["rows"] if text_of_json(row) not in known[1 - side]]
+        for side, (batch, names) in enumerate((batch, _names_of(batch)) for batch in (was, now))
+    )
+    lines = []
+    for old, new in pairs(before, after, "shot", "object", "round"):
+        row = new or old or {}
+        name = f"shot {shown(row['shot'])}: {_name(row)}"
+        lines += _row(name + (f", round {shown(row['round'])}" if row["round"] else ""), old, new, "")
+    return first_of(lines) or None
+
+
+def _names_of(batch: Entry) -> dict[str, Any]:
+    return {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
+
+
+def _as_row(row: Any, names: Mapping[str, Any]) -> dict[str, Any]:
+    """Row of a batch in the form of a row of a shot."""
+    told = dict(zip(BATCH_COLUMNS, row, strict=True))
+    first_xy = [told.pop("x"), told.pop("y")]
+    return {**told, "first_xy": first_xy, "name": names.get(text_of_json(told["object"]))}
+
+
+def _paired_shots(was: list[Entry], now: list[Entry]) -> Iterator[tuple[Entry | None, Entry | None]]:
+    """Pairs of shots by their places in the lists or, if a shot was added or removed, by how they were fired."""
+    if len(was) == len(now):
+        yield from zip(was, now, strict=True)
+        return
+    keys = [[key_of(shot, "weapon", "at", "aim") for shot in shots] for shots in (was, now)]
+    for _, first, last, begin, end in difflib.SequenceMatcher(a=keys[0], b=keys[1], autojunk=False).get_opcodes():
+        yield from itertools.zip_longest(was[first:last], now[begin:end])
+
+
+def _gained_and_lost(was: Any, now: Any) -> list[str]:
+    """Phrases about the pixels that are in only one of two lists of runs [y, x_first, x_last]."""
+    if not (_are_runs(was) and _are_runs(now)):
+        return []
+    told = []
+    for word, some, others in (("gained", now, was), ("lost", was, now)):
+        runs = _left(some, others)
+        count = sum(last - first + 1 for _, first, last in runs)
+        pixels = itertools.islice(((x, y) for y, first, last in runs for x in range(first, last + 1)), PIXELS_NAMED)
+        names = ", ".join(f"({x}, {y})" for x, y in pixels)
+        more = f" and {count - PIXELS_NAMED} more" if count > PIXELS_NAMED else ""
+        told += [f"{word} at {names}{more}"] if count else []
+    return told
+
+
+def _left(runs: Any, taken: Any) -> list[tuple[int, int, int]]:
+    """Runs without the pixels of others."""
+    rows: dict[int, list[Any]] = {}
+    for run in sorted(taken):
+        rows.setdefault(run[0], []).append(run)
+    left = []
+    for y, first, last in runs:
+        free = first
+        for _, begin, end in rows.get(y, ()):
+            if begin <= last and end >= free:
+                left.append((y, free, begin - 1))
+                free = end + 1
+        left.append((y, free, last))
+    return [run for run in left if run[1] <= run[2]]
+
+
+def _are_runs(value: Any) -> bool:
+    return isinstance(value, list | tuple) and all(
+        isinstance(run, list | tuple) and len(run) == 3 and all(type(v) is int for v in run) for run in value
+    )
+
+
+def _fields(was: Entry, now: Entry, keys: Iterable[str]) -> list[str]:
+    """Phrases about the given fields that differ."""
+    told = []
+    for key in keys:
+        before, after = was.get(key, ABSENT), now.get(key, ABSENT)
+        if not same(before, after) and key == "first_xy":
+            told.append(f"first at ({_place(after)}), was ({_place(before)})")
+        elif isinstance(before, dict) and isinstance(after, dict):
+            told += by_path(key, before, after)
+        elif not same(before, after):
+            told.append(f"{key} {shown(after)}, was {shown(before)}")
+    return told
+
+
+def _without(part: Entry, kind: str) -> dict[str, Any]:
+    return {key: value for key, value in part.items() if key not in ABOUT[kind]}
+
+
+def _told_as(report: Entry) -> str:
+    """Whether a report lists its shots one by one or as a batch, in words."""
+    batch = report.get("batch")
+    if isinstance(batch, dict):
+        return "shots told as a batch"
+    return "shots told one by one"
+
+
+def _title(shot: Entry, numbers: Mapping[int, int]) -> str:
+    """Title of a shot, with its number in the picture."""
+    return f"shot {numbers.get(id(shot), 0)} ({unquoted(shot.get('weapon'))} at {_place(shot.get('at'))})"
+
+
+def _name(entry: Entry) -> str:
+    return f"object {shown(entry.get('object'))} {shown(entry.get('name'))}"
+
+
+def _count(n: Any, what: str = "px") -> str:
+    return f"{shown(n)} {what}" + ("" if what == "px" or n == 1 else "s")
+
+
+def _place(at: Any) -> str:
+    """Position or pixel as text, without brackets."""
+    return ", ".join(map(shown, at)) if isinstance(at, list | tuple) else shown(at)

@@ -1,0 +1,341 @@
+"""Overlay of a picture: numbered shots, names of hit objects, links from occluders to objects, and rays.
+
+A label is placed where it covers no sample, no object that it could seem to name, and no other label.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from typing import Any
+
+import numpy as np
+
+from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
+from hitplanes.planes.files.png import cv2
+from hitplanes.planes.grid.spans import Box, Spans
+from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.scene import Scene
+
+from .canvas import INK, OUTLINES_MAX, Text, World, enlarged, fill_runs
+from .phrases import NAME_MAX, apart, short
+from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
+
+LETTER, ROW = 7, 17
+"""Width of a letter and height of a label, px; not taken from the font, whose sizes depend on OpenCV's version."""
+
+LABELS_MAX = 16
+"""Most names in one picture; the cards have all."""
+
+LINKS_MAX = 8
+"""Most occluders that are linked to the object they kept most samples from; the cards have all."""
+
+SHOT_BADGE = 11
+"""Radius of the disc of a shot's number, px."""
+
+NEAR, CLOSE, FAR = 40, 110, 400
+"""How far a name may lie from its object, how far a link lies if it can, and how far it and a number may lie, px."""
+
+DARK = (20, 22, 26)
+WHITE = (255, 255, 255)
+
+
+class Overlay:
+    """Marks and labels over an enlarged view; `texts` collects the text layer."""
+
+    def __init__(self, world: World) -> None:
+        self.world, self.image, self.view, self.factor = world, world.image, world.view, world.factor
+        self.taken: Bools = np.zeros(self.image.shape[:2], np.bool_)
+        self.targets: Bools = self.taken.copy()
+        self.texts: list[Text] = []
+
+    def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
+        """Reserve the samples, the objects that were hit, and the occluders that blocked, against labels."""
+        runs = [of for shot in shots for of in shot["samples"].values()]
+        hit = {row["object"] for shot in shots for row in shot["rows"]}
+        blocking = {by["object"] for shot in shots for by in shot["blockers"]}
+        self.taken |= self._plane(
+            [*runs, *(Spans.from_mask(*scene.mask(item)).runs() for item in sorted(hit | blocking))]
+        )
+        self.targets |= self._plane(
+            [Spans.from_mask(*scene.mask(item)).runs() for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]]
+        )
+
+    def _plane(self, runs: Sequence[Any]) -> Bools:
+        """Mask of the pixels of the picture that runs of the world cover."""
+        x, y, x_max, y_max = self.view
+        at = np.zeros((y_max - y + 1, x_max - x + 1), np.bool_)
+        for some in runs:
+            fill_runs(at, self.view, some)
+        return enlarged(at, self.factor)
+
+    def shot(self, shot: Mapping[str, Any], number: int) -> None:
+        """Draw a cross on the pixel of a shot and its number in a disc with a line to it; an arrow if out of view."""
+        height, width = self.image.shape[:2]
+        x, y = self._start(shot)
+        inside = 0 <= x < width and 0 <= y < height
+        if not inside:
+            edge = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
+            x, y = edge
+        bx, by = self._free(x, y, SHOT_BADGE + 1, SHOT_BADGE + 1)
+        if inside:
+            cv2.line(self.image, (x, y), (bx, by), WHITE, 1)
+            _cross(self.image, x, y, max(3, self.factor))
+        else:
+            cv2.arrowedLine(self.image, (bx, by), (x, y), WHITE, 1, tipLength=0.4)
+        cv2.circle(self.image, (bx, by), SHOT_BADGE - 1, DARK, -1)
+        cv2.circle(self.image, (bx, by), SHOT_BADGE - 1, WHITE, 1)
+        self._take(bx - SHOT_BADGE, by - SHOT_BADGE, bx + SHOT_BADGE + 1, by + SHOT_BADGE + 1)
+        label = str(number)
+        self.texts.append(Text(bx - 4 * len(label), by + 4, label, WHITE, bold=True))
+
+    def _start(self, shot: Mapping[str, Any]) -> tuple[int, int]:
+        """Start of a shot in the picture: the middle of its pixel, or the start of its rays."""
+        if "rays" in shot:
+            x, y = np.floor(self.world.placed(np.array(shot["at"]))).astype(np.int64).tolist()
+            return x, y
+        x, y = self._at(*shot["at_xy"])
+        return x + self.factor // 2, y + self.factor // 2
+
+    def names(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
+        """Name the objects that were hit, most pixels first."""
+        pixels: dict[int, int] = {}
+        for row in (row for shot in shots for row in shot["rows"]):
+            pixels[row["object"]] = pixels.get(row["object"], 0) + row["pixels"]
+        for item in sorted(pixels, key=lambda item: (-pixels[item], item))[:LABELS_MAX]:
+            mask, (x, y) = scene.mask(item)
+            box = (*self._at(x, y), *self._at(x + mask.shape[1], y + mask.shape[0]))
+            at = np.argwhere(mask)[:, ::-1] + (x, y)
+            seen = at[(at >= self.view[:2]).all(axis=1) & (at <= self.view[2:]).all(axis=1)]
+            if len(seen):
+                self._label(scene.name_of(item), box, INK, NEAR, seen)
+
+    def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
+        """Ring samples that an occluder kept from an object, and name both; objects that were not hit come first."""
+        color = MARKS["occluded"][0]
+        pairs = [(told, by) for shot in shots for by in shot["blockers"] for told in by["blocked"]]
+        linked: set[int] = set()
+        for told, by in sorted(pairs, key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
+            x, y = (v + self.factor // 2 for v in self._at(*told["at_xy"]))
+            inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
+            if not inside or by["object"] in linked or len(linked) >= LINKS_MAX:
+                continue
+            text = f"{short(by['name'])} blocks {short(told['name'])}"
+            if self._label(text, (x - 7, y - 7, x + 8, y + 8), color, FAR):
+                linked.add(by["object"])
+                for shade, thick in ((DARK, 3), (color, 1)):
+                    cv2.circle(self.image, (x, y), 6, shade, thick)
+
+    def distances(self, shots: Sequence[Mapping[str, Any]]) -> None:
+        """Write the distance by which rays missed the nearest object, beside its line."""
+        for miss in (shot["nearest_miss"] for shot in shots if shot.get("nearest_miss")):
+            ends = self.world.placed(np.array([miss["ray_xy"], miss["object_xy"]]))
+            x, y = np.rint(np.clip(ends.mean(axis=0), -FAR, max(self.image.shape) + FAR)).astype(np.int64).tolist()
+            inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
+            if inside and 0 < miss["distance"] <= NEAR_MISS:
+                self._label(apart(miss["distance"]), (x - 4, y - 4, x + 5, y + 5), MINT, NEAR)
+
+    def _label(
+        self, text: str, box: Box, color: tuple[int, int, int], farthest: int, pixels: Ints | None = None
+    ) -> bool:
+        """Write a text near a box of the picture, with a line to it if it is far; return whether there was room.
+
+        If there is no room beside the other objects, the text may cover one that no shot hit. The line ends at the
+        nearest of the pixels (n, 2) of the world, or at the box.
+        """
+        text = short(text, 2 * NAME_MAX)
+        half_w, half_h = (LETTER * len(text) + 8) // 2, ROW // 2 + 1
+        reaches = [(reach, free) for reach in (min(CLOSE, farthest), farthest) for free in (True, False)]
+        spots = ((spot, free) for reach, free in reaches for spot in _around(box, half_w, half_h, reach))
+        for (x, y), free in spots:
+            place = x - half_w, y - half_h, x + half_w, y + half_h
+            if self._is_free(*place) and not (free and self.targets[place[1] : place[3], place[0] : place[2]].any()):
+                break
+        else:
+            return False
+        near = min(max(x, box[0]), box[2] - 1), min(max(y, box[1]), box[3] - 1)
+        if pixels is not None:
+            away = (pixels - self.view[:2]) * self.factor + self.factor // 2 - (x, y)
+            near = tuple((away[(away**2).sum(axis=1).argmin()] + (x, y)).tolist())
+        if not free or abs(x - near[0]) > half_w + 8 or abs(y - near[1]) > half_h + 8:
+            cv2.line(self.image, (x, y), near, color, 1)
+        part = self.image[y - half_h : y + half_h, x - half_w : x + half_w]
+        part[:] = (part.astype(np.uint16) * 60 + np.array(DARK, np.uint16) * 195) // 255
+        self._take(x - half_w, y - half_h, x + half_w, y + half_h)
+        self.texts.append(Text(x, y + 5, text, color, middle=True))
+        return True
+
+    def _free(self, x: int, y: int, half_w: int, half_h: int) -> tuple[int, int]:
+        """Free place for a rectangle around a point, else the nearest free place, else a place that is not free."""
+        for bx, by in _around((x - 6, y - 6, x + 6, y + 6), half_w, half_h, FAR):
+            if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
+                return bx, by
+        height, width = self.image.shape[:2]
+        rows, columns = np.mgrid[half_h : height - half_h : SHOT_BADGE, half_w : width - half_w : SHOT_BADGE].reshape(
+            2, -1
+        )
+        for i in np.argsort((columns - x) ** 2 + (rows - y) ** 2, kind="stable").tolist():
+            bx, by = int(columns[i]), int(rows[i])
+            if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
+                return bx, by
+        return min(max(x, half_w), max(width - half_w, 0)), min(max(y - 22, half_h), max(height - half_h, 0))
+
+    def _is_free(self, x0: int, y0: int, x1: int, y1: int) -> bool:
+        height, width = self.taken.shape
+        return min(x0, y0) >= 0 and x1 <= width and y1 <= height and not self.taken[y0:y1, x0:x1].any()
+
+    def _take(self, x0: int, y0: int, x1: int, y1: int) -> None:
+        self.taken[max(y0, 0) : max(y1, 0), max(x0, 0) : max(x1, 0)] = True
+
+    def _at(self, x: int, y: int) -> tuple[int, int]:
+        """Top left corner, in the picture, of a pixel of the world."""
+        return (x - self.view[0]) * self.factor, (y - self.view[1]) * self.factor
+
+
+def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple[int, int]]:
+    """Middles of rectangles around a box: above, below, right, left, then the corners, ever farther."""
+    x0, y0, x1, y1 = box
+    x, y = (x0 + x1) // 2, (y0 + y1) // 2
+    for gap in range(3, farthest, 12):
+        left, right, up, down = x0 - gap - half_w, x1 + gap + half_w, y0 - gap - half_h, y1 + gap + half_h
+        yield from ((x, up), (x, down), (right, y), (left, y))
+        yield from ((right, up), (left, up), (right, down), (left, down))
+
+
+def _cross(world: Image, x: int, y: int, size: int) -> None:
+    """Draw a cross on the pixel of a shot."""
+    for color, thickness in ((DARK, 3), (WHITE, 1)):
+        cv2.line(world, (x - size, y), (x + size, y), color, thickness)
+        cv2.line(world, (x, y - size), (x, y + size), color, thickness)
+
+
+NUMBERED_MAX = 3
+"""Most rays of a shot whose entries have numbers and normals."""
+
+STEPS_SHOWN = 256
+"""Most tests of a projectile that are drawn, each as a disc."""
+
+OF_RAYS = ("filtered", "occluded", "hit")
+"""Verdicts whose cells are marked under rays; the arrow shows the cells that meet nothing."""
+
+BADGE_INK = (18, 20, 24)
+
+CLEAR_OF = ("number", "first contact", "goes in", "comes out", "ends: occluder", "ends: budget", "ray")
+"""Symbols that a number may not cover."""
+
+
+def marked(shots: Sequence[Mapping[str, Any]], verdict: str) -> list[Mapping[str, Any]]:
+    """Shots whose samples of one verdict are marked; for rays only those of OF_RAYS are."""
+    return [shot for shot in shots if "rays" not in shot or verdict in OF_RAYS]
+
+
+def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bools]:
+    """Draw the rays of all shots, and the areas that they sweep.
+
+    Returns
+    -------
+    numbers, and mask (h, w) of the pixels that are drawn on
+    """
+    shots = [shot for shot in report["shots"] if "rays" in shot]
+    signs = Signs(world.image.shape[:2], sum(len(shot["rays"]) for shot in shots))
+    for shot in shots:
+        _sweeps(signs, world, shot, _steps_of(report["weapons"][shot["weapon"]]))
+        _arrows(signs, world, shot)
+        _miss(signs, world, shot)
+    texts = [text for shot in shots for text in _numbers(signs, world, shot)]
+    world.painted |= {f"ray: {name}" for name in signs.lay(world.image)}
+    taken = np.zeros(world.image.shape[:2], np.bool_)
+    for strokes in signs.strokes.values():
+        taken |= strokes.ground > 0
+    return texts, taken
+
+
+def draw_arrows(world: World, shot: Mapping[str, Any]) -> None:
+    """Draw the rays of one shot alone, with what they go through."""
+    signs = Signs(world.image.shape[:2], len(shot["rays"]))
+    _arrows(signs, world, shot)
+    signs.lay(world.image)
+
+
+def _steps_of(weapon: Mapping[str, Any]) -> int | None:
+    """Number of moments at which a projectile is tested; 0 if it is swept, None if the weapon is not a projectile."""
+    while weapon["kind"] != "projectile":
+        inner = [value for value in weapon.values() if isinstance(value, Mapping)]
+        if not inner:
+            return None
+        weapon = inner[0]
+    return weapon.get("steps") or 0
+
+
+def _sweeps(signs: Signs, world: World, shot: Mapping[str, Any], steps: int | None) -> None:
+    """Draw the areas that rays sweep, or the discs at which they are tested, and the first contact of a projectile."""
+    radius = shot["radius"] * world.factor
+    for ray in shot["rays"]:
+        stop = ray["stop"]
+        begin, at, end = world.placed(np.array([ray["start"], stop["point"], ray["end"]]))
+        if steps:
+            for k in range(1, min(steps, STEPS_SHOWN) + 1):
+                if k <= stop["fraction"] * steps:
+                    signs.tested(begin + (end - begin) * (k / steps), radius)
+        elif radius:
+            signs.sweep(begin, at, radius)
+        if steps is not None and stop["item"] is not None:
+            signs.contact(at, radius, world.placed(np.array([stop["cell_xy"]]))[0], float(world.factor))
+
+
+def _arrows(signs: Signs, world: World, shot: Mapping[str, Any]) -> None:
+    """Draw the rays of a shot and their passes through objects, with normals if there are few rays."""
+    for ray in shot["rays"]:
+        begin, at, end = world.placed(np.array([ray["start"], ray["stop"]["point"], ray["end"]]))
+        signs.ray(begin, at, end, ray["stop"]["reason"])
+        for told in ray["passes"]:
+            into = world.placed(np.array([told["point"]]))[0]
+            if told["entry"] < ray["stop"]["fraction"]:  # else the head of the arrow is there
+                signs.through(into, begin + (end - begin) * told["exit"], told["exit"] < ray["stop"]["fraction"])
+            normal = np.array(told["normal"], np.float64)
+            if normal.any() and len(shot["rays"]) <= NUMBERED_MAX:
+                signs.normal(into, normal)
+
+
+def _numbers(signs: Signs, world: World, shot: Mapping[str, Any]) -> Iterator[Text]:
+    """Draw a number beside each entry, if there are few rays."""
+    if len(shot["rays"]) > NUMBERED_MAX:
+        return
+    radius = shot["radius"] * world.factor
+    for ray in shot["rays"]:
+        begin, end = world.placed(np.array([ray["start"], ray["end"]]))
+        for told in ray["passes"]:
+            into = world.placed(np.array([told["point"]]))[0]
+            spot = next(_spots(signs, into, end - begin, np.array(told["normal"]), radius), None)
+            if spot is not None:
+                signs.badge(spot)
+                label = str(told["order"] + 1)
+                x, y = np.rint(spot).astype(np.int64).tolist()
+                yield Text(x - 4 * len(label), y + 4, label, BADGE_INK, bold=True)
+
+
+def _spots(signs: Signs, at: Floats, ahead: Floats, normal: Floats, radius: float) -> Iterator[Floats]:
+    """Free places for a number beside a point of a ray of a radius, first on the side that the normal is not on."""
+    length = float(np.sqrt((ahead**2).sum()))
+    if not length:
+        return
+    side = np.array([-ahead[1], ahead[0]]) / length
+    if (side * normal).sum() > 0 or ((side * normal).sum() == 0 and side[1] > 0):
+        side = -side
+    height, width = signs.shape
+    for far in (radius + BADGE + 6, radius + 2 * BADGE + 8):
+        for spot in (at + far * side, at - far * side):
+            x, y = (int(v) for v in np.floor(np.clip(spot, -BADGE, (width, height))))
+            reach = int(BADGE) + 2
+            inside = reach <= x < width - reach and reach <= y < height - reach
+            box = slice(max(y - reach, 0), y + reach + 1), slice(max(x - reach, 0), x + reach + 1)
+            if inside and not any(
+                strokes.ink[box].any() for name, strokes in signs.strokes.items() if name in CLEAR_OF
+            ):
+                yield spot
+
+
+def _miss(signs: Signs, world: World, shot: Mapping[str, Any]) -> None:
+    """Draw the nearest miss, if it is within NEAR_MISS."""
+    miss = shot["nearest_miss"]
+    if miss is not None and 0 < miss["distance"] <= NEAR_MISS:
+        signs.miss(*world.placed(np.array([miss["ray_xy"], miss["object_xy"]])))

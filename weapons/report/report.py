@@ -1,0 +1,564 @@
+"""Report JSON of hits: what was fired, the verdicts of all samples, what was hit, and why the rest was not."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
+from hitplanes.planes.common.checks import InputError, Ints, listed
+from hitplanes.planes.common.limits import ALL, CHUNK_SAMPLES, SUB, VIEW_MAX
+from hitplanes.planes.common.tables import Text
+from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.spans import Box, Spans, meets
+from hitplanes.planes.scene.history import PastScene
+from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.scene import Scene
+
+from ..explain.ray_samples import Miss
+from ..explain.samples import detail_of
+from ..fire.call import fired as fire_checked
+from ..fire.hits import HitRow, Hits
+from ..kinds.areas import parts_of, ray_parts_of
+from ..kinds.placements import Placements, placements_for
+from ..rays.contacts import Reason, rays_of
+from ..rays.ray_hits import Passes, RayHits, Stops
+
+if TYPE_CHECKING:
+    from .prefilter_trace import PrefilterTrace
+
+
+CELLS_MAX = 2**18
+"""Most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels."""
+
+
+def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
+    """Count the samples of all shots in a view.
+
+    Returns
+    -------
+    JSON with the keys
+
+    - "cell": side of a cell, px
+    - "origin_xy": pixel of cell (0, 0)
+    - "beyond": number of samples out of view
+    - "counts": for each verdict that occurs, runs [row, column_first, column_last, samples] of cells
+    """
+    x, y, x_max, y_max = view_xyxy
+    cell = 1
+    while -(-(x_max - x + 1) // cell) * -(-(y_max - y + 1) // cell) > CELLS_MAX:
+        cell *= 2
+    width, height = (x_max - x) // cell + 1, (y_max - y) // cell + 1
+    counts, beyond = np.zeros((len(OF_PATTERNS), height * width), np.int64), 0
+    for xy, verdict in _parts(fired):
+        seen = (xy >= (x, y)).all(axis=1) & (xy <= (x_max, y_max)).all(axis=1)
+        column, row = ((xy[seen] - (x, y)) // cell).T
+        for kind in np.unique(verdict[seen]).tolist():
+            own = verdict[seen] == kind
+            cells, samples = np.unique(row[own] * width + column[own], return_counts=True)
+            counts[kind, cells] += samples
+        beyond += int((~seen).sum())
+    runs = {v.name.lower(): _runs(counts[v].reshape(height, width)) for v in OF_PATTERNS if counts[v].any()}
+    return {"cell": cell, "origin_xy": [x, y], "beyond": beyond, "counts": runs}
+
+
+def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
+    """Pixels (n, 2) and verdicts of all samples, in chunks of shots."""
+    for hits in fired:
+        if isinstance(hits, RayHits):
+            for shot in range(len(hits.shots)):
+                cells = hits.samples_at(shot)
+                walked = cells.verdict != Verdict.BEYOND
+                yield cells.xy[walked], cells.verdict[walked]
+            continue
+        step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
+        for first in range(0, len(hits.shots), step):
+            detail = detail_of(hits.scene, hits.weapon, hits.shots.take(first, first + step))
+            yield np.stack([detail.x, detail.runs.y[detail.run]], axis=1), detail.verdict
+
+
+def _runs(counts: Ints) -> list[list[int]]:
+    """Runs of equal counts, without those of 0, in the rows of a plane."""
+    height, width = counts.shape
+    flat = counts.reshape(-1)
+    changed = np.flatnonzero(np.diff(flat, prepend=-1) != 0)
+    first = np.union1d(changed, np.arange(height) * width)
+    last = np.append(first[1:], len(flat)) - 1
+    some = flat[first] > 0
+    first, last = first[some], last[some]
+    runs: list[list[int]] = np.stack([first // width, first % width, last % width, flat[first]], axis=1).tolist()
+    return runs
+
+
+def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
+    """Rays of one shot as JSON, with its nearest miss."""
+    parts = ray_parts_of(hits.weapon)
+    assert parts is not None  # its hits are those of rays
+    rays = rays_of(parts, hits.shots.take(row, row + 1))
+    stops, passes = hits.stops_at(row), hits.passes_at(row)
+    of = np.searchsorted(_ray_numbers(passes, parts[1].count if parts[1] else 1), np.arange(len(rays) + 1)).tolist()
+    ends = (rays.start_256 + rays.step_256) / SUB
+    told = [
+        {
+            "round": int(rays.round[i]),
+            "pellet": int(rays.pellet[i]),
+            "start": (rays.start_256[i] / SUB).tolist(),
+            "end": ends[i].tolist(),
+            "stop": _stop(scene, stops, i),
+            "passes": [_pass(scene, passes, k) for k in range(of[i], of[i + 1])],
+        }
+        for i in range(len(rays))
+    ]
+    miss = hits.nearest_miss(row)
+    near = None if miss is None else {**item_told(scene, miss.object), **_near(miss)}
+    return {"radius": parts[2].radius_256 / SUB, "rays": told, "nearest_miss": near}
+
+
+def ray_boxes(hits: RayHits) -> Box | None:
+    """Box around all rays, from their starts to their stops."""
+    if not len(hits.stop):
+        return None
+    begin, end = pixel(hits.shots.at_256), hits.stop.cell_xy
+    x, y = np.minimum(begin.min(axis=0), end.min(axis=0)).tolist()
+    x_max, y_max = np.maximum(begin.max(axis=0), end.max(axis=0)).tolist()
+    return x, y, x_max, y_max
+
+
+def _ray_numbers(passes: Passes, pellets: int) -> Any:
+    return passes.round * pellets + passes.pellet
+
+
+def item_told(scene: Scene, item: int) -> dict[str, Any]:
+    """Id and name of an item, as JSON."""
+    return {"object": item, "name": scene.name_of(item)}
+
+
+def _stop(scene: Scene, stops: Stops, i: int) -> dict[str, Any]:
+    item = int(stops.item[i])
+    return {
+        "reason": Reason(int(stops.reason[i])).name.lower(),
+        "item": None if item < 0 else item_told(scene, item),
+        "cell_xy": stops.cell_xy[i].tolist(),
+        "point": stops.point_xy[i].tolist(),
+        "distance": float(stops.distance[i]),
+        "fraction": float(stops.fraction[i]),
+        "normal": stops.normal_xy[i].tolist(),
+    }
+
+
+def _pass(scene: Scene, passes: Passes, k: int) -> dict[str, Any]:
+    return {
+        **item_told(scene, int(passes.object[k])),
+        "order": int(passes.order[k]),
+        "entry_xy": passes.entry_xy[k].tolist(),
+        "exit_xy": passes.exit_xy[k].tolist(),
+        "entry_px": float(passes.entry_px[k]),
+        "exit_px": float(passes.exit_px[k]),
+        "entry": float(passes.entry[k]),
+        "exit": float(passes.exit[k]),
+        "point": passes.point_xy[k].tolist(),
+        "material": float(passes.material[k]),
+        "normal": passes.normal_xy[k].tolist(),
+        "weight": int(passes.weight[k]),
+    }
+
+
+def _near(miss: Miss) -> dict[str, Any]:
+    return {"distance": miss.distance, "ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy)}
+
+
+MOVED_MAX = 200
+"""Most moved objects in a report; a picture with more is too full to read."""
+
+
+def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
+    """Differences between a scene of the past and the present, as JSON.
+
+    Parameters
+    ----------
+    then, now : the scene that was fired at, and the present scene
+    fired : hits in the past scene
+    view_xyxy : only items that were or are in this box are listed
+
+    Returns
+    -------
+    JSON with the keys
+
+    - "tick" of the past scene, and "hash" of the present one
+    - "moved": items with their present pixels as runs, and the middles of their boxes
+    - "gone", "new": items
+    - "shots": what each shot hits now; null if it would start in an item and its weapon forbids that
+    """
+    if not isinstance(now, Scene):
+        raise InputError(f"now: expected a Scene, got {type(now).__name__}")
+    before, after = then.items.stack(), now.items.stack()
+    was = {item: rank for rank, item in enumerate(before.ids.tolist())}
+    is_now = {item: rank for rank, item in enumerate(after.ids.tolist())}
+    moved: list[dict[str, Any]] = []
+    for item in sorted(was.keys() & is_now.keys()):
+        old, new = before.box_xyxy[was[item]], after.box_xyxy[is_now[item]]
+        if len(moved) == MOVED_MAX:
+            break
+        mask, corner = now.mask(item)
+        same = np.array_equal(old, new) and np.array_equal(before.mask(was[item]), mask)
+        if same or not meets(np.array(view_xyxy), np.stack([old, new])).any():
+            continue
+        moved.append(
+            {
+                **item_told(now, item),
+                "runs": Spans.from_mask(mask, corner).runs().tolist(),
+                "from_xy": ((old[:2] + old[2:]) / 2).tolist(),
+                "to_xy": ((new[:2] + new[2:]) / 2).tolist(),
+            }
+        )
+    return {
+        "tick": then.tick if isinstance(then, PastScene) else None,
+        "hash": now.content_hash(),
+        "moved": moved,
+        "gone": [item_told(then, item) for item in sorted(was.keys() - is_now.keys())],
+        "new": [item_told(now, item) for item in sorted(is_now.keys() - was.keys())],
+        "shots": [_again(now, hits, shot) for hits in fired for shot in range(len(hits.shots))],
+    }
+
+
+def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
+    """Objects that a shot hits now; None if it would start in an item and its weapon forbids that."""
+    try:
+        found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1), "auto", "auto", "auto")
+    except InputError:
+        return None
+    return [{**item_told(now, row.object), "pixels": row.pixels} for row in found]
+
+
+FORMAT = "hitplanes-report/1"
+
+SHOTS_MAX = 24
+"""Most shots that are listed one by one; more are summed up as a batch."""
+
+PLACEMENTS_AT_A_TIME = 2**16
+
+NEAR_OUTSIDE = 48
+"""Width of the strip beyond the bounds in which samples are shown, px."""
+
+
+def report_of(
+    scene: Scene,
+    fired: Sequence[Hits],
+    names: Sequence[str] | None = None,
+    *,
+    now: Scene | None = None,
+    prefilter: str | None = None,
+    broadphase: str | None = None,
+) -> dict[str, Any]:
+    """Report of shots as JSON, with all that its picture needs.
+
+    Up to 24 shots are listed one by one, with their samples as runs [y, x_first, x_last] by verdict, each pixel once
+    under its strongest verdict. More shots are summed up as a batch.
+
+    Parameters
+    ----------
+    scene : the scene that was fired at
+    fired : answers of `fire` on it, each of one shot or of many
+    names : names of the weapons; by default their kinds
+    now : the present scene, to show what has moved since the shots, and what they would hit now
+    prefilter, broadphase : the pre-filter ("circle", "4 boxes", ...) whose volumes, and the broad phase ("grid",
+        "quadtree", "bvh") whose cells the picture shows, with the number of objects tested
+
+    Raises
+    ------
+    InputError
+        If hits are of another scene, or of another version of it, or if two different weapons have one name.
+    """
+    fired = _checked(scene, fired)
+    called = _weapon_names(fired, names)
+    shots = sum(len(hits.shots) for hits in fired)
+    each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
+    told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
+    view = view_of(scene, fired)
+    sieve = None
+    if prefilter is not None or broadphase is not None:
+        from .prefilter_trace import prefilter_trace  # few reports need it
+
+        sieve = prefilter_trace(scene, view, prefilter, broadphase)
+    return {
+        "format": FORMAT,
+        "version": version("hitplanes"),
+        "scene": {
+            "name": scene.name,
+            "hash": scene.content_hash(),
+            "version": scene.version,
+            "bounds_xyxy": None if scene.bounds is None else list(scene.bounds),
+            "hittable": len(scene.ids(Role.HITTABLE)),
+            "occluders": len(scene.ids(Role.OCCLUDER)),
+        },
+        "view_xyxy": list(view),
+        "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
+        "shots": told,
+        "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
+        **({} if sieve is None else {"filter": _sifted(sieve, fired, each if told else [], told)}),
+        **({} if now is None else {"now": present_of(scene, now, fired, view)}),
+    }
+
+
+def _sifted(
+    sieve: PrefilterTrace, fired: Sequence[Hits], each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """Add the tested objects to each shot, and return the pre-filter's part of the report."""
+    for (hits, _, row), shot in zip(each, told, strict=True):
+        shot["tested"] = sieve.told(hits, row)
+    opened = [np.zeros(0, np.int64), *(sieve.opened(hits) for hits in fired)]
+    return sieve.to_dict(np.unique(np.concatenate(opened)))
+
+
+def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
+    """Box of the world that a picture shows: the scene, and samples near it."""
+    x, y, x_max, y_max = scene.extent()
+    reach = np.concatenate([np.zeros((0, 4), np.int64), *(_boxes(hits) for hits in fired)])
+    if not len(reach):
+        return x, y, min(x_max, x + VIEW_MAX), min(y_max, y + VIEW_MAX)
+    low, high = reach[:, :2].min(axis=0).tolist(), reach[:, 2:].max(axis=0).tolist()
+    middle = np.concatenate([_anchors(hits) for hits in fired])
+    over = VIEW_MAX // 4 if scene.bounds is None else NEAR_OUTSIDE
+    (x, x_max), (y, y_max) = (
+        _shown(*side, over)
+        for side in (
+            (x, x_max, low[0], high[0], *_ends(middle[:, 0])),
+            (y, y_max, low[1], high[1], *_ends(middle[:, 1])),
+        )
+    )
+    return x, y, x_max, y_max
+
+
+def _anchors(hits: Hits) -> Ints:
+    """Pixel (N, 2) of each shot that the picture should show: that of its first hit, or its own."""
+    at = pixel(hits.shots.at_256)
+    some = hits.starts[:-1] < hits.starts[1:]
+    at[some] = hits.first_xy[hits.starts[:-1][some]]
+    return at
+
+
+def _ends(values: Ints) -> tuple[int, int]:
+    return int(values.min()), int(values.max())
+
+
+def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int, over: int) -> tuple[int, int]:
+    """Range of one axis that is shown: the whole world and a little more, or the reach of the samples, or the shots."""
+    if last - first < VIEW_MAX:
+        return max(min(first, low - 2), first - over), min(max(last, high + 2), last + over)
+    if high - low >= VIEW_MAX - VIEW_MAX // 4:
+        low, high = at_low, at_high
+    begin = min(max(first, low - VIEW_MAX // 8), last - VIEW_MAX // 4)
+    return begin, min(last, max(high + VIEW_MAX // 8, begin + VIEW_MAX // 4), begin + VIEW_MAX)
+
+
+def _boxes(hits: Hits) -> Ints:
+    """Boxes (n, 4) around the samples of each part of a batch that has samples."""
+    if isinstance(hits, RayHits):
+        around = ray_boxes(hits)
+        return np.array([] if around is None else [around], np.int64).reshape(-1, 4)
+    found = []
+    for volley in _volleys(hits):
+        boxes = volley.boxes
+        boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
+        if len(boxes):
+            found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
+    return np.array(found, np.int64).reshape(-1, 4)
+
+
+def _volleys(hits: Hits) -> Iterator[Placements]:
+    """Placements of a batch, in chunks of about PLACEMENTS_AT_A_TIME."""
+    burst, spread, _ = parts_of(hits.weapon)
+    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
+    for first in range(0, len(hits.shots), step):
+        yield placements_for(hits.weapon, hits.shots.take(first, first + step))
+
+
+def _checked(scene: Scene, fired: object) -> list[Hits]:
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    Text().check("scene.name", scene.name)
+    if isinstance(fired, Hits):
+        raise InputError("fired: expected a list of Hits, got Hits alone")
+    told: list[Hits] = listed("fired", fired, "a list of Hits")
+    for row, hits in enumerate(told):
+        if not isinstance(hits, Hits):
+            raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
+        if not hits.one_scene:
+            raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
+        if hits.scene is not scene or hits.version != scene.version:
+            got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
+            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")
+    return told
+
+
+def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[str]:
+    """Name of each weapon; equal weapons share one, others of the same kind are numbered."""
+    if names is not None:
+        names = listed("names", names, "a list of names")
+        if len(names) != len(fired):
+            raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(names)}")
+        names = [Text().check(f"names[{i}]", name) for i, name in enumerate(names)]
+        known: dict[str, Any] = {}
+        for name, hits in zip(names, fired, strict=True):
+            if known.setdefault(name, hits.weapon) != hits.weapon:
+                raise InputError(f"names: expected one weapon for each name, got two for {name!r}")
+        return list(names)
+    given: dict[Any, str] = {}
+    for hits in fired:
+        same = sum(weapon.kind == hits.weapon.kind for weapon in given)
+        given.setdefault(hits.weapon, f"{hits.weapon.kind} {same + 1}" if same else hits.weapon.kind)
+    return [given[hits.weapon] for hits in fired]
+
+
+def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
+    shots = hits.shots
+    accept = int(shots.accept[row])
+    owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
+    margins = _margins(hits, row)
+    return {
+        "shot": int(shots.number[row]),
+        "weapon": weapon,
+        "at": (shots.at_256[row] / SUB).tolist(),
+        "at_xy": pixel(shots.at_256[row]).tolist(),
+        "aim": _degrees(hits, row),
+        "seed": int(shots.seed[row]),
+        "accept": None if accept == ALL else scene.category_names(accept),
+        "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
+        "verdicts": hits.verdict_counts(row),
+        "rows": _rows(scene, hits, row, margins),
+        "why_not": _why_not(scene, hits, row, margins),
+        "blockers": [
+            {
+                **item_told(scene, entry.occluder),
+                "samples": entry.samples,
+                "blocked": [
+                    {**item_told(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
+                ],
+            }
+            for entry in hits.blockers(row)
+        ],
+        "samples": _sample_runs(hits, row),
+        "plan": hits.plan.to_dict(),
+        **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
+    }
+
+
+def _why_not(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Objects near a shot that it did not hit, as JSON."""
+    return [
+        {
+            **item_told(scene, entry.object),
+            "reason": entry.reason,
+            "samples": entry.samples,
+            "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
+            "distance": round(entry.distance, 3),
+            **margins.get(entry.object, {}),
+        }
+        for entry in hits.why_not(shot)
+    ]
+
+
+def _margins(hits: Hits, shot: int) -> dict[int, dict[str, Any]]:
+    """Margins of one shot by object, as JSON; empty if the shot has none."""
+    if not hits.has_margins:
+        return {}
+    return {
+        m.object: {"margin": {"distance": round(m.distance, 3), "shift_xy": [round(v, 3) for v in m.shift_xy]}}
+        for m in hits.margins(shot)
+    }
+
+
+def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of a shot, as JSON; rows of rays have no shares."""
+    pixels, rows = hits.pixels_at(shot), hits.of(shot)
+    shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
+    return [
+        {
+            **item_told(scene, row.object),
+            "round": row.round,
+            "samples": row.samples,
+            "pixels": row.pixels,
+            "weight": row.weight,
+            "pellets": row.pellets,
+            "first_xy": list(row.first_xy),
+            "distance2": row.distance2,
+            **({} if share is None else {"shares": {k: round(value, 6) for k, value in share._asdict().items()}}),
+            **margins.get(row.object, {}),
+            "runs": pixels[row.round, row.object].runs().tolist(),
+        }
+        for row, share in zip(rows, shares, strict=True)
+    ]
+
+
+def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
+    """Runs of the pixels of each verdict that occurs; the verdict of a pixel is the same for every pellet."""
+    samples = hits.samples_at(row)
+    runs = {}
+    for verdict in Verdict:
+        xy = samples.xy[samples.verdict == verdict]
+        if len(xy):
+            runs[verdict.name.lower()] = Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]).runs().tolist()
+    return runs
+
+
+def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
+    """Batch of shots as JSON: totals, objects, all rows, and the heat map of the view."""
+    first = np.cumsum([0, *(len(hits.shots) for hits in fired)]).tolist()
+    rows = [[row.shot + begin, *_flat(row)] for begin, hits in zip(first, fired, strict=False) for row in hits]
+    verdicts = np.zeros(len(Verdict), np.int64)
+    for hits in fired:
+        verdicts[: hits.verdicts.shape[1]] += hits.verdicts.sum(axis=0)
+    known = Verdict if any(isinstance(hits, RayHits) for hits in fired) else OF_PATTERNS
+    return {
+        "shots": first[-1],
+        "shots_that_hit": len({row[0] for row in rows}),
+        "verdicts": {verdict.name.lower(): int(verdicts[verdict]) for verdict in known},
+        "objects": _objects(scene, rows),
+        "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
+        "rows": rows,
+        "heat": heat_of(fired, view),
+        "plan": _distinct([hits.plan.to_dict() for hits in fired]),
+    }
+
+
+def _distinct(plans: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Distinct plans."""
+    return list({json.dumps(plan): plan for plan in plans}.values())
+
+
+def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
+    """Objects that were hit, sorted by the number of shots that hit them, then by pixels and id."""
+    shots: dict[int, set[int]] = {}
+    pixels: dict[int, int] = {}
+    weight: dict[int, int] = {}
+    for shot, _, item, _, count, heft, *_ in rows:
+        shots.setdefault(item, set()).add(shot)
+        pixels[item] = pixels.get(item, 0) + count
+        weight[item] = weight.get(item, 0) + heft
+    order = sorted(shots, key=lambda item: (-len(shots[item]), -pixels[item], item))
+    return [
+        {**item_told(scene, item), "shots": len(shots[item]), "pixels": pixels[item], "weight": weight[item]}
+        for item in order
+    ]
+
+
+def _flat(row: HitRow) -> list[int]:
+    return [row.round, row.object, row.samples, row.pixels, row.weight, row.pellets, *row.first_xy, row.distance2]
+
+
+def _name(scene: Scene, item: int) -> str:
+    """Name of an object; the scene need not have it, because owners are arbitrary ids."""
+    return scene.name_of(item) if item < scene.items.count else f"id {item}"
+
+
+def _degrees(hits: Hits, row: int) -> float | None:
+    """Aim of a shot, rounded to a millionth of a degree; None if its weapon has no direction."""
+    if not isinstance(hits, RayHits) and not parts_of(hits.weapon)[2].directed:
+        return None
+    c, s = hits.shots.direction[row].tolist()
+    return round(math.degrees(math.atan2(s, c)), 6) + 0.0
