@@ -1,4 +1,4 @@
-"""Rays that jump: the clearance plane, the first cell of a ray that is taken, and the same answers as by walking."""
+"""Rays that march: the distance field, the first cell of a ray that is taken, and the same answers as by walking."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from test_rays import check_columns
 
 from hitplanes import (
     ALL,
+    Disc,
     History,
     Hits,
     InputError,
@@ -30,10 +31,12 @@ from hitplanes import (
     Sweep,
     Weapon,
     fire,
+    prepare,
 )
 from hitplanes.planes.bits import distance_field
 from hitplanes.planes.common.backend import kernels_of
-from hitplanes.weapons.rays import first_hit, ray_call
+from hitplanes.weapons.fire.plan import Plan
+from hitplanes.weapons.rays import ray_call
 
 worlds = st.randoms(use_true_random=False)
 FAR = 2**20 - 400
@@ -169,10 +172,10 @@ def answer(battle: Battle, strategy: str) -> Hits | str:
 def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
     battle = single(rng, count)
     note(repr(battle))
-    walked, jumped = (answer(battle, strategy) for strategy in ("direct", "composed"))
-    assert walked == jumped
+    walked, marched = (answer(battle, strategy) for strategy in ("walk", "march"))
+    assert walked == marched
     if isinstance(walked, RayHits):
-        assert walked.verdicts.tolist() == jumped.verdicts.tolist()  # type: ignore[union-attr]
+        assert walked.verdicts.tolist() == marched.verdicts.tolist()  # type: ignore[union-attr]
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -182,7 +185,7 @@ def test_rays_that_jump_hit_what_the_oracle_hits(kernels: ModuleType, rng: rando
     note(repr(battle))
     if battle.gun.inside == "error":
         battle = replace(battle, gun=replace(battle.gun, inside="hit"))
-    check_columns(battle.fired(strategy="composed"), battle.walks(), battle.gun.falloff)
+    check_columns(battle.fired(strategy="march"), battle.walks(), battle.gun.falloff)
 
 
 def body(*pixels: tuple[int, int], **values: Any) -> Body:
@@ -214,7 +217,7 @@ def test_what_comes_first_at_a_corner(
     turned = [replace(b, pixels=frozenset((sx * x, sy * y) for x, y in b.pixels)) for b in bodies]
     shot = Shot((sx * start[0], sy * start[1]), (sx * 6.0, sy * 6.0))
     battle = Battle(Gun("pistol"), [shot, replace(shot, number=1)], turned, (-9, -9, 9, 9))
-    check_columns(battle.fired(strategy="composed"), battle.walks(), None)
+    check_columns(battle.fired(strategy="march"), battle.walks(), None)
 
 
 def test_a_refused_occluder_does_not_come_first_at_a_corner(kernels: ModuleType) -> None:
@@ -222,7 +225,7 @@ def test_a_refused_occluder_does_not_come_first_at_a_corner(kernels: ModuleType)
     sides = [body((1, 0)), body((0, 1), layer=2), body((0, 1), occluder=True, categories=2)]
     shots = [Shot((-3.0, -3.0), (6.0, 6.0), accept=accept, number=k) for k, accept in enumerate((1, 3, ALL))]
     battle = Battle(Gun("pistol"), shots, sides, (-9, -9, 9, 9))
-    hits = battle.fired(strategy="composed")
+    hits = battle.fired(strategy="march")
     check_columns(hits, battle.walks(), None)
     assert hits.object.tolist() == [0, 1, 1]
 
@@ -240,8 +243,8 @@ def test_rays_of_any_reach(kernels: ModuleType) -> None:
         target = rng.uniform((-40, 7), (260, 207), (400, 2))
         at = target + away * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         for weapon in (Pistol(None), Pistol(min(2 * away, FAR), falloff="smooth"), Pistol(FAR)):
-            hits = fire(scene, weapon, at, toward=target, strategy="composed")
-            assert hits == fire(scene, weapon, at, toward=target, strategy="direct") and len(hits) > 30
+            hits = fire(scene, weapon, at, toward=target, strategy="march")
+            assert hits == fire(scene, weapon, at, toward=target, strategy="walk") and len(hits) > 30
 
 
 SEVERAL: list[Weapon] = [
@@ -254,16 +257,15 @@ SEVERAL: list[Weapon] = [
 def test_shots_of_several_rays_in_parts(weapon: Weapon, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     scene, at = some_scene(rng), rng.uniform(0, 100, (70, 2))
-    whole = fire(scene, weapon, at, aim=30, strategy="composed")
-    monkeypatch.setattr(ray_call, "CHUNK_ROWS", 64)
-    monkeypatch.setattr(first_hit, "RAYS_AT_ONCE", 7)
-    for strategy in ("composed", "direct"):
+    whole = fire(scene, weapon, at, aim=30, strategy="march")
+    monkeypatch.setattr(ray_call, "RAYS_AT_ONCE", 64)
+    for strategy in ("march", "walk", "cast"):
         hits = fire(scene, weapon, at, aim=30, strategy=strategy)
         assert hits == whole and len(hits.stop) == hits.rays > len(hits) > 35  # type: ignore[attr-defined]
 
 
-def some_scene(rng: np.random.Generator) -> Scene:
-    scene = Scene((100, 100))
+def some_scene(rng: np.random.Generator, size_wh: tuple[int, int] = (100, 100)) -> Scene:
+    scene = Scene(size_wh)
     for k in range(30):
         scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
     return scene
@@ -277,9 +279,9 @@ def test_the_plane_follows_the_scene() -> None:
     scene, at, aim = some_scene(rng), rng.uniform(0, 100, (200, 2)), rng.uniform(0, 360, 200)
     mover = scene.add(np.ones((5, 5), np.bool_), (50, 50), role="mover")
 
-    def jumped() -> dict[str, tuple[str, int]]:
-        hits = fire(scene, Pistol(80), at, aim=aim, strategy="composed")
-        assert hits == fire(scene, Pistol(80), at, aim=aim, strategy="direct")
+    def marched() -> dict[str, tuple[str, int]]:
+        hits = fire(scene, Pistol(80), at, aim=aim, strategy="march")
+        assert hits == fire(scene, Pistol(80), at, aim=aim, strategy="walk")
         return {stage.name: (stage.why, stage.bytes_made) for stage in hits.plan.ran}
 
     for change in (
@@ -287,26 +289,26 @@ def test_the_plane_follows_the_scene() -> None:
         lambda: scene.add(np.ones((3, 3), np.bool_), (20, 20)), lambda: scene.set(8, angle=45),
     ):  # fmt: skip
         change()
-        assert jumped()["clearance plane"] == ("measured anew", 104 * 104)
-        assert jumped()["clearance plane"] == ("as it was", 0)
+        assert marched()["distance field"] == ("measured anew", 104 * 104)
+        assert marched()["distance field"] == ("as it was", 0)
     scene.move(mover, (20, 20))
     scene.move(9, (1000, 1000))
-    jumped()
+    marched()
     scene.move(9, (2000, 1000))  # off the bounds before and after
-    assert jumped()["clearance plane"] == ("as it was", 0)
+    assert marched()["distance field"] == ("as it was", 0)
 
 
 def test_what_is_told_later_is_of_the_scene_as_it_was() -> None:
     rng = np.random.default_rng(9)
     scene, at, aim = some_scene(rng), rng.uniform(0, 100, (50, 2)), rng.uniform(0, 360, 50)
-    hits, same = (fire(scene, Pistol(80), at, aim=aim, strategy=s) for s in ("composed", "direct"))
+    hits, same = (fire(scene, Pistol(80), at, aim=aim, strategy=s) for s in ("march", "walk"))
     assert isinstance(hits, RayHits) and isinstance(same, RayHits)
     passes, stop = same.passes, same.stop
     scene.move(scene.ids(), (5, 5))
     for _ in range(20):
         scene.add(rng.random((30, 30)) < 0.5, (50, 50))
     scene.remove(range(20))
-    fire(scene, Pistol(80), at, aim=aim, strategy="composed")
+    fire(scene, Pistol(80), at, aim=aim, strategy="march")
     assert hits.passes == passes and hits.stop == stop
     with pytest.raises(ValueError, match="read-only"):
         hits.stop.item[0] = 3
@@ -320,8 +322,8 @@ def test_shots_at_the_past_jump_there() -> None:
         scene.move(scene.ids(), rng.uniform(0, 100, (len(scene), 2)))
         history.record(tick)
     ticks = rng.integers(0, 3, 60)
-    jumped, walked = (fire(history, Pistol(80), at, aim=aim, tick=ticks, strategy=s) for s in ("composed", "direct"))
-    assert jumped == walked and jumped.plan.has_run("jumps") and not walked.plan.has_run("jumps")
+    marched, walked = (fire(history, Pistol(80), at, aim=aim, tick=ticks, strategy=s) for s in ("march", "walk"))
+    assert marched == walked and marched.plan.has_run("march") and not walked.plan.has_run("march")
 
 
 # The choice
@@ -334,21 +336,72 @@ def test_rays_jump_where_it_pays() -> None:
     for _ in range(100):
         scene.add(np.ones((48, 48), np.bool_), rng.uniform(0, (1920, 1080)))
 
-    def jumps_by(weapon: Weapon, rays: int, **how: Any) -> bool:
+    def marches_by(weapon: Weapon, rays: int, **how: Any) -> bool:
         plan = fire(scene, weapon, rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
-        assert plan.has_run("jumps") != (
-            plan.has_left_out("jumps") or not isinstance(weapon, Pistol) or weapon.width > 0
+        assert plan.has_run("march") != (
+            plan.has_left_out("march") or not isinstance(weapon, Pistol) or weapon.width > 0
         )
-        return plan.has_run("jumps")
+        return plan.has_run("march")
 
-    assert not jumps_by(Pistol(1000), 3)
-    assert jumps_by(Pistol(1000), 3000) and jumps_by(Pistol(1000), 3)
-    assert not jumps_by(Pistol(1000), 3000, prefilter="box") and not jumps_by(Pistol(1000), 3000, strategy="direct")
-    assert not jumps_by(Laser(1000), 300) and not jumps_by(Pistol(1000, width=2), 300)
+    assert not marches_by(Pistol(1000), 3)
+    assert marches_by(Pistol(1000), 3000) and marches_by(Pistol(1000), 3)
+    assert not marches_by(Pistol(1000), 3000, prefilter="box") and not marches_by(Pistol(1000), 3000, strategy="walk")
+    assert not marches_by(Laser(1000), 300) and not marches_by(Pistol(1000, width=2), 300)
     scene.move(0, (500, 500))
-    assert not jumps_by(Pistol(1000), 3)
-    assert [jumps_by(Pistol(1000), 20) for _ in range(100)].index(True) > 1
-    assert jumps_by(Pistol(1000), 1)
+    assert not marches_by(Pistol(1000), 3)
+    assert [marches_by(Pistol(1000), 20) for _ in range(100)].index(True) > 1
+    assert marches_by(Pistol(1000), 1)
+
+
+def way_of(plan: Plan) -> str:
+    """The one way by which rays were found."""
+    (way,) = (name for name in ("walk", "cast", "march") if plan.has_run(name))
+    return way
+
+
+@pytest.mark.parametrize("made", [False, True])
+@pytest.mark.parametrize("lost_us", [0, 5000, 10**6])
+def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, made: bool, lost_us: int) -> None:
+    """Whatever was fired before: it hangs on whether the field is made, and what was lost without it."""
+    rng = np.random.default_rng(17)
+    at, aim = rng.uniform(0, 400, (6000, 2)), rng.uniform(0, 360, 6000)
+    ways = set()
+    for rays in (1, 40, 6000):
+        found = []
+        for busy in (False, True):
+            scene = some_scene(np.random.default_rng(19), (400, 300))
+            field = scene.distance_field()
+            assert field is not None
+            if made:
+                fire(scene, Pistol(90), (2, 4), strategy="march")
+            if busy:
+                for weapon in (Laser(90), Pistol(90, width=3), Disc(4), Pistol(90)):
+                    for strategy in ("walk", "cast", "auto"):
+                        fire(scene, weapon, at[:50], aim=30, strategy=strategy, prefilter="box")
+                    prepare(some_scene(rng), weapon).fire((3, 4))
+                for strategy in ("walk", "cast"):
+                    fire(scene, Pistol(90), at, aim=aim, strategy=strategy)
+            assert field.is_made(scene.items) == made
+            assert field.lost_ns == 0, "only calls that choose count"
+            field.lost_ns = 1e3 * lost_us
+            found.append(way_of(fire(scene, Pistol(90), at[:rays], aim=aim[:rays]).plan))
+        assert len(set(found)) == 1
+        ways.add(found[0])
+    always = kernels is distance_field and (made or lost_us > 0)  # compiled, few rays are cast in any case
+    assert ways == ({"march"} if always else {"cast", "march"})
+
+
+def test_the_plan_tells_what_was_lost_without_a_field() -> None:
+    scene = some_scene(np.random.default_rng(21), (400, 300))
+    field = scene.distance_field()
+    assert field is not None
+    told = []
+    for _ in range(2):
+        plan = fire(scene, Pistol(90), (2.25, 4)).plan
+        told.append(next(stage.why for stage in plan.left_out if stage.name == "march"))
+        lost = f"which would take 720 us to make: {field.lost_ns / 1e3:.0f} us lost so far"
+        assert told[-1].endswith(lost) and told[-1].startswith("about ")
+    assert told[0] != told[1]
 
 
 def test_few_are_left_to_walk() -> None:
@@ -358,12 +411,14 @@ def test_few_are_left_to_walk() -> None:
         scene.add(np.ones((5, 5), np.bool_), (x, 20))
     at = [(10, 20.25), (10, 21.5), (20, 10.5), (0.5, 0.5), (10, 22.5), (20.25, 20.25)]
     toward = [(55, 20.5), (55, 21.5), (20, 55), (55.5, 55.5), (5, 22.5), (57, 20.5)]
-    plan = fire(scene, Pistol(None), at, toward=toward, strategy="composed").plan
+    plan = fire(scene, Pistol(None), at, toward=toward, strategy="march").plan
     assert plan.has_left_out("walk") and plan.has_left_out("pre-filter") and not plan.has_run("walk")
-    hits = fire(scene, Pistol(None), at[::5], toward=toward[::5], exclude=0, strategy="composed")
+    hits = fire(scene, Pistol(None), at[::5], toward=toward[::5], exclude=0, strategy="march")
     assert hits.object.tolist() == [1, 1] and hits.plan.has_left_out("walk")
-    hits = fire(scene, Pistol(None), toward[:1], toward=at[:1], exclude=2, strategy="composed")
-    assert hits.object.tolist() == [1] and hits.plan.has_run("walk")
+    hits = fire(scene, Pistol(None), toward[:1], toward=at[:1], exclude=2, strategy="march")
+    assert hits.object.tolist() == [1] and hits.plan.has_run("cast") and not hits.plan.has_run("walk")
+    hits = fire(scene, Pistol(None), toward[:1] * 99, toward=at[:1] * 99, exclude=2, strategy="march")
+    assert hits.object.tolist() == [1] * 99 and hits.plan.has_run("walk") and not hits.plan.has_run("cast")
 
 
 @example(1)

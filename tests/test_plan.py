@@ -134,15 +134,15 @@ OF_RAYS = [
     (RAYFIRE, "rows_of_passes", "rows", 10**11),
     (RAYFIRE, "pixels_of", "rows", 2 * 10**11),
 ]
-OF_JUMPS = [
+OF_MARCH = [
     *OF_ALL,
     (RAYFIRE, "chosen_candidates", "plan", 100),
     (RAYFIRE, "leave_out_absent", "plan", 200),
     (RAYFIRE, "chosen_way", "plan", 400),
     (RAYFIRE, "rays_of", "rays", 10**3),
-    (label_plane.LabelPlane, "read", "code plane", 10**4),
-    (distance_field.DistanceField, "read", "clearance plane", 10**5),
-    (first_hit, "_first_taken", "jumps", 10**6),
+    (label_plane.LabelPlane, "read", "label plane", 10**4),
+    (distance_field.DistanceField, "read", "distance field", 10**5),
+    (distance_field, "first_taken", "march", 10**6),
     (first_hit, "refused", "filter", 10**7),
     (first_hit.FirstHits, "rows", "rows", 10**8),
 ]
@@ -190,7 +190,7 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         ],
     ),
     "rays": (Rifle(60, max_hits=2), {"aim": 30, "prefilter": "circle"}, [*OF_RAYS, BOXES]),
-    "rays that jump": (Pistol(60), {"aim": 30, "strategy": "composed"}, OF_JUMPS),
+    "rays that march": (Pistol(60), {"aim": 30, "strategy": "march"}, OF_MARCH),
     "rays by an index": (
         Rifle(60, max_hits=2),
         {"aim": 30, "prefilter": "circle", "broadphase": "bvh"},
@@ -526,7 +526,7 @@ OF_FIRE = (
     "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"
     " kinds.rays kinds.weapon late"
 )
-OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk"
+OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_strategy rays.ray_walk"
 
 
 def loaded(before: str, code: str) -> set[str]:

@@ -19,7 +19,7 @@ from hitplanes.planes.bits import raycast
 from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
 from hitplanes.planes.common.backend import in_parts, kernels_of
 from hitplanes.planes.scene.items import Stack
-from hitplanes.weapons.rays import first_hit, ray_call
+from hitplanes.weapons.rays import ray_call
 
 worlds = st.randoms(use_true_random=False)
 Bounds = tuple[int, int, int, int]
@@ -179,7 +179,7 @@ def first_by_fractions(stack: Stack, at: list[int], by: list[int]) -> tuple[int,
     return time, x, y, rank
 
 
-@pytest.mark.parametrize("way", ["cast", "jump", "ready", "ready, jumping"])
+@pytest.mark.parametrize("way", ["cast", "march", "ready", "ready, marching"])
 @pytest.mark.parametrize("accept", [1, 2, 3])
 @pytest.mark.parametrize("exclude", [None, 0, 1, [0, 1], [0, 2]], ids=repr)
 def test_a_ray_goes_through_what_it_refuses(kernels: ModuleType, way: str, accept: int, exclude: object) -> None:
@@ -187,13 +187,12 @@ def test_a_ray_goes_through_what_it_refuses(kernels: ModuleType, way: str, accep
     scene, out = Scene((99, 9), categories=["other"]), np.atleast_1d(-1 if exclude is None else exclude)
     for k in range(4):
         scene.add(np.ones((3, 3), np.bool_), (20 + 20 * k, 4), categories=1 + k % 2)
-    if way.endswith("jumping"):
-        fire(scene, Pistol(90), (2, 4), strategy="composed")  # the plane is there
+    if way.endswith("marching"):
+        fire(scene, Pistol(90), (2, 4), strategy="march")  # the distance field is there
     if way.startswith("ready"):
         hits = prepare(scene, Pistol(90), accept=accept, exclude=exclude).fire((2, 4))
     else:
-        strategy = "composed" if way == "jump" else "direct"
-        hits = fire(scene, Pistol(90), (2, 4), accept=accept, exclude=exclude, strategy=strategy)
+        hits = fire(scene, Pistol(90), (2, 4), accept=accept, exclude=exclude, strategy=way)
     assert hits.object.tolist() == [k for k in range(4) if accept & 1 + k % 2 and k not in out][:1]
 
 
@@ -207,7 +206,7 @@ def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: f
         scene.add(frame, np.rint(turn * 3 * far), categories=2)
     behind = scene.add(np.ones((3, 3), np.bool_), np.rint(turn * 1000))
     for accept, first in ((1, behind), (3, None)):
-        hits = fire(scene, Pistol(2000), (0, 0), aim=aim, accept=accept, strategy="direct")
+        hits = fire(scene, Pistol(2000), (0, 0), aim=aim, accept=accept, strategy="cast")
         assert hits == fire(scene, Pistol(2000), (0, 0), aim=aim, accept=accept, prefilter="box")
         assert len(hits) == 1 and (first is None or hits.object[0] == first)
     hollow, corners = Scene(None), np.zeros((41, 41), np.bool_)
@@ -215,17 +214,17 @@ def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: f
     for far in range(300):
         hollow.add(corners, (3 * far, 10))
     last = hollow.add(np.ones((99, 3), np.bool_), (1000, 10))
-    hits = fire(hollow, Pistol(2000), (-5, 10), strategy="direct")
+    hits = fire(hollow, Pistol(2000), (-5, 10), strategy="cast")
     assert hits == fire(hollow, Pistol(2000), (-5, 10), prefilter="box") and hits.object.tolist() == [last]
     assert hits.plan.has_run("cast") and hits.plan.has_run("walk") == (kernels is raycast)
     sooner = hollow.add(np.ones((99, 3), np.bool_), (50, 10))  # some twenty boxes are entered before
-    assert fire(hollow, Pistol(2000), (-5, 10), strategy="direct").object.tolist() == [sooner]
+    assert fire(hollow, Pistol(2000), (-5, 10), strategy="cast").object.tolist() == [sooner]
 
 
 def test_a_true_byte_may_be_any(kernels: ModuleType) -> None:
     scene = Scene((99, 99))
     scene.add(np.full((6, 6), 254, np.uint8).view(np.bool_), (50, 50))
-    for how in ({}, {"prefilter": "box"}, {"strategy": "composed"}, {"strategy": "direct"}):
+    for how in ({}, {"prefilter": "box"}, {"strategy": "march"}, {"strategy": "cast"}):
         assert len(fire(scene, Pistol(90), (2.0, 50.0), **how)) == 1
     assert len(prepare(scene, Pistol(90)).fire((2.0, 50.0))) == 1
 
@@ -236,14 +235,10 @@ def test_a_true_byte_may_be_any(kernels: ModuleType) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds, count=st.integers(1, 4))
 def test_rays_that_are_cast_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
-    """A pre-filter is of the walk; without one all are cast, but for those left over."""
     battle = single(rng, count)
     note(repr(battle))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(first_hit, "WALK_CALL_NS", 1e12)
-        cast = answer(battle, "direct")
-        patch.setattr(first_hit, "WALK_CALL_NS", -1e12)
-        assert cast == answer(battle, "direct")
+    cast = answer(battle, "cast")
+    assert cast == answer(battle, "walk")
     if not isinstance(cast, str):
         check_columns(cast, battle.walks(), battle.gun.falloff)
 
@@ -263,12 +258,11 @@ def test_all_weapons_that_end_at_their_first_hit_are_cast(
     for k in range(30):
         scene.add(rng.random((8, 8)) < 0.8, rng.uniform(0, 100, 2), role="occluder" if k % 5 == 0 else "hittable")
     walked = fire(scene, weapon, at, aim=30, prefilter="box")
-    monkeypatch.setattr(first_hit, "WALK_CALL_NS", 1e12)
     monkeypatch.setattr(ray_call, "trace", lambda *_: pytest.fail("walked"))
-    cast = fire(scene, weapon, at, aim=30, strategy="direct")
+    cast = fire(scene, weapon, at, aim=30, strategy="cast")
     assert cast == walked and len(cast) > 20
     stages = {stage.name for stage in cast.plan.ran}, {stage.name for stage in cast.plan.left_out}
-    assert "cast" in stages[0] and {"walk", "pre-filter", "broad phase", "jumps", "stops"} <= stages[1]
+    assert "cast" in stages[0] and {"walk", "pre-filter", "broad phase", "march", "stops"} <= stages[1]
 
 
 def test_threads_share_rays_out(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -305,5 +299,5 @@ def test_rays_are_cast_where_it_pays(kernels: ModuleType) -> None:
         plan = fire(scene, Pistol(1000), rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
         return not plan.has_run("pre-filter")
 
-    assert is_cast(1) and is_cast(3) and is_cast(1, strategy="direct") and not is_cast(1, prefilter="box")
+    assert is_cast(1) and is_cast(3) and is_cast(1, strategy="cast") and not is_cast(1, prefilter="box")
     assert is_cast(300) == (kernels is not raycast)

@@ -70,14 +70,14 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     scene = battle.scene()
     whole = fired(battle, scene=scene)
     assert sorted(set(whole.stop.shot.tolist())) == list(range(9))
-    walks: tuple[dict[str, Any], ...] = ({"strategy": "direct"}, {"prefilter": "none"})
+    walks: tuple[dict[str, Any], ...] = ({"strategy": "walk"}, {"prefilter": "none"})
     for options in (*walks, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(
                 "hitplanes.weapons.rays.ray_call.trace", lambda *given, calls=calls: calls.append(1) or trace(*given)
             )
-            patch.setattr("hitplanes.weapons.rays.ray_call.RAYS_MOST", chunk)
+            patch.setattr("hitplanes.weapons.rays.ray_call.WALKED_AT_ONCE", chunk)
             patch.setattr("hitplanes.planes.bits.cells.PAIRS_AT_ONCE", chunk * 8)
             patch.setattr("hitplanes.weapons.rays.contacts.CHUNK_SAMPLES", chunk)
             cut = fired(battle, scene=scene, **options)
@@ -90,7 +90,7 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
 def test_a_start_inside_is_named_by_its_row_in_any_part(
     rays: int, bad: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hitplanes.weapons.rays.ray_call.RAYS_MOST", rays)
+    monkeypatch.setattr("hitplanes.weapons.rays.ray_call.WALKED_AT_ONCE", rays)
     for around in ({}, {"sweep": (30.0, 3)}, {"rounds": (2, (0.0, 0.0), 5.0)}):
         gun = Gun(range=9, inside="error", **around)  # type: ignore[arg-type]
         shots = [Shot((20 if i in bad else 0, 20)) for i in range(6)]
@@ -102,18 +102,23 @@ def test_a_start_inside_is_named_by_its_row_in_any_part(
         harmless(replace(battle, shots=[s for i, s in enumerate(shots) if i not in bad])).fired()
 
 
-def test_a_composed_ray_is_refused_by_name() -> None:
+def test_a_way_that_cannot_serve_is_passed_over() -> None:
     scene = Scene((40, 40))
+    scene.add([[True]], (5, 1))
     for weapon in (Pistol(9, width=2), Sweep(Laser(9), 30, 3), Rounds(Spread(Rifle(9), 3, 2), 2), Projectile(9, 1)):
-        with pytest.raises(InputError, match=r"^strategy: expected one of 'auto', 'direct', got 'composed'"):
-            fire(scene, weapon, (1, 1), strategy="composed")
-        assert fire(scene, weapon, (1, 1), strategy="direct") == fire(scene, weapon, (1, 1))
-    with pytest.raises(
-        InputError, match=r"^strategy: expected bounds that fit one plane for 'composed', got a scene with"
-    ):
-        fire(Scene(), Pistol(9), (1, 1), strategy="composed")
-    with pytest.raises(InputError, match=r"^strategy: expected one of .*did you mean 'direct'"):
-        fire(scene, Pistol(9), (1, 1), strategy="dirrect")
+        walked = fire(scene, weapon, (1, 1), strategy="walk")
+        for way in ("cast", "march"):
+            hits = fire(scene, weapon, (1, 1), strategy=way)
+            assert hits == walked and hits.plan.has_run("walk") and not hits.plan.has_run(way)
+            left_out = {stage.name: stage.why for stage in hits.plan.left_out}
+            assert (
+                left_out[way] == f"{way} is passed over: only thin rays that end at their first hit do; every ray walks"
+            )
+    hits = fire(Scene(), Pistol(9), (1, 1), strategy="march")
+    told = {stage.name: stage.why for stage in hits.plan.left_out}
+    assert told["march"].startswith("march is passed over: no bounds that fit one plane; ")
+    with pytest.raises(InputError, match=r"^strategy: expected one of .*did you mean 'walk'"):
+        fire(scene, Pistol(9), (1, 1), strategy="wlak")
 
 
 # What is told

@@ -31,9 +31,9 @@ from hitplanes import (
     prepare,
     use_jit,
 )
+from hitplanes.planes.bits import raycast
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit
-from hitplanes.weapons.prepared import prepared_ray
 from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
 
 worlds = st.randoms(use_true_random=False)
@@ -43,7 +43,7 @@ AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
 @pytest.fixture
 def kernels(jit: bool) -> ModuleType:
     """What rays are cast by, and its compiled twin."""
-    return kernels_of(prepared_ray)
+    return kernels_of(raycast)
 
 
 def both(
@@ -93,56 +93,51 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
             shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": 9}][k % 4]
             got = ready.fire(at, **shot)
             alone += type(got) is OneRay
-            same(got, fire(scene, weapon, at, exclude=exclude, strategy="direct", **shot))
+            same(got, fire(scene, weapon, at, exclude=exclude, strategy="walk", **shot))
             rows += len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
     assert 40 < rows < 180 and alone > 150
 
 
-def test_rays_jump_once_a_scene_stood_still_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def casts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Numbers of casts in numpy: the last counts on, and whoever begins to count appends a 0."""
+    counts, inner = [0], raycast.caster
+
+    def counted(*of: Any) -> Any:
+        cast = inner(*of)
+
+        def one(*ray: int) -> tuple[int, ...]:
+            counts[-1] += 1
+            return cast(*ray)
+
+        return one
+
+    monkeypatch.setattr(raycast, "caster", counted)
+    return counts
+
+
+def test_rays_march_once_a_scene_stood_still_for_long_enough(casts: list[int]) -> None:
     scene = crowd(5)
-    use_jit(False)
-    try:
-        ready = prepare(scene, Pistol(200))
-        cast = [0]
-        truly = prepared_ray.raycast.first_touched
-
-        def counted(*args: Any) -> Any:
-            cast[0] += 1
-            return truly(*args)
-
-        monkeypatch.setattr(prepared_ray.raycast, "first_touched", counted)
-        for _ in range(2):
-            cast[0] = 0
-            for k in range(80):
-                ready.fire((20.5, k), aim=0.5)
-            assert 0 < cast[0] < 40
-            scene.move(0, (50, 50))
-    finally:
-        use_jit(None)
+    ready = prepare(scene, Pistol(200))
+    for _ in range(2):
+        for k in range(80):
+            ready.fire((20.5, k), aim=0.5)
+        scene.move(0, (50, 50))
+        casts.append(0)
+    assert 0 < casts[0] < 40 and 0 < casts[1] < 40
 
 
-def test_a_ray_along_a_surface_does_not_jump_pixel_by_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ray_along_a_surface_does_not_march_pixel_by_pixel(casts: list[int]) -> None:
     """It is cast, as the wall that it passes by has no pixel on its way."""
     scene = Scene((4000, 60))
     scene.add(np.ones((10, 3800), np.bool_), (2000, 50))
     scene.add(np.ones((9, 9), np.bool_), (3900, 42))
-    use_jit(False)
-    try:
-        fire(scene, Pistol(3900), (30, 42.25), strategy="composed")  # the plane is there
-        looks = [0]
-        monkeypatch.setattr(
-            prepared_ray.raycast, "first_touched", lambda *_, f=prepared_ray.raycast.first_touched: count(looks, f(*_))
-        )
-        hits = prepare(scene, Pistol(3900)).fire((30, 42.25))
-        assert hits == fire(scene, Pistol(3900), (30, 42.25), prefilter="box") and len(hits) == 1 == looks[0]
-    finally:
-        use_jit(None)
-
-
-def count(calls: list[int], value: Any) -> Any:
-    calls[0] += 1
-    return value
+    fire(scene, Pistol(3900), (30, 42.25), strategy="march")  # the distance field is there
+    casts.append(0)
+    hits = prepare(scene, Pistol(3900)).fire((30, 42.25))
+    assert casts[-1] == 1
+    assert hits == fire(scene, Pistol(3900), (30, 42.25), strategy="walk") and len(hits) == 1
 
 
 def test_what_is_asked_of_a_ray(kernels: ModuleType) -> None:

@@ -250,7 +250,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(scene, "label_plane", lambda: pytest.fail("a plane of the present"))
     monkeypatch.setattr(scene.items, "stack", lambda: pytest.fail("a stack of the present"))
     for weapon in (*PATTERNS, *RAYS):
-        for strategy in ("auto", "direct"):
+        for strategy in ("auto", "direct", "walk"):
             shots = volley(weapon, 40, random.Random(2))
             fire(
                 history,
@@ -301,8 +301,8 @@ ERRORS: dict[str, tuple[Callable[[Scene, History], object], str]] = {
     "of a moment": (lambda s, h: fire(h.at(30), Point(), (1, 1), tick=30), "tick: expected none, as a Scene has"),
     "no scene": (lambda s, h: fire(h.ticks, Point(), (1, 1)), "scene: expected a Scene or a History, got list"),  # type: ignore[arg-type]
     "a bad shot": (lambda s, h: fire(h, Point(), [(1, 1), (1, np.inf)], tick=30), r"at\[1\]\[1\]: expected a finite"),
-    "a composed ray": (
-        lambda s, h: fire(h, Pistol(9, width=2), (1, 1), tick=30, strategy="composed"), "strategy: .*got 'composed'"),
+    "an unknown strategy of a ray": (
+        lambda s, h: fire(h, Pistol(9, width=2), (1, 1), tick=30, strategy="wlak"), "strategy: .*got 'wlak'"),
 }  # fmt: skip
 
 

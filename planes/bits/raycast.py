@@ -10,11 +10,12 @@ counts. `jit.rays` has the compiled kernel.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from ..common.checks import Ints
+from ..common.checks import Bools, Ints
 from ..common.limits import HALF, SUB
 from ..grid.spans import Box, meets
 from ..scene.items import Stack, clipped
@@ -59,7 +60,10 @@ class Near(NamedTuple):
     box_xyxy: Ints
 
 
-# house: hit rule of rays
+Cast = Callable[[int, int, int, int], tuple[int, ...]]
+"""Function that casts one ray from (x, y) to (x + dx, y + dy), 1/256 px; it returns a row of `Touched`."""
+
+
 def first_touched(
     stack: Stack,
     bounds: Box | None,
@@ -82,15 +86,41 @@ def first_touched(
     more than ROWS_MOST rows
     """
     found = []
-    for ray, (start, step) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
-        if step == [0, 0] or max(map(abs, step)) > LONGEST:
-            found.append((UNDECIDED, 0, 0, -1))
-            continue
-        origin = (start[0] + HALF) // SUB, (start[1] + HALF) // SUB
-        line = Ray((start[0] - SUB * origin[0], start[1] - SUB * origin[1]), (step[0], step[1]))
-        accepts = None if accept is None or exclude is None else (accept[ray], exclude[ray])
-        found.append(_first(line, origin, _near(line, origin, stack, bounds, accepts), stack))
+    for ray, ((x, y), (dx, dy)) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
+        accepts = None
+        if accept is not None and exclude is not None:
+            accepts = (stack.categories & accept[ray]) != 0
+            accepts &= ~(stack.owner[:, None] == exclude[ray]).any(axis=1)
+        found.append(caster(stack, bounds, accepts)(x, y, dx, dy))
     return Touched(*np.array(found, np.int64).reshape(-1, 4).T)
+
+
+def caster(stack: Stack, bounds: Box | None, accepts: Bools | None) -> Cast:
+    """Function that casts one ray at the accepted items of a mask (M,), or at all."""
+
+    def cast(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+        if not (dx or dy) or max(abs(dx), abs(dy)) > LONGEST:
+            return UNDECIDED, 0, 0, -1
+        origin = (x + HALF) // SUB, (y + HALF) // SUB
+        ray = Ray((x - SUB * origin[0], y - SUB * origin[1]), (dx, dy))
+        return _first(ray, origin, _near(ray, origin, stack, bounds, accepts), stack)
+
+    return cast
+
+
+# house: hit rule of rays
+def first_at_once(taken: Bools, blocked: Bools, place: Ints) -> Ints:
+    """Of cells (n, k) that each ray enters at the same moment, the column of the one that ends it.
+
+    Cells with an accepted occluder come first, then those of the least (y, x). The front item of the cell ends the ray.
+
+    Parameters
+    ----------
+    taken, blocked : whether an accepted item covers the cell, and whether an accepted occluder does
+    place : numbers of the cells, ordered by (y, x)
+    """
+    later = place.max(initial=0) + 1
+    return np.asarray(np.argmin((~taken * 2 + ~blocked) * later + place, axis=1))
 
 
 class Ray:
@@ -150,15 +180,14 @@ class Ray:
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
 
-def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: tuple[Ints, Ints] | None) -> Near:
+def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Near:
     """Accepted items whose boxes a ray touches, in order of entry."""
     ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
     around = [(low - HALF) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
     around += [(high + HALF) // SUB + o for (_, high), o in zip(ends, origin, strict=True)]
     rank = np.flatnonzero(meets(np.array(around), stack.box_xyxy))
     if accepts is not None:
-        owned = (stack.owner[rank, None] == accepts[1]).any(axis=1)
-        rank = rank[(stack.categories[rank] & accepts[0] != 0) & ~owned]
+        rank = rank[accepts[rank]]
     box = stack.box_xyxy[rank]
     if bounds is not None:
         box = clipped(box, bounds)
@@ -192,9 +221,13 @@ def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, 
         if first == best[0] <= last:
             ranks = _holders(x, y, origin, near, stack)
             if len(ranks):
-                cells.append((not stack.occluder[ranks].any(), y, x, int(ranks.min())))
-    _, y, x, rank = min(cells)
-    return best[0], x + origin[0], y + origin[1], rank
+                cells.append((x + origin[0], y + origin[1], ranks))
+    at = 0
+    if len(cells) > 1:
+        blocked = np.array([[stack.occluder[ranks].any() for _, _, ranks in cells]])
+        at = int(first_at_once(np.ones_like(blocked), blocked, np.arange(len(cells))[None])[0])
+    x, y, ranks = cells[at]
+    return best[0], x, y, int(ranks.min())
 
 
 def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:

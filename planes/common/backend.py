@@ -54,7 +54,6 @@ COMPILED = {
     "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.rays",
     "hitplanes.planes.bits.raycast": "hitplanes.planes.jit.rays",
     "hitplanes.weapons.prepared.position_cache": "hitplanes.weapons.prepared.compiled",
-    "hitplanes.weapons.prepared.prepared_ray": "hitplanes.weapons.prepared.compiled",
 }
 """Each module with numpy kernels, and the module that has the same functions compiled."""
 

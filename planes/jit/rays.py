@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numba import njit, types
 
 from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
-from ..bits.raycast import Touched
+from ..bits.raycast import Cast, Touched
 from ..common.backend import in_parts
 from ..common.checks import Bools, Ints
 from ..common.limits import HALF, SUB
@@ -202,8 +205,8 @@ def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: igno
     return 0 if first < stop else NOTHING
 
 
-PART_NS, RAY_NS, ITEM_NS = 4e5, 3000.0, 1.5
-"""Least work of a thread, ns; time of each ray, and of each pair of a ray and an item, ns."""
+PART_PAIRS, RAY_PAIRS = 270_000, 2000
+"""Least number of pairs of a ray and an item that is worth a thread; each ray counts as so many more."""
 
 LATE = 2**62
 """A time after all others."""
@@ -385,19 +388,41 @@ def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accep
     return best, first_x + origin_x, first_y + origin_y, front
 
 
+BOUNDS = types.UniTuple(types.int64, 4)
+
+
 @compiled(types.void(
-    PAIRS, PAIRS, types.Array(types.int64, 2, "A"), BOXES, INTS, FLAGS, FLAGS, INTS, INTS, INTS, OWNERS,
-    types.UniTuple(types.int64, 4),
+    PAIRS, PAIRS, types.Array(types.int64, 2, "A"), BOXES, INTS, FLAGS, FLAGS, INTS, INTS, INTS, OWNERS, BOUNDS,
 ))  # fmt: skip
-def _each(
-    start, step, found, box, offset, masks, occluder, categories, owner, accept, exclude, bounds
-):  # fmt: skip
+def _each(start, step, found, box, offset, masks, occluder, categories, owner, accept, exclude, bounds):
     near, times = np.empty(len(box) + 1, np.int64), np.empty(len(box) + 1, np.int64)
     for who in range(len(start)):
         found[0, who], found[1, who], found[2, who], found[3, who] = touched(
             start[who, 0], start[who, 1], step[who, 0], step[who, 1], box, offset, masks, occluder, categories, owner,
             accept, exclude, who, bounds, near, times,
         )  # fmt: skip
+
+
+@compiled(types.UniTuple(types.int64, 4)(BOXES, INTS, FLAGS, FLAGS, INTS, BOUNDS, *[types.int64] * 4), nogil=False)
+def _one(box, offset, masks, occluder, rank, bounds, x, y, dx, dy):
+    near, times = np.empty(len(box) + 1, np.int64), np.empty(len(box) + 1, np.int64)
+    entry, column, row, at = touched(
+        x, y, dx, dy, box, offset, masks, occluder, NONE, NONE, NONE, NOBODY, 0, bounds, near, times
+    )
+    return entry, column, row, rank[at] if at >= 0 else at
+
+
+ONE = _one.overloads[_one.signatures[0]].entry_point
+"""Its entry point, without the dispatch on argument types, which takes longer than the call."""
+
+
+def caster(stack: Stack, bounds: Box | None, accepts: Bools | None) -> Cast:
+    """See `bits.raycast.caster`."""
+    rank = np.arange(len(stack)) if accepts is None else np.flatnonzero(accepts)
+    columns: tuple[Any, ...] = stack.box_xyxy, stack.offset, stack.masks, stack.occluder
+    if accepts is not None:
+        columns = stack.box_xyxy[rank], stack.offset[rank], stack.masks, stack.occluder[rank]
+    return partial(ONE, *map(np.ascontiguousarray, columns), rank, EVERYWHERE if bounds is None else bounds)
 
 
 def first_touched(
@@ -419,5 +444,5 @@ def first_touched(
         whose = (NONE, NOBODY) if accept is None or exclude is None else (accept[part], exclude[part])
         _each(start_256[part], step_256[part], found[:, part], *given, *whose, within)
 
-    in_parts(len(start_256), PART_NS / (RAY_NS + ITEM_NS * len(stack)), some)
+    in_parts(len(start_256), PART_PAIRS / (RAY_PAIRS + len(stack)), some)
     return Touched(*found)

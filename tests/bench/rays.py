@@ -19,7 +19,7 @@ import pymunk
 from turns import least
 
 from hitplanes import Laser, Pistol, RayHits, Rifle, Role, Scene, Sprite, Weapon, fire, use_jit
-from hitplanes.weapons.rays import first_hit, ray_walk
+from hitplanes.weapons.rays import ray_walk
 
 LENGTH, BATCH, SINGLE = 1000, 10_000, 100
 WORLD = (1920, 1080)
@@ -155,34 +155,22 @@ def savings(scene: Scene, size_wh: tuple[int, int]) -> None:
 
 
 def ways(scene: Scene, size_wh: tuple[int, int]) -> None:
-    """Microseconds of a call of rays by each way to their first hit, and by the one chosen, once the plane is there.
+    """Microseconds of a call of rays by each way to their first hit, and by the one chosen; the rows are the same.
 
-    The rows are the same.
+    The distance field is made before.
     """
-    print(f"{'way, us':14} {'rays':>5} {'walk':>9} {'cast':>9} {'jump':>9} {'chosen':>9}")
+    print(f"{'way, us':14} {'rays':>5} {'walk':>9} {'cast':>9} {'march':>9} {'auto':>9}")
     for count in (1, 3, 10, 100, 1000):
         shots = shots_of(count, size_wh)
         found = []
-        for name, how in WAYS.items():
-            with patched(name):
-                answer = rays(scene, Pistol(LENGTH), shots, **how)
-                assert not found or answer == found[0][0]
-                found.append((answer, 1e6 * least(lambda h=how, s=shots: rays(scene, Pistol(LENGTH), s, **h))[0]))
+        for way in WAYS:
+            answer = rays(scene, Pistol(LENGTH), shots, strategy=way)
+            assert not found or answer == found[0][0]
+            found.append((answer, 1e6 * least(lambda w=way, s=shots: rays(scene, Pistol(LENGTH), s, strategy=w))[0]))
         print(f"{'pistol':14} {count:5} " + " ".join(f"{us:9.0f}" for _, us in found), flush=True)
 
 
-WAYS = {"walk": {"strategy": "direct"}, "cast": {"strategy": "direct"}, "jump": {"strategy": "composed"}, "chosen": {}}
-
-
-@contextmanager
-def patched(name: str) -> Iterator[None]:
-    """Let rays that do not jump all walk, or all be cast."""
-    cost = first_hit.WALK_CALL_NS
-    first_hit.WALK_CALL_NS = {"walk": -1e18, "cast": 1e18}.get(name, cost)
-    try:
-        yield
-    finally:
-        first_hit.WALK_CALL_NS = cost
+WAYS = ("walk", "cast", "march", "auto")
 
 
 def main(counts: list[int]) -> None:

@@ -18,7 +18,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..kinds.weapon import PatternTable
 from .prefilter import BOX, Candidates, prefilter_of
 
-STRATEGIES = ("auto", "direct", "composed")
+STRATEGIES = ("auto", "direct", "composed", "walk", "cast", "march")
 BROADPHASES = ("auto", *STRUCTURES)
 
 # Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; only their ratios matter.

@@ -1,4 +1,4 @@
-"""Compiled kernels of prepared weapons: one call of a kernel answers a shot, or casts a thin ray.
+"""Compiled kernels of prepared weapons: one call of a kernel answers a shot.
 
 A shot walks the stack from front to back at first. When the shots have spent as much time on that as the visible set
 costs, it is made, and its tiles are listed by cells of shot positions.
@@ -22,10 +22,9 @@ from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans
-from hitplanes.planes.jit.areas import NOBODY, NONE, PAD, cut_off, laid, near_of, struck, take
-from hitplanes.planes.jit.bit_rows import EVERYWHERE, FEW_ROWS, cell_at, in_order, key_of, shared, sort_places
-from hitplanes.planes.jit.cache import address, compiled, flags_at, ints_at, pointer, words_at
-from hitplanes.planes.jit.rays import touched
+from hitplanes.planes.jit.areas import PAD, cut_off, laid, near_of, struck, take
+from hitplanes.planes.jit.bit_rows import FEW_ROWS, cell_at, in_order, key_of, shared, sort_places
+from hitplanes.planes.jit.cache import address, compiled, ints_at, pointer, words_at
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -34,71 +33,6 @@ from ..fire.strategy import COMPILED
 from ..kinds.weapon import Weapon, columns_of
 from .one_shot import Answer, Filter, Frame, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
-
-(
-    CAST_LEFT,
-    CAST_TOP,
-    CAST_RIGHT,
-    CAST_LOW,
-    CAST_ITEMS,
-    CAST_BOX,
-    CAST_OFFSET,
-    CAST_MASKS,
-    CAST_OCCLUDER,
-    CAST_RANK,
-    CAST_NEAR,
-    CAST_TIMES,
-) = range(12)
-"""Fields of a scene for casts: bounds, number of accepted items, addresses of their columns and of scratch memory."""
-
-
-# house: way of rays
-@compiled(types.UniTuple(types.int64, 4)(*[types.int64] * 5), nogil=False)
-def _cast(x, y, dx, dy, scene_at):
-    scene = ints_at(scene_at)
-    count, near, times = scene[CAST_ITEMS], ints_at(scene[CAST_NEAR]), ints_at(scene[CAST_TIMES])
-    box = carray(pointer(scene[CAST_BOX]), (count, 4), np.int64)
-    offset, masks, occluder = ints_at(scene[CAST_OFFSET]), flags_at(scene[CAST_MASKS]), flags_at(scene[CAST_OCCLUDER])
-    bounds = scene[CAST_LEFT], scene[CAST_TOP], scene[CAST_RIGHT], scene[CAST_LOW]
-    entry, column, row, at = touched(
-        x, y, dx, dy, box, offset, masks, occluder, NONE, NONE, NONE, NOBODY, 0, bounds, near, times
-    )
-    return entry, column, row, ints_at(scene[CAST_RANK])[at] if at >= 0 else at
-
-
-cast = _cast.overloads[_cast.signatures[0]].entry_point
-"""Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
-
-
-class Caster:
-    """Compiled form of `prepared_ray.Caster`."""
-
-    def __init__(self, scene: Scene, kept: Filter) -> None:
-        self._scene = scene
-        self._view = kept.view(pierce=False)
-        self._forms = -1
-        self._here = np.zeros(CAST_TIMES + 1, np.int64)  # changed in place, because the kernel has its address
-        self._at = address(self._here)
-        self._kept: tuple[Any, ...] = ()
-        self._columns: tuple[Any, ...]
-
-    def follow(self, stack: Stack) -> None:
-        """Read the scene as it is now."""
-        if stack.forms != self._forms:
-            rank = np.flatnonzero(self._view.accepts(stack))
-            columns = stack.offset[rank], stack.masks, stack.occluder[rank], rank, *np.empty((2, len(rank)), np.int64)
-            self._columns, self._forms = tuple(map(np.ascontiguousarray, columns)), stack.forms
-        rank = self._columns[3]
-        box = np.ascontiguousarray(stack.box_xyxy if len(rank) == len(stack) else stack.box_xyxy[rank])
-        bounds = EVERYWHERE if self._scene.bounds is None else self._scene.bounds
-        self._here[:] = [*bounds, len(rank), address(box), *map(address, self._columns)]
-        self._kept = box, self._columns
-
-    def cast(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
-        """First touched pixel of a ray, as `prepared_ray.Caster.cast` returns it."""
-        found: tuple[int, ...] = cast(x, y, dx, dy, self._at)
-        return found
-
 
 ROWS = 256
 """Initial capacity of a buffer, rows."""

@@ -254,10 +254,10 @@ def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: obje
     kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
     parts = ray_parts_of(weapon)
     if parts is not None:
-        from ..rays.first_hit import can_march
+        from ..rays.ray_strategy import is_thin_first
         from .prepared_ray import ReadyRay
 
-        alone = parts[0] is None and parts[1] is None and can_march(parts[2])
+        alone = parts[0] is None and parts[1] is None and is_thin_first(parts[2])
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
     frame = frame_of(weapon)
     return Ready(scene, weapon, kept) if frame is None else ReadyPattern(scene, weapon, kept, frame)

@@ -1,27 +1,22 @@
-"""Prepared weapon of one thin ray that ends at its first hit: each shot is cast at the items.
+"""Prepared weapon of one thin ray that ends at its first hit: each shot is cast at the items, or marches.
 
-In numpy a ray is marched by the distance field instead, in Python integers, once enough rays were fired at the
-unchanged scene to pay for the field. It is cast if the march comes to an item that the filter refuses, or to several
-pixels at once. Compiled kernels cast all rays.
+The way is chosen as `fire` chooses it (see `rays.ray_strategy`). A ray that marches is cast if it comes to an item that
+the filter refuses, or to several pixels at once.
 
 position, aim -> start and step, 1/256 px -> what is touched first -> a row, or none
 """
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable
 from functools import cached_property
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits import distance_field, raycast
-from hitplanes.planes.bits.distance_field import NOTHING, PAD
-from hitplanes.planes.bits.raycast import Touched
-from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
+from hitplanes.planes.bits.raycast import Cast, Touched
 from hitplanes.planes.common.caches import cached_attribute
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
@@ -34,78 +29,12 @@ from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from ..rays.contacts import rays_of
-from ..rays.first_hit import CAST_PAIR_NS, CAST_RAY_NS, FirstHits, ends_of_touched, owed_ns
+from ..rays.first_hit import PREPARED, FirstHits, ends_of_touched
 from ..rays.ray_hits import Passes, RayHits, Stops, weights_at
+from ..rays.ray_strategy import chosen_way
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
-
-JUMP_NS = 10_000.0
-"""Cost of marching one ray a call, ns; measured with `tests/bench/speed.py`."""
-
-
-class Caster:
-    """First touched pixels of rays of one filter in a scene."""
-
-    def __init__(self, scene: Scene, kept: Filter) -> None:
-        self._scene = scene
-        self._whose = np.array([kept.accept]), kept.exclude
-        self._view = kept.view(pierce=False)
-        self._stack: Stack
-        self._accepts: Bools
-        self._refuses = False
-        self._owed: float | None
-        self._plane: tuple[memoryview, tuple[int, ...], memoryview, int, int] | None
-
-    def follow(self, stack: Stack) -> None:
-        """Read the scene as it is now."""
-        self._stack, self._plane, self._owed = stack, None, None
-        self._accepts = self._view.accepts(stack)
-        self._refuses = not self._accepts.all()
-
-    # house: way of rays
-    def cast(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
-        """Row of `raycast.first_touched` for a ray from (x, y) to (x + dx, y + dy), 1/256 px."""
-        if self._plane is not None or self._made():
-            found = self._jumped(x, y, dx, dy)
-            if found is not None:
-                return found
-        start, step, whose = np.array([[x, y]]), np.array([[dx, dy]]), self._whose if self._refuses else ()
-        touched = raycast.first_touched(self._stack, self._scene.bounds, start, step, *whose)
-        return tuple(int(column[0]) for column in touched)
-
-    def _made(self) -> bool:
-        """Whether the distance field is made; it is made once the rays cast without it cost more than it does."""
-        plane = self._scene.distance_field()
-        if plane is None:
-            return False
-        if self._owed is None:
-            self._owed = owed_ns(plane, self._scene)
-        plane.missed += CAST_RAY_NS - JUMP_NS + len(self._stack) * CAST_PAIR_NS
-        if plane.missed <= self._owed and not plane.is_made(self._scene.items):
-            return False
-        labels = plane.labels.read(self._scene.items)
-        distances, (left, top) = plane.read(self._scene.items, labels), plane.corner_xy.tolist()
-        self._plane = distances.reshape(-1).data, distances.shape, labels.reshape(-1).data, left, top
-        return True
-
-    # house: way of rays
-    def _jumped(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...] | None:
-        """The same by march; None if the ray must be cast."""
-        assert self._plane is not None
-        flat, (height, width), labels, left, top = self._plane
-        entry, cell, several = distance_field.one_taken(
-            flat, (height, width), (x - SUB * left, y - SUB * top), (dx, dy)
-        )
-        if entry == NOTHING:
-            return NOTHING, 0, 0, -1
-        if entry < 0 or several:
-            return None
-        row, column = divmod(cell, width)
-        code = labels[(row - PAD) * (width - 2 * PAD) + column - PAD]
-        rank = int(self._stack.rank_by_code[code >> 1])
-        return (entry, column + left, row + top, rank) if self._accepts[rank] else None
-
 
 Pair = tuple[float, float]
 
@@ -139,17 +68,15 @@ class ReadyRay(Ready):
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
         super().__init__(scene, weapon, kept)
-        self._length, self._fades, self._inside = ray.length_256, ray.fades, ray.inside == "hit"
-        self._items, self._version = scene.items, -1
+        self._ray, self._length, self._fades = ray, ray.length_256, ray.fades
+        self._items, self._version, self._arrangement = scene.items, -1, -1
         self._lock = threading.Lock()
-        self._kernels: ModuleType | None = None
-        self._cast: Callable[[int, int, int, int], tuple[int, ...]]
-        self._caster: Any
+        self._stack: Stack
+        self._accepts: Bools | None
+        self._first: Cast
         self._present: Present
-        self._ids: memoryview
-        self._blocks: memoryview
+        self._objects: memoryview
 
-    # house: hit rule of rays
     def fire(self, at: Any, aim: Any = None, toward: Any = None, shot: Any = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         if self._items.version != self._version:
@@ -159,17 +86,35 @@ class ReadyRay(Ready):
         step = self._step(place, aim, target) if place and numbered and (target or toward is None) else None
         if place and step:
             start = round(SUB * place[0]), round(SUB * place[1])
-            found = entry, x, y, rank = self._cast(*start, *step)
-            if entry > 0 or entry == NOTHING or (entry == 0 and self._inside):
+            found = entry, x, y, rank = self._first(*start, *step)
+            if entry > 0 or entry == NOTHING or (entry == 0 and self._ray.inside == "hit"):
                 hits: OneRay = OneRay()
                 hits._present, hits._at, hits._told, hits._found = self._present, place, (aim, target, shot), found
-                if rank >= 0 and not self._blocks[rank]:
+                item = -1 if rank < 0 else self._objects[rank]
+                if item >= 0:
                     column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
                     weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
                     distance2 = column * column + row * row
-                    hits.append(new(HitRow, (0, 0, self._ids[rank], 1, 1, weight, 1, (x, y), distance2)))
+                    hits.append(new(HitRow, (0, 0, item, 1, 1, weight, 1, (x, y), distance2)))
                 return hits
         return Ready.fire(self, at, aim, toward, shot)
+
+    def _unsettled(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+        """What a ray touches first, by the way chosen now; the next rays go the same way unless it is pending."""
+        chosen = chosen_way("auto", False, self._ray, self.scene, self._stack, 1, prepared=True)
+        given = self.scene, self._stack, self._accepts
+        first = cast = PREPARED["cast"](*given)
+        if chosen.way == "march":
+            march = PREPARED["march"](*given)
+
+            def first(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+                """March, and cast what the march leaves undecided."""
+                found = march(x, y, dx, dy)
+                return cast(x, y, dx, dy) if found[0] == UNDECIDED else found
+
+        if not chosen.pending:
+            self._first = first
+        return first(x, y, dx, dy)
 
     def _step(self, place: Pair, aim: Any, target: Pair | None) -> tuple[int, int] | None:
         """Vector from the start of a shot to its end, 1/256 px; None if an argument must be checked by `fire`."""
@@ -196,12 +141,12 @@ class ReadyRay(Ready):
             version = self._items.version
             if version == self._version:
                 return
-            kernels = kernels_of(sys.modules[__name__])
-            if kernels is not self._kernels:
-                self._kernels, self._caster = kernels, kernels.Caster(self.scene, self._filter)
-            stack = self._items.stack()
-            self._caster.follow(stack)
-            self._cast, self._ids, self._blocks = self._caster.cast, stack.ids.data, stack.occluder.data
+            stack = self._stack = self._items.stack()
+            if stack.forms != self._arrangement:
+                accepts = self._filter.view(pierce=False).accepts(stack)
+                self._accepts, self._arrangement = None if accepts.all() else accepts, stack.forms
+                self._objects = np.where(stack.occluder, -1, stack.ids).data
+            self._first = self._unsettled
             self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
             self._version = version
 

@@ -328,6 +328,11 @@ class Reason(IntEnum):
     BUDGET = 3
 
 
+def reasons_at(stack: Stack, rank: Ints) -> Ints:
+    """Why rays end at items: an occluder stops them, an object is hit."""
+    return np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
+
+
 @dataclass(frozen=True, eq=False)
 class Terminations:
     """Columns of the ends of rays.

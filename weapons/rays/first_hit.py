@@ -1,135 +1,39 @@
-"""Rays that end at their first hit: the choice among walk, cast and march, and the hits of such rays.
+"""Rays that end at their first hit: their ends by cast and by march, and their hits.
 
-- The walk (`ray_walk`) follows any ray.
 - The cast tests a thin ray against the boxes and pixels of all items. It leaves to the walk a ray of no length, and one
   that starts inside an item which its weapon does not hit there.
 - The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item. A
-  ray passes what its filter refuses cell by cell. It is left to the walk if something else lies behind what it refuses,
-  or is touched at the same moment, or if the ray has no length.
+  ray passes what its filter refuses cell by cell. It is left over if something else lies behind what it refuses, or
+  is touched at the same moment, or if the ray has no length.
 
 Rows are made at once; passes and stops when they are asked for. A ray walked one cell of the object that ended it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
 
 import numpy as np
 
 from hitplanes.planes.bits import distance_field, raycast
-from hitplanes.planes.bits.distance_field import PAD, UNDECIDED, Clearance, DistanceField, Passed
-from hitplanes.planes.bits.raycast import Touched
+from hitplanes.planes.bits.distance_field import NOTHING, PAD, UNDECIDED, Clearance, DistanceField
+from hitplanes.planes.bits.raycast import Cast, Touched, first_at_once
 from hitplanes.planes.common.backend import kernels_of
-from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, Labels, choice
+from hitplanes.planes.common.checks import Bools, Ints, Labels
 from hitplanes.planes.common.limits import HALF, SUB
-from hitplanes.planes.grid.fixed_point import pixel
-from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import meets
-from hitplanes.planes.scene.items import Items, Stack
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Rows
-from ..fire.plan import Plan
 from ..fire.prefilter import may_refuse, refused
-from ..fire.strategy import REDRAW_PIXEL_NS, STRATEGIES
 from ..kinds.placements import ONES, Shots
-from ..kinds.rays import Projectile, RayWeapon
-from .contacts import Rays, Reason, Terminations, endless
-from .ray_hits import Passes, Stops, groups_of, normals_at, points_at, rows_of_passes, weights_at
+from ..kinds.rays import RayWeapon
+from .contacts import Contacts, Rays, Reason, Terminations, endless, reasons_at
+from .ray_hits import Passes, Stops, Summed, groups_of, passes_of, rows_of_passes, stops_of, weights_at
 from .ray_walk import Range, lines_of
-
-if TYPE_CHECKING:
-    from hitplanes.planes.bits.distance_field import DistanceField
-
-
-# Costs in ns, measured with `tests/bench/rays.py` on one machine; the choice depends on their ratios only.
-
-WALK_CALL_NS, WALK_ITEM_NS, WALK_RAY_NS, WALK_MET_NS = 700_000.0, 20.0, 12_000.0, 3000.0
-"""Walk: a call, each item, each ray, and each box in which a ray is expected to start."""
-
-JUMP_CALL_NS, JUMP_RAY_NS, CLEARANCE_PIXEL_NS = 190_000.0, 400.0, 5.5
-"""March: a call, each ray, and each pixel of a distance field that is made."""
-
-CAST_CALL_NS, CAST_RAY_NS, CAST_PAIR_NS = 270_000.0, 75_000.0, 30.0
-"""Cast in numpy: a call, each ray, and each pair of a ray and an item."""
-
-COMPILED_CALL_NS, COMPILED_RAY_NS, COMPILED_PAIR_NS = 170_000.0, 600.0, 1.3
-"""Cast by a compiled kernel: a call, each ray, and each pair of a ray and an item."""
-
-
-class Way(NamedTuple):
-    """How the ends of rays are found, and why: by march if `plane` is set, by cast if `casts`, else by the walk."""
-
-    plane: DistanceField | None
-    casts: bool
-    why: str
-
-
-def ends_at_first(ray: RayWeapon) -> bool:
-    """Whether rays of a weapon end at the first object that they touch, and take no time."""
-    return ray.hits_most == 1 and ray.budget_256 is None and not isinstance(ray, Projectile)
-
-
-def can_march(ray: RayWeapon) -> bool:
-    """Whether rays of a weapon may march or be cast."""
-    return ends_at_first(ray) and not ray.radius_256
-
-
-def chosen_way(strategy: str, asked: bool, ray: RayWeapon, scene: Scene, stack: Stack, rays: int) -> Way:
-    """Choose how the ends of so many rays of a weapon are found.
-
-    Parameters
-    ----------
-    strategy : argument of `fire`
-    asked : whether the caller named a pre-filter or a broad phase, which only the walk uses
-
-    Raises
-    ------
-    InputError
-        If the strategy is not known, or is "composed" and the bounds do not fit one plane.
-    """
-    choice("strategy", strategy, STRATEGIES if can_march(ray) else STRATEGIES[:2])
-    if not can_march(ray):
-        return Way(None, False, "only thin rays that end at their first hit do")
-    plane = None if strategy == "direct" else scene.distance_field()
-    if strategy == "composed":
-        if plane is None:
-            raise InputError("strategy: expected bounds that fit one plane for 'composed', got a scene without them")
-        return Way(plane, False, "asked for")
-    if asked or not len(stack):
-        return Way(None, False, "every ray walks")
-    walk, cast = _walk_ns(rays, stack), _cast_ns(rays, len(stack))
-    casts, direct = cast < walk, min(cast, walk)
-    costs = f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
-    if plane is None:
-        why = "direct is asked for" if strategy == "direct" else "no bounds that fit one plane"
-        return Way(None, casts, f"{why}: {costs}")
-    jump, owed = JUMP_CALL_NS + rays * JUMP_RAY_NS, owed_ns(plane, scene)
-    plane.missed += max(direct - jump, 0.0)
-    return Way(plane if plane.missed > owed else None, casts, f"{costs}, {(jump + owed) / 1e3:.0f} us by jumps")
-
-
-def owed_ns(plane: DistanceField, scene: Scene) -> float:
-    """Cost of bringing a distance field up to date, ns."""
-    if plane.is_made(scene.items):
-        return 0.0
-    return plane.labels.cost(scene.items) * REDRAW_PIXEL_NS + plane.labels.size * CLEARANCE_PIXEL_NS
-
-
-def _walk_ns(rays: int, stack: Stack) -> float:
-    """Cost of the walk of rays, ns, among items that are spread evenly over the box around all."""
-    item_wh, world_wh = stack.sizes
-    met = min(len(stack) * float((item_wh / world_wh).prod()), len(stack))
-    return WALK_CALL_NS + len(stack) * WALK_ITEM_NS + rays * (WALK_RAY_NS + met * WALK_MET_NS)
-
-
-def _cast_ns(rays: int, items: int) -> float:
-    """Cost of casting rays at items, ns."""
-    if kernels_of(raycast) is raycast:
-        return CAST_CALL_NS + rays * (CAST_RAY_NS + items * CAST_PAIR_NS)
-    return COMPILED_CALL_NS + rays * (COMPILED_RAY_NS + items * COMPILED_PAIR_NS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,80 +53,68 @@ class FirstHits:
     ends: Terminations
     stack: Stack
 
-    @property
-    def hit(self) -> Ints:
-        """Numbers of the rays that hit an object."""
-        return np.flatnonzero(self.ends.reason == Reason.HITS)
-
-    @cached_property
-    def lines(self) -> Lines:
-        """Lines (R,) of the rays, relative to the pixels of their starts."""
-        return lines_of(self.rays, self.ray)
-
-    @cached_property
-    def parts(self) -> Floats:
-        """Ends as fractions (R,) of the rays."""
-        parts, stopped = np.ones(len(self.rays)), np.flatnonzero(self.ends.rank >= 0)
-        parts[stopped] = self.ends.time[stopped] / self.lines.scale[stopped]
-        return parts
-
     def rows(self, shots: int) -> Rows:
         """Rows of so many shots; if a shot has one ray, a row for each hit."""
         if len(self.rays) > shots:
-            passes = self.passes
-            group = groups_of(passes, int(self.rays.round.max(initial=0)) + 1)
-            return rows_of_passes(passes, np.concatenate([group[:, None], passes.entry_xy], axis=1), self.rays)
-        hit = self.hit
+            return self._rows_of_several()
+        hit = np.flatnonzero(self.ends.reason == Reason.HITS)
         x, y = self.ends.x[hit], self.ends.y[hit]
-        one = ONES[: len(hit)]
-        weight = self._weights(hit)
+        one, falloff = ONES[: len(hit)], self.ray.fades
+        scale = lines_of(self.rays, self.ray).scale[hit] if falloff else one
         return Rows(
-            self.rays.shot[hit], self.rays.round[hit], self.stack.ids[self.ends.rank[hit]], one, one, weight, one,
+            self.rays.shot[hit], self.rays.round[hit], self.stack.ids[self.ends.rank[hit]], one, one,
+            weights_at(self.ends.time[hit], scale, falloff), one,
             np.stack([x, y], axis=1) + self.rays.origin_xy[hit], x * x + y * y,
         )  # fmt: skip
 
-    @cached_property
+    def _rows_of_several(self) -> Rows:
+        """Rows of shots of several rays."""
+        rays, ends, hit = self.rays, self.ends, np.flatnonzero(self.ends.reason == Reason.HITS)
+        lines, one = lines_of(rays, self.ray), np.ones(len(hit), np.int64)
+        scale, xy = lines.scale[hit], np.stack([ends.x[hit], ends.y[hit]], axis=1) + rays.origin_xy[hit]
+        first = Summed(
+            rays.shot[hit], rays.round[hit], rays.pellet[hit], self.stack.ids[ends.rank[hit]], one - 1,
+            ends.time[hit] / scale * lines.length[hit], weights_at(ends.time[hit], scale, self.ray.fades), one, xy,
+        )  # fmt: skip
+        group = groups_of(first, int(rays.round.max(initial=0)) + 1)
+        return rows_of_passes(first, np.concatenate([group[:, None], xy], axis=1), rays)
+
+    @property
     def passes(self) -> Passes:
         """Pass of each ray that hit an object; it ends in the cell of the hit."""
-        ends, rays, hit = self.ends, self.rays, self.hit
-        rank, part = ends.rank[hit], self.parts[hit]
-        xy = self._cells(hit) + rays.origin_xy[hit]
-        along = part * self.lines.length[hit]
-        none = np.zeros(len(hit), np.int64)
-        sides = self.lines.entered_by(hit, ends.x[hit], ends.y[hit])
-        return Passes(
-            rays.shot[hit], rays.round[hit], rays.pellet[hit], self.stack.ids[rank], none,
-            xy, xy.copy(), part, part.copy(), along, along.copy(), np.zeros(len(hit)),
-            normals_at(self.stack, rank, xy, sides),
-            self._weights(hit),
-            points_at(rays, hit, part),
-            np.ones(len(hit), np.int64), none.copy(),
-        )  # fmt: skip
+        return self._passes_and_stops[0]
 
-    @cached_property
+    @property
     def stops(self) -> Stops:
         """Where each ray ended."""
-        ends, rays, stack, parts = self.ends, self.rays, self.stack, self.parts
-        stopped = np.flatnonzero(ends.rank >= 0)
-        rank = ends.rank[stopped]
-        cell_xy = pixel(rays.start_256 + rays.step_256)
-        cell_xy[stopped] = self._cells(stopped) + rays.origin_xy[stopped]
-        item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
-        item[stopped] = stack.ids[rank]
-        sides = self.lines.entered_by(stopped, ends.x[stopped], ends.y[stopped])
-        normal[stopped] = normals_at(stack, rank, cell_xy[stopped], sides)
-        return Stops(
-            rays.shot, rays.round, rays.pellet, ends.reason, item, cell_xy, parts,
-            parts * self.lines.length, points_at(rays, np.arange(len(rays)), parts), normal,
-        )  # fmt: skip
+        return self._passes_and_stops[1]
 
-    def _weights(self, hit: Ints) -> Ints:
-        falloff = self.ray.fades
-        return weights_at(self.ends.time[hit], self.lines.scale[hit] if falloff else ONES[: len(hit)], falloff)
+    @cached_property
+    def _passes_and_stops(self) -> tuple[Passes, Stops]:
+        """Passes and stops of rays that walked the cells in which they end, and no others."""
+        ends, stopped = self.ends, np.flatnonzero(self.ends.rank >= 0)
+        lines, time = lines_of(self.rays, self.ray), ends.time[stopped]
+        ends.fraction[stopped] = time / lines.scale[stopped]
+        one = np.ones(len(stopped), np.int64)
+        met = Contacts(stopped, ends.rank[stopped], one, ends.x[stopped], ends.y[stopped], time, time)
+        of = ends, self.rays, lines, lines.take(stopped), self.stack
+        return passes_of(met, *of, self.ray.fades)[0], stops_of(met, *of)
 
-    def _cells(self, some: Ints) -> Ints:
-        """Cells in which rays end, relative to the pixels of their starts."""
-        return np.stack([self.ends.x[some], self.ends.y[some]], axis=1)
+
+def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:
+    """Ends of rays at what they touch first, without `fraction`; `origin_xy` (R, 2) are the pixels of their starts."""
+    return _ended(np.flatnonzero(found.entry >= 0), found, origin_xy, stack)
+
+
+def _ended(met: Ints, found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:
+    """Ends of rays, of which some (n,) touch something: `found` has a row for each of these, or for each ray."""
+    if len(found.entry) > len(met):
+        found = Touched(*(column[met] for column in found))
+    ends, aside = endless(len(origin_xy)), origin_xy.take(met, axis=0)
+    ends.x[met], ends.y[met] = found.x - aside[:, 0], found.y - aside[:, 1]
+    ends.rank[met], ends.time[met] = found.rank, found.entry
+    ends.reason[met] = reasons_at(stack, found.rank)
+    return ends
 
 
 # house: way of rays
@@ -238,37 +130,24 @@ def ends_by_cast(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tu
     found = kernels_of(raycast).first_touched(stack, through.bounds, rays.start_256, rays.step_256, *whose)
     ends = ends_of_touched(found, rays.origin_xy, stack)
     through.plan.run("cast", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)
-    unsure = found.entry == UNDECIDED
-    if ray.inside != "hit":
-        unsure |= found.entry == 0
-    return ends, np.flatnonzero(unsure)
+    return ends, np.flatnonzero(_undecided(found.entry, ray))
 
 
-# house: hit rule of rays
-def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:
-    """Ends of rays at what they touch first, without `fraction`; `origin_xy` (R, 2) are the pixels of their starts."""
-    ends, met = endless(len(origin_xy)), np.flatnonzero(found.entry >= 0)
-    aside, rank = origin_xy[met], found.rank[met]
-    ends.x[met], ends.y[met] = found.x[met] - aside[:, 0], found.y[met] - aside[:, 1]
-    ends.rank[met], ends.time[met] = rank, found.entry[met]
-    ends.reason[met] = np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
-    return ends
-
-
-RAYS_AT_ONCE = 2**14
-"""Number of rays whose columns fit the processor's cache."""
+def _undecided(entry: Ints, ray: RayWeapon) -> Bools:
+    """Rays that were not followed, or start inside an item that the weapon does not hit there."""
+    return np.asarray((entry == UNDECIDED) | ((entry == 0) & (ray.inside != "hit")))
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """The scene as marching rays read it: labels, distances, and the filter of their shots."""
+class _Planes:
+    """The planes of a scene as marching rays read them, and the filter of their shots."""
 
     rays: Rays
     shots: Shots
-    stack: Stack
+    through: Range
+    corner_xy: Ints
     labels: Labels
     distances: Clearance
-    plan: Plan
 
     def place(self, cell: Ints) -> tuple[Ints, Ints]:
         """Columns and rows of cells; in numpy this is several times as fast as `divmod`."""
@@ -279,13 +158,14 @@ class _Seen:
         """Rank of the front-most item of taken cells, and their labels."""
         x, y = self.place(cell)
         code = self.labels.reshape(-1).take((y - PAD) * self.labels.shape[1] + (x - PAD))
-        return self.stack.rank_by_code.take(code >> 1), code
+        return self.through.stack.rank_by_code.take(code >> 1), code
 
     def refuses(self, ray: Ints, rank: Ints) -> Bools:
         """Whether rays refuse items."""
-        self.plan.run("jumps", "")
-        found = refused(self.stack, rank, self.shots, self.rays.shot[ray])
-        self.plan.run("filter", "categories and owners", found.nbytes)
+        plan = self.through.plan
+        plan.run("march", "")
+        found = refused(self.through.stack, rank, self.shots, self.rays.shot[ray])
+        plan.run("filter", "categories and owners", found.nbytes)
         return found
 
     def passed(self, ray: Ints, cell: Ints) -> Bools:
@@ -293,76 +173,73 @@ class _Seen:
         rank, code = self.front(cell)
         return np.asarray(self.refuses(ray, rank) & (code & 1 == 0))
 
+    def first_of(self, cells: Ints) -> tuple[Ints, Bools]:
+        """First of the cells (n, 4) that rays enter at the same moment, and whether several of them are taken."""
+        stack, taken = self.through.stack, self.distances.reshape(-1)[cells] == 0
+        blocked = np.zeros_like(taken)
+        if stack.has_occluders:
+            rank, code = self.front(cells[taken])
+            blocks = stack.occluder[rank]
+            behind = np.flatnonzero(~blocks & (code & 1 == 1))
+            blocks[behind] = self._has_occluder(cells[taken][behind])
+            blocked[taken] = blocks
+        last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
+        best = first_at_once(taken, blocked, cells)
+        return cells[np.arange(len(cells)), best], (taken & (cells != last)).any(axis=1)
+
+    def _has_occluder(self, cells: Ints) -> Bools:
+        """Whether any occluder covers cells (n,)."""
+        stack, walls = self.through.stack, np.flatnonzero(self.through.stack.occluder)
+        xy, box = np.stack(self.place(cells), axis=1) + self.corner_xy, stack.box_xyxy[walls]
+        pixel, wall = np.nonzero(meets(np.concatenate([xy, xy], axis=1)[:, None], box))
+        x, y = (xy[pixel] - box[wall, :2]).T
+        on = stack.masks[stack.offset[walls[wall]] + y * stack.width[walls[wall]] + x]
+        return np.asarray(np.bincount(pixel, on, len(xy)) > 0)
+
 
 # house: way of rays
-# house: hit rule of rays
-def ends_by_march(
-    rays: Rays, ray: RayWeapon, shots: Shots, items: Items, stack: Stack, plane: DistanceField, plan: Plan
-) -> tuple[Terminations, Ints]:
+def ends_by_march(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
     """Find the ends of rays by marching them through the distance field.
 
     Returns
     -------
     the ends without `fraction`, and the numbers of the rays that are left to another way
     """
-    seen = _Seen(rays, shots, stack, *_read(plane, items, plan), plan)
-    choosy = may_refuse(stack, shots)
-    entry, cell, several = _first_taken(seen.distances, rays, plane.corner_xy, seen.passed if choosy else None)
-    unsure, met = entry == UNDECIDED, np.flatnonzero(entry >= 0)
-    at = np.flatnonzero(several)
-    if len(at):
-        cells = _cells_at_once(cell[at], entry[at] == 0, rays.start_256[at], rays.step_256[at], seen.distances.shape[1])
-        cell[at], others = _first_of(cells, seen, plane.corner_xy)
-        unsure[at] = others & choosy
-    place = cell[met]
-    rank, _ = seen.front(place)
+    assert through.field is not None  # a scene without one is not marched through
+    corner_xy, choosy = through.field.corner_xy, may_refuse(through.stack, shots)
+    planes = _Planes(rays, shots, through, corner_xy, *_read(through, through.field))
+    start_256 = rays.start_256 - SUB * corner_xy
     if choosy:
-        unsure[met] |= seen.refuses(met, rank)
-    if ray.inside != "hit":
-        unsure |= entry == 0
-    (x, y), aside = seen.place(place), plane.corner_xy - rays.origin_xy.take(met, axis=0)
-    ends = endless(len(rays))
-    ends.x[met], ends.y[met] = x + aside[:, 0], y + aside[:, 1]
-    ends.rank[met], ends.time[met] = rank, entry[met]
-    ends.reason[met] = np.where(stack.occluder[rank], Reason.OCCLUDER, Reason.HITS)
-    plan.run("jumps", "each to the first cell that is taken", ends.nbytes)
-    return ends, np.flatnonzero(unsure)
+        entry, cell, several = distance_field.first_taken(planes.distances, start_256, rays.step_256, planes.passed)
+    else:
+        entry, cell, several = kernels_of(distance_field).first_taken(planes.distances, start_256, rays.step_256)
+    left, met, at = _undecided(entry, ray), np.flatnonzero(entry >= 0), np.flatnonzero(several)
+    if len(at):
+        starts, width = entry[at] == 0, planes.distances.shape[1]
+        cell[at], several[at] = planes.first_of(_at_once(cell[at], starts, start_256[at], rays.step_256[at], width))
+        left |= several & choosy
+    rank, _ = planes.front(cell[met])
+    if choosy:
+        left[met] |= planes.refuses(met, rank)
+    x, y = planes.place(cell[met])
+    found = Touched(entry[met], x + corner_xy[0], y + corner_xy[1], rank)
+    ends = _ended(met, found, rays.origin_xy, through.stack)
+    through.plan.run("march", "each ray to the first cell that is taken", ends.nbytes)
+    return ends, np.flatnonzero(left)
 
 
-def _read(plane: DistanceField, items: Items, plan: Plan) -> tuple[Labels, Clearance]:
+def _read(through: Range, field: DistanceField) -> tuple[Labels, Clearance]:
     """Labels and distances of the scene as it is now."""
-    made = plane.is_made(items)
-    labels = plane.labels.read(items)
-    redrawn = plane.labels.redrawn
-    plan.run("code plane", f"{redrawn} px drawn anew", redrawn * labels.itemsize)
-    distances = plane.read(items, labels)
-    plan.run("clearance plane", "as it was" if made else "measured anew", 0 if made else distances.nbytes)
+    items, plan = through.items, through.plan
+    made, labels = field.is_made(items), field.labels.read(items)
+    redrawn = field.labels.redrawn
+    plan.run("label plane", f"{redrawn} px drawn anew", redrawn * labels.itemsize)
+    distances = field.read(items, labels)
+    plan.run("distance field", "as it was" if made else "measured anew", 0 if made else distances.nbytes)
     return labels, distances
 
 
-def _first_taken(distances: Clearance, rays: Rays, corner_xy: Ints, passed: Passed | None) -> tuple[Ints, Ints, Bools]:
-    """First taken cell of each ray that it does not pass, for RAYS_AT_ONCE rays at a time."""
-    start, found = rays.start_256 - SUB * corner_xy, []
-    for begin in range(0, max(len(rays), 1), RAYS_AT_ONCE):
-        part = slice(begin, begin + RAYS_AT_ONCE)
-        if passed is None:
-            kernels = kernels_of(distance_field)
-            found.append(kernels.first_taken(distances, start[part], rays.step_256[part]))
-        else:
-            later = partial(_later, passed, begin)
-            found.append(distance_field.first_taken(distances, start[part], rays.step_256[part], later))
-    if len(found) == 1:
-        first: tuple[Ints, Ints, Bools] = found[0]
-        return first
-    entry, cell, several = (np.concatenate(column) for column in zip(*found, strict=True))
-    return entry, cell, several
-
-
-def _later(passed: Passed, begin: int, ray: Ints, cell: Ints) -> Bools:
-    return passed(ray + begin, cell)
-
-
-def _cells_at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width: int) -> Ints:
+def _at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width: int) -> Ints:
     """Cells (n, 4) of the distance field that each ray enters at the same moment; a cell may be listed twice.
 
     Parameters
@@ -378,32 +255,39 @@ def _cells_at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, 
     return np.asarray(place[:, None] + steps[:, :, 0] + width * steps[:, :, 1])
 
 
-def _first_of(cells: Ints, seen: _Seen, corner_xy: Ints) -> tuple[Ints, Bools]:
-    """First of the cells (n, k) that rays enter at the same moment: those with an occluder first, then by (y, x).
-
-    Returns
-    -------
-    the cell of each ray; and whether more than one of its cells is taken
-    """
-    taken = seen.distances.reshape(-1)[cells] == 0
-    blocked = np.zeros_like(taken)
-    if seen.stack.has_occluders:
-        rank, code = seen.front(cells[taken])
-        in_front = seen.stack.occluder[rank]
-        behind = np.flatnonzero(~in_front & (code & 1 == 1))
-        xy = np.stack(seen.place(cells[taken][behind]), axis=1) + corner_xy
-        in_front[behind] = _has_occluder(seen.stack, xy)
-        blocked[taken] = in_front
-    last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
-    best = np.argmin((~taken * 2 + ~blocked) * seen.distances.size + cells, axis=1)
-    return cells[np.arange(len(cells)), best], (taken & (cells != last)).any(axis=1)
+ENGINES: dict[str, Callable[[Rays, RayWeapon, Shots, Range], tuple[Terminations, Ints]]] = {
+    "cast": ends_by_cast,
+    "march": ends_by_march,
+}
+"""Functions that find the ends of rays, by the names of `ray_strategy.WAYS`."""
 
 
-def _has_occluder(stack: Stack, xy: Ints) -> Bools:
-    """Whether any occluder covers pixels (n, 2)."""
-    walls = np.flatnonzero(stack.occluder)
-    box = stack.box_xyxy[walls]
-    pixel, wall = np.nonzero(meets(np.concatenate([xy, xy], axis=1)[:, None], box))
-    x, y = (xy[pixel] - box[wall, :2]).T
-    on = stack.masks[stack.offset[walls[wall]] + y * stack.width[walls[wall]] + x]
-    return np.asarray(np.bincount(pixel, on, len(xy)) > 0)
+def caster(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
+    """Function that casts one ray at the accepted items of a mask (M,), or at all."""
+    cast: Cast = kernels_of(raycast).caster(stack, scene.bounds, accepts)
+    return cast
+
+
+def marcher(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
+    """Like `caster`, by march; a ray that is refused, or comes to several cells at once, is UNDECIDED."""
+    field = scene.distance_field()
+    assert field is not None
+    plane = field.labels.read(scene.items)
+    distances, (left, top) = field.read(scene.items, plane), field.corner_xy.tolist()
+    flat, shape, labels, width = distances.reshape(-1).data, distances.shape, plane.reshape(-1).data, plane.shape[1]
+    ranks = stack.rank_by_code.data
+
+    def march(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+        entry, cell, several = distance_field.one_taken(flat, shape, (x - SUB * left, y - SUB * top), (dx, dy))
+        if entry < 0 or several:
+            return NOTHING if entry == NOTHING else UNDECIDED, 0, 0, -1
+        row, column = divmod(cell, shape[1])
+        rank = ranks[labels[(row - PAD) * width + column - PAD] >> 1]
+        decided = accepts is None or accepts[rank]
+        return (entry, column + left, row + top, rank) if decided else (UNDECIDED, 0, 0, -1)
+
+    return march
+
+
+PREPARED = {"cast": caster, "march": marcher}
+"""Functions that make the functions which follow one prepared ray, by the same names."""

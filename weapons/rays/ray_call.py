@@ -1,7 +1,7 @@
 """Fire a ray weapon: the whole flow on one screen.
 
-scene -> stack -> weapon -> rays -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
-                                 -> cast at all items, or march to the first pixel that is taken -> ends -> rows
+scene -> stack -> weapon -> rays -> way: walk -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
+                                         cast at all items, or march to the first pixel that is taken -> ends -> rows
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from hitplanes.planes.common.checks import Ints
-from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS, CHUNK_ROWS
+from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.scene import Scene
 
@@ -26,15 +26,20 @@ from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from .contacts import Contacts, Parts, Rays, Terminations, rays_of
-from .first_hit import FirstHits, Way, can_march, chosen_way, ends_at_first, ends_by_cast
+from .first_hit import ENGINES, FirstHits
 from .ray_hits import Passes, RayHits, Stops, Told, passes_of, pixels_of, rows_of_passes, stops_of
+from .ray_strategy import (
+    CHUNK_GROWTH,
+    RAYS_AT_ONCE,
+    WALKED_AT_ONCE,
+    WAYS,
+    Choice,
+    chosen_way,
+    ends_at_first,
+    is_thin_first,
+    way_of_rest,
+)
 from .ray_walk import Range, expected_cells, trace
-
-RAYS_MOST = 1024
-"""Most rays of one chunk; larger chunks are not faster."""
-
-GROWTH = 4
-"""Largest ratio of the sizes of a chunk of rays and the chunk before it."""
 
 C = TypeVar("C", Passes, Stops)
 Choose = Callable[[int], Candidates]
@@ -57,12 +62,14 @@ def fired_rays(
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
     prefilter, broadphase, strategy = how
-    way = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
+    chosen = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack, False)
-    candidates = choose(0 if way.plane or way.casts else each * len(shots))
-    through = Range(scene.items, stack, scene.bounds, candidates, plan)
-    plan.run("plan", way.why if way.plane or way.casts else candidates.why)
-    step = max(1, CHUNK_ROWS // each)
+    walks = chosen.way == "walk"
+    candidates = choose(each * len(shots) if walks else 0)
+    field = scene.distance_field() if chosen.way == "march" else None
+    through = Range(scene.items, stack, scene.bounds, candidates, plan, field=field)
+    plan.run("plan", candidates.why if walks else chosen.why)
+    step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
     found: list[tuple[int, Followed | FirstHits]] = []
     for begin in range(0, max(len(shots), 1), step):
@@ -70,7 +77,7 @@ def fired_rays(
         rays = rays_of(parts, some)
         plan.run("rays", "both ends on the grid", rays.nbytes)
         if ends_at_first(ray):
-            ends = _first_ends(rays, ray, some, through, way, choose)
+            ends = _first_ends(rays, ray, some, through, chosen.way, choose)
             first = FirstHits(rays, ray, ends, stack)
             rows.append(first.rows(len(some)))
             found.append((begin, first))
@@ -84,7 +91,7 @@ def fired_rays(
             rows[-1].shot[:] += begin
     hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
     plan.run("rows", "")
-    _leave_out_unused(plan, scene, through, shots, ray, way)
+    _leave_out_unused(plan, scene, through, shots, ray, (strategy, chosen))
     plan.run("plan", "")
     return hits
 
@@ -101,16 +108,18 @@ def _later(columns: C, first_shot: int) -> C:
     return replace(columns, shot=columns.shot + first_shot) if first_shot else columns
 
 
-def _leave_out_unused(plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, way: Way) -> None:
-    """Add the stages that this scene and this weapon did not need to the plan."""
+def _leave_out_unused(
+    plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, how: tuple[str, Choice]
+) -> None:
+    """Add the stages that this scene and this weapon did not need to the plan; `how` is what was asked and chosen."""
     filtered = plan.has_run("pre-filter")
-    plan.leave_out_all(_unused, through.candidates.why_unindexed if filtered else None, ray, way)
+    plan.leave_out_all(_unused, through.candidates.why_unindexed if filtered else None, ray, *how)
     choosy = may_refuse(through.stack, shots)
     leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
     leave_out_imagery(plan, scene)
 
 
-def _unused(why_unindexed: str | None, ray: RayWeapon, way: Way) -> Iterator[tuple[str, str]]:
+def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: Choice) -> Iterator[tuple[str, str]]:
     """Stages that rays did not need, and why; `why_unindexed` is None unless some rays went through the pre-filter."""
     idle = "no ray was left to walk"
     for name in ("pre-filter", "walk", "stops"):
@@ -118,31 +127,24 @@ def _unused(why_unindexed: str | None, ray: RayWeapon, way: Way) -> Iterator[tup
     yield "broad phase", why_unindexed or idle
     if ends_at_first(ray):
         yield "passes", "told when they are asked for, as the stops are"
-    if can_march(ray) and way.plane is None:
-        yield "jumps", way.why
-    if can_march(ray) and not way.casts:
-        yield "cast", way.why
+    for name in WAYS:
+        if name not in (chosen.way, "walk") and (is_thin_first(ray) or name == strategy):
+            yield name, chosen.why
     yield "cells between items", "only those inside their boxes are looked at"
     yield "verdicts", "counted when asked for"
     yield "volumes", "boxes are the pre-filter"
 
 
-def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: Way, choose: Choose) -> Terminations:
-    """Ends of rays that end at their first hit, found as `way` says; the rays that it leaves over walk."""
-    if way.plane is not None:
-        from .first_hit import ends_by_march  # few calls need it
-
-        ends, left = ends_by_march(rays, ray, shots, through.items, through.stack, way.plane, through.plan)
-    elif way.casts:
-        ends, left = ends_by_cast(rays, ray, shots, through)
-    else:
+def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose) -> Terminations:
+    """Ends of rays that end at their first hit; what one way leaves over is found by the next."""
+    if way == "walk":
         return Terminations.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
+    ends, left = ENGINES[way](rays, ray, shots, through)
     if len(left):
-        walking, candidates = Way(None, way.plane is not None and way.casts, way.why), choose(len(left))
+        rest = way_of_rest(way, through.stack, len(left))
+        through = replace(through, candidates=choose(len(left) if rest == "walk" else 0))
         through.plan.run("plan", "")
-        ends.put(
-            left, _first_ends(rays.pick(left), ray, shots, replace(through, candidates=candidates), walking, choose)
-        )
+        ends.put(left, _first_ends(rays.pick(left), ray, shots, through, rest, choose))
     return ends
 
 
@@ -156,7 +158,7 @@ def _walked(
     the rays of a chunk, and what `trace` returns for them
     """
     begin = cells = 0
-    most = RAYS_MOST
+    most = WALKED_AT_ONCE
     if through.candidates.prefilter.name == "none":
         most = min(most, CHUNK_PAIRS // max(len(through.stack), 1))
     step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, through.stack))))
@@ -166,7 +168,7 @@ def _walked(
         through.plan.run("walk", "")
         yield some, met, ends, lines, relative
         begin, cells = begin + step, cells + len(met.x)
-        step = max(1, min(most, GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
+        step = max(1, min(most, CHUNK_GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
 
 
 def _followed(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -361,7 +361,21 @@ def _unwritable(columns: C) -> C:
     return columns
 
 
-def groups_of(of: Rows | Passes, rounds: int) -> Ints:
+class Summed(NamedTuple):
+    """The columns of `Passes` that rows are summed up from."""
+
+    shot: Ints
+    round: Ints
+    pellet: Ints
+    object: Ints
+    order: Ints
+    entry_px: Floats
+    weight: Ints
+    samples: Ints
+    entry_xy: Ints
+
+
+def groups_of(of: Rows | Passes | Summed, rounds: int) -> Ints:
     """Number that identifies the shot, the round and the object of each row or pass."""
     return (of.shot * rounds + of.round) * ITEMS_MAX + of.object
 
@@ -391,7 +405,7 @@ def pixels_of(passes: Passes, cells: Contacts, some: Rays, rays: Rays) -> Ints:
 
 
 # house: row order
-def rows_of_passes(passes: Passes, pixels: Ints, rays: Rays) -> Rows:
+def rows_of_passes(passes: Passes | Summed, pixels: Ints, rays: Rays) -> Rows:
     """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
     group = groups_of(passes, rounds)

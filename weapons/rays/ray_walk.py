@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from hitplanes.planes import late
+from hitplanes.planes.bits.distance_field import DistanceField
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.rasterize import Lines
@@ -35,13 +36,7 @@ from .contacts import (
     stretches,
     terminations_of,
 )
-
-PAIRS_FIRST = 150
-"""Pairs of rays and boxes expected in the first stretch, at least one a ray; a stretch costs as much as so many pairs.
-Measured with `tests/bench/rays.py`, as GROWTH is."""
-
-GROWTH = 2
-"""Ratio of the lengths of a stretch and the stretch before it."""
+from .ray_strategy import STRETCH_GROWTH, STRETCH_PAIRS
 
 SLACK = 2.0**-20
 """Tolerance of the float test that finds the stretch in which a ray enters a box: a fraction of its length, and px."""
@@ -59,7 +54,8 @@ class Looked:
 class Range:
     """The items that rays are tested against, and the records of the work.
 
-    `looked` is set only for a report; `whole` follows rays in one stretch, beyond their ends.
+    `field` is that of a scene within bounds, for rays that march. `looked` is set only for a report; `whole` follows
+    rays in one stretch, beyond their ends.
     """
 
     items: Items
@@ -69,6 +65,7 @@ class Range:
     plan: Plan
     looked: Looked | None = None
     whole: bool = False
+    field: DistanceField | None = None
 
 
 # house: way of rays
@@ -140,14 +137,14 @@ def _edges(lines: Lines, ray: RayWeapon, through: Range) -> list[float]:
         or is_moving(ray, through.items, through.stack)
     ):
         return [-np.inf, np.inf]
-    first = max(PAIRS_FIRST / max(len(lines), 1), 1) / _pairs_per_px(stack, lines.radius)
+    first = max(STRETCH_PAIRS / max(len(lines), 1), 1) / _pairs_per_px(stack, lines.radius)
     longest = float(lines.length.max(initial=0))
-    if longest <= GROWTH * first:
+    if longest <= STRETCH_GROWTH * first:
         return [-np.inf, np.inf]
     edges = [-np.inf]
     while first < longest:
         edges.append(first)
-        first *= GROWTH
+        first *= STRETCH_GROWTH
     return [*edges, np.inf]
 
 
