@@ -395,19 +395,19 @@ BOUNDS = types.UniTuple(types.int64, 4)
     PAIRS, PAIRS, types.Array(types.int64, 2, "A"), BOXES, INTS, FLAGS, FLAGS, INTS, INTS, INTS, OWNERS, BOUNDS,
 ))  # fmt: skip
 def _each(start, step, found, box, offset, masks, occluder, categories, owner, accept, exclude, bounds):
-    near, times = np.empty(len(box) + 1, np.int64), np.empty(len(box) + 1, np.int64)
+    scratch = np.empty((2, len(box) + 1), np.int64)
     for who in range(len(start)):
         found[0, who], found[1, who], found[2, who], found[3, who] = touched(
             start[who, 0], start[who, 1], step[who, 0], step[who, 1], box, offset, masks, occluder, categories, owner,
-            accept, exclude, who, bounds, near, times,
+            accept, exclude, who, bounds, scratch[0], scratch[1],
         )  # fmt: skip
 
 
 @compiled(types.UniTuple(types.int64, 4)(BOXES, INTS, FLAGS, FLAGS, INTS, BOUNDS, *[types.int64] * 4), nogil=False)
 def _one(box, offset, masks, occluder, rank, bounds, x, y, dx, dy):
-    near, times = np.empty(len(box) + 1, np.int64), np.empty(len(box) + 1, np.int64)
+    scratch = np.empty((2, len(box) + 1), np.int64)
     entry, column, row, at = touched(
-        x, y, dx, dy, box, offset, masks, occluder, NONE, NONE, NONE, NOBODY, 0, bounds, near, times
+        x, y, dx, dy, box, offset, masks, occluder, NONE, NONE, NONE, NOBODY, 0, bounds, scratch[0], scratch[1]
     )
     return entry, column, row, rank[at] if at >= 0 else at
 
