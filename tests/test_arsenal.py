@@ -350,7 +350,7 @@ def uncollected() -> Iterator[None]:
 def fire_every_way(scene: Scene, weapon: Weapon) -> None:
     """One shot and many, by every strategy and pre-filter; all that is worked out of a pattern is."""
     many = [(10 + 3 * i, 20) for i in range(70)]
-    for strategy in ("auto", "direct", "composed"):
+    for strategy in ("auto", "direct", "built"):
         fire(scene, weapon, many, aim=17, strategy=strategy)
         fire(scene, weapon, (50, 50), aim=17, strategy=strategy)
     for prefilter in ("none", "box", "circle", "oriented box", "4 boxes", "polygon", "swept"):
@@ -421,10 +421,10 @@ def work_out(weapon: AreaWeapon) -> None:
     pattern = pattern_of(weapon, *(int(v) for v in unit(17)))
     for worked_out in ("spans", "prefix", "count", "box_xyxy"):
         getattr(pattern.table, worked_out)
-    for worked_out in ("strip", "window_bytes", "is_disc"):
+    for worked_out in ("strip", "window_bytes"):
         getattr(pattern, worked_out)
     for _ in range(2):
-        windows.pattern_bits_of([pattern], windows.OFTEN)
+        windows.pattern_bits_of([pattern])
     nearest = windows.big_of(pattern).depths.nearest
     for _ in range(9):
         nearest(1)

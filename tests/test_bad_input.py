@@ -373,7 +373,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: shot(broadphase="grid", prefilter="none"),
         "broadphase: expected 'none' without a pre-filter, got 'grid'",
     ),
-    "strategy": (lambda: shot(strategy="composd"), "strategy: .*got 'composd' .did you mean 'composed'"),
+    "strategy": (lambda: shot(strategy="buildt"), "strategy: .*got 'buildt' .did you mean 'built'"),
     # what may be asked of hits
     "rows of shot 1 of 1": (lambda: shot().of(1), "shot: expected a whole number from 0 to 0, got 1"),
     "rows of shot -1": (lambda: shot().of(-1), "shot: expected a whole number from 0 to 0, got -1"),

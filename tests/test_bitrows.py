@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import math
+import itertools
 import random
 from typing import Any
 
@@ -14,12 +14,15 @@ from hypothesis import given, settings
 
 from hitplanes import Disc, Scene, Sprite, fire, use_jit
 from hitplanes.planes.bits import bit_rows, cells, front_to_back, visible
-from hitplanes.planes.bits.bit_rows import PAD, WORD, Placed, VisibleTiles
+from hitplanes.planes.bits.bit_rows import WORD, Placed
+from hitplanes.planes.bits.front_to_back import OrderedTiles, Rule
 from hitplanes.planes.bits.tiles import STRIDE, TileAtlas, Tiles
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds import weapon
+from hitplanes.weapons.kinds.areas import pattern_of
 from hitplanes.weapons.kinds.weapon import Pattern
 
 Pixel = tuple[int, int]
@@ -80,7 +83,7 @@ class Case:
         packed = np.zeros((len(masks), height), np.uint64)
         for row, mask in zip(packed, masks, strict=True):
             row[: len(mask)] = bit_rows.packed([mask])[0, : len(mask)]
-        self.seen: VisibleTiles = visible._laid_out(np.arange(len(masks)), boxes, packed)
+        self.seen: OrderedTiles = visible._laid_out(np.arange(len(masks)), boxes, packed)
         most = rng.choice([3, 12, 40, 150])
         self.patterns = []
         for _ in range(rng.choice([1, 1, 3])):
@@ -88,10 +91,17 @@ class Case:
             if rng.random() < 0.3:  # a long one, of which the boxes of most tiles tell less than its strip
                 mask = np.eye(rng.randint(100, 300), dtype=np.bool_)[:: rng.choice([-1, 1])]
             self.patterns.append((Spans.from_mask(mask, (0, 0)), rng.randint(-20, 5), rng.randint(-20, 5), mask))
-        spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for _, left, top, mask in self.patterns]
-        self.windows = weapon._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        self.weighted = rng.random() < 0.5
+        self.weights = [{pixel: rng.randrange(2**16) for pixel in self.pixels(k)} for k in range(len(self.patterns))]
+        prefixes = [np.array([0, *itertools.accumulate(own.values())]) for own in self.weights]
+        self.windows = weapon._made(
+            [
+                Pattern(Spans.from_mask(mask, (left, top)), prefix if self.weighted else None)
+                for (_, left, top, mask), prefix in zip(self.patterns, prefixes, strict=True)
+            ]
+        )
         count = rng.randint(1, 6)
-        pattern = np.array([rng.randrange(len(spans)) for _ in range(count)])
+        pattern = np.array([rng.randrange(len(self.patterns)) for _ in range(count)])
         x, y = np.array([[rng.randint(-60, 60) for _ in range(count)] for _ in range(2)])
         far = rng.choice([0, 9, 5000, 2**21])
         shift = np.array([[rng.randint(-far, far) for _ in range(count)] for _ in range(2)])
@@ -99,21 +109,32 @@ class Case:
         pairs = [(p, t) for p in range(count) for t in range(len(masks)) if rng.random() < 0.8]
         self.placement, self.near = (as_read(np.array(c, np.int64), rng) for c in np.array(pairs).reshape(-1, 2).T)
 
+    def pixels(self, pattern: int) -> list[Pixel]:
+        """Pixels of a pattern, row by row."""
+        _, left, top, mask = self.patterns[pattern]
+        return [(left + x, top + y) for y, x in np.argwhere(mask).tolist()]
+
+    def weight(self, placement: int, pixels: set[Pixel]) -> int:
+        """Sum of the weights of pixels of a placement."""
+        x, y = int(self.placed.x[placement]), int(self.placed.y[placement])
+        own = self.weights[int(self.placed.pattern[placement])]
+        return sum(own[px - x, py - y] for px, py in pixels)
+
     def shared(self, placement: int, tile: int) -> set[Pixel]:
         _, left, top, mask = self.patterns[int(self.placed.pattern[placement])]
         x, y = int(self.placed.x[placement]) + left, int(self.placed.y[placement]) + top
         return pixels_of(mask, x, y) & self.tiles[tile]
 
     def found(self) -> list[tuple[int, ...]]:
-        """What `found` must give."""
+        """What pairs share, in the order of rows."""
         told = []
         for who, at in zip(self.placement.tolist(), self.near.tolist(), strict=True):
             shared = self.shared(who, at)
             if shared:
                 ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
                 best = min(((x - ox) ** 2 + (y - oy) ** 2, y - oy, x - ox) for x, y in shared)
-                told.append((who, at, len(shared), best[0], ox + best[2], oy + best[1]))
-        return told
+                told.append((who, at, len(shared), best[0], ox + best[2], oy + best[1], self.weight(who, shared)))
+        return sorted(told, key=lambda row: (row[0], row[3], row[5], row[4], row[1]))
 
     def scatter(self, count: int) -> None:
         """Place so many patterns near the tiles, and so near to each other that they often lie on the same pixels."""
@@ -124,7 +145,7 @@ class Case:
         self.placed = Placed(*(as_read(c, rng) for c in (pattern, x, y, origin_x, origin_y)))
 
     def gathered(self, pellets: range, ranks: list[int], turn: int, origin: Pixel) -> list[tuple[int, ...]]:
-        """What `gathered_up` must give of one round."""
+        """What pellets of one round share with items."""
         rows = []
         for rank in sorted(set(ranks)):
             tiles = [tile for tile, own in enumerate(ranks) if own == rank]
@@ -134,64 +155,27 @@ class Case:
                 every = {(x - origin[0], y - origin[1]) for s in hit.values() for x, y in s}
                 distance2, y, x = min((x * x + y * y, y, x) for x, y in every)
                 samples, hitting = sum(map(len, hit.values())), len({who for who, _ in hit})
-                rows.append((turn, rank, samples, once, hitting, distance2, origin[0] + x, origin[1] + y))
-        return sorted(rows, key=lambda row: (row[5], row[7], row[6], row[1]))
-
-
-NOT_BESIDE = np.zeros((0, 64, 8), np.uint8)
+                weight = sum(self.weight(who, shared) for (who, _), shared in hit.items())
+                nearest = distance2, origin[0] + x, origin[1] + y
+                rows.append((turn, rank, samples, *nearest, weight, once, hitting))
+        return sorted(rows, key=lambda row: (row[3], row[5], row[4], row[1]))
 
 
 @settings(max_examples=120, deadline=None)
 @given(SEEDS, st.sampled_from([64, 200, 2**15]))
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
-def test_what_patterns_and_tiles_share(name: str, seed: int, at_once: int) -> None:
-    if ".jit." in name:
-        pytest.importorskip("numba")
-    kernels, case = importlib.import_module(name), Case(seed)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
-        found = kernels.found(case.placed, case.windows, case.seen, case.placement, case.near, NOT_BESIDE)
-    assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
-    order = sorted(range(len(case.near)), key=lambda i: (case.near[i], case.placement[i]))
-    order = [i for i in order if case.shared(int(case.placement[i]), int(case.near[i]))]
-    if order:
-        near, placement = case.near[order], case.placement[order]
-        first = np.flatnonzero(np.diff(near, prepend=-1))
-        together = [
-            len(
-                set().union(
-                    *(case.shared(int(p), int(tile)) for p, t in zip(placement, near, strict=True) if t == tile)
-                )
-            )
-            for tile in near[first]
-        ]
-        assert kernels.union(case.placed, case.windows, case.seen, placement, near, first).tolist() == together
-
-
-@settings(max_examples=25, deadline=None)
-@given(SEEDS, st.one_of(st.integers(0, 40), st.sampled_from([80, bit_rows.BESIDE_REACH])))
-def test_the_nearest_of_all_that_is_seen_is_that_of_a_disc(seed: int, radius: int) -> None:
-    """About its own pixel, of which it holds all that is as near as any of its own."""
+def test_what_patterns_and_tiles_share(seed: int, at_once: int) -> None:
+    """Of given pairs, which may not meet."""
     case = Case(seed)
-    rng = random.Random(seed)
-    side2 = np.arange(-radius, radius + 1) ** 2
-    mask = side2 + side2[:, None] <= radius * radius
-    spans = Spans.from_mask(mask, (-radius, -radius))
-    case.patterns, case.windows = (
-        [(spans, -radius, -radius, mask)],
-        weapon._made([Pattern(spans, None)], rng.random() < 0.5),
-    )
-    x, y = case.placed.x, case.placed.y
-    case.placed = Placed(np.zeros_like(x), x, y, x, y)
-    beside = bit_rows.beside_of(case.seen)
-    found = bit_rows.found(case.placed, case.windows, case.seen, case.placement, case.near, beside)
-    assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
-    for tile, pixels in enumerate(case.tiles):
-        left, top = case.seen.box_xyxy[tile, :2].tolist()
-        for row in range(case.seen.height):
-            columns = np.array([px - left for px, py in pixels if py == top + row], np.int64)
-            told = np.abs(np.arange(WORD)[:, None] - columns).min(axis=1, initial=bit_rows.NOWHERE)
-            assert beside[tile, :, row].tolist() == told.tolist()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
+        pairs = case.placement, case.near
+        found = front_to_back.front_to_back(case.placed, 1, case.windows, case.seen, Rule(True), pairs)
+    assert columns_of(found, case.weighted) == [row if case.weighted else row[:6] for row in case.found()]
+
+
+def columns_of(found: front_to_back.RoundHits, weighted: bool) -> list[tuple[int, ...]]:
+    assert (found.weight is not None) == weighted or not len(found.turn)
+    return list(zip(*(column.tolist() for column in found if column is not None), strict=True))
 
 
 @settings(max_examples=80, deadline=None)
@@ -211,59 +195,17 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
     listed = cells.cells_of(seen.box_xyxy, reach, case.rng.choice([2, 5]))
     placed = case.placed._replace(origin_x=case.placed.origin_x[::each], origin_y=case.placed.origin_y[::each])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front_to_back, "PAIRS_AT_ONCE", at_once)
+        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
         if ".jit." in name:
             patch.setattr(bitrows_jit, "ROOM", 0)
             patch.setattr(bitrows_jit, "ROOM_LEAST", room)
-        found = kernels.gathered_up(placed, case.windows, seen, listed, each)
+        found = kernels.front_to_back(placed, each, case.windows, seen, Rule(True), listed)
     told = []
     for turn in range(len(placed.origin_x)):
         origin = int(placed.origin_x[turn]), int(placed.origin_y[turn])
         told += case.gathered(range(turn * each, turn * each + each), seen.rank.tolist(), turn, origin)
-    assert list(zip(*(column.tolist() for column in found), strict=True)) == told
-
-
-@settings(max_examples=80, deadline=None)
-@given(SEEDS)
-def test_groups_of_pellets_whose_boxes_overlap(seed: int) -> None:
-    """Each of up to PAIRED placements with each other one of its group; larger groups are taken for it."""
-    case, rng = Case(seed), random.Random(seed)
-    case.scatter(30)
-    placement = np.array(sorted(rng.sample(range(30), 25)))
-    begin = np.array([0, *sorted(rng.sample(range(1, 25), 5))])
-    length = np.diff(begin, append=25)
-
-    def columns_and_rows(who: int) -> tuple[set[int], set[int]]:
-        x_min, y_min, x_max, y_max = case.windows.box_xyxy[case.placed.pattern[who]].tolist()
-        x, y = int(case.placed.x[who]), int(case.placed.y[who])
-        return set(range(x + x_min, x + x_max + 1)), set(range(y + y_min, y + y_max + 1))
-
-    told = []
-    for first, count in zip(begin.tolist(), length.tolist(), strict=True):
-        boxes = [columns_and_rows(who) for who in placement[first : first + count].tolist()]
-        meeting = any(a[0] & b[0] and a[1] & b[1] for k, a in enumerate(boxes) for b in boxes[:k])
-        told.append(meeting or count > front_to_back.PAIRED)
-    assert front_to_back._may_overlap(case.placed, case.windows, placement, begin, length).tolist() == told
-
-
-@pytest.mark.parametrize("last", [False, True])
-def test_rows_without_a_pixel_lose_to_one_on_the_rim_of_the_largest_disc(last: bool) -> None:
-    """Tiles of one column of 64 rows, of which the first or the last has a pixel, on either side of the disc."""
-    reach = bit_rows.BESIDE_REACH
-    side = np.arange(-reach, reach + 1)
-    spans = Spans.from_mask(side[:, None] ** 2 + side**2 <= reach * reach, (-reach, -reach))
-    rim = [(dx, math.isqrt(reach * reach - dx * dx)) for dx in range(reach + 1)]
-    rim = [(x * right, y * low) for x, y in rim for right in (-1, 1) for low in (-1, 1)]
-    boxes = np.array([(x, y - (WORD - 1) * last, x, y + (WORD - 1) * (not last)) for x, y in rim])
-    packed = np.zeros((len(rim), WORD), np.uint64)
-    packed[:, -last] = 1
-    seen = visible._laid_out(np.arange(len(rim)), boxes, packed)
-    every, zero = np.arange(len(rim)), np.zeros(1, np.int64)
-    made = weapon._made([Pattern(spans, None)], False)
-    placed, beside = Placed(*[zero] * 5), bit_rows.beside_of(seen)
-    found = bit_rows.found(placed, made, seen, np.zeros_like(every), every, beside)
-    told = list(zip(found.x.tolist(), found.y.tolist(), found.distance2.tolist(), strict=True))
-    assert told == [(x, y, x * x + y * y) for x, y in rim]
+    told = [row[:6] + row[6:7] * case.weighted + row[7:] * (each > 1) for row in told]
+    assert columns_of(found, case.weighted) == told
 
 
 @settings(max_examples=100, deadline=None)
@@ -294,17 +236,16 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
 
 
 @settings(deadline=None)
-@given(SEEDS, st.sampled_from([1, 3, 2**21, 2**40, 2**60]))
-@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
-def test_the_order_of_rows(name: str, seed: int, far: int) -> None:
+@given(SEEDS, st.sampled_from([1, 3, 2**21, 2**40, 2**60]), st.sampled_from([1, 64]))
+def test_the_order_of_rows(seed: int, far: int, few: int) -> None:
     """Also where the keys together do not fit one number."""
-    if ".jit." in name:
-        pytest.importorskip("numba")
-    kernels, rng = importlib.import_module(name), random.Random(seed)
+    rng = random.Random(seed)
     count = rng.choice([0, 1, 2, 9, 60])
     keys = [sorted(rng.randint(0, 3) for _ in range(count))]
     keys += [[rng.randint(-min(far, 9), far) for _ in range(count)] for _ in range(3)]
-    order = kernels.row_order(*(as_read(np.array(key, np.int64), rng) for key in keys))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bit_rows, "FEW_ROWS", few)
+        order = bit_rows.row_order(*(as_read(np.array(key, np.int64), rng) for key in keys))
     assert order.tolist() == sorted(range(count), key=lambda i: [key[i] for key in keys])
 
 
@@ -409,18 +350,19 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
         and (box[k, :2] <= box[tile, 2:]).all() and (box[k, 2:] >= box[tile, :2]).all()
     ]  # fmt: skip
     bounds = rng.choice([None, (-30, -20, 100, 90), (0, 0, 0, 0), (500, 500, 501, 501)])
-    seen = visible.visible_tiles_of(tiles, box, bounds, which, of, front)
+    rows = visible._rows(tiles, box, bounds, which, of, front)
+    seen = visible._laid_out(tiles.rank[which], box[which], rows)
     truth = []
     for tile in which.tolist():
         left = each[tile].difference(*(each[k] for k in range(tile) if blocks[k]))
         if bounds:
             left = {(x, y) for x, y in left if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]}
         truth.append((int(tiles.rank[tile]), left))
-    cropped = visible.cropped(seen.rank, seen.box_xyxy, bit_rows.rows_of(seen.words, seen.height, seen.begin))
+    cropped = visible.cropped(seen.rank, seen.box_xyxy, rows)
     for one, kept in ((seen, truth), (cropped, [(rank, left) for rank, left in truth if left])):
         told = zip(one.rank.tolist(), one.begin.tolist(), *one.box_xyxy[:, :2].T.tolist(), strict=True)
-        assert [(rank, pixels_in(one.words, b, x, y, one.height)) for rank, b, x, y in told] == kept
-        assert len(one.words) == PAD + len(one.rank) * (one.height + PAD) and one.height % 8 == 0
+        assert [(rank, pixels_in(one.words, b, x, y, WORD)) for rank, b, x, y in told] == kept
+        assert not one.words[:WORD].any() and not one.words[-WORD:].any()
     for own, (_, left) in zip(cropped.box_xyxy.tolist(), [t for t in truth if t[1]], strict=True):
         xs, ys = zip(*left, strict=True)
         assert own == [min(xs), min(ys), max(xs), max(ys)]
@@ -485,18 +427,21 @@ def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None
         old, kept = tiles, words
 
 
-def test_windows_of_patterns_are_kept_and_as_many_as_pay() -> None:
-    """All 64 shifts of a pattern that was placed often, one call or many."""
+def test_bit_rows_of_patterns_are_kept() -> None:
+    """Of one pattern, of several together; and what is too large for them is known before they are made."""
     mask = np.ones((5, 9), np.bool_)
     pattern, other = (Pattern(Spans.from_mask(mask, (x, 0)), None) for x in (0, 3))
-    few = weapon.pattern_bits_of([pattern], weapon.OFTEN - 3)
-    assert few.shifted == 0 and weapon.pattern_bits_of([pattern], 2) is few
-    often = weapon.pattern_bits_of([pattern], 2)
-    assert often.shifted > 0 and weapon.pattern_bits_of([pattern], 1) is often
-    assert weapon.pattern_bits_of([pattern], 1).shifted and not weapon.pattern_bits_of([pattern], 0).shifted
-    assert weapon.pattern_bits_of([pattern, other], 10**6).shifted == 0
-    assert weapon.pattern_bits_of([other], weapon.OFTEN).shifted == 0
+    assert weapon.pattern_bits_of([pattern]) is weapon.pattern_bits_of([pattern])
+    assert weapon.pattern_bits_of([pattern, other]) is not weapon.pattern_bits_of([other, pattern])
     assert weapon.fits([pattern, other]) and weapon.fits([])
+    for reach in (3, 70, 300):
+        for weighted in (False, True):
+            disc = pattern_of(Disc(reach, falloff="linear" if weighted else None), ONE, 0)
+            made = weapon.pattern_bits_of([disc])
+            assert disc.window_bytes == made.words.nbytes + made.sums.nbytes
+            assert disc.window_bytes <= weapon._window_bytes(2 * reach + 3, 2 * reach + 3, weighted)
+    assert weapon.fits_at_reach(2048, False) and not weapon.fits_at_reach(2**14, False)
+    assert weapon.fits_at_reach(1300, True) and not weapon.fits_at_reach(2048, True)
 
 
 @settings(deadline=None)

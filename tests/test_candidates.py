@@ -219,8 +219,8 @@ def test_the_plan_tells_what_was_tested() -> None:
     assert why(told.left_out, "broad phase") == "no box is compared"
     auto, asked = (fire(scene, Disc(3), (60, 60), broadphase=b, strategy="direct").plan for b in ("auto", "none"))
     assert why(auto.left_out, "broad phase") == "boxes are compared as samples are counted"
-    fading = fire(scene, Disc(3, falloff="linear"), (60, 60), strategy="direct").plan
-    assert why(fading.left_out, "broad phase") == "few pairs: every box is compared"
+    spans = fire(scene, Disc(3), (60, 60), strategy="spans").plan
+    assert why(spans.left_out, "broad phase") == "few pairs: every box is compared"
     assert why(asked.left_out, "broad phase") == "as asked for"
     (row,) = (stage for stage in told.to_dict()["ran"] if stage["stage"] == "pre-filter")
     assert row["pairs"] == [count, count]
@@ -228,14 +228,11 @@ def test_the_plan_tells_what_was_tested() -> None:
 
 def test_a_broad_phase_that_no_sample_needed_is_left_out() -> None:
     scene = crowd(3, 30)
-    how = {"prefilter": "circle", "broadphase": "grid", "strategy": "composed"}
-    told = fire(scene, Disc(3, falloff="linear"), (60, 60), **how).plan
-    for stage in ("broad phase", "volumes", "pre-filter"):
+    told = fire(scene, Disc(3), (60, 60), strategy="visible").plan
+    assert why(told.left_out, "broad phase") == "visible: cells" and told.has_left_out("volumes")
+    told = fire(Scene(), Disc(3), (60, 60), prefilter="circle", strategy="spans").plan
+    for stage in ("volumes", "pre-filter"):
         assert why(told.left_out, stage) == "no sample needed the stack"
-    assert scene.index("grid").boxes is None
-    told = fire(scene, Disc(3), (60, 60), **how).plan  # of bit rows, cells are the pre-filter
-    assert why(told.left_out, "broad phase") == "composed: cells" and told.has_left_out("volumes")
-    assert scene.index("grid").boxes is None
 
 
 def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
@@ -243,11 +240,11 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
     for shots in (1, 1000):
         fire(scene, Disc(1), np.full((shots, 2), 50.0), strategy="direct")
     assert scene.index("bvh").boxes is None
-    many, fading = crowd(4, 3000, 2000), Disc(1, falloff="linear")
+    many = crowd(4, 3000, 2000)
     at = np.random.default_rng(1).uniform(0, 2000, (3000, 2))
-    hits = fire(many, fading, at, strategy="direct")
+    hits = fire(many, Disc(1), at, strategy="spans")
     assert why(hits.plan.ran, "broad phase").startswith(f"bvh: {len(many.items.stack())} boxes")
-    assert hits == fire(many, fading, at, strategy="direct", broadphase="none")
+    assert hits == fire(many, Disc(1), at, strategy="spans", broadphase="none")
 
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,29 +256,11 @@ def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: py
     assert due > 2
     made = []
     for _ in range(due + 2):
-        fire(scene, Point(falloff="linear"), (3, 3), strategy="direct")
+        fire(scene, Point(), (3, 3), strategy="spans")
         made.append(scene.index("bvh").boxes is not None)
     assert made.index(True) == due - 1
     scene.move(scene.ids(), (5, 5))  # to follow all would cost more than the shot saves
-    assert (
-        not why(fire(scene, Point(falloff="linear"), (3, 3), strategy="direct").plan.ran, "broad phase")
-        or lost > 250.0 * 600
-    )
-
-
-def test_a_beam_across_many_is_swept_and_a_short_one_is_not() -> None:
-    scene = crowd(6, 900, 900)
-    at = np.random.default_rng(4).uniform(0, 900, (50, 2))
-    long = fire(scene, Beam(length=600, width=2, falloff="linear"), at, aim=40, strategy="direct")
-    assert why(long.plan.ran, "pre-filter").startswith("box, then swept")
-    for weapon, aim in (
-        (Beam(length=600, width=2, falloff="linear"), 0),
-        (Beam(length=4, width=2, falloff="linear"), 40),
-        (Disc(200, falloff="linear"), 0),
-        (Beam(length=600, width=2), 40),  # bit rows of a pair cost less than its capsules
-    ):
-        told = fire(scene, weapon, at, aim=aim if isinstance(weapon, Beam) else None, strategy="direct").plan
-        assert not why(told.ran, "pre-filter").startswith("box, then"), weapon
+    assert not why(fire(scene, Point(), (3, 3), strategy="spans").plan.ran, "broad phase") or lost > 250.0 * 600
 
 
 UNUSED = (

@@ -341,7 +341,7 @@ def check_battle(seed: int) -> int:
     battle, rng = some_battle(seed), random.Random(~seed)
     scene, volley = battle.scene(), battle.volley
     truth = expected(scene, volley)
-    strategies = ["direct", "composed"] if battle.size_wh else ["direct"]
+    strategies = ["direct", "built"] if battle.size_wh else ["direct"]
     for strategy, prefilter in itertools.product(strategies, ("none", "box", "auto")):
         hits = volley.fired(scene, strategy=strategy, prefilter=prefilter)
         assert told(hits) == truth, f"{seed=} {strategy} {prefilter}"
@@ -505,7 +505,7 @@ def verdict(hits: Hits) -> str:
     return name
 
 
-@pytest.fixture(params=["direct", "composed"])
+@pytest.fixture(params=["direct", "built"])
 def strategy(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -668,19 +668,16 @@ def test_inputs_are_left_as_they_were() -> None:
     kept = [v.copy() for v in (mask, at, accept, exclude)]
     scene = Scene((9, 9))
     scene.add(mask, (1, 1))
-    fire(scene, Spread(Disc(2), 3, 1), at, accept=accept, exclude=exclude, strategy="composed").shares()
+    fire(scene, Spread(Disc(2), 3, 1), at, accept=accept, exclude=exclude, strategy="built").shares()
     for before, after in zip(kept, (mask, at, accept, exclude), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
-def test_composed_needs_bounds() -> None:
-    """Of what fades, that is read from a plane; bit rows need none."""
+def test_what_is_built_needs_no_bounds() -> None:
     for scene in (Scene(), Scene((70_000, 2))):
         item = scene.add(square(3), (1, 1))
-        with pytest.raises(InputError, match=r"strategy: expected bounds"):
-            fire(scene, Disc(2, falloff="linear"), (0, 0), strategy="composed")
-        for weapon in (Point(), Disc(2)):
-            assert fire(scene, weapon, (1, 1), strategy="composed").object.tolist() == [item]
+        for weapon in (Point(), Disc(2), Disc(2, falloff="linear")):
+            assert fire(scene, weapon, (1, 1), strategy="built").object.tolist() == [item]
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from test_fire import Placements, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
 
 from hitplanes import ALL, Disc, Hits, InputError, Point, Role, Scene, Sprite, fire, load_scene
-from hitplanes.planes.bits import bit_rows, cells
+from hitplanes.planes.bits import bit_rows, cells, front_to_back
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.label_plane import LabelPlane
 from hitplanes.planes.scene import items as items_module
@@ -179,7 +179,7 @@ class ChangingScene(RuleBasedStateMachine):
         hits = volley.fired(scene, strategy="direct")
         assert told(hits) == truth
         if scene.bounds is not None:
-            assert volley.fired(scene, strategy="composed") == hits
+            assert volley.fired(scene, strategy="built") == hits
         for broadphase in ("grid", "quadtree", "bvh"):
             assert volley.fired(scene, strategy="direct", broadphase=broadphase) == hits
             scene.index(broadphase).read(scene.items).check()
@@ -328,7 +328,7 @@ def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) 
         masks = [before.mask(place).copy() for place in range(len(before))]
         scene.set(rng.sample(range(12), 3), angle=[rng.uniform(0, 360) for _ in range(3)], scale=rng.choice([1, 1.5]))
         volley = some_volley(rng, Disc(5), [(20, 15)], 12)
-        assert told(volley.fired(scene, strategy=rng.choice(["direct", "composed"]))) == expected(scene, volley)
+        assert told(volley.fired(scene, strategy=rng.choice(["direct", "built"]))) == expected(scene, volley)
         for place, mask in enumerate(masks):
             np.testing.assert_array_equal(before.mask(place), mask)
         atlas = scene.items.atlas
@@ -349,7 +349,7 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
         scene.remove(b)
         assert fire(scene, Point(), (4, 4)).object.tolist() == [a]
         scene.remove([a])
-        assert not fire(scene, Disc(9), (4, 4), strategy="composed")
+        assert not fire(scene, Disc(9), (4, 4), strategy="built")
     assert scene.items.atlas.live == 0 and scene.items.atlas.used <= 17
 
 
@@ -357,7 +357,7 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
 def in_whole_parts() -> list[tuple[Placements, Scene, str, Hits]]:
     """Volleys, what they are fired at, how, and what they hit."""
     battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 4))]
-    ways = [(v, s, how) for v, s in battles for how in (("direct", "composed") if s.bounds else ("direct",))]
+    ways = [(v, s, how) for v, s in battles for how in ("direct", "built", "spans")]
     return [(volley, scene, how, volley.fired(scene, strategy=how)) for volley, scene, how in ways]
 
 
@@ -367,12 +367,11 @@ def test_the_size_of_the_parts_changes_no_row(
 ) -> None:
     monkeypatch.setattr(areas, "CHUNK_SAMPLES", samples)
     monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
-    monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
+    monkeypatch.setattr(front_to_back, "WORDS_AT_ONCE", max(samples, WORD))
     monkeypatch.setattr(areas, "PLACEMENTS_AT_ONCE", samples)
     monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", max(samples, WORD))
     monkeypatch.setattr(cells, "PAIRS_AT_ONCE", pairs)
     monkeypatch.setattr(weapon, "PATTERNS_BYTES_MOST", 10 * samples)
-    monkeypatch.setattr(weapon, "TABLE_BYTES_MOST", 10 * pairs)
     monkeypatch.setattr(spans, "CHUNK_SAMPLES", samples)
     for number, (volley, scene, how, whole) in enumerate(in_whole_parts):
         assert volley.fired(scene, strategy=how) == whole, f"{number=} {how}"

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 from hitplanes.planes.bits import front_to_back
 from hitplanes.planes.bits.bit_rows import Placed
-from hitplanes.planes.bits.front_to_back import OrderedTiles
+from hitplanes.planes.bits.front_to_back import OrderedTiles, Rule
 from hitplanes.planes.bits.tiles import TileAtlas
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.spans import Spans
@@ -78,7 +78,7 @@ class Case:
             line = np.eye(rng.randint(100, 200), dtype=np.bool_)[:: rng.choice([-1, 1])]
             self.patterns = [(line, -rng.randint(0, 100), -rng.randint(0, 100))]
         spans = [Pattern(Spans.from_mask(mask, (left, top)), None) for mask, left, top in self.patterns]
-        self.windows = weapon._made(spans, rng.random() < 0.5 and len(spans) == 1)
+        self.windows = weapon._made(spans)
         count = 0 if rng.random() < 0.05 else rng.choice([1, 2, 5])
         pattern = np.array([rng.randrange(len(spans)) for _ in range(count)], np.int64)
         x, y = np.array([[rng.randint(-spread, spread) for _ in range(count)] for _ in range(2)], np.int64)
@@ -128,12 +128,8 @@ class Case:
             ox, oy = int(self.placed.origin_x[who]), int(self.placed.origin_y[who])
             for item, pixels in self.hits(who):
                 nearest = min(((x - ox) ** 2 + (y - oy) ** 2, y, x) for x, y in pixels)
-                tiles = [
-                    k for k, (x0, y0, x1, y1) in enumerate(self.ordered.box_xyxy.tolist())
-                    if self.ordered.rank[k] == item and any(x0 <= x <= x1 and y0 <= y <= y1 for x, y in pixels)
-                ]  # fmt: skip
-                rows.append((who, *nearest, item, min(tiles), len(pixels)))
-        return [(who, tile, count, d2, x, y) for who, d2, y, x, _, tile, count in sorted(rows)]
+                rows.append((who, *nearest, item, len(pixels)))
+        return [(who, item, count, d2, x, y) for who, d2, y, x, item, count in sorted(rows)]
 
 
 @settings(max_examples=80, deadline=None)
@@ -144,9 +140,8 @@ def judged(seed: int, at_once: int, crowd: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
         patch.setattr(front_to_back, "FRONTS_AT_ONCE", crowd)
-        found = kernels.front_to_back(
-            case.placed, case.windows, case.ordered, case.accept, case.exclude, case.pierce, case.bounds
-        )
+        rule = Rule(case.pierce, case.bounds, case.accept, case.exclude)
+        found = kernels.front_to_back(case.placed, 1, case.windows, case.ordered, rule)[:6]
     assert all(column.dtype == np.int64 for column in found)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == case.found()
 
@@ -161,16 +156,14 @@ def test_tiles_reach_into_the_cells_beside_and_below(jit: bool) -> None:
     """A tile of 64 x 64 px is hit at its corners wherever it lies among the cells, which begin with another tile."""
     tiles = TileAtlas().tiles(([np.ones((64, 64), np.bool_)] * 2).__getitem__, np.arange(2), 1)
     every, none = np.full(2, 1), np.zeros(0, np.bool_)
-    dot = weapon._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)], False)
+    dot = weapon._made([Pattern(Spans.from_mask(np.ones((1, 1), np.bool_), (0, 0)), None)])
     for offset in range(64):
         corner = np.array([(-64, -128), (offset, offset)])
         boxes = np.concatenate([corner, corner + 63], axis=1)
         ordered = OrderedTiles(tiles.rank, boxes, tiles.begin, tiles.words, none, every, every)
         x, y = offset + np.array([(0, 0, 63, 63, 64, -1), (0, 63, 0, 63, 0, 0)])
-        found = kernels_of(front_to_back).front_to_back(
-            Placed(0 * x, x, y, x, y), dot, ordered, None, None, False, None
-        )
-        assert found.placement.tolist() == [0, 1, 2, 3] and found.seen.tolist() == [1] * 4
+        found = kernels_of(front_to_back).front_to_back(Placed(0 * x, x, y, x, y), 1, dot, ordered, Rule(False))
+        assert found.turn.tolist() == [0, 1, 2, 3] and found.rank.tolist() == [1] * 4
 
 
 def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: bool) -> None:
@@ -187,12 +180,10 @@ def test_pixels_as_near_come_row_by_row_and_none_from_beyond_the_bounds(jit: boo
         ordered = OrderedTiles(tiles.rank, boxes, tiles.begin, tiles.words, np.zeros(0, np.bool_), none, none)
         found = kernels_of(front_to_back).front_to_back(
             Placed(zero, zero, zero, zero, zero),
-            weapon._made([Pattern(spans, None)], False),
+            1,
+            weapon._made([Pattern(spans, None)]),
             ordered,
-            None,
-            None,
-            False,
-            (-20, -20, 20, 10),
+            Rule(False, (-20, -20, 20, 10)),
         )
         rows = list(zip(found.y.tolist(), found.x.tolist(), found.samples.tolist(), strict=True))
         assert rows == [*((y, x, 1) for y, x in sorted((y, x) for x, y in around)), (0, 9, 11)]

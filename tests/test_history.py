@@ -64,7 +64,7 @@ def yard(n: int = 40) -> Scene:
 def answers(scene: Scene) -> list[Any]:
     """What some weapons hit all over a scene, by each strategy, and its hash."""
     at = np.random.default_rng(5).uniform(0, (200, 120), (12, 2))
-    strategies = ("auto", "direct") if scene.bounds is None else ("auto", "direct", "composed")
+    strategies = ("auto", "direct") if scene.bounds is None else ("auto", "direct", "built")
     fired = [fire(scene, weapon, at, aim=30, seed=3, strategy=s) for weapon in WEAPONS for s in strategies]
     return [scene.content_hash(), *(hits.to_dict()["rows"] for hits in fired)]
 
@@ -470,7 +470,7 @@ def test_caches_are_there_for_the_next_shot() -> None:
     history.record()
     at = np.random.default_rng(1).uniform(0, 100, (50, 2))
     weapons = Disc(3), Disc(3, falloff="linear")
-    for weapon, strategy in itertools.product(weapons, ("composed", "direct")):
+    for weapon, strategy in itertools.product(weapons, ("built", "direct")):
         fire(history.at(0), weapon, at, strategy=strategy, broadphase="grid")
     scene.move(0, (50, 50))
     history.record()
@@ -478,10 +478,10 @@ def test_caches_are_there_for_the_next_shot() -> None:
     plane = past.label_plane()
     assert plane is not None and plane.labels is not None and past.index("grid").boxes is not None
     for weapon in weapons:
-        hits = fire(past, weapon, at, strategy="composed")
+        hits = fire(past, weapon, at, strategy="built")
         assert hits == fire(past, weapon, at, strategy="direct", prefilter="none")
         made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
-        assert made["code plane" if weapon.falloff else "composition"] == 0
+        assert made["label plane" if weapon.falloff else "visible set"] == 0
     assert plane.redrawn == 0
 
 
@@ -490,7 +490,7 @@ def test_a_few_shots_make_no_plane_and_no_index() -> None:
     history = History(scene)
     history.record()
     past = history.at(0)
-    for falloff, whole in ((None, "composition"), ("linear", "code plane")):
+    for falloff, whole in ((None, "visible set"), ("linear", "label plane")):
         for _ in range(3):
             hits = fire(past, Disc(3, falloff=falloff), (30, 30))
         plane = past.label_plane()
@@ -858,7 +858,7 @@ class RecordedScene(ChangingScene):
         assert past.content_hash() == rebuilt.content_hash()
         assert masks(past) == masks(rebuilt)
         where = [(0.0, 9.0), *(model.position for model in truth.models.values())]
-        strategies = ("auto", "direct") if past.bounds is None else ("auto", "direct", "composed")
+        strategies = ("auto", "direct") if past.bounds is None else ("auto", "direct", "built")
         for strategy in strategies:
             volley = some_volley(rng, some_weapon(rng), where, len(truth.models))
             assert volley.fired(past, strategy=strategy) == volley.fired(rebuilt, strategy="direct")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import re
 import tracemalloc
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -166,7 +167,7 @@ def test_json(seed: int) -> None:
 def test_equality_leaves_out_plan_and_version() -> None:
     scene = Scene((9, 9))
     item = scene.add(square(5), (1, 1))
-    direct, composed = (fire(scene, Disc(2), (3, 3), strategy=s) for s in ("direct", "composed"))
+    direct, composed = (fire(scene, Disc(2), (3, 3), strategy=s) for s in ("direct", "built"))
     assert direct == composed and direct.plan != composed.plan
     scene.move(item, (1, 1))
     again = fire(scene, Disc(2), (3, 3))
@@ -423,7 +424,7 @@ def test_giant_patterns(weapon: Any, at: tuple[int, int], bounded: bool) -> None
     a, b = scene.add(square(5), (10, 10)), scene.add(square(5), (20, 10))
     scene.add(square(2, 5), (20, 10), role="occluder", layer=1)
     spans = weapon.spans(2**30, 0)
-    results = [fire(scene, weapon, at, strategy=s) for s in (("direct", "composed") if bounded else ("direct",))]
+    results = [fire(scene, weapon, at, strategy=s) for s in (("direct", "built") if bounded else ("direct",))]
     shares = results[0].shares()
     assert all(
         stage.bytes_made <= 8 * 40 * 30 for hits in results for stage in hits.plan.ran if stage.name != "patterns"
@@ -495,7 +496,7 @@ def test_far_apart_in_one_batch() -> None:
 
 
 @pytest.mark.parametrize("weapon", [Point(), Beam(5, 1), Spread(Disc(2), 3, 2), Rounds(Beam(3, 1), 2, (1, 0), 5.0)])
-@pytest.mark.parametrize("strategy", ["auto", "direct", "composed"])
+@pytest.mark.parametrize("strategy", ["auto", "direct", "built"])
 def test_no_shots(weapon: Any, strategy: str) -> None:
     scene = Scene((9, 9))
     scene.add(square(3), (3, 3))
@@ -523,7 +524,7 @@ def test_an_empty_scene(bounded: bool) -> None:
         lambda: scene.remove(scene.add(square(3))),
     ):
         change()
-        for strategy in ("auto", "direct", *(["composed"] if bounded else [])):
+        for strategy in ("auto", "direct", *(["built"] if bounded else [])):
             hits = fire(scene, Disc(3, pierce=True), [(4, 4), (0, 0)], strategy=strategy)
             assert not hits and hits.verdicts[:, 1:4].sum() == 0 and hits.fired.tolist() == [29, 29]
             assert hits.margins() == hits.why_not() == hits.blockers() == hits.shares() == []
@@ -532,7 +533,7 @@ def test_an_empty_scene(bounded: bool) -> None:
 def test_a_pattern_of_no_pixel() -> None:
     scene = Scene((9, 9))
     scene.add(square(9))
-    for strategy in ("direct", "composed"):
+    for strategy in ("direct", "built"):
         hits = fire(scene, Stencil([".."], falloff="linear"), (4, 4), strategy=strategy)
         assert not hits and hits.fired.tolist() == [0]
         assert hits.why_not() == hits.shares() == hits.margins() == [] and len(hits.samples_at().xy) == 0
@@ -547,7 +548,7 @@ def stages(hits: Hits) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
     return ran, {s.name: s.why for s in hits.plan.left_out}, {s.name: s.bytes_made for s in hits.plan.ran}
 
 
-BEGIN = ["shots", "stack", "patterns", "plan"]
+BEGIN = ["shots", "stack", "plan", "patterns"]
 
 
 def test_direct_makes_no_plane() -> None:
@@ -557,28 +558,25 @@ def test_direct_makes_no_plane() -> None:
     plane = scene.label_plane()
     assert plane is not None and plane.labels is None
     assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "samples", "rows"]
-    assert left_out["composition"] == "direct: asked for"
+    assert left_out["visible set"] == left_out["label plane"] == "tiles needs none"
     ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="direct"))
     assert plane.labels is None
+    assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "weights", "samples", "rows"]
+    ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="spans"))
     assert list(ran) == [*BEGIN, "weights", "verdicts", "outside", "pre-filter", "samples", "walk", "rows"]
-    assert left_out["code plane"] == "direct: asked for"
+    assert left_out["visible set"] == left_out["label plane"] == "spans needs none"
 
 
-@pytest.mark.parametrize("weapon", [Point(), Disc(3, falloff="linear")])
-def test_composed_tells_what_it_drew(weapon: Point | Disc) -> None:
+def test_labels_tell_what_was_drawn() -> None:
     scene = Scene((50, 40))
     item = scene.add(square(5), (3, 3))
     made = []
     for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20)), lambda: scene.move(item, (0, 0))):
         change()
-        ran, left_out, bytes_made = stages(fire(scene, weapon, (4, 4), strategy="composed"))
-        if weapon.falloff:
-            assert list(ran) == [*BEGIN, "code plane", "weights", "verdicts", "outside", "samples", "read", "rows"]
-            assert {"walk", "pre-filter"} <= set(left_out)
-        else:
-            assert list(ran) == ["shots", "stack", "plan", "code plane", "read", "rows"]
-            assert left_out["patterns"] == "each shot is one pixel"
-        made.append(bytes_made["code plane"])
+        ran, left_out, bytes_made = stages(fire(scene, Point(), (4, 4), strategy="built"))
+        assert list(ran) == ["shots", "stack", "plan", "label plane", "samples", "rows"]
+        assert left_out["patterns"] == "each shot is one pixel"
+        made.append(bytes_made["label plane"])
     assert made == [2 * 50 * 40, 0, 2 * 2 * 25, 2 * 2 * 25]
 
 
@@ -588,10 +586,10 @@ def test_composed_bit_rows_tell_what_they_made() -> None:
     made = []
     for change in (lambda: None, lambda: None, lambda: scene.move(item, (20, 20))):
         change()
-        ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="composed"))
-        assert list(ran)[:5] == ["shots", "stack", "plan", "composition", "patterns"]
+        ran, left_out, bytes_made = stages(fire(scene, Disc(3), (4, 4), strategy="built"))
+        assert list(ran)[:5] == ["shots", "stack", "plan", "visible set", "patterns"]
         assert list(ran)[5:] == ["pre-filter", "samples", "rows"] and "verdicts" in left_out
-        made.append(bytes_made["composition"])
+        made.append(bytes_made["visible set"])
     assert made[0] == made[2] > 0 == made[1]
 
 
@@ -600,52 +598,77 @@ def test_what_a_scene_does_not_need_is_left_out() -> None:
     hits = fire(scene, Disc(3), (4, 4))
     _, left_out, bytes_made = stages(hits)
     unused = {"weights", "outside", "occluders", "layers", "filter", "broad phase", "volumes"}
-    assert unused | {"composition", "verdicts"} == set(left_out) and bytes_made["patterns"] > 0
-    _, left_out, bytes_made = stages(fire(scene, Disc(3, falloff="linear"), (4, 4)))
-    unused = unused - {"weights"} | {"pre-filter", "walk"}
-    assert unused | {"code plane"} == set(left_out) and bytes_made["patterns"] > 0
+    unused |= {"visible set", "label plane"}
+    assert unused | {"verdicts"} == set(left_out) and bytes_made["patterns"] > 0
+    _, left_out, bytes_made = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="spans"))
+    assert unused - {"weights"} | {"pre-filter", "walk"} == set(left_out) and bytes_made["patterns"] > 0
     for role in ("background", "mover", "hud"):
         scene.add(square(3), role=role)
     assert {"background", "mover", "hud"} <= set(stages(fire(scene, Disc(3), (4, 4)))[1])
     scene.add(square(3), role="occluder")
-    ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4)))
+    ran, left_out, _ = stages(fire(scene, Disc(3, falloff="linear"), (4, 4), strategy="spans"))
     assert "walk" in ran and not {"weights", "occluders", "walk"} & set(left_out)
     bounded = Scene((9, 9))
     assert "outside" not in stages(fire(bounded, Disc(3), (4, 4)))[1]
 
 
-def test_auto_says_why_and_changes_no_row() -> None:
-    """A single point is not worth a plane; a million samples over a crowd are."""
-    scene = Scene((64, 64))
-    for number in range(200):
-        scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
-    one = fire(scene, Point(falloff="linear"), (5, 5))
-    assert stages(one)[1]["code plane"].startswith("direct: about")
-    at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
-    many = fire(scene, Disc(8, falloff="linear"), at)
-    assert "us composed" in stages(many)[0]["code plane"]
-    assert many == fire(scene, Disc(8, falloff="linear"), at, strategy="direct")
-    assert "no bounds" in stages(fire(Scene(), Point(falloff="linear"), (0, 0)))[1]["code plane"]
+def way(hits: Hits) -> str:
+    """The way that answered a call, and why."""
+    return stages(hits)[0]["plan"]
 
 
-def test_auto_composes_for_bit_rows_when_it_pays() -> None:
-    """A hundred shots are not worth a composition, 4000 are; what is there is read, but for a few shots."""
+def test_auto_makes_what_pays_and_says_why() -> None:
+    """A hundred shots are not worth a visible set, 4000 are; what is there is read, but for a few shots."""
     scene = Scene((64, 64))
     for number in range(200):
         scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
     at = np.stack([np.arange(4000) % 64, np.arange(4000) // 64], axis=1)
-    direct = fire(scene, Disc(8), at, strategy="direct")
-    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "direct: few shots"
-    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"].startswith("direct: about")
-    many = fire(scene, Disc(8), at)
-    assert stages(many)[0]["plan"].startswith("composed: about") and many == direct
-    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"] == "composed: it is there"
-    assert stages(fire(scene, Disc(8), at[0]))[0]["plan"] == "direct: few shots"
-    assert stages(fire(scene, Disc(8), at[0], prefilter="box"))[0]["plan"] == "direct: a pre-filter was asked for"
-    differ = fire(scene, Disc(8), at[:2], exclude=[1, 2], strategy="composed")
-    assert stages(differ)[0]["plan"] == "direct: shots accept different items"
+    for weapon in (Disc(8), Disc(8, falloff="linear")):
+        scene.move(0, (1, 1))
+        scene.move(0, (0, 0))
+        assert re.fullmatch(r"tiles: visible would take \d+ us to make, \d+ us lost so far; about \d+ us",
+                            way(fire(scene, weapon, at[:99])))  # fmt: skip
+        many = fire(scene, weapon, at)
+        assert re.fullmatch(r"visible: calls have lost the \d+ us that it takes to make what it needs", way(many))
+        assert many == fire(scene, weapon, at, strategy="spans") and many
+        assert re.fullmatch(r"visible: about \d+ us", way(fire(scene, weapon, at[:99])))
+    assert re.fullmatch(r"integers: about \d+ us", way(fire(scene, Disc(8), at[0])))
+    asked = "tiles: not labels, as shots are not one pixel; not visible, as a pre-filter is asked for; asked for"
+    assert way(fire(scene, Disc(8), at[0], prefilter="box", strategy="built")) == asked
+    differ = fire(scene, Disc(8), at[:2], exclude=[1, 2], strategy="visible")
+    assert way(differ).startswith("integers: not visible, as shots accept different items; about")
     scene.move(0, (9, 9))
-    assert stages(fire(scene, Disc(8), at[:99]))[0]["plan"].startswith("direct: about")
+    assert way(fire(scene, Disc(8), at[:99])).startswith("tiles: visible would take")
+
+
+def test_what_is_too_large_for_bit_rows_is_counted_by_spans() -> None:
+    scene = Scene()
+    scene.add(square(9), (4000, 50))
+    at, large = [(0, 0), (3, 9)], Disc(9000)
+    assert way(fire(scene, large, at)) == "spans: the patterns are too large for bit rows"
+    assert len(fire(scene, large, at)) == 2
+
+
+def test_the_same_call_at_the_same_scene_takes_the_same_way() -> None:
+    """Whatever was fired at other scenes, with the same weapon or another, before or between."""
+    rng = np.random.default_rng(5)
+    at = rng.uniform(0, 64, (400, 2))
+    calls = [(Disc(4), at[:1]), (Disc(4), at), (Point(), at), (Disc(9, falloff="linear"), at[:50]), (Disc(4), at)] * 3
+
+    def ways(between: bool) -> list[str]:
+        scene, other = (Scene((64, 64)) for _ in range(2))
+        for number in range(60):
+            scene.add(square(9), (number * 7 % 64, number * 11 % 64), layer=number % 5)
+            other.add(square(3), (number, number))
+        taken = []
+        for weapon, places in calls:
+            if between:
+                fire(other, weapon, at)
+            taken.append(way(fire(scene, weapon, places)))
+        return taken
+
+    assert ways(False) == ways(True) == ways(False)
+    assert {text.split(":")[0] for text in ways(False)} >= {"integers", "tiles", "visible", "labels"}
 
 
 # Bad arguments
@@ -685,7 +708,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"seed": None}, r"seed: expected a whole number"),
     ({"shot": [0, -1]}, r"shot\[1\]: expected a whole number from 0"),
     ({"shot": [0, 1, 2]}, r"shot: expected shape \(2,\)"),
-    ({"strategy": "fast"}, r"strategy: expected one of 'auto', 'direct', 'composed', got 'fast'"),
+    ({"strategy": "fast"}, r"strategy: expected one of 'auto', 'direct', 'built', .*, got 'fast'"),
     ({"prefilter": "bax"}, r"prefilter: expected one of .* \(did you mean 'box'\?\)"),
 ]
 
@@ -803,7 +826,7 @@ def test_far_apart_items_under_a_giant_are_laid_one_by_one() -> None:
     assert 75 <= walked.bytes_made <= 75 + events
 
 
-@pytest.mark.parametrize("strategy", ["composed", "auto"])
+@pytest.mark.parametrize("strategy", ["built", "auto"])
 def test_threads_that_fire_at_once_agree(strategy: str) -> None:
     rng = np.random.default_rng(5)
     scene = Scene((300, 200))

@@ -17,7 +17,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Box, Disc, History, Laser, Pistol, Point, Rifle, Scene, Sprite, Weapon, fire, report_of
+from hitplanes import (
+    Box,
+    Disc,
+    History,
+    Laser,
+    Pistol,
+    Point,
+    Rifle,
+    Scene,
+    Spread,
+    Sprite,
+    Weapon,
+    fire,
+    report_of,
+)
 from hitplanes.planes.bits import bit_rows, distance_field, front_to_back, label_plane, visible
 from hitplanes.planes.broadphase import boxes
 from hitplanes.planes.scene import items, render
@@ -86,25 +100,19 @@ OF_BITS = [
     *OF_ALL,
     (BITFIRE, "placements_for", "patterns", 200),
     (BITFIRE, "pattern_bits_of", "patterns", 400),
-    (BITFIRE, "chosen_form", "plan", 10**3),
-    (BITFIRE, "chosen_candidates", "plan", 2 * 10**3),
-    (BITFIRE, "leave_out_uncounted", "rows", 4 * 10**3),
+    (FIRING, "chosen_way", "plan", 10**3),
+    (FIRING, "chosen_candidates", "plan", 2 * 10**3),
+    (FIRING, "leave_out_unused", "rows", 4 * 10**3),
+    (front_to_back, "front_to_back", "samples", 10**4),
+    (BITFIRE, "_rows_of", "samples", 2 * 10**4),
 ]
-OF_TILES = [
-    *OF_BITS,
-    (BITFIRE, "gathered", "samples", 10**4),
-    (items.Items, "tiles", "tiles", 10**5),
-    (Candidates, "near", "volumes", 10**6),
-    (BITFIRE, "refused", "filter", 10**7),
-    (BITFIRE, "in_front", "visible", 10**8),
-    (BITFIRE, "visible_tiles_of", "visible", 10**9),
-]
+OF_TILES = [*OF_BITS, (items.Items, "tiles", "tiles", 10**5)]
 OF_PATTERNS = [
     *OF_ALL,
     (RUNFIRE, "placements_for", "patterns", 200),
-    (RUNFIRE, "chosen_strategy", "plan", 10**3),
-    (RUNFIRE, "chosen_candidates", "plan", 2 * 10**3),
-    (RUNFIRE, "leave_out_unused", "plan", 4 * 10**3),
+    (FIRING, "chosen_way", "plan", 10**3),
+    (FIRING, "chosen_candidates", "plan", 2 * 10**3),
+    (FIRING, "leave_out_unused", "rows", 4 * 10**3),
     (RUNFIRE, "rows_of_span_hits", "rows", 10**4),
     (RESOLVE, "_count", "verdicts", 10**5),
     (PatternTable, "weight", "weights", 10**6),
@@ -148,46 +156,31 @@ OF_MARCH = [
 ]
 BOXES, INDEX = (Candidates, "meeting", "pre-filter", 10**12), (Candidates, "meeting", "broad phase", 10**12)
 CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]] = {
-    "bit rows": (Disc(9), {"strategy": "direct", "prefilter": "circle"}, [*OF_TILES, BOXES]),
-    "bit rows by an index": (
+    "tiles with a pre-filter": (
         Disc(9),
-        {"strategy": "direct", "prefilter": "circle", "broadphase": "grid"},
-        [*OF_TILES, INDEX],
+        {"strategy": "tiles", "prefilter": "circle"},
+        [*OF_TILES, (Candidates, "near", "volumes", 10**6), BOXES],
     ),
-    "bit rows front to back": (
+    "tiles by an index": (
         Disc(9),
-        {"strategy": "direct"},
+        {"strategy": "tiles", "prefilter": "circle", "broadphase": "grid"},
+        [*OF_TILES, (Candidates, "near", "volumes", 10**6), INDEX],
+    ),
+    "tiles": (Spread(Disc(9, falloff="linear"), 3, 5), {"strategy": "tiles"}, OF_TILES),
+    "visible": (
+        Disc(9),
+        {"strategy": "visible"},
         [
             *OF_BITS,
-            (items.Items, "tiles", "tiles", 10**5),
-            (front_to_back, "front_to_back", "samples", 10**6),
-            (BITFIRE, "rows_of", "samples", 10**7),
-        ],
-    ),
-    "bit rows composed": (
-        Disc(9),
-        {"strategy": "composed"},
-        [
-            *OF_BITS,
-            (BITFIRE, "rows_of", "samples", 10**4),
-            (visible.VisibleSets, "read", "composition", 10**5),
+            (visible.VisibleSets, "read", "visible set", 10**5),
             (visible.VisibleSet, "cells_for", "pre-filter", 10**6),
         ],
     ),
-    "direct": (Disc(9, falloff="linear"), {"strategy": "direct", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
-    "by an index": (
+    "spans": (Disc(9, falloff="linear"), {"strategy": "spans", "prefilter": "circle"}, [*OF_DIRECT, BOXES]),
+    "spans by an index": (
         Disc(9, falloff="linear"),
-        {"strategy": "direct", "prefilter": "circle", "broadphase": "grid"},
+        {"strategy": "spans", "prefilter": "circle", "broadphase": "grid"},
         [*OF_DIRECT, INDEX],
-    ),
-    "composed": (
-        Disc(9, falloff="linear"),
-        {"strategy": "composed"},
-        [
-            *OF_PATTERNS,
-            (label_plane.LabelPlane, "read", "code plane", 10**9),
-            (RESOLVE, "read_labels", "read", 10**10),
-        ],
     ),
     "rays": (Rifle(60, max_hits=2), {"aim": 30, "prefilter": "circle"}, [*OF_RAYS, BOXES]),
     "rays that march": (Pistol(60), {"aim": 30, "strategy": "march"}, OF_MARCH),
@@ -232,7 +225,7 @@ def test_the_times_are_those_of_the_call() -> None:
     """What no stage counts is less than a tenth."""
     scene = yard(full=True)
     at = np.random.default_rng(3).uniform(0, 80, (3000, 2))
-    for weapon, how in ((Disc(6), {"strategy": "direct"}), (Disc(6), {"strategy": "composed"}), (Laser(90), {})):
+    for weapon, how in ((Disc(6), {"strategy": "direct"}), (Disc(6), {"strategy": "built"}), (Laser(90), {})):
         shares = []
         for _ in range(5):  # another process may come in between
             begin = time.perf_counter_ns()
@@ -392,11 +385,11 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
 def mixed() -> dict[str, Hits]:
     """A shot of each way, at nothing but objects on one layer, that nothing is asked of."""
     return {
-        "direct": fire(yard(), Disc(9, falloff="linear"), SHOTS, strategy="direct"),
-        "composed": fire(yard(), Disc(9, pierce=True, falloff="linear"), SHOTS, strategy="composed"),
-        "bit rows": fire(yard(), Disc(9), SHOTS, strategy="direct"),
+        "spans": fire(yard(), Disc(9, falloff="linear"), SHOTS, strategy="spans"),
+        "visible": fire(yard(), Disc(9, pierce=True, falloff="linear"), SHOTS, strategy="visible"),
+        "tiles": fire(yard(), Disc(9), SHOTS, strategy="tiles"),
         "few": fire(yard(), Disc(9), SHOTS),
-        "points": fire(yard(), Point(), SHOTS, strategy="composed"),
+        "points": fire(yard(), Point(), SHOTS, strategy="built"),
         "rays": fire(yard(), Laser(60), SHOTS, aim=30),
         "unbounded": fire(yard(None), Disc(9, falloff="linear"), SHOTS),
     }
@@ -426,9 +419,9 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
     filtered = False
     for hits in mixed().values():
         assert hits and names(hits)[1] >= {"occluders", "layers", "filter"}
-    for falloff in ("linear", None):
-        full = fire(yard(full=True), Disc(9, falloff=falloff), SHOTS)
-        assert ("occluders" in names(full)[0]) == bool(falloff) and not {"occluders", "layers"} & names(full)[1]
+    for way in ("spans", "tiles"):
+        full = fire(yard(full=True), Disc(9), SHOTS, strategy=way)
+        assert ("occluders" in names(full)[0]) == (way == "spans") and not {"occluders", "layers"} & names(full)[1]
     filtered = True
     assert "filter" not in names(fire(yard(), Disc(9), SHOTS, exclude=5))[1]
     unmet = yard()
@@ -461,7 +454,6 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
 
     for owner, name in (
         (RESOLVE, "refused"), (BITFIRE, "refused"), (TRACING, "refused"), (contacts, "_end_at_occluders"),
-        (RESOLVE, "_look_behind"),
         (weapon_module, "falloff_weights"), (label_plane.LabelPlane, "read"), (boxes.Index, "read"),
         (Candidates, "near"), (prefilter, "near_rays"), (render, "draw_view"), (PatternTable, "weight"),
         (RAYFIRE, "leave_out_absent"),
@@ -469,18 +461,19 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
         count(owner, name)
     hits = {"direct": fire(yard(), Disc(9), SHOTS, strategy="direct"), "rays": fire(yard(), Laser(60), SHOTS, aim=30)}
     assert all(hits.values()) and called == {"leave_out_absent": 1}
-    fire(yard(), Disc(9), SHOTS, strategy="composed")
+    fire(yard(), Disc(9), SHOTS, strategy="built")
     assert called == {"leave_out_absent": 1}
     assert fire(yard(), Disc(9.03125), SHOTS).verdict_counts()["hit"]
     assert called == {"leave_out_absent": 1, "weight": 1}  # of the verdicts, that are asked for
     called.clear()
-    fire(yard(), Disc(9), SHOTS, strategy="direct", exclude=[[5], *[[4]] * 8], prefilter="box")
-    assert called == {"refused": 2}  # what shots come near, and what lies in front of that
-    fire(yard(full=True), Disc(9.03125, falloff="linear"), SHOTS, strategy="composed", exclude=5)
+    fire(yard(), Disc(9), SHOTS, strategy="spans", exclude=[[5], *[[4]] * 8], prefilter="box")
+    assert called == {"refused": 1, "weight": 1}
+    fire(yard(full=True), Disc(9.03125, falloff="linear"), SHOTS, strategy="built", exclude=5)
+    fire(yard(full=True), Point(), SHOTS, strategy="built")
     fire(yard(full=True), Disc(9), SHOTS, strategy="direct", prefilter="circle", broadphase="grid")
     fire(yard(full=True), Laser(60), SHOTS, aim=30, exclude=5, prefilter="circle")
     assert set(called) == {
-        "refused", "_end_at_occluders", "_look_behind", "falloff_weights", "read", "near", "near_rays", "weight",
+        "refused", "_end_at_occluders", "falloff_weights", "read", "near", "near_rays", "weight",
         "leave_out_absent",
     }  # fmt: skip
 
@@ -491,11 +484,11 @@ def test_no_run_is_laid_out_for_bounds_that_nothing_reaches_over(monkeypatch: py
     monkeypatch.setattr(PatternTable, "laid", lambda *args: laid.append(1) or lay(*args))
     for size_wh, at, times in ((None, (20, 20), 1), ((99, 79), (20, 20), 1), ((99, 79), (8, 25), 2)):
         laid.clear()
-        hits = fire(yard(size_wh), Disc(9, falloff="linear"), at, strategy="direct")
+        hits = fire(yard(size_wh), Disc(9, falloff="linear"), at, strategy="spans")
         assert len(laid) == times and bool(hits.verdict_counts()["outside"]) == (times == 2)
 
 
-@pytest.mark.parametrize("way", ["direct", "composed", "rays"])
+@pytest.mark.parametrize("way", ["direct", "built", "rays"])
 def test_imagery_costs_a_shot_nothing(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Background, movers and HUD are told to be left out; else nothing changes."""
     scenes = yard(), yard()
@@ -576,5 +569,5 @@ def test_each_thing_alone_adds_what_is_its_own() -> None:
     assert changed["imagery"] == set(IMAGERY)
     assert changed["occluders"] == {"stack", "tiles", "occluders", "samples"}
     assert changed["filter"] == {"filter", "samples"}
-    by_runs = {"weights", "verdicts", "walk", "code plane"}
-    assert changed["falloff"] == {"patterns", "tiles", "pre-filter", "composition", "samples", "rows"} | by_runs
+    by_runs = {"weights", "verdicts", "walk", "label plane"}
+    assert changed["falloff"] == {"patterns", "tiles", "pre-filter", "visible set", "samples", "rows"} | by_runs

@@ -103,7 +103,7 @@ def test_the_coarse_map_is_made_when_it_pays_and_gone_after_a_change(jit: bool) 
     some = scene.add(Sprite.from_mask(np.ones((5, 5), np.bool_)), (20, 20))
 
     def hits(x: float, looks: int) -> int:
-        return len(fire(scene, Point(), np.full((looks, 2), x), strategy="composed"))
+        return len(fire(scene, Point(), np.full((looks, 2), x), strategy="built"))
 
     assert [hits(20, 30), hits(50, 33)] == [30, 0]
     plane = scene.label_plane()

@@ -231,11 +231,11 @@ def test_options_go_along() -> None:
     shots = volley(Disc(15), 6, random.Random(1))
     ticks = [0, 10, 0, 30, 10, 50]
     first = fire(history, Disc(15), tick=ticks, **shots)
-    for options in ({"strategy": "composed"}, {"prefilter": "circle", "broadphase": "bvh"}, {"prefilter": "none"}):
+    for options in ({"strategy": "built"}, {"prefilter": "circle", "broadphase": "bvh"}, {"prefilter": "none"}):
         hits = fire(history, Disc(15), tick=ticks, **shots, **options)  # type: ignore[arg-type]
         assert hits == first
         ran = [stage.name for stage in hits.plan.ran]
-        assert ("composition" in ran) == (options == {"strategy": "composed"})
+        assert ("visible set" in ran) == (options == {"strategy": "built"})
     with pytest.raises(InputError, match="prefilter: expected one of"):
         fire(history, Disc(15), tick=ticks, **shots, prefilter="sphere")
 
@@ -260,7 +260,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
                 strategy=strategy,
             )
     fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, broadphase="bvh")
-    fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, strategy="composed")
+    fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, strategy="built")
     assert scene._label_plane is None and scene._indexes == {}
     monkeypatch.undo()
     assert before == (scene.version, scene.content_hash())

@@ -93,7 +93,7 @@ BLAST, RAY = Disc(3), Laser(300)
 
 
 def fire_some(scene: Scene) -> None:
-    for strategy in ("direct", "composed"):
+    for strategy in ("direct", "built"):
         fire(scene, BLAST, [(9, 9), (50, 50)], strategy=strategy, prefilter="circle", broadphase="grid")
     fire(scene, BLAST, [(9, 9)] * 20)
     fire(scene, RAY, (0, 9), aim=0)

@@ -49,7 +49,7 @@ def test_rows_hang_on_no_number_of_threads(threads: int, monkeypatch: pytest.Mon
             truth = fire(scene, weapon, at, strategy="direct", **how)
             use_jit(True)
             use_threads(threads)
-            for strategy in ("direct", "composed"):
+            for strategy in ("direct", "built"):
                 assert fire(scene, weapon, at, strategy=strategy, **how) == truth, f"{weapon} {strategy} {how}"
             rows += len(truth)
     assert rows > 500 and (len(used) > 1) == (threads > 1)

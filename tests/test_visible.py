@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Beam, Disc, Scene, fire, use_jit
+from hitplanes import Beam, Disc, Scene, fire
 from hitplanes.planes.bits import cells as cells_module
 from hitplanes.planes.bits import visible
 from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
@@ -55,14 +55,14 @@ def test_more_views_in_turn_than_are_kept_lose_anew_before_each_is_composed_agai
 
 @pytest.mark.parametrize("corner", CORNERS)
 def test_few_placements_do_without_lists(jit: bool, corner: tuple[int, int]) -> None:
-    """Rows of the first shots, of those that pay for lists, and of shots far off are those of direct ones."""
+    """Rows of few shots, of those that pay for lists, and of shots far off are those of direct ones."""
     scene = crowd(corner=corner)
     rng = np.random.default_rng(2)
     seen, rows = set(), 0
-    for k in range(WITHOUT_MOST // 4 + 8):
-        weapon = Beam(60 + k % 20, 5) if k % 2 else Disc(3 + k)
-        at = np.array(corner) + rng.integers(-50, 450, (4, 2)) + rng.choice([0, 0, 10**6], (4, 1))
-        hits = fire(scene, weapon, at, aim=float(k), strategy="composed")
+    for k in range(20):
+        weapon, shots = Beam(60 + k % 20, 5) if k % 2 else Disc(3 + k), 4 if k % 3 else WITHOUT_MOST + 1
+        at = np.array(corner) + rng.integers(-50, 450, (shots, 2)) + rng.choice([0, 0, 10**6], (shots, 1))
+        hits = fire(scene, weapon, at, aim=float(k), strategy="built")
         rows += len(hits)
         assert hits == fire(scene, weapon, at, aim=float(k), strategy="direct")
         (stage,) = (stage for stage in hits.plan.ran if stage.name == "pre-filter")
@@ -78,9 +78,10 @@ def test_many_placements_are_worth_lists_and_those_that_are_there_cost_nothing()
     small, large = np.array([-3, -3, 3, 3]), np.array([-40, -40, 40, 40])
     cells, made = visible_set.cells_for(small, WITHOUT_MOST + 1)
     assert made == cells.nbytes > 0 and visible_set.cells_for(small, 1) == (cells, 0)
-    everything, made = visible_set.cells_for(large, WITHOUT_MOST)
-    assert made == 0 and everything.listed.tolist() == list(range(len(visible_set.seen.rank)))
-    assert visible_set.cells_for(large, 1)[1] > 0
+    for _ in range(2):
+        everything, made = visible_set.cells_for(large, WITHOUT_MOST)
+        assert made == 0 and everything.listed.tolist() == list(range(len(visible_set.seen.rank)))
+    assert visible_set.cells_for(large, WITHOUT_MOST + 1)[1] > 0
 
 
 def test_pairs_of_placements_and_tiles_that_are_compared_are_not_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,19 +99,6 @@ def test_nothing_can_be_seen_of_no_objects() -> None:
     visible_set = VisibleSet(*what(Scene()))
     cells, made = visible_set.cells_for(np.array([-3, -3, 3, 3]), 1)
     assert made == 0 and not len(cells.listed)
-
-
-def test_distances_along_rows_are_counted_where_they_are_made() -> None:
-    scene = crowd()
-    at = np.random.default_rng(3).integers(0, 400, (200, 2))
-    try:
-        use_jit(False)
-        told = [fire(scene, Disc(9), at, strategy="composed").plan.ran for _ in range(2)]
-    finally:
-        use_jit(None)
-    first, second = (next(stage.bytes_made for stage in ran if stage.name == "samples") for ran in told)
-    visible_set = scene.visible_sets().kept(View(False, ALL, ()), scene.version)
-    assert visible_set is not None and first - second == visible_set.beside.nbytes > 0
 
 
 @pytest.mark.parametrize("size", [(1, 1), (250, 1), (1, 250), (70, 250)])

@@ -1,46 +1,69 @@
-"""Placed patterns against tiles of bit rows: against ordered tiles, front to back, or against visible tiles, by cells.
+"""The one loop of areas: placed patterns against tiles of bit rows, front to back.
 
-Ordered tiles need no preparation: they serve scenes in which everything moves, few shots, and shots that accept
-different items. All functions map arrays to arrays; `jit.areas` has the compiled kernels.
+It serves tiles as they lie in the stack, which need no preparation, and the visible tiles of a scene that stands still,
+which hide nothing from each other and are listed by cells. All functions map arrays to arrays; `jit.areas` has the
+compiled form of the loop. The rule is that of `span_walk.walk`, the reference, and is compared with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
-from math import isqrt
-from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common.backend import kernels_of
 from ..common.checks import Bools, Ints
 from ..grid.spans import Box, begins, ragged
 from . import bit_rows
-from .bit_rows import (
-    WORD,
-    Beside,
-    PatternBits,
-    Placed,
-    TileHits,
-    VisibleTiles,
-    Words,
-    found,
-    nearest,
-    placed_boxes,
-    rows_of,
-)
+from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, sums_of, weights_of
 from .cells import Cells, listed_at, met_boxes
 
-NOT_BESIDE: Beside = np.zeros((0, WORD, 0), np.uint8)
-"""No distances along rows: the nearest pixel is searched among the pixels that are hit."""
+WORDS_AT_ONCE = 2**16
+"""Words of pairs worked on at a time: 512 KB; with fewer, the calls of numpy take longer."""
 
-PAIRS_AT_ONCE = 2**16
-"""Approximate number of pairs of placements and tiles counted at a time: 512 KB for each of their columns."""
+FRONTS_AT_ONCE = 2**14
+"""Most pairs of tiles near the same placement that are all listed; of more, only those that meet are listed."""
 
-PAIRED = 8
-"""Most pellets on one tile whose boxes are compared pair by pair."""
+NO_FLAGS, NO_NUMBERS = np.zeros(0, np.bool_), np.zeros(0, np.int64)
+
+
+class OrderedTiles(NamedTuple):
+    """Tiles at their places in the world, front to back, as columns.
+
+    Parameters
+    ----------
+    rank : (T,) place in the stack of each tile's item, rising
+    box_xyxy : (T, 4) inclusive, px
+    begin : (T,) first row in `words`
+    words : flat rows, with WORD empty ones before and after each tile
+    occluder : (T,) whether the item is an occluder, which no shot hits; (0,) if there are none
+    categories, owner : (T,) category bits and owner of the item; (0,) if no shot refuses an item
+    """
+
+    rank: Ints
+    box_xyxy: Ints
+    begin: Ints
+    words: Words
+    occluder: Bools = NO_FLAGS
+    categories: Ints = NO_NUMBERS
+    owner: Ints = NO_NUMBERS
+
+
+class Rule(NamedTuple):
+    """What pixels of placements are stopped by.
+
+    Parameters
+    ----------
+    pierce : whether they go on through objects; they end at occluders
+    bounds : box beyond which nothing is hit
+    accept : category bits of all placements, or (P,) of each; None refuses nothing
+    exclude : owners whose items are skipped, (1, K) for all placements or (P, K), -1 for none
+    """
+
+    pierce: bool
+    bounds: Box | None = None
+    accept: Ints | int | None = None
+    exclude: Ints | None = None
 
 
 class RoundHits(NamedTuple):
@@ -50,201 +73,37 @@ class RoundHits(NamedTuple):
     ----------
     turn : number of the round among those of all shots
     rank : place of the item in the stack
-    samples, pixels, pellets : pixels of all pellets; distinct pixels; pellets that hit
-    distance2, x, y : the hit pixel that is nearest to the round's own
+    samples : pixels of all pellets
+    distance2, x, y : the hit pixel that is nearest to the round's own, the first by (distance2, y, x)
+    weight : sum of the weights of the pixels; None at full weight
+    pixels, pellets : distinct pixels, and pellets that hit; None if a round has one pellet
     """
 
     turn: Ints
     rank: Ints
     samples: Ints
-    pixels: Ints
-    pellets: Ints
     distance2: Ints
     x: Ints
     y: Ints
+    weight: Ints | None = None
+    pixels: Ints | None = None
+    pellets: Ints | None = None
 
 
-def gathered(
-    placed: Placed, windows: PatternBits, seen: VisibleTiles, placement: Ints, near: Ints, each: int
-) -> RoundHits:
-    """Count the pixels that rounds of `each` pellets share with items, as many pairs at a time as fit the cache.
+class TileHits(NamedTuple):
+    """Pixels that placements and tiles share, as columns (n,), sorted by (placement, tile); see `RoundHits`.
 
-    Parameters
-    ----------
-    placed : pellets, sorted by round; the origins are those of the rounds (T,)
-    placement, near : (n,) sorted pairs of a pellet and a visible tile that may meet
-    """
-    origin = placed.origin_x, placed.origin_y
-    if each > 1:
-        placed = Placed(*placed[:3], *(column.repeat(each) for column in origin))
-    edges = [0, len(placement)]
-    if len(placement) > PAIRS_AT_ONCE:
-        turn = placement // each
-        wanted = turn[PAIRS_AT_ONCE::PAIRS_AT_ONCE]
-        edges = [0, *np.unique(np.searchsorted(turn, wanted)).tolist(), len(placement)]
-    kernels = kernels_of(bit_rows)
-    parts = [
-        _counted_by_round(placed, windows, seen, placement[a:b], near[a:b], each, kernels) for a, b in pairwise(edges)
-    ]
-    return parts[0] if len(parts) == 1 else RoundHits(*map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _counted_by_round(
-    placed: Placed,
-    windows: PatternBits,
-    seen: VisibleTiles,
-    placement: Ints,
-    near: Ints,
-    each: int,
-    kernels: ModuleType,
-) -> RoundHits:
-    """Like `gathered`, for one part of the pairs; those of a round are in one part."""
-    found: TileHits = kernels.found(placed, windows, seen, placement, near, NOT_BESIDE)
-    rank, samples = seen.rank[found.seen], found.samples
-    turn = found.placement // each
-    pixels, pellets = samples, np.ones_like(samples)
-    if each > 1 or (seen.rank[1:] == seen.rank[:-1]).any():
-        order = kernels.row_order(turn, rank, found.seen, found.placement)
-        found, rank, turn = TileHits(*(column[order] for column in found)), rank[order], turn[order]
-        first = np.flatnonzero(begins(turn) | begins(rank))
-        samples = pixels = _sums(found.samples, first)
-        if each > 1:
-            pellets, pixels = _distinct(placed, windows, seen, found, first, kernels)
-        best = _nearest(found, first, kernels)
-        found, rank, turn = TileHits(*(column[best] for column in found)), rank[best], turn[best]
-    order = kernels.row_order(turn, found.distance2, found.y, found.x)
-    columns = turn, rank, samples, pixels, pellets[: len(turn)], found.distance2, found.x, found.y
-    return RoundHits(*(column[order] for column in columns))
-
-
-def _sums(values: Ints, first: Ints) -> Ints:
-    """Sums of groups that begin at `first`."""
-    return np.add.reduceat(values, first) if len(first) else np.zeros(0, np.int64)
-
-
-def _nearest(found: TileHits, first: Ints, kernels: ModuleType) -> Ints:
-    """The pair of each group whose pixel is nearest to the origin."""
-    new = np.zeros(len(found.seen), np.int64)
-    new[first] = 1
-    group = np.cumsum(new)
-    return np.asarray(kernels.row_order(group, found.distance2, found.y, found.x)[first])
-
-
-def _distinct(
-    placed: Placed, windows: PatternBits, seen: VisibleTiles, found: TileHits, first: Ints, kernels: ModuleType
-) -> tuple[Ints, Ints]:
-    """Pellets that hit, and distinct pixels, of each group; its pairs are sorted by (tile, placement)."""
-    new = begins(found.seen)
-    new[first] = True
-    tile = np.flatnonzero(new)
-    together, length = _sums(found.samples, tile), np.diff(tile, append=len(new))
-    several = np.flatnonzero(length > 1)
-    several = several[_may_overlap(placed, windows, found.placement, tile[several], length[several])]
-    if len(several):
-        length = length[several]
-        group, place = ragged(length)
-        pair = tile[several][group] + place
-        first_of = np.cumsum(length) - length
-        together[several] = kernels.union(placed, windows, seen, found.placement[pair], found.seen[pair], first_of)
-    group = np.searchsorted(first, np.arange(len(new)), side="right") - 1
-    order = kernels.row_order(group, found.placement, group, group)
-    new = begins(found.placement[order])
-    new[first] = True
-    return _sums(new.astype(np.int64), first), _sums(together, np.searchsorted(tile, first))
-
-
-def _may_overlap(placed: Placed, windows: PatternBits, placement: Ints, begin: Ints, length: Ints) -> Bools:
-    """Whether boxes of pellets overlap in each group (n,), of `length` placements from `begin` on.
-
-    The answer is True for groups of more than PAIRED pellets.
-    """
-    few = np.flatnonzero(length <= PAIRED)
-    group, place = ragged(length[few])
-    pair, step = ragged(length[few][group] - 1 - place)
-    group, place = few[group[pair]], place[pair]
-    pellets = placed._replace(pattern=placed.pattern[placement], x=placed.x[placement], y=placed.y[placement])
-    left, top, right, low = placed_boxes(pellets, windows)
-    a = begin[group] + place
-    b = a + 1 + step
-    met = (left[a] <= right[b]) & (left[b] <= right[a])
-    met &= (top[a] <= low[b]) & (top[b] <= low[a])
-    overlap = length > PAIRED
-    overlap[group[met]] = True
-    return overlap
-
-
-def item_rows(found: TileHits, placed: Placed, rank: Ints) -> TileHits:
-    """Hits of items from hits of tiles: those of one placement and item are added up.
-
-    Parameters
-    ----------
-    found : sorted by (placement, tile)
-    rank : (T,) place in the stack of the item of each tile, rising
-
-    Returns
-    -------
-    for each item the first of its tiles that is hit, the samples of all of them, and the nearest pixel; sorted by
-    (placement, distance2, y, x, tile)
-    """
-    order = _row_order(found, placed)
-    item, who = rank[found.seen], found.placement
-    same = (item[1:] == item[:-1]) & (who[1:] == who[:-1])
-    if not np.logical_or.reduce(same):
-        return TileHits(who, *[column[order] for column in found[1:]])
-    first = np.concatenate(([True], ~same)).nonzero()[0]
-    turn = np.empty_like(order)
-    turn[order] = np.arange(len(order))
-    soonest = np.minimum.reduceat(turn, first)
-    by_turn = soonest.argsort()
-    nearest = order[soonest[by_turn]]
-    samples = np.add.reduceat(found.samples, first)[by_turn]
-    return TileHits(who[nearest], found.seen[first[by_turn]], samples, *[column[nearest] for column in found[3:]])
-
-
-# house: row order
-def _row_order(found: TileHits, placed: Placed) -> Ints:
-    """Order of pairs (n,) by (placement, distance2, y, x, place); they are sorted by placement already."""
-    who = found.placement
-    most = int(np.maximum.reduce(found.distance2, initial=0))
-    high = isqrt(most) + 1  # no pixel lies so far above or below its origin
-    if len(who) and (int(who[-1]) + 1) * (most + 1) * (2 * high) * 2 >= 2**63:
-        return np.lexsort((found.x, found.y, found.distance2, who))
-    key = who * (most + 1)
-    key += found.distance2
-    key *= 2 * high
-    key += found.y - placed.origin_y[who]
-    key += key
-    key += found.x > placed.origin_x[who]  # at most one pixel of a row lies at this distance on each side
-    return key.argsort(kind="stable")
-
-
-WORDS_AT_ONCE = 2**16
-"""Words of pairs worked on at a time: 512 KB; with fewer, the calls of numpy take longer."""
-
-FRONTS_AT_ONCE = 2**14
-"""Most pairs of tiles near the same placement that are all listed; of more, only those that meet are listed."""
-
-
-class OrderedTiles(NamedTuple):
-    """The tiles of a stack at their places in the world, front to back, as columns.
-
-    Parameters
-    ----------
-    rank : (T,) place in the stack of each tile's item, rising
-    box_xyxy : (T, 4) inclusive, px
-    begin : (T,) first row in `words`
-    words : flat rows, with WORD empty ones before and after each tile
-    occluder : (T,) whether the item is an occluder, which no shot hits; (0,) if there are none
-    categories, owner : (T,) category bits and owner of the item
+    `pixels` counts those that no earlier pellet of the round hit on the tile.
     """
 
+    placement: Ints
     rank: Ints
-    box_xyxy: Ints
-    begin: Ints
-    words: Words
-    occluder: Bools
-    categories: Ints
-    owner: Ints
+    samples: Ints
+    distance2: Ints
+    x: Ints
+    y: Ints
+    weight: Ints | None
+    pixels: Ints | None
 
 
 class Near(NamedTuple):
@@ -268,110 +127,118 @@ class Near(NamedTuple):
 
 def front_to_back(
     placed: Placed,
+    each: int,
     windows: PatternBits,
-    ordered: OrderedTiles,
-    accept: Ints | int | None,
-    exclude: Ints | None,
-    pierce: bool,
-    bounds: Box | None,
-) -> TileHits:
+    tiles: OrderedTiles,
+    rule: Rule,
+    near: Cells | tuple[Ints, Ints] | None = None,
+) -> RoundHits:
     """Hits of placed patterns: each pixel of a pattern ends at the first accepted item that covers it, front to back.
 
     Parameters
     ----------
-    accept : category bits of all placements, or (P,) of each; None refuses nothing
-    exclude : owners whose items are skipped, (1, K) for all placements or (P, K), -1 for none; or None
-    pierce : whether pixels go on through objects; they end at occluders
-    bounds : box beyond which nothing is hit
-
-    Returns
-    -------
-    pairs of a placement and an item: `seen` is the item's first tile that is hit, `samples` those of all its tiles,
-    and the pixel the nearest to the origin; sorted by (placement, distance2, y, x, rank)
+    placed : pellets, sorted by round, `each` of a round
+    near : lists of the tiles, by cells for the box around the patterns; or sorted pairs (n,) of a placement and a tile
+        that may meet; None: all boxes are compared
     """
-    near, height = _near(placed, windows, ordered, accept, exclude)
+    pairs, height = _near(placed, windows, tiles, rule, near)
+    hides = not rule.pierce or len(tiles.occluder) > 0
     parts = []
-    for part in _parts(near, max(WORDS_AT_ONCE // height, 1)):
-        pairs, rows = _shared(placed, windows, ordered, part, height)
-        if len(rows):
-            _hide(rows, ordered, pairs, pierce)
-            if bounds is not None:
-                bit_rows.cut_off(rows, pairs.left, pairs.top, bounds)
-            parts.append(_counted(placed, ordered, pairs, rows))
-    if not parts:
-        return TileHits(*[np.zeros(0, np.int64)] * 6)
-    found = parts[0] if len(parts) == 1 else TileHits(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-    return item_rows(found, placed, ordered.rank)
+    for these in _parts(pairs, max(WORDS_AT_ONCE // height, 1), each):
+        part, rows = these, _shared(placed, windows, tiles, these, height)
+        if hides:
+            some = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
+            part, rows = these.at(some), rows[some]
+            _hide(rows, tiles, part, rule.pierce)
+        if rule.bounds is not None:
+            bit_rows.cut_off(rows, part.left, part.top, rule.bounds)
+        parts.append(_counted(placed, each, windows, tiles, part, rows))
+    return hits_of_rounds(_joined(parts), each)
 
 
 def _near(
-    placed: Placed, windows: PatternBits, ordered: OrderedTiles, accept: Ints | int | None, exclude: Ints | None
+    placed: Placed, windows: PatternBits, tiles: OrderedTiles, rule: Rule, near: Cells | tuple[Ints, Ints] | None
 ) -> tuple[Near, int]:
     """Pairs of a placement and an accepted tile whose box and strip meet; and the number of rows to compare."""
-    asked = bit_rows.placed_boxes(placed, windows)
-    placement, tile = met_boxes(asked.T, ordered.box_xyxy)
-    placement, tile = bit_rows.crossing(placed, windows, ordered.box_xyxy.T, placement, tile)
-    left, top = ordered.box_xyxy[:, 0], ordered.box_xyxy[:, 1]
-    high = int(np.maximum.reduce(ordered.box_xyxy[:, 3] - top, initial=0)) + 1
-    low = int(np.maximum.reduce(asked[3] - asked[1], initial=0)) + 1
-    near = Near(placement, tile, left[tile], top[tile] if low >= high else asked[1][placement])
-    if accept is None:
-        return near, min(high, low)
-    return near.at(_accepted(ordered, accept, exclude, placement, tile).nonzero()[0]), min(high, low)
+    asked, sides = bit_rows.placed_boxes(placed, windows), tiles.box_xyxy.T
+    if near is None:
+        placement, tile = met_boxes(asked.T, tiles.box_xyxy)
+    else:
+        placement, tile = listed_at(near, placed.x, placed.y) if isinstance(near, Cells) else near
+        placement, tile = _meeting(asked, sides, placement, tile)
+    placement, tile = bit_rows.crossing(placed, windows, sides, placement, tile)
+    if rule.accept is not None:
+        rows = _accepted(tiles, rule.accept, rule.exclude, placement, tile).nonzero()[0]
+        placement, tile = placement.take(rows), tile.take(rows)
+    high, low = (_eights(int(np.maximum.reduce(box[3] - box[1], initial=0)) + 1) for box in (sides, windows.box_xyxy.T))
+    top = sides[1].take(tile) if low >= high else asked[1].take(placement)
+    return Near(placement, tile, sides[0].take(tile), top), min(high, low)
 
 
-def _accepted(ordered: OrderedTiles, accept: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
+def _eights(rows: int) -> int:
+    """The next multiple of 8, by which rows are counted."""
+    return max(-(-rows // 8) * 8, 8)
+
+
+def _meeting(asked: Ints, sides: Ints, placement: Ints, tile: Ints) -> tuple[Ints, Ints]:
+    """Pairs (n,) whose boxes share a pixel; `asked` and `sides` are the sides (4, m) of boxes."""
+    for axis in (0, 1):
+        met = sides[axis].take(tile) <= asked[axis + 2].take(placement)
+        met &= sides[axis + 2].take(tile) >= asked[axis].take(placement)
+        rows = met.nonzero()[0]
+        placement, tile = placement.take(rows), tile.take(rows)
+    return placement, tile
+
+
+def _accepted(tiles: OrderedTiles, accept: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
     """Which tiles of pairs (n,) their placements accept."""
     bits = accept if isinstance(accept, int) else accept[placement]
-    accepted = (ordered.categories[tile] & bits) != 0
+    accepted = (tiles.categories[tile] & bits) != 0
     if exclude is not None:
         owners = exclude[placement] if len(exclude) > 1 else exclude
-        accepted &= (ordered.owner[tile][:, None] != owners).all(axis=1)
+        accepted &= (tiles.owner[tile][:, None] != owners).all(axis=1)
     return np.asarray(accepted)
 
 
-def _parts(near: Near, most: int) -> Iterator[Near]:
-    """Parts of about `most` pairs; those of a placement stay together."""
+def _parts(near: Near, most: int, each: int) -> Iterator[Near]:
+    """Parts of about `most` pairs; those of a round stay together."""
     count, begin = len(near.tile), 0
-    while begin == 0 or begin < count:
+    while begin < count:
         end = min(begin + most, count)
         if end < count:
-            end = int(near.placement.searchsorted(near.placement[end], side="right"))
+            end = int(near.placement.searchsorted((near.placement[end] // each + 1) * each))
         yield near if end - begin == count else near.at(slice(begin, end))
-        begin = max(end, 1)
+        begin = end
 
 
-def _shared(placed: Placed, windows: PatternBits, ordered: OrderedTiles, near: Near, height: int) -> tuple[Near, Words]:
-    """Pairs that share pixels, and those pixels (n, height)."""
-    rows = rows_of(ordered.words, height, _first(ordered, near.tile, near.top))
-    who = near.placement
-    pattern = bit_rows.which(placed, windows, who)
-    rows &= bit_rows.windows_at(windows, height, pattern, near.left - placed.x[who], near.top - placed.y[who])
-    some = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
-    return near.at(some), rows[some]
+def _shared(placed: Placed, windows: PatternBits, tiles: OrderedTiles, near: Near, height: int) -> Words:
+    """Pixels (n, height) that pairs share."""
+    rows, who = rows_of(tiles.words, height, _first(tiles, near.tile, near.top)), near.placement
+    left, top = near.left - placed.x.take(who), near.top - placed.y.take(who)
+    rows &= bit_rows.windows_at(windows, height, bit_rows.which(placed, windows, who), left, top)
+    return rows
 
 
-def _first(ordered: OrderedTiles, tile: Ints, top: Ints) -> Ints:
+def _first(tiles: OrderedTiles, tile: Ints, top: Ints) -> Ints:
     """Places (n,) in `words` of the rows at y = `top`; up to WORD rows before a tile's first or after its last."""
-    first = ordered.begin[tile]
-    first -= ordered.box_xyxy[:, 1][tile]
+    first = tiles.begin[tile]
+    first -= tiles.box_xyxy[:, 1][tile]
     first += top
     return first
 
 
-# house: hit rule of areas
-def _hide(rows: Words, ordered: OrderedTiles, near: Near, pierce: bool) -> None:
+def _hide(rows: Words, tiles: OrderedTiles, near: Near, pierce: bool) -> None:
     """Clear the pixels (n, height) that are covered by a tile in front at which they end."""
-    of, front, right = _fronts(ordered, near, rows.shape[1])
+    of, front, right = _fronts(tiles, near, rows.shape[1])
     if pierce:
-        ends = ordered.occluder[front].nonzero()[0] if len(ordered.occluder) else np.zeros(0, np.int64)
+        ends = tiles.occluder[front].nonzero()[0]
         of, front, right = of[ends], front[ends], right[ends]
     height = rows.shape[1]
     step = max(WORDS_AT_ONCE // height, 1)
     for first in range(0, len(of), step):
         now = slice(first, first + step)
         own, by = of[now], right[now]
-        cover = rows_of(ordered.words, height, _first(ordered, front[now], near.top[own]))
+        cover = rows_of(tiles.words, height, _first(tiles, front[now], near.top[own]))
         cover <<= np.maximum(by, 0).view(np.uint64)[:, None]
         cover >>= np.maximum(-by, 0).view(np.uint64)[:, None]
         np.invert(cover, out=cover)
@@ -381,73 +248,117 @@ def _hide(rows: Words, ordered: OrderedTiles, near: Near, pierce: bool) -> None:
         rows[own] &= cover
 
 
-def _fronts(ordered: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, Ints]:
+def _fronts(tiles: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, Ints]:
     """Tiles in front of those of pairs (n,) near the same placement, as sorted (pair, tile, columns to the right)."""
     count = len(near.tile)
     start = near.placement.searchsorted(near.placement)
     before = np.arange(count) - start
     end = before.cumsum()
-    total = int(end[-1])
+    total = int(end[-1]) if count else 0
     if not total:
         return end[:0], end[:0], end[:0]
     if total > FRONTS_AT_ONCE:
-        return _fronts_of_many(ordered, near)
+        return _fronts_of_many(tiles, near)
     of = np.arange(count).repeat(before)
     other = np.arange(total) - (end - before - start).repeat(before)
     right, down = near.left[other] - near.left[of], near.top[other] - near.top[of]
-    wide = int(np.maximum.reduce(ordered.box_xyxy[:, 2] - ordered.box_xyxy[:, 0])) + 1
+    wide = int(np.maximum.reduce(tiles.box_xyxy[:, 2] - tiles.box_xyxy[:, 0])) + 1
     met = ((np.abs(right) < wide) & (np.abs(down) < height)).nonzero()[0]
     return of[met], near.tile[other[met]], right[met]
 
 
-def _fronts_of_many(ordered: OrderedTiles, near: Near) -> tuple[Ints, Ints, Ints]:
+def _fronts_of_many(tiles: OrderedTiles, near: Near) -> tuple[Ints, Ints, Ints]:
     """Like `_fronts`, for crowds, in which most tiles near a placement do not meet: those that meet are found first."""
     distinct, which = np.unique(near.tile, return_inverse=True)
-    boxes = ordered.box_xyxy[distinct]
+    boxes = tiles.box_xyxy[distinct]
     own, other = met_boxes(boxes, boxes)
     before = (other < own).nonzero()[0]
     own, other = own[before], other[before]
     begin = own.searchsorted(np.arange(len(distinct) + 1))
     of, place = ragged((begin[1:] - begin[:-1])[which])
     front = distinct[other[begin[which][of] + place]]
-    pairs = near.placement * len(ordered.rank) + near.tile
-    asked = near.placement[of] * len(ordered.rank) + front
+    pairs = near.placement * len(tiles.rank) + near.tile
+    asked = near.placement[of] * len(tiles.rank) + front
     there = (pairs[pairs.searchsorted(asked, side="right") - 1] == asked).nonzero()[0]
     of, front = of[there], front[there]
-    return of, front, ordered.box_xyxy[front, 0] - near.left[of]
+    return of, front, tiles.box_xyxy[front, 0] - near.left[of]
 
 
-def _counted(placed: Placed, ordered: OrderedTiles, near: Near, rows: Words) -> TileHits:
-    """Hits of objects, from the pixels (n, height) that are left."""
-    samples = np.add.reduce(np.bitwise_count(rows), axis=1, dtype=np.int64)
-    if len(ordered.occluder):
-        samples[ordered.occluder[near.tile]] = 0
+def _counted(placed: Placed, each: int, windows: PatternBits, tiles: OrderedTiles, near: Near, rows: Words) -> TileHits:
+    """Hits on objects, from the pixels (n, height) that are left."""
+    samples = sums_of(np.bitwise_count(rows))
+    if len(tiles.occluder):
+        samples[tiles.occluder[near.tile]] = 0
     hit = samples.nonzero()[0]
     if len(hit) < len(samples):
-        near, rows, samples = near.at(hit), rows[hit], samples[hit]
+        near, rows, samples = near.at(hit), rows.take(hit, axis=0), samples.take(hit)
     who = near.placement
-    origin_x, origin_y = placed.origin_x[who], placed.origin_y[who]
+    turn = who // each if each > 1 else who
+    origin_x, origin_y = placed.origin_x.take(turn), placed.origin_y.take(turn)
     distance2, x, y = nearest(rows, near.left - origin_x, near.top - origin_y)
-    return TileHits(who, near.tile, samples, distance2, x + origin_x, y + origin_y)
+    weight = None
+    if len(windows.sums):
+        left, top = near.left - placed.x.take(who), near.top - placed.y.take(who)
+        weight = weights_of(rows, windows, bit_rows.which(placed, windows, who), left, top)
+    pixels = _distinct(turn, near, tiles, rows, samples) if each > 1 else None
+    return TileHits(who, tiles.rank.take(near.tile), samples, distance2, x + origin_x, y + origin_y, weight, pixels)
 
 
-def looked_up(placed: Placed, windows: PatternBits, seen: VisibleTiles, cells: Cells, beside: Beside) -> TileHits:
-    """Hits of placed patterns on visible tiles, the nearest item of a placement first.
+def _distinct(turn: Ints, near: Near, tiles: OrderedTiles, rows: Words, samples: Ints) -> Ints:
+    """Pixels (n,) of pairs that no earlier pellet of the round hit on the tile: all with the first that hit it."""
+    order = np.lexsort((near.tile, turn))
+    new = begins(turn[order]) | begins(near.tile[order])
+    first = new.nonzero()[0]
+    pixels = np.zeros_like(samples)
+    pixels[order[first]] = samples[order[first]]
+    length = np.diff(first, append=len(order))
+    shared = length > 1  # tiles that several pellets of a round hit
+    group = order[shared.repeat(length)]
+    first, length = first[shared], length[shared]
+    if not len(group):
+        return pixels
+    together = np.zeros((len(group), 2 * bit_rows.WORD), np.uint64)  # rows from the tile's own first one on
+    row = np.arange(rows.shape[1]) + (near.top - tiles.box_xyxy[near.tile, 1])[group][:, None]
+    np.put_along_axis(together, row % (2 * bit_rows.WORD), rows[group], axis=1)  # rows before it are empty
+    union = np.bitwise_or.reduceat(together, np.cumsum(length) - length, axis=0)
+    pixels[order[first]] = np.bitwise_count(union).sum(axis=1, dtype=np.int64)
+    return pixels
 
-    Parameters
-    ----------
-    cells : lists of the visible tiles, for the box around the patterns
-    beside : distances along the rows of the visible tiles, or empty: see `bit_rows.found`
 
-    Returns
-    -------
-    as `item_rows`
-    """
-    placement, near = listed_at(cells, placed.x, placed.y)
-    return item_rows(found(placed, windows, seen, placement, near, beside), placed, seen.rank)
+def _joined(parts: list[TileHits]) -> TileHits:
+    """Hits of all parts, one after another."""
+    if len(parts) == 1:
+        return parts[0]
+    if not parts:
+        none = NO_NUMBERS
+        return TileHits(none, none, none, none, none, none, None, None)
+    columns: list[Any] = [None if column[0] is None else np.concatenate(column) for column in zip(*parts, strict=True)]
+    return TileHits(*columns)
 
 
-def gathered_up(placed: Placed, windows: PatternBits, seen: VisibleTiles, cells: Cells, each: int) -> RoundHits:
-    """Hits of rounds of `each` pellets on visible tiles; `cells` list the tiles, for the box around the patterns."""
-    placement, near = listed_at(cells, placed.x, placed.y)
-    return gathered(placed, windows, seen, placement, near, each)
+def hits_of_rounds(found: TileHits, each: int) -> RoundHits:
+    """Hits of rounds on items, from those of their pellets on tiles."""
+    turn, rank = found.placement // each if each > 1 else found.placement, found.rank
+    samples, distance2, x, y, weight, pixels = found[2:]
+    pellets: Ints | None = None
+    if each > 1 or np.logical_or.reduce((rank[1:] == rank[:-1]) & (turn[1:] == turn[:-1])):
+        order = np.lexsort((found.placement, rank, turn))
+        new = begins(turn[order]) | begins(rank[order])
+        first = new.nonzero()[0]
+        samples = _added(samples[order], first)
+        weight, pixels = (None if column is None else _added(column[order], first) for column in (weight, pixels))
+        if each > 1:
+            pellets = _added((new | begins(found.placement[order])).astype(np.int64), first)
+        group = np.empty_like(turn)
+        group[order] = np.cumsum(new) - 1
+        best = row_order(group, distance2, y, x)[first]
+        turn, rank, distance2, x, y = (column[best] for column in (turn, rank, distance2, x, y))
+    order = row_order(turn, distance2, y, x)
+    every = turn, rank, samples, distance2, x, y, weight, pixels, pellets
+    columns: list[Any] = [None if column is None else column.take(order) for column in every]
+    return RoundHits(*columns)
+
+
+def _added(values: Ints, first: Ints) -> Ints:
+    """Sums of groups that begin at `first`."""
+    return np.add.reduceat(values, first) if len(first) else values[:0]

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..common.checks import Bools, Ints, Labels
-from ..grid.spans import Box, each_pixel, ragged
+from ..common.checks import Bools, Ints
+from ..grid.spans import each_pixel, ragged
 from ..scene.items import Stack
 
 Kinds = npt.NDArray[np.uint8]
@@ -171,17 +171,6 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     first, last = _stretches(meeting, x)
     met = meeting[first]
     return Events(kind[pair[met]], pairs.rank[pair[met]], run[met], x[first], x[last]), state
-
-
-def read_labels(runs: Runs, labels: Labels, plane_xyxy: Box) -> tuple[Ints, Ints, Ints, Ints]:
-    """Read the label plane under runs within it, as stretches of one label: (run, x_first, x_last, label)."""
-    x, y = plane_xyxy[:2]
-    run, column = each_pixel(runs.x_first, runs.x_last)
-    found = labels.reshape(-1)[((runs.y - y) * labels.shape[1] - x)[run] + column]
-    mask = found != 0
-    run, column, found = run[mask], column[mask], found[mask]
-    first, last = _stretches(run, column, found)
-    return run[first], column[first], column[last], found[first].astype(np.int64)
 
 
 def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:

@@ -25,7 +25,7 @@ from ..common.checks import Bools, Ints
 from ..grid.spans import Box, Spans, ragged
 from ..scene.items import Stack
 from .bit_rows import WORD, Placed, Words, packed
-from .front_to_back import OrderedTiles
+from .front_to_back import NO_FLAGS, NO_NUMBERS, OrderedTiles
 
 OFTEN = 8
 """Answers of a pattern after which the planes of its depths are made; they take as long as so many answers."""
@@ -195,8 +195,6 @@ STRIDES_MOST = 8
 
 PACKED_AT_ONCE = 1024
 """Tiles packed at a time; their unpacked pixels take 4 KB each."""
-
-NO_FLAGS, NO_NUMBERS = np.zeros(0, np.bool_), np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,9 @@ from ..common.checks import Bools, Ints
 from ..grid.spans import Box
 from ..scene.items import Items, Stack
 from . import bit_rows, cells
-from .bit_rows import PAD, Beside, VisibleTiles, Words, beside_of
+from .bit_rows import WORD, Words
 from .cells import Cells
+from .front_to_back import OrderedTiles
 from .tiles import Tiles
 
 
@@ -64,7 +65,7 @@ CELLS_BYTES = 2**25
 """Size of the cache of cells of a visible set, for the last few boxes of patterns, bytes."""
 
 WITHOUT_MOST = 128
-"""Placements that are compared with all visible tiles before cells are made; making them takes about as long."""
+"""Most placements of a call that are compared with all visible tiles; making cells takes about as long."""
 
 PAIRS_MOST = 2**20
 """Most pairs of placements and tiles that a call compares without cells."""
@@ -105,14 +106,7 @@ class VisibleSet:
         blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
         rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
         self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
-        self.ids = stack.ids[self.seen.rank]
         self._cells: LruCache[tuple[int, ...], Cells] = LruCache(CELLS_BYTES, lambda made: made.nbytes)
-        self._without = 0
-
-    @cached_attribute
-    def beside(self) -> Beside:
-        """Distances along the rows of the visible tiles, by which discs find their nearest pixel."""
-        return beside_of(self.seen)
 
     def cells(self, reach_xyxy: Ints) -> Cells:
         """Tiles that a pattern with this box may meet, by cells of its position; kept for the last few boxes."""
@@ -120,14 +114,12 @@ class VisibleSet:
         return self._cells.get(tuple(reach_xyxy.tolist()), lambda: make(self.seen.box_xyxy, reach_xyxy, SHOT_BITS))
 
     def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells, int]:
-        """Cells for a number of placements, and the bytes newly made; for the first few, one cell with all tiles."""
+        """Cells for a number of placements, and the bytes newly made; for a few, one cell with all tiles."""
         reach = tuple(reach_xyxy.tolist())
         if reach in self._cells.values:
             return self.cells(reach_xyxy), 0
-        self._without += placements
-        if self._without <= WITHOUT_MOST and placements * len(self.seen.rank) <= PAIRS_MOST:
+        if placements <= WITHOUT_MOST and placements * len(self.seen.rank) <= PAIRS_MOST:
             return self._everything(*reach), 0
-        self._without = 0
         made = self.cells(reach_xyxy)
         return made, made.nbytes
 
@@ -184,6 +176,10 @@ class VisibleSets:
             self._missed[view] = self._missed.get(view, 0.0) + max(lost, 0.0)
             return self._missed[view] > cost
 
+    def lost(self, view: View, version: int) -> float:
+        """The time that a view's calls have lost for want of its visible set, ns."""
+        return self._missed.get(view, 0.0) if self._version == version else 0.0
+
     def read(self, view: View, items: Items, bounds: Box | None) -> VisibleSet:
         """The visible set of the items as they are now, within the bounds of the scene."""
         found = self.kept(view, items.version)
@@ -215,10 +211,8 @@ def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:
     return place[before], front[other[before]]
 
 
-def visible_tiles_of(
-    tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints
-) -> VisibleTiles:
-    """Visible pixels of tiles.
+def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Words:
+    """Visible pixels of tiles, as rows (V, height).
 
     Parameters
     ----------
@@ -227,11 +221,6 @@ def visible_tiles_of(
     which : (V,) the tiles to look at
     of, front : (n,) pairs of a place in `which`, sorted, and a tile that covers it
     """
-    return _laid_out(tiles.rank[which], boxes_xyxy[which], _rows(tiles, boxes_xyxy, bounds, which, of, front))
-
-
-def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: Ints, front: Ints) -> Words:
-    """Rows (V, height) of the visible pixels of tiles; see `visible_tiles_of`."""
     height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
@@ -241,7 +230,7 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     return np.asarray(rows)
 
 
-def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> VisibleTiles:
+def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:
     """Tiles with a visible pixel, each cropped to the box of its visible pixels.
 
     Parameters
@@ -261,10 +250,10 @@ def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> VisibleTiles:
     )
 
 
-def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> VisibleTiles:
-    """Rows (V, height) of tiles as one flat array, with empty rows around each tile."""
+def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:
+    """Rows (V, height) of tiles as one flat array, with WORD empty rows around each tile."""
     count, height = rows.shape
-    stride = height + PAD
-    words = np.zeros(count * stride + PAD, np.uint64)
-    words[PAD:].reshape(count, stride)[:, :height] = rows
-    return VisibleTiles(rank, boxes_xyxy, np.arange(count) * stride + PAD, words, height)
+    stride = height + WORD
+    words = np.zeros(count * stride + WORD, np.uint64)
+    words[WORD:].reshape(count, stride)[:, :height] = rows
+    return OrderedTiles(rank, boxes_xyxy, np.arange(count) * stride + WORD, words)

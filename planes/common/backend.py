@@ -143,6 +143,11 @@ def news() -> list[str]:
     return messages
 
 
+def jit_is_on() -> bool:
+    """Whether compiled kernels are used; asking loads none."""
+    return _asked[0]
+
+
 def kernels_of(module: ModuleType) -> ModuleType:
     """The numpy module itself, or its compiled module after `use_jit`."""
     if not _asked[0]:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit, types
 
 from ..bits import front_to_back as front_to_back_module
-from ..bits.bit_rows import WORD, Beside, PatternBits, Placed, TileHits, VisibleTiles
+from ..bits.bit_rows import WORD, PatternBits, Placed
 from ..bits.cells import Cells
-from ..bits.front_to_back import OrderedTiles, RoundHits
+from ..bits.front_to_back import OrderedTiles, RoundHits, Rule
 from ..common.checks import Ints
-from ..grid.spans import Box
 from .bit_rows import (
     ALL,
     BOXES,
@@ -28,10 +25,10 @@ from .bit_rows import (
     bits_of,
     cell_at,
     columns_about,
-    in_order,
     is_beyond,
     is_far,
     key_of,
+    lowest,
     pixel_of,
     pixels_of,
     row_key,
@@ -52,6 +49,10 @@ CELL_BITS = 6
 PAD = WORD
 """Empty rows before and after the rows of a pattern, as `kinds.weapon.columns_of` lays them out."""
 
+LISTED = 50.0
+"""Pairs of a placement and a tile that take as long as one that the placement's cell lists."""
+
+SUMS = types.Array(types.uint32, 1, "C", readonly=True)
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
 
 
@@ -227,175 +228,87 @@ def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
     return objects
 
 
-# house: hit rule of areas
-@compiled(
-    types.UniTuple(types.int64, 3)(
-            types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS, FLAGS, INTS,
-            INTS, INTS, OWNERS, types.boolean, types.UniTuple(types.int64, 4)
-    )
-)  # fmt: skip
-def _front_to_back(
-    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
-    rank, box, tile_begin, tiles, occluder, categories, owner, accept, exclude, pierce, bounds,
-):  # fmt: skip
-    room, most, words = out.shape[1], 0, 0
-    for kind in range(len(first)):
-        words = max(words, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
-    begin = listed = cells = np.zeros(0, np.int64)
-    if end - who > FEW and len(box):
-        begin, listed, cells = _binned(box)
-    near, rest, last_kind = np.empty(len(box), np.int64), np.empty(words, np.uint64), -1
-    whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
-    while who < end:
-        kind = pattern[who]
-        left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
-        right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
-        if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
-            return -1, 0, 0
-        close = near_of(box, begin, listed, cells, left, top, right, bottom, near)
-        if len(strips):
-            close = _crossing(strips, kind, x[who], y[who], box, near, close)
-        close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
-        if close == 0:
-            who += 1
-            continue
-        if count + close > room:
-            break
-        if kind != last_kind:
-            rest[:], last_kind = 0, kind
-        step, rows = following[kind], bottom - top + 1
-        columns = (62 + right - left + 1) // 64 + 2
-        pixels = laid(windows, first[kind], columns, step, rows, rest)
-        if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
-            pixels = cut_off(rest, columns, step, left, top, rows, bounds[0], bounds[1], bounds[2], bounds[3])
-        item, row = -1, count - 1
-        for i in range(close):
-            if pixels == 0:
-                break
-            at = near[i]
-            low, high = max(box[at, 1], top), min(box[at, 3], bottom)
-            offset = box[at, 0] - left + 63
-            tile, word, shift = tile_begin[at] - box[at, 1], PAD + (offset >> 6) * step - top, offset & 63
-            if len(occluder) and occluder[at]:
-                pixels -= take(tiles, tile, rest, word, step, shift, low, high)
-                continue
-            own, level = origin_x[who] - box[at, 0], origin_y[who]
-            if pierce:
-                samples, distance2, across, down = shared(tiles, tile, rest, word, step, shift, low, high, own, level)
-            else:
-                samples, distance2, across, down = struck(tiles, tile, rest, word, step, shift, low, high, own, level)
-                pixels -= samples
-            if samples == 0:
-                continue
-            new = key_of(distance2, across, down)
-            if rank[at] == item:
-                hit_samples[row] += samples
-                if new < key[row]:
-                    key[row], nearest_x[row] = new, across
-            else:
-                row += 1
-                item = rank[at]
-                whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
-        in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
-        most = max(most, row + 1 - count)
-        count = row + 1
-        who += 1
-    return who, count, most
+TURN, RANK, SAMPLES, WEIGHT, PIXELS, PELLETS, KEY, X, Y = range(9)
+"""Columns of rows; KEY becomes a squared distance. While a round is counted, Y holds the last pellet of a row."""
 
-
-NONE = np.zeros(0, np.int64)
-NOBODY = np.zeros((1, 0), np.int64)
-
-
-def front_to_back(
-    placed: Placed,
-    windows: PatternBits,
-    ordered: OrderedTiles,
-    accept: Ints | int | None,
-    exclude: Ints | None,
-    pierce: bool,
-    bounds: Box | None,
-) -> TileHits:
-    """See `bits.front_to_back.front_to_back`."""
-    accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
-    found = None
-    if not windows.shifted:
-        each = PLACEMENT_NS + TILE_NS * len(ordered.rank)
-        found = rows_by(
-            _front_to_back, 6, len(placed.x), PART_NS / each,
-            *placed, windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips, *ordered,
-            accepted, NOBODY if exclude is None else exclude, pierce, EVERYWHERE if bounds is None else bounds,
-        )  # fmt: skip
-    if found is None:
-        return front_to_back_module.front_to_back(placed, windows, ordered, accept, exclude, pierce, bounds)
-    return TileHits(*found)
-
-
-LOOKUP_PART_NS, LOOKUP_PLACEMENT_NS, LISTED_NS = 8e5, 10.0, 40.0
-"""Least work of a thread, ns; time of each placement, and of each tile in the list of its cell, ns."""
-
-GIVEN = (
-    types.int64, types.int64, types.int64, ROWS_OUT,
-    *[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, BOXES, INTS, WORDS,
-    *[types.int64] * 5, INTS, INTS,
-)  # fmt: skip
-"""Types of the first arguments of both kernels: those of `rows_by`, then those of `_given`."""
-
-
-@compiled(types.UniTuple(types.int64, 3)(*GIVEN))
-def _looked_up(
-    who, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
-    rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed,
-):  # fmt: skip
-    room, most = out.shape[1], 0
-    whose, hit, hit_samples, key, nearest_x, nearest_y = out[0], out[1], out[2], out[3], out[4], out[5]
-    while who < end:
-        cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
-        if cell < 0 or begin[cell] == begin[cell + 1]:
-            who += 1
-            continue
-        kind, item, row = pattern[who], -1, count - 1
-        left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
-        right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
-        if is_far(origin_x[who], origin_y[who], left, top, right, bottom):
-            return -1, 0, 0
-        step = following[kind]
-        for place in range(begin[cell], begin[cell + 1]):
-            at = listed[place]
-            low, lowest = max(box[at, 1], top), min(box[at, 3], bottom)
-            if (box[at, 0] > right) | (box[at, 2] < left) | (low > lowest):
-                continue
-            if len(strips) and is_beyond(strips, kind, x[who], y[who], box[at, 0], box[at, 1], box[at, 2], box[at, 3]):
-                continue
-            offset = box[at, 0] - left + 63
-            word = first[kind] + (offset >> 6) * step - top
-            own, level = origin_x[who] - box[at, 0], origin_y[who]
-            samples, distance2, across, down = shared(
-                tiles, tile_begin[at] - box[at, 1], windows, word, step, offset & 63, low, lowest, own, level
-            )
-            if samples == 0:
-                continue
-            new = key_of(distance2, across, down)
-            if rank[at] == item:
-                hit_samples[row] += samples
-                if new < key[row]:
-                    key[row], nearest_x[row] = new, across
-            else:
-                if row + 1 == room:
-                    return who, count, most
-                row += 1
-                item = rank[at]
-                whose[row], hit[row], hit_samples[row], key[row], nearest_x[row] = who, at, samples, new, across
-        in_order(count, row + 1, origin_x[who], origin_y[who], hit, hit_samples, key, nearest_x, nearest_y)
-        most = max(most, row + 1 - count)
-        count = row + 1
-        who += 1
-    return who, count, most
+TOGETHER = WORD + 8
+"""Words of the pixels of a tile that pellets of a round have hit."""
 
 
 @njit
-def _anew(together, tiles, tile, windows, word, step, shift, low, high):
+def lay(windows, first, step, hull, rest):
+    """Copy the words of a pattern that tiles may read to `rest`; return their pixels.
+
+    Parameters
+    ----------
+    hull : first and last column of words, and first and last row
+    """
+    pixels = 0
+    for column in range(hull[0], hull[1] + 1):
+        source, target = np.uint64(first + column * step + hull[2]), np.uint64(PAD + column * step + hull[2])
+        rows = hull[3] - hull[2] + 1
+        for i in range(rows + 8):  # tiles are read eight rows at a time
+            row = np.uint64(i)
+            rest[target + row] = windows[source + row]
+            pixels += bits_of(windows[source + row])
+    return pixels
+
+
+@njit
+def clip(rest, step, hull, left, top, bounds):
+    """Clear the words of a pattern in `rest` beyond the bounds; return the pixels that are left."""
+    pixels = 0
+    for column in range(hull[0], hull[1] + 1):
+        begin = left - 63 + 64 * column  # of the world
+        low, high = max(bounds[0] - begin, 0), min(bounds[2] - begin, 63)
+        kept = np.uint64(0)
+        if low <= 63 and high >= low:
+            kept = (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
+        for row in range(hull[2], hull[3] + 9):
+            word = column * step + PAD + row
+            rest[word] = rest[word] & kept if bounds[1] <= top + row <= bounds[3] else np.uint64(0)
+            pixels += bits_of(rest[word])
+    return pixels
+
+
+@njit(inline="always")
+def hull_of(box, near, count, left, top, bottom):
+    """Words of a pattern that tiles may read: first and last column, first and last row."""
+    first, last, low, high = 2**62, 0, bottom, top
+    for i in range(count):
+        at = near[i]
+        column = (box[at, 0] - left + 63) >> 6
+        first, last = min(first, column), max(last, column + 1)
+        low, high = min(low, max(box[at, 1], top)), max(high, min(box[at, 3], bottom))
+    return first, last, low - top, high - top
+
+
+@njit
+def weighed(tiles, tile, windows, word, step, shift, low, high, sums, begin, wide):
+    """Sum of the weights of the pixels that a tile shares with a window, run by run.
+
+    Parameters
+    ----------
+    sums, begin, wide : sums along rows; the place of the tile's first column in row `low`; numbers of a row
+    """
+    tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
+    right, left, total = np.uint64(shift), np.uint64(63 - shift), np.int64(0)
+    for i in range(high - low + 1):
+        row = np.uint64(i)
+        met = tiles[tile + row] & ((windows[word + row] >> right) | (windows[following + row] << left << ONE))
+        at = begin + i * wide
+        while met:
+            skipped = lowest(met)
+            met >>= np.uint64(skipped)
+            length = lowest(~met)  # 64 if all are set
+            total += np.int64(sums[at + skipped + length] - sums[at + skipped]) & 0xFFFFFFFF
+            at += skipped + length
+            met = (met >> np.uint64(length - 1)) >> ONE
+    return total
+
+
+@njit
+def anew(together, tiles, tile, windows, word, step, shift, low, high):
     """Add the pixels that a tile shares with a window to `together`, row by row; return the number of new ones."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left, new = np.uint64(shift), np.uint64(63 - shift), np.int64(0)
@@ -409,121 +322,167 @@ def _anew(together, tiles, tile, windows, word, step, shift, low, high):
 
 # house: row order
 @njit(inline="always")
-def _in_order(first, last, item, samples, pixels, pellets, key, x):
-    """Sort rows like `bit_rows.in_order`; of equally near pixels the front item's comes first."""
+def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
+    """Sort rows `first` .. `last` - 1 of a round by (key, rank), and replace the keys by squared distance and y.
+
+    More than FEW_ROWS rows are left unsorted for `rows_by`.
+    """
     for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
-        own = item[i], samples[i], pixels[i], pellets[i], key[i], x[i]
         j = i
-        while j > first and (key[j - 1] > own[4] or (key[j - 1] == own[4] and item[j - 1] > own[0])):
-            item[j], samples[j], pixels[j] = item[j - 1], samples[j - 1], pixels[j - 1]
-            pellets[j], key[j], x[j] = pellets[j - 1], key[j - 1], x[j - 1]
+        while j > first and (key[j - 1] > key[j] or (key[j - 1] == key[j] and rank[j - 1] > rank[j])):
+            for column in range(RANK, X + 1):
+                out[column, j - 1], out[column, j] = out[column, j], out[column, j - 1]
             j -= 1
-        item[j], samples[j], pixels[j], pellets[j], key[j], x[j] = own
+    pixels_of(first, last, origin_x, origin_y, key, x, y)
 
 
-@compiled(types.UniTuple(types.int64, 3)(*GIVEN, types.int64, types.int64))
-def _gathered_up(
-    turn, end, count, out, pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, strips,
-    rank, box, tile_begin, tiles, cells_x, cells_y, bits, wide, high, begin, listed, each, height,
+@compiled(
+    types.UniTuple(types.int64, 3)(
+            types.int64, types.int64, types.int64, ROWS_OUT,
+            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
+            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
+            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
+    )
+)  # fmt: skip
+def _front_to_back(
+    turn, end, count, out, pattern, x, y, origin_x, origin_y,
+    pattern_box, first, following, pattern_words, strips, sums, first_sum,
+    rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
+    begin, listed,
+    pierce, bounds, accept, exclude, each,
 ):  # fmt: skip
-    room, most = out.shape[1], 0
-    whose, item, samples, pixels = out[0], out[1], out[2], out[3]
-    pellets, key, nearest_x, nearest_y = out[4], out[5], out[6], out[7]  # `nearest_y` first holds the row's last pellet
-    stride, tiles_hit = height + 8, np.empty(len(rank), np.int64)
-    row_of, part_of = np.full(rank[-1] + 1 if len(rank) else 0, -1), np.full(len(rank), -1)
-    together = np.empty(len(rank) * stride, np.uint64)
+    room, most, longest, several = out.shape[1], 0, 0, each > 1 and len(box) > 0
+    for kind in range(len(first)):
+        longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
+    near, bins, binned, grid = np.empty(len(box), np.int64), begin[:0], listed[:0], begin[:0]
+    if not cells_wide and (end - turn) * each > FEW and len(box):
+        bins, binned, grid = _binned(box)
+    whole = pierce and not len(occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
+    words = pattern_words if whole else np.empty(longest, np.uint64)
+    row_of, part_of = np.full(rank[-1] + 1 if several else 0, -1), np.full(len(box) * several, -1)
+    hit, together = np.empty(len(box) * several, np.int64), np.empty(len(box) * several * TOGETHER, np.uint64)
+    ranks, keys, xs, ys = out[RANK], out[KEY], out[X], out[Y]
     while turn < end:
         row, hits, full = count - 1, 0, False
-        for who in range(turn * each, (turn + 1) * each):
-            cell = cell_at(x[who], y[who], cells_x, cells_y, bits, wide, high)
-            if cell < 0 or begin[cell] == begin[cell + 1]:
-                continue
+        for who in range(turn * each, turn * each + each):
             kind = pattern[who]
             left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
             right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
             if is_far(origin_x[turn], origin_y[turn], left, top, right, bottom):
                 return -1, 0, 0
-            step = following[kind]
-            for place in range(begin[cell], begin[cell + 1]):
-                at = listed[place]
-                low, lowest = max(box[at, 1], top), min(box[at, 3], bottom)
-                if (box[at, 0] > right) | (box[at, 2] < left) | (low > lowest):
-                    continue
-                if len(strips) and is_beyond(
-                    strips, kind, x[who], y[who], box[at, 0], box[at, 1], box[at, 2], box[at, 3]
-                ):
-                    continue
-                offset = box[at, 0] - left + 63
-                tile, word, shift = tile_begin[at] - box[at, 1], first[kind] + (offset >> 6) * step - top, offset & 63
-                own, level = origin_x[turn] - box[at, 0], origin_y[turn]
-                met, distance2, across, down = shared(tiles, tile, windows, word, step, shift, low, lowest, own, level)
-                if met == 0:
-                    continue
-                part = part_of[at]
-                if part < 0:
-                    part = part_of[at] = hits * stride
-                    together[part : part + stride] = 0
-                    tiles_hit[hits] = at
-                    hits += 1
-                new = _anew(
-                    together[part + low - box[at, 1] :], tiles, tile, windows, word, step, shift, low, lowest
-                )  # fmt: skip
-                nearest = key_of(distance2, across, down)
-                mine = row_of[rank[at]]
-                if mine < 0:
-                    if row + 1 == room:
-                        full = True
-                        break
-                    row += 1
-                    row_of[rank[at]] = row
-                    whose[row], item[row], samples[row], pixels[row], pellets[row] = turn, rank[at], met, new, 1
-                    key[row], nearest_x[row], nearest_y[row] = nearest, across, who
-                    continue
-                samples[mine] += met
-                pixels[mine] += new
-                pellets[mine] += nearest_y[mine] != who
-                nearest_y[mine] = who
-                if nearest < key[mine]:
-                    key[mine], nearest_x[mine] = nearest, across
+            if cells_wide:
+                cell = cell_at(x[who], y[who], cells_x, cells_y, bits, cells_wide, cells_high)
+                close = 0
+                for entry in range(begin[max(cell, 0)], begin[cell + 1] if cell >= 0 else begin[0]):
+                    tile = listed[entry]
+                    across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
+                    near[close] = tile
+                    close += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
+            else:
+                close = near_of(box, bins, binned, grid, left, top, right, bottom, near)
+            if len(strips):
+                close = _crossing(strips, kind, x[who], y[who], box, near, close)
+            if len(accept) or len(occluder):
+                close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
+            full = row + 1 + close > room
             if full:
                 break
+            if close == 0:
+                continue
+            corner, pixels = first[kind], 1
+            if not whole:
+                corner, hull = PAD, hull_of(box, near, close, left, top, bottom)
+                pixels = lay(pattern_words, first[kind], following[kind], hull, words)
+                if left < bounds[0] or top < bounds[1] or right > bounds[2] or bottom > bounds[3]:
+                    pixels = clip(words, following[kind], hull, left, top, bounds)
+            step, broad = following[kind], pattern_box[kind, 2] - pattern_box[kind, 0] + 2
+            item = -1
+            for i in range(close):
+                if pixels == 0:
+                    break
+                at = near[i]
+                low, high = max(box[at, 1], top), min(box[at, 3], bottom)
+                offset = box[at, 0] - left + 63
+                tile, word, shift = tile_begin[at] - box[at, 1], corner + (offset >> 6) * step - top, offset & 63
+                if len(occluder) and occluder[at]:
+                    pixels -= take(tiles, tile, words, word, step, shift, low, high)
+                    continue
+                own, level = origin_x[turn] - box[at, 0], origin_y[turn]
+                if pierce or several or len(sums):
+                    found = shared(tiles, tile, words, word, step, shift, low, high, own, level)
+                else:
+                    found = struck(tiles, tile, words, word, step, shift, low, high, own, level)
+                samples, weight, new, nearest = found[0], 0, found[0], key_of(found[1], found[2], found[3])
+                if samples == 0:
+                    continue
+                if len(sums):
+                    place = first_sum[kind] + (low - top) * broad + offset - 63
+                    weight = weighed(tiles, tile, words, word, step, shift, low, high, sums, place, broad)
+                if several:
+                    if part_of[at] < 0:
+                        part_of[at] = hits * TOGETHER
+                        together[hits * TOGETHER : (hits + 1) * TOGETHER] = 0
+                        hit[hits] = at
+                        hits += 1
+                    part = together[part_of[at] + low - box[at, 1] :]
+                    new = anew(part, tiles, tile, words, word, step, shift, low, high)
+                if not pierce:
+                    if several or len(sums):
+                        take(tiles, tile, words, word, step, shift, low, high)
+                    pixels -= samples
+                mine = row_of[rank[at]] if several else row if rank[at] == item else -1
+                if mine < 0:
+                    row, mine, item = row + 1, row + 1, rank[at]
+                    out[TURN, row], out[RANK, row], out[SAMPLES, row], out[KEY, row], out[X, row] = (
+                        turn, item, samples, nearest, found[2],
+                    )  # fmt: skip
+                    out[WEIGHT, row], out[PIXELS, row], out[PELLETS, row], out[Y, row] = weight, new, 1, who
+                    if several:
+                        row_of[item] = row
+                    continue
+                out[SAMPLES, mine] += samples
+                out[WEIGHT, mine] += weight
+                out[PIXELS, mine] += new
+                out[PELLETS, mine] += out[Y, mine] != who
+                out[Y, mine] = who
+                if nearest < out[KEY, mine]:
+                    out[KEY, mine], out[X, mine] = nearest, found[2]
         for k in range(hits):
-            row_of[rank[tiles_hit[k]]] = part_of[tiles_hit[k]] = -1
+            row_of[rank[hit[k]]] = part_of[hit[k]] = -1
         if full:
             break
-        _in_order(count, row + 1, item, samples, pixels, pellets, key, nearest_x)
-        pixels_of(count, row + 1, origin_x[turn], origin_y[turn], key, nearest_x, nearest_y)
-        most = max(most, row + 1 - count)
-        count = row + 1
-        turn += 1
+        if row >= count:
+            in_row_order(count, row + 1, origin_x[turn], origin_y[turn], out, ranks, keys, xs, ys)
+        most, count, turn = max(most, row + 1 - count), row + 1, turn + 1
     return turn, count, most
 
 
-def looked_up(placed: Placed, windows: PatternBits, seen: VisibleTiles, cells: Cells, beside: Beside) -> TileHits:
-    """See `bits.front_to_back.looked_up`; `beside` is not needed."""
+NONE = np.zeros(0, np.int64)
+NOBODY = np.zeros((1, 0), np.int64)
+NOWHERE = Cells(0, 0, 0, 0, 0, NONE, NONE)
+
+
+def front_to_back(
+    placed: Placed,
+    each: int,
+    windows: PatternBits,
+    tiles: OrderedTiles,
+    rule: Rule,
+    near: Cells | tuple[Ints, Ints] | None = None,
+) -> RoundHits:
+    """See `bits.front_to_back.front_to_back`."""
+    accept, cells = rule.accept, near if isinstance(near, Cells) else NOWHERE
+    accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
     found = None
-    if not windows.shifted:
-        least = LOOKUP_PART_NS / (LOOKUP_PLACEMENT_NS + LISTED_NS * _listed(cells))
-        found = rows_by(_looked_up, 6, len(placed.x), least, *_given(placed, windows, seen, cells))
-    return front_to_back_module.looked_up(placed, windows, seen, cells, beside) if found is None else TileHits(*found)
-
-
-def gathered_up(placed: Placed, windows: PatternBits, seen: VisibleTiles, cells: Cells, each: int) -> RoundHits:
-    """See `bits.front_to_back.gathered_up`."""
-    found = None
-    if not windows.shifted:
-        least = LOOKUP_PART_NS / (each * (LOOKUP_PLACEMENT_NS + LISTED_NS * _listed(cells)))
-        given = *_given(placed, windows, seen, cells), each, seen.height
-        found = rows_by(_gathered_up, 8, len(placed.origin_x), least, *given)
-    return front_to_back_module.gathered_up(placed, windows, seen, cells, each) if found is None else RoundHits(*found)
-
-
-def _listed(cells: Cells) -> float:
-    """Mean number of tiles that a cell lists."""
-    return len(cells.listed) / max(len(cells.begin) - 1, 1)
-
-
-def _given(placed: Placed, windows: PatternBits, seen: VisibleTiles, cells: Cells) -> tuple[Any, ...]:
-    """Arguments that both kernels have in common."""
-    pattern = windows.box_xyxy, windows.first, windows.rows, windows.words, windows.strips
-    return *placed, *pattern, seen.rank, seen.box_xyxy, seen.begin, seen.words, *cells
+    if near is None or isinstance(near, Cells):
+        listed = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
+        found = rows_by(
+            _front_to_back, Y + 1, len(placed.origin_x), PART_NS / (each * (PLACEMENT_NS + TILE_NS * listed)),
+            *placed, *windows, *tiles, *cells, rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
+            accepted, NOBODY if rule.exclude is None else rule.exclude, each,
+        )  # fmt: skip
+    if found is None:
+        return front_to_back_module.front_to_back(placed, each, windows, tiles, rule, near)
+    several = (found[PIXELS], found[PELLETS]) if each > 1 else (None, None)
+    weight = found[WEIGHT] if len(windows.sums) else None
+    return RoundHits(found[TURN], found[RANK], found[SAMPLES], found[KEY], found[X], found[Y], weight, *several)

@@ -11,7 +11,7 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from ..bits import bit_rows
-from ..bits.bit_rows import Beside, PatternBits, Placed, TileHits, VisibleTiles, Words
+from ..bits.bit_rows import Words
 from ..bits.cells import Cells, coarse_enough
 from ..common.backend import in_parts
 from ..common.checks import Ints
@@ -48,7 +48,7 @@ def bits_of(_: Any, word: Any) -> Any:
 
 
 @intrinsic
-def _lowest(_: Any, word: Any) -> Any:
+def lowest(_: Any, word: Any) -> Any:
     """Place of the lowest set bit of a word; 64 if none is set."""
 
     def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
@@ -65,14 +65,6 @@ def _above(_: Any, word: Any) -> Any:
         return builder.ctlz(values[0], ir.Constant(ir.IntType(1), 0))
 
     return types.int64(types.uint64), made
-
-
-@njit(inline="always")
-def _window(words: Any, begin: Any, following: Any, shift: Any) -> Any:
-    """One row of a window: a word, or parts of two neighbouring words."""
-    if shift == 0:
-        return words[begin]
-    return (words[begin] >> np.uint64(shift)) | (words[begin + following] << np.uint64(64 - shift))
 
 
 @njit(inline="always")
@@ -106,7 +98,6 @@ def _sooner(a, b, distance2, y, x):
     return x[a] < x[b] if x[a] != x[b] else a < b
 
 
-# house: row order
 @njit
 def sort_places(order, distance2, y, x):
     """Sort places of rows by (distance2, y, x, place): Shell (1959), as rows are mostly few and in sorted runs."""
@@ -158,7 +149,7 @@ Kernel = Callable[..., tuple[int, int, int]]
 """A function of (placement, end, rows written so far, columns of rows, further arguments), which goes on from there.
 
 It returns (placement where it stopped, or -1 if it cannot decide; rows written; most rows of a placement). Columns
-begin with the placement and what it hits, and end with squared distance, x and y.
+begin with the placement and the rank that it hits, and end with squared distance, x and y.
 """
 
 
@@ -177,7 +168,6 @@ def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any)
     return known[0] if len(known) == 1 else np.concatenate(known, axis=1)
 
 
-# house: row order
 def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
     """Columns of the rows of placements `who` .. `last` - 1; memory that is never written costs nothing."""
     count, crowd, out = 0, 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
@@ -188,7 +178,7 @@ def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any,
             return None
         if who == last:
             rows = out[:, :count]
-            return rows if crowd <= FEW_ROWS else rows[:, np.lexsort(rows[[1, -2, -1, -3, 0]])]
+            return rows if crowd <= FEW_ROWS else rows[:, bit_rows.row_order(rows[0], *rows[[-3, -1, -2, 1]])]
         more = np.empty((columns, 2 * out.shape[1]), np.int64)
         more[:, :count] = out[:, :count]
         out = more
@@ -204,7 +194,7 @@ def columns_about(own):
 @njit(inline="always")
 def row_key(met, row, down, ahead, behind, beyond):
     """A number that sorts the nearest pixels of rows by (squared distance, row); the last bit is set if it is after."""
-    after, before = _lowest(met >> ahead), _above(met << behind)
+    after, before = lowest(met >> ahead), _above(met << behind)
     across = beyond + min(after, before)
     key = ((across * across + down * down) << ROW_BITS) | (row << 1) | (after < before)
     return key if met else FAR
@@ -243,45 +233,6 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     return samples, *pixel_of(nearest, own, low - level)
 
 
-@compiled(types.int64(*[INTS] * 5, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, INTS, INTS, *[OUT] * 6))
-def _found(
-    pattern, x, y, origin_x, origin_y, pattern_box, first, following, windows, box, begin, tiles,
-    placement, near, out_placement, out_seen, out_samples, out_distance2, out_x, out_y,
-):  # fmt: skip
-    count = 0
-    for pair in range(len(placement)):
-        who, at = placement[pair], near[pair]
-        kind, left, top = pattern[who], box[at, 0], box[at, 1]
-        pattern_left, pattern_top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
-        low = max(top, pattern_top)
-        high = min(box[at, 3], y[who] + pattern_box[kind, 3])
-        if low > high or left > x[who] + pattern_box[kind, 2] or pattern_left > box[at, 2]:
-            continue
-        column = left - pattern_left + 63
-        shift, step = column & 63, following[kind]
-        word = first[kind] + (column >> 6) * step - pattern_top
-        tile = begin[at] - top
-        own, level = origin_x[who] - left, origin_y[who]
-        samples, distance2, across, down = shared(tiles, tile, windows, word, step, shift, low, high, own, level)
-        if samples:
-            out_placement[count], out_seen[count], out_samples[count] = who, at, samples
-            out_distance2[count], out_x[count], out_y[count] = distance2, origin_x[who] + across, origin_y[who] + down
-            count += 1
-    return count
-
-
-def found(
-    placed: Placed, windows: PatternBits, seen: VisibleTiles, placement: Ints, near: Ints, beside: Beside
-) -> TileHits:
-    """See `bits.bit_rows.found`; `beside` is not needed, and tables of all shifts are left to numpy."""
-    if windows.shifted:
-        return bit_rows.found(placed, windows, seen, placement, near, beside)
-    out = np.empty((6, len(near)), np.int64)
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
-    count = _found(*placed, *pattern, seen.box_xyxy, seen.begin, seen.words, placement, near, *out)
-    return TileHits(*out[:, :count])
-
-
 @compiled(types.void(WORDS, INTS, INTS, INTS, INTS, types.uint64[:, ::1]))
 def _visible(words, begin, of, front, right, seen):
     height = seen.shape[1]
@@ -303,62 +254,6 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     seen = np.empty((len(begin), height), np.uint64)
     _visible(words, begin, of, front, right, seen)
     return seen
-
-
-@compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, BOXES, INTS, WORDS, types.int64, *[INTS] * 3, OUT))
-def _union(
-    pattern, x, y, pattern_box, first, following, windows, box, begin, tiles, height, placement, near, group,
-    out,
-):  # fmt: skip
-    together = np.zeros(height, np.uint64)
-    for number in range(len(group)):
-        last = group[number + 1] if number + 1 < len(group) else len(placement)
-        at = near[group[number]]
-        left, top = box[at, 0], box[at, 1]
-        together[:] = 0
-        for pair in range(group[number], last):
-            who = placement[pair]
-            kind = pattern[who]
-            pattern_top = y[who] + pattern_box[kind, 1]
-            column = left - x[who] - pattern_box[kind, 0] + 63
-            shift, step = column & 63, following[kind]
-            word = first[kind] + (column >> 6) * step - pattern_top
-            for row in range(max(top, pattern_top), min(box[at, 3], y[who] + pattern_box[kind, 3]) + 1):
-                together[row - top] |= tiles[begin[at] + row - top] & _window(windows, word + row, step, shift)
-        samples = 0
-        for row in range(height):
-            samples += bits_of(together[row])
-        out[number] = samples
-
-
-def union(placed: Placed, windows: PatternBits, seen: VisibleTiles, placement: Ints, near: Ints, first: Ints) -> Ints:
-    """See `bits.bit_rows.union`."""
-    if windows.shifted:
-        return bit_rows.union(placed, windows, seen, placement, near, first)
-    out = np.empty(len(first), np.int64)
-    pattern = (windows.box_xyxy, windows.first, windows.rows, windows.words)
-    tiles = (seen.box_xyxy, seen.begin, seen.words, seen.height)
-    _union(*placed[:3], *pattern, *tiles, placement, near, first, out)
-    return out
-
-
-@compiled(types.void(*[INTS] * 4, OUT))
-def _row_order(group, distance2, y, x, order):
-    begin = 0
-    while begin < len(order):
-        end = begin
-        while end < len(order) and group[end] == group[begin]:
-            order[end] = end
-            end += 1
-        sort_places(order[begin:end], distance2, y, x)
-        begin = end
-
-
-def row_order(group: Ints, distance2: Ints, y: Ints, x: Ints) -> Ints:
-    """See `bits.bit_rows.row_order`."""
-    order = np.empty(len(group), np.int64)
-    _row_order(group, distance2, y, x, order)
-    return order
 
 
 BRUTE_PAIRS = 2**14

@@ -1,4 +1,4 @@
-"""The planner: "direct", "composed" and "auto" over the grid of `speed.py`, and how auto does beside the better one.
+"""The planner: "direct", "built" and "auto" over the grid of `speed.py`, and how auto does beside the better one.
 
 python tests/bench/strategies.py
 """
@@ -14,7 +14,7 @@ from speed_moving import Own, frames_of, own_rows
 from speed_static import Settings, modes, ours
 from speed_world import PATTERNS, runs, scene_of
 
-STRATEGIES = ("direct", "composed", "auto")
+STRATEGIES = ("direct", "built", "auto")
 
 
 def planner(settings: Settings) -> Iterator[Cell]:
@@ -53,7 +53,7 @@ def _in_motion(settings: Settings, objects: int, shots: int) -> Cell:
 
 def _with_losses(settings: Settings, cell: Cell) -> Cell:
     for mode in modes(settings):
-        best = min(cell.sides[f"{mode}, {strategy}"].least for strategy in ("direct", "composed"))
+        best = min(cell.sides[f"{mode}, {strategy}"].least for strategy in ("direct", "built"))
         cell.values[f"auto over best, {mode}"] = cell.sides[f"{mode}, auto"].least / best
     return cell
 

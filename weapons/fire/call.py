@@ -18,11 +18,12 @@ from .. import late
 from ..kinds.areas import ray_parts_of
 from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
-from .areas import fired_by_bits, fired_by_runs, traits_of
-from .hits import Hits
-from .plan import Plan, read_stack
-from .prefilter import prefilter_of
-from .strategy import BROADPHASES, STRATEGIES
+from .areas import request_of, verdicts_of
+from .hits import Hits, Rows
+from .plan import Plan, leave_out_unused, read_stack
+from .prefilter import may_refuse, prefilter_of
+from .spans import QueryContext
+from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 
 if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
@@ -63,11 +64,14 @@ def fire(
         before the pixels; it changes no row
     broadphase : "auto", "none", "grid", "quadtree", "bvh": how boxes that meet are found; it changes no row, and
         needs a pre-filter
-    strategy : "auto", "direct", "composed": how pixels are looked up; it changes no row. "composed" serves
+    strategy : how the shots are answered; it changes no row. A way that cannot serve a call is passed over, and the
+        plan says why.
 
-        - thin rays that end at their first hit
-        - patterns with falloff, or beyond 2048 px, if the scene has bounds
-        - other patterns; shots that accept different items are answered direct, and the plan says so
+        - "auto": the cheapest way
+        - "direct": one that needs nothing but the scene; "built": one for which what is visible, labels or distances
+          are worked out first, if they are not there
+        - a way by its name: of areas "spans" (the reference), "tiles", "visible", "labels", "integers"; of rays "walk"
+          (the reference), "cast", "march"
 
     Each of aim, toward, accept, exclude, seed, shot and tick is one value for all shots, or one for each.
 
@@ -149,11 +153,26 @@ def fired(
     if parts is not None:
         hits: Hits = late.ray_call.fired_rays(scene, weapon, parts, shots, (prefilter, broadphase, strategy), plan)
     else:
-        stack = read_stack(scene, plan)
-        fired_by = fired_by_bits if traits_of(weapon).counted else fired_by_runs
-        hits = fired_by(scene, weapon, shots, stack, (prefilter, broadphase, strategy), plan)
+        hits = _fired_areas(scene, weapon, shots, (prefilter, broadphase, strategy), plan)
     if texts := news():
         plan.run("kernels", "; ".join(texts))
+    return hits
+
+
+def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan) -> Hits:
+    """Decide what shots of an area weapon hit, by the way that the strategy chooses."""
+    stack = read_stack(scene, plan)
+    request = request_of(scene, weapon, shots, stack, how[:2] != ("auto", "auto"))
+    way, why = chosen_way(how[2], request)
+    asked = request.placements if request.filtered or way.name == "spans" else 0
+    candidates = chosen_candidates(*how[:2], scene, stack, asked)
+    context = QueryContext(stack, scene.bounds, request.traits.pierces, candidates, plan)
+    plan.run("plan", f"{way.name}: {why}")
+    parts = way.engine(request, context)
+    rows = Rows.joined(parts)
+    hits = Hits(rows, lambda: verdicts_of(weapon, shots, context), scene, weapon, shots, plan)
+    leave_out_unused(plan, scene, candidates, request.traits.weighted, may_refuse(stack, shots), way.name)
+    plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits
 
 

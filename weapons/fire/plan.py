@@ -11,7 +11,6 @@ from typing import Any
 from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..kinds.weapon import PatternTable
 from .prefilter import BOX, Candidates
 
 READING = threading.RLock()
@@ -223,40 +222,28 @@ def read_stack(scene: Scene, plan: Plan) -> Stack:
     return stack
 
 
-def leave_out_unused(
-    plan: Plan, scene: Scene, candidates: Candidates, table: PatternTable, choosy: bool, why_strategy: str
-) -> None:
-    """Complete the plan of a call answered by spans with the stages that it left out."""
-    idle = "no sample needed the stack"
-    plan.leave_out("broad phase", candidates.why_unindexed if candidates.index is None else idle)
-    if not candidates.prefilter.volume:
-        plan.leave_out("volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter")
-    elif not plan.has_run("pre-filter"):
-        plan.leave_out("volumes", idle)
-    leave_out_absent(plan, scene, candidates.stack, weighted=table.prefix is not None, choosy=choosy)
-    for name in ("filter", "occluders"):
-        plan.leave_out(name, idle)
-    plan.leave_out("code plane", f"direct: {why_strategy}")
-    plan.leave_out("pre-filter", idle)
-    plan.leave_out("walk", "no sample lay where it needed one")
-    leave_out_imagery(plan, scene)
+def leave_out_unused(plan: Plan, scene: Scene, candidates: Candidates, weighted: bool, choosy: bool, way: str) -> None:
+    """Complete the plan of a call of an area weapon, answered by a way, with the stages that it left out."""
+    of = candidates, weighted, scene.bounds is not None, choosy, way, scene.items.imagery()
+    plan.leave_out_all(_unused, *of)
 
 
-def leave_out_uncounted(plan: Plan, scene: Scene, candidates: Candidates, choosy: bool, name: str, why: str) -> None:
-    """Complete the plan of a call counted by bit rows with the stages that it left out."""
-    bounded = scene.bounds is not None
-    plan.leave_out_all(_uncounted, candidates, bounded, choosy, name == "composed", why, scene.items.imagery())
-
-
-def _uncounted(
-    candidates: Candidates, bounded: bool, choosy: bool, composed: bool, why: str, imagery: Sequence[Role]
+def _unused(
+    candidates: Candidates, weighted: bool, bounded: bool, choosy: bool, way: str, imagery: Sequence[Role]
 ) -> Iterator[tuple[str, str]]:
-    yield "broad phase", "composed: cells" if composed else candidates.why_unindexed
-    yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
-    yield from _absent(candidates.stack, False, bounded, choosy)
+    yield "broad phase", "visible: cells" if way == "visible" else candidates.why_unindexed
+    if not candidates.prefilter.volume:
+        yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
+    yield from _absent(candidates.stack, weighted, bounded, choosy)
     yield "verdicts", "counted when asked for"
-    if not composed:
-        yield "composition", f"direct: {why}"
+    if way == "spans":
+        idle = "no sample needed the stack"
+        yield from ((name, idle) for name in ("filter", "occluders", "pre-filter", "volumes"))
+        yield "walk", "no sample lay where it needed one"
+    if way != "visible":
+        yield "visible set", f"{way} needs none"
+    if way != "labels":
+        yield "label plane", f"{way} needs none"
     yield from _undrawn(imagery)
 
 

@@ -1,4 +1,4 @@
-"""The reference of areas: spans of placed patterns walk the stack (direct) or read the label plane (composed)."""
+"""The reference of areas: spans of placed patterns walk the stack, front to back."""
 
 from __future__ import annotations
 
@@ -11,17 +11,15 @@ from hitplanes.planes.bits.span_walk import (
     HIT,
     LIVE,
     OF_PATTERNS,
-    SKIP,
     VERDICT_OF,
     Events,
     Kinds,
     Pairs,
     Runs,
     Verdict,
-    read_labels,
     walk,
 )
-from hitplanes.planes.common.checks import Ints, Labels
+from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES
 from hitplanes.planes.grid.spans import Box, merged_runs, pieces
 from hitplanes.planes.scene.items import Stack, clipped
@@ -64,47 +62,17 @@ class SpanHits:
     counts: Ints
 
 
-# house: way of areas
 def direct(volley: Placements, shots: Shots, context: QueryContext) -> SpanHits:
     """Walk the stack under every placement, but only where an item may be."""
     boxes = volley.boxes
     counts = _inside(volley, boxes, context)
     if not len(context.stack):
         return _met(volley, Runs.joined([]), [], counts, context.plan)
-    pairs = _candidates(volley, np.arange(len(boxes)), boxes, shots, context)
+    placement, rank = near_pairs(volley, np.arange(len(boxes)), boxes, context)
+    pairs = Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, context))
     runs = _under_items(volley, pairs, context)
     context.plan.run("samples", "runs where items may be", runs.nbytes)
     return _met(volley, runs, _walked(runs, pairs, context, counts), counts, context.plan)
-
-
-# house: way of areas
-# house: hit rule of areas
-def composed(volley: Placements, shots: Shots, context: QueryContext, labels: Labels, plane_xyxy: Box) -> SpanHits:
-    """Read the front item under every sample; walk the stack only where a shot looks behind it."""
-    counts = _inside(volley, volley.boxes, context)
-    plan, stack = context.plan, context.stack
-    every = np.arange(len(volley.shot))
-    runs = _laid(volley, every, np.broadcast_to(np.array(plane_xyxy), (len(every), 4)))
-    plan.run("samples", "runs inside the bounds", runs.nbytes)
-    plan.run("read", "one code for each sample", stack.rank_by_code.nbytes)
-    events, behind = [], []
-    for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
-        part = runs.take(strip)
-        run, x_first, x_last, code = read_labels(part, labels, plane_xyxy)
-        rank = stack.rank_by_code[code >> 1]
-        plan.run("read", "", int(part.lengths.sum()) * labels.itemsize + 5 * rank.nbytes)
-        kind = _kinds(rank, volley.shot[part.placement[run]], shots, context)
-        more = (code & 1 == 1) & ((kind == SKIP) | (context.pierce & (kind == HIT)))
-        _count(counts, part.placement[run[~more]], kind[~more], (x_last - x_first + 1)[~more])
-        plan.run("verdicts", "")
-        hit = ~more & (kind == HIT)
-        events.append(Events(kind[hit], rank[hit], run[hit] + strip.start, x_first[hit], x_last[hit]))
-        seen = part.take(run[more])
-        behind.append(Runs(seen.placement, seen.y, x_first[more], x_last[more], seen.ordinal))
-        plan.run("read", "", events[-1].nbytes + behind[-1].nbytes)
-    front = _met(volley, runs, events, counts, plan)
-    rest = Runs.joined(behind)
-    return _joined(front, _look_behind(volley, rest, shots, context, counts)) if len(rest) else front
 
 
 def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Runs:
@@ -123,22 +91,6 @@ def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Run
     which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
     runs = runs.take(which)
     return Runs(runs.placement, runs.y, x_first, x_last, runs.ordinal)
-
-
-def _look_behind(volley: Placements, runs: Runs, shots: Shots, context: QueryContext, counts: Ints) -> SpanHits:
-    """Walk the stack under the samples that the label plane could not answer."""
-    busy, first = np.unique(runs.placement, return_index=True)
-    last = np.append(first[1:], len(runs)) - 1
-    left, right = np.minimum.reduceat(runs.x_first, first), np.maximum.reduceat(runs.x_last, first)
-    boxes = np.stack([left, runs.y[first], right, runs.y[last]], axis=1)
-    pairs = _candidates(volley, busy, boxes, shots, context)
-    return _met(volley, runs, _walked(runs, pairs, context, counts), counts, context.plan)
-
-
-def _candidates(volley: Placements, placements: Ints, boxes: Ints, shots: Shots, context: QueryContext) -> Pairs:
-    """Items that placements may touch, and what they do to samples."""
-    placement, rank = near_pairs(volley, placements, boxes, context)
-    return Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, context))
 
 
 def near_pairs(volley: Placements, placements: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
@@ -231,9 +183,3 @@ def _met(volley: Placements, runs: Runs, events: list[Events], counts: Ints, pla
     if volley.table.prefix is not None:
         plan.run("weights", "", weight.nbytes)
     return SpanHits(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)
-
-
-def _joined(a: SpanHits, b: SpanHits) -> SpanHits:
-    """Hits of samples in front and of those behind; both hold the same counts."""
-    names = ("placement", "rank", "y", "x_first", "x_last", "weight")
-    return SpanHits(**{n: np.concatenate([getattr(a, n), getattr(b, n)]) for n in names}, counts=a.counts)

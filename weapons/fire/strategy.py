@@ -1,139 +1,218 @@
-"""The cost models of the ways to answer a call, and the choice of strategy, pre-filter and broad phase."""
+"""The strategy table of areas: for each way when it serves, what it costs, and its engine; and the choice of one.
+
+A way is chosen by the call and by the scene, so that the same call at the same scene takes the same way. The plan says
+why. What a way needs of the scene is made once calls have lost as much time without it as it takes to make (rent or
+buy), so that the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
-import numpy as np
-
-from hitplanes.planes.bits import bit_rows
-from hitplanes.planes.bits.label_plane import area
-from hitplanes.planes.bits.visible import View
-from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.bits.tiles import stride_of
+from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
-from hitplanes.planes.common.limits import STRUCTURES, SUB
+from hitplanes.planes.common.limits import STRUCTURES
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..kinds.weapon import PatternTable
+from .areas import OF_ALL, Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
+from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
+from .spans import QueryContext
 
-STRATEGIES = ("auto", "direct", "composed", "walk", "cast", "march")
 BROADPHASES = ("auto", *STRUCTURES)
-
-# Measured with `tests/bench/strategies.py` and `tests/bench/prefilters.py` on one machine; only their ratios matter.
-DIRECT_PLACEMENT_NS, DIRECT_PIXEL_NS = 300.0, 20.0
-COMPOSED_CALL_NS, COMPOSED_PLACEMENT_NS, COMPOSED_SPAN_NS, COMPOSED_PIXEL_NS = 110_000.0, 300.0, 130.0, 12.0
-REDRAW_PIXEL_NS = 0.5
-SWEPT_CALL_NS, SWEPT_PAIR_NS, SWEPT_DROPPED_NS = 300_000.0, 350.0, 2100.0
-BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 
 
 class Costs(NamedTuple):
-    """What a call counted by bit rows costs, ns.
+    """Times, ns, measured by `tests/bench/calibrate.py`; only their ratios matter."""
 
-    `call` to `pair` are what it costs more without a visible set, or without a label plane.
-    """
-
-    call: float  # a call without pellets
-    read: float  # a call of one-pixel shots
-    scattered: float  # a call with pellets
-    placement: float  # each placement
-    pair: float  # each pair of a placement and an item
-    compose: float  # making a visible set
-    item: float  # each item of the visible set
-    draw: float  # each item drawn into the label plane
-    pixel: float  # each pixel of the label plane
+    tiles_call: float  # a call by the tiles of the stack
+    tiles_placement: float  # each placement
+    tiles_pair: float  # each pair of a placement and an item
+    visible_call: float  # a call by the visible set
+    visible_placement: float  # each placement
+    visible_made: float  # making a visible set
+    visible_item: float  # each item of it
+    labels_call: float  # a call by the label plane
+    labels_drawn: float  # each item drawn into it at first
+    labels_pixel: float  # each pixel that is drawn anew
 
 
 IN_NUMPY = Costs(
-    call=50_000, read=50_000, scattered=120_000, placement=500, pair=4.0, compose=2_000_000, item=2500, draw=7500,
-    pixel=REDRAW_PIXEL_NS,
+    tiles_call=350_000, tiles_placement=800, tiles_pair=4.0, visible_call=300_000, visible_placement=300,
+    visible_made=2_000_000, visible_item=2500, labels_call=300_000, labels_drawn=7500, labels_pixel=0.5,
 )  # fmt: skip
 COMPILED = Costs(
-    call=5000, read=25_000, scattered=190_000, placement=120, pair=0.3, compose=100_000, item=1500, draw=400, pixel=0.05
-)
-"""Measured with `tests/bench/strategies.py` on one machine; only their ratios matter."""
+    tiles_call=50_000, tiles_placement=170, tiles_pair=0.3, visible_call=45_000, visible_placement=50,
+    visible_made=100_000, visible_item=1500, labels_call=25_000, labels_drawn=400, labels_pixel=0.05,
+)  # fmt: skip
+"""Times in numpy, and with compiled kernels."""
+
+INTEGERS_CALL, INTEGERS_PLACEMENT, INTEGERS_PAIR, INTEGERS_BIT = 30_000.0, 2000.0, 3000.0, 0.16
+"""Time of a call counted in integers, ns; of each placement, each tile near it, and each bit of the pattern's rows."""
+
+BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
+
+INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 48, 64, 2**15
+"""Largest reach of patterns, px, most placements, and most pairs of placements and items counted in integers."""
 
 
-def chosen_strategy(strategy: str, scene: Scene, stack: Stack, table: PatternTable, placements: int) -> tuple[str, str]:
-    """Strategy of a call answered by spans, and why: the one asked for, or the cheaper one by the cost model.
-
-    Raises
-    ------
-    InputError
-        If "composed" is asked for, and the scene has no bounds that fit one plane.
-    """
-    choice("strategy", strategy, STRATEGIES)
-    plane = scene.label_plane()
-    if strategy == "composed" and plane is None:
-        what = "'composed' of falloff or of patterns beyond 2048 px"
-        raise InputError(f"strategy: expected bounds that fit one plane for {what}, got a scene without them")
-    if strategy != "auto":
-        return strategy, "asked for"
-    if plane is None:
-        return "direct", "no bounds that fit one plane"
-    patterns = max(len(table.count), 1)
-    samples = placements * int(table.count.sum()) / patterns
-    spans = placements * table.runs / patterns
-    composed = COMPOSED_CALL_NS + placements * COMPOSED_PLACEMENT_NS + spans * COMPOSED_SPAN_NS
-    composed += samples * COMPOSED_PIXEL_NS + plane.cost(scene.items) * REDRAW_PIXEL_NS
-    x, y, x_max, y_max = plane.box_xyxy
-    density = area(stack.box_xyxy) / ((x_max - x + 1) * (y_max - y + 1))
-    direct = placements * DIRECT_PLACEMENT_NS + min(_box_costs(scene, len(stack), placements))
-    direct += samples * density * DIRECT_PIXEL_NS
-    name = "composed" if composed < direct else "direct"
-    return name, f"about {composed / 1e3:.0f} us composed, {direct / 1e3:.0f} us direct"
-
-
-def chosen_form(
-    strategy: str,
-    how: tuple[str, str],
-    scene: Scene,
-    stack: Stack,
-    view: View | None,
-    kind: tuple[bool, bool],
-    placements: int,
-) -> tuple[str, str]:
-    """Strategy of a call that is counted by bit rows, and why: the one asked for, or the cheaper by the cost model.
+class Way(NamedTuple):
+    """A way to answer a call.
 
     Parameters
     ----------
-    how : pre-filter and broad phase that were asked for; only the direct strategy has them
-    view : what all shots accept; None if they accept different items
-    kind : whether a shot is one pixel, answered by one read of the label plane; whether the weapon has pellets
+    name : by which it is asked for
+    refuses : why it cannot serve a call, or ""
+    cost : ns that the call takes, and ns to make what it needs of the scene and is not there
+    engine : returns rows, in parts
     """
+
+    name: str
+    refuses: Callable[[Request], str]
+    cost: Callable[[Request], tuple[float, float]]
+    engine: Callable[[Request, QueryContext], list[Rows]]
+
+
+def _costs() -> Costs:
+    return COMPILED if jit_is_on() else IN_NUMPY
+
+
+def _near(request: Request) -> float:
+    """Expected number of items near a placement, if they are spread evenly over the box around all."""
+    if not len(request.stack):
+        return 0.0
+    item_wh, world_wh = request.stack.sizes
+    share = ((item_wh + 2 * request.traits.reach + 1) / world_wh).clip(max=1.0)
+    return len(request.stack) * float(share.prod())
+
+
+def _tiles_refuse(request: Request) -> str:
+    return "" if request.traits.fits else "the patterns are too large for bit rows"
+
+
+def _tiles_cost(request: Request) -> tuple[float, float]:
+    costs = _costs()
+    each = costs.tiles_placement + len(request.stack) * costs.tiles_pair
+    return costs.tiles_call + request.placements * each, 0.0
+
+
+def _visible_refuse(request: Request) -> str:
+    if request.view is None:
+        return "shots accept different items"
+    return "a pre-filter is asked for" if request.filtered else _tiles_refuse(request)
+
+
+def _visible_cost(request: Request) -> tuple[float, float]:
+    costs, scene = _costs(), request.scene
+    known = request.view is not None and scene.visible_sets().kept(request.view, scene.version) is not None
+    made = 0.0 if known else costs.visible_made + len(request.stack) * costs.visible_item
+    return costs.visible_call + request.placements * costs.visible_placement, made
+
+
+def _labels_refuse(request: Request) -> str:
+    if not request.traits.is_point:
+        return "shots are not one pixel"
+    if request.view != OF_ALL[False] or request.stack.has_unmet:
+        return "shots refuse items, or pierce"
+    if request.filtered:
+        return "a pre-filter is asked for"
+    return "" if request.scene.label_plane() is not None else "the scene has no bounds that fit one plane"
+
+
+def _labels_cost(request: Request) -> tuple[float, float]:
+    costs, plane = _costs(), request.scene.label_plane()
+    assert plane is not None  # else it refuses
+    drawn = len(request.stack) * costs.labels_drawn if plane.labels is None else 0.0
+    return costs.labels_call, plane.cost(request.scene.items) * costs.labels_pixel + drawn
+
+
+def _integers_refuse(request: Request) -> str:
+    if jit_is_on():
+        return "kernels are compiled"
+    if request.filtered:
+        return "a pre-filter is asked for"
+    if request.traits.scattered or request.traits.weighted:
+        return "there are pellets or weights"
+    if request.traits.reach > INTEGERS_REACH:
+        return f"patterns reach farther than {INTEGERS_REACH} px"
+    few = 0 < request.placements <= INTEGERS_PLACEMENTS
+    return "" if few and request.placements * len(request.stack) <= INTEGERS_PAIRS else "there are too many shots"
+
+
+def _integers_cost(request: Request) -> tuple[float, float]:
+    size = 2 * request.traits.reach + 1
+    each = INTEGERS_PLACEMENT + _near(request) * (INTEGERS_PAIR + INTEGERS_BIT * stride_of(size) * size)
+    return INTEGERS_CALL + request.placements * each, 0.0
+
+
+def _spans_refuse(_: Request) -> str:
+    return ""
+
+
+def _spans_cost(request: Request) -> tuple[float, float]:
+    return (0.0 if _tiles_refuse(request) else inf), 0.0
+
+
+WAYS = (
+    Way("integers", _integers_refuse, _integers_cost, by_integers),
+    Way("labels", _labels_refuse, _labels_cost, by_labels),
+    Way("visible", _visible_refuse, _visible_cost, by_visible_set),
+    Way("tiles", _tiles_refuse, _tiles_cost, by_tiles),
+    Way("spans", _spans_refuse, _spans_cost, by_spans),
+)
+"""All ways of areas. The reference costs more than any other, so it is chosen only where bit rows do not serve."""
+
+BY_NAME = {way.name: way for way in WAYS}
+
+ASKED = {"direct": ("tiles", "spans"), "built": ("labels", "visible", "tiles", "spans")}
+"""Ways of the strategies that name several; the first that serves is taken."""
+
+STRATEGIES = ("auto", *ASKED, *(way.name for way in WAYS), "walk", "cast", "march")
+"""Names that a call may ask for; the last three are ways of rays. A way that cannot serve a call is passed over."""
+
+
+def chosen_way(strategy: str, request: Request) -> tuple[Way, str]:
+    """The way that answers a call, and why: the one asked for if it serves, else the cheapest."""
     choice("strategy", strategy, STRATEGIES)
-    if view is None:
-        return "direct", "shots accept different items"
-    if strategy != "auto":
-        return strategy, "asked for"
-    if how != ("auto", "auto"):
-        return "direct", "a pre-filter was asked for"
-    point, scattered = kind
-    plane = scene.label_plane() if point else None
-    known = scene.visible_sets()
-    if (plane is not None and not plane.cost(scene.items)) or (plane is None and known.kept(view, scene.version)):
-        return "composed", "it is there"
-    costs = IN_NUMPY if kernels_of(bit_rows) is bit_rows else COMPILED
-    lost = placements * (costs.placement + len(stack) * costs.pair)
-    lost += costs.read if plane is not None else costs.scattered if scattered else costs.call
-    cost = costs.compose + len(stack) * costs.item
-    if plane is not None:
-        drawn = len(stack) * costs.draw if plane.labels is None else 0
-        cost = plane.cost(scene.items) * costs.pixel + drawn
-    why = f"about {cost / 1e3:.0f} us to compose, {lost / 1e3:.0f} us more without it"
-    return "composed" if known.pays(view, scene.version, lost, cost) else "direct", why
+    passed_over = ""
+    for name in ASKED.get(strategy, (strategy,)):
+        if name in BY_NAME:
+            why = BY_NAME[name].refuses(request)
+            if not why:
+                return BY_NAME[name], f"{passed_over}asked for"
+            passed_over += f"not {name}, as {why}; "
+    return _cheapest(request, passed_over)
 
 
-def chosen_candidates(
-    prefilter: object, broadphase: object, scene: Scene, stack: Stack, swept: bool, asked: int
-) -> Candidates:
+def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
+    """The way that takes the least time, and why; what it needs of the scene is made by rent or buy."""
+    ready, least, wanted = BY_NAME["spans"], inf, None
+    for way in WAYS:
+        if way.refuses(request):
+            continue
+        cost, made = way.cost(request)
+        if made and wanted is None:
+            wanted = way, cost, made
+        if not made and cost < least:
+            ready, least = way, cost
+    if wanted is not None and wanted[1] < least and request.view is not None:
+        (way, cost, made), known, version = wanted, request.scene.visible_sets(), request.scene.version
+        if known.pays(request.view, version, least - cost, made):
+            return way, f"{passed_over}calls have lost the {made / 1e3:.0f} us that it takes to make what it needs"
+        lost = known.lost(request.view, version)
+        passed_over += f"{way.name} would take {made / 1e3:.0f} us to make, {lost / 1e3:.0f} us lost so far; "
+    return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
+
+
+def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack: Stack, asked: int) -> Candidates:
     """Pre-filter and broad phase of a call, and why: those asked for, or the cheaper ones by the cost model.
 
     Parameters
     ----------
-    swept : whether capsules pay: see `sweep_pays`
     asked : placements whose near items will be looked up
 
     Raises
@@ -148,7 +227,7 @@ def chosen_candidates(
             raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
         return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
     if wanted.name == "auto":
-        wanted = prefilter_of("swept") if swept else BOX
+        wanted = BOX
     text = "box" if wanted == BOX else f"box, then {wanted}"
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, text)
@@ -160,48 +239,14 @@ def chosen_candidates(
     return Candidates(scene.items, stack, wanted, scene.index(structure), f"{text}, by {structure}")
 
 
-def sweep_pays(stack: Stack, table: PatternTable, asked: int) -> bool:
-    """Whether capsules around long, slanting patterns drop enough of the items that their boxes meet.
-
-    The number of pairs is estimated for items of the mean size, spread evenly over the box around all.
-
-    Parameters
-    ----------
-    table : patterns of the first shot; those of the others are about alike
-    asked : placements whose near items will be looked up
-    """
-    pattern = table.patterns[0] if table.patterns else None
-    if pattern is None or pattern.swept is None or asked * len(stack) * SWEPT_DROPPED_NS < SWEPT_CALL_NS:
-        return False
-    a, b, radius = pattern.swept
-    item_wh, world_wh = stack.sizes
-    box_wh = np.minimum((np.abs(b - a) + 2 * radius) / SUB + item_wh, world_wh)
-    width = 2 * radius / SUB + float(np.sqrt((item_wh**2).sum()))
-    length = float(np.sqrt((((b - a) / SUB) ** 2).sum())) + width
-    pairs = asked * len(stack) * float((box_wh / world_wh).prod())
-    dropped = pairs * (1 - min(length * width / float(box_wh.prod()), 1))
-    return dropped * SWEPT_DROPPED_NS > pairs * SWEPT_PAIR_NS + SWEPT_CALL_NS
-
-
-def _box_costs(scene: Scene, items: int, placements: int) -> tuple[float, float]:
-    """Time to find the boxes that placements meet, ns: one by one, and by a BVH, including its update or build."""
+def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
+    """Whether a BVH, with its update, is faster than comparing all boxes; a missing one is built by rent or buy."""
     one_by_one = placements * items * BOX_PAIR_NS
     answer = placements * BVH_PLACEMENT_NS + BVH_CALL_NS
     if answer >= one_by_one:
-        return one_by_one, answer
+        return False
     index = scene.index("bvh")
-    return one_by_one, answer + index.owed(scene.items) * (BVH_BUILT_NS if index.boxes is None else BVH_MOVED_NS)
-
-
-def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
-    """Whether a BVH, including its update, is faster than comparing all boxes.
-
-    A missing BVH is built once it would have saved as much as it costs, so the total is at most twice that of the
-    better choice (Karlin et al., "Competitive snoopy caching", 1988).
-    """
-    one_by_one, by_bvh = _box_costs(scene, items, placements)
-    index = scene.index("bvh")
-    if one_by_one > by_bvh or index.boxes is not None:
-        return one_by_one > by_bvh
-    index.missed += max(one_by_one - placements * BVH_PLACEMENT_NS - BVH_CALL_NS, 0)
+    if index.boxes is not None:
+        return one_by_one > answer + index.owed(scene.items) * BVH_MOVED_NS
+    index.missed += one_by_one - answer
     return index.missed > items * BVH_BUILT_NS

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 from weakref import ref
 
 import numpy as np
+import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import BESIDE_REACH, WORD, PatternBits, Words
+from hitplanes.planes.bits.bit_rows import WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, big_pattern
 from hitplanes.planes.common.caches import LruCache
@@ -20,6 +20,8 @@ from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+
+Kind = TypeVar("Kind", bound=np.generic)
 
 LENGTH = Number(0, REACH_MAX)
 """A length that a weapon may have, px."""
@@ -112,9 +114,9 @@ class Pattern:
 
     @cached_property
     def window_bytes(self) -> int:
-        """Memory of its bit rows, bytes."""
+        """Memory of its bit rows, and of the sums of its weights, bytes."""
         x, y, x_max, y_max = self.spans.box_xyxy or (0, 0, -1, -1)
-        return ((x_max - x) // WORD + 3) * (y_max - y + 1 + 2 * WORD) * 8
+        return _window_bytes(x_max - x + 1, y_max - y + 1, self.prefix is not None)
 
     @cached_property
     def strip(self) -> Strip:
@@ -138,16 +140,6 @@ class Pattern:
     def columns(self) -> TableSpans:
         """Spans, as columns of a table."""
         return _columns([self.spans], 0)
-
-    @cached_property
-    def is_disc(self) -> bool:
-        """Whether it is a small disc: it has all pixels that are at most as far as its farthest one."""
-        if not self.spans.count or max(map(abs, self.spans.box_xyxy or ())) > BESIDE_REACH:
-            return False
-        farthest = int((self.spans.pixels() ** 2).sum(axis=1).max())
-        x = np.array([math.isqrt(farthest - y * y) for y in range(math.isqrt(farthest) + 1)])
-        row = 2 * x + 1
-        return self.spans.count == int(row[0] + 2 * row[1:].sum())
 
     @property
     def nbytes(self) -> int:
@@ -279,7 +271,7 @@ class PatternTable:
         return np.asarray(self.prefix[ordinal + x_last + 1] - self.prefix[ordinal + x_first])
 
 
-def _joined(columns: Sequence[Ints]) -> Ints:
+def _joined(columns: Sequence[npt.NDArray[Kind]]) -> npt.NDArray[Kind]:
     """Columns one after another; a single one is not copied."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
@@ -301,17 +293,11 @@ def _columns(spans: Sequence[Spans], first: int) -> TableSpans:
     return TableSpans(y, x_first, x_last, ordinal, pattern * (rows + 2) + y - top, top, rows)
 
 
-TABLE_BYTES_MOST = 2**22
-"""Largest table of all 64 shifts of a pattern, bytes; in a larger one each read misses the processor's cache."""
-
-PATTERN_BYTES_MOST = 2**22
-"""Largest bit rows of a pattern, bytes; larger patterns are counted by spans."""
+PATTERN_BYTES_MOST = 2**25
+"""Largest bit rows of a pattern, with the sums of its weights, bytes; larger patterns are counted by spans."""
 
 PATTERNS_BYTES_MOST = 2**26
 """Largest bit rows of all patterns of a call, bytes."""
-
-OFTEN = 64
-"""Placements of a pattern, over all calls, after which the table of its shifts is made."""
 
 WINDOW_CACHE_BYTES = 2**26
 """Size of the caches of bit rows, of their columns of words, and of integer rows, bytes each."""
@@ -327,8 +313,8 @@ def _bytes(windows: PatternBits) -> int:
     return ENTRY_BYTES + sum(column.nbytes for column in windows if isinstance(column, np.ndarray))
 
 
-_kept: LruCache[tuple[tuple[ref[Pattern], ...], bool], PatternBits] = LruCache(
-    WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key[0])
+_kept: LruCache[tuple[ref[Pattern], ...], PatternBits] = LruCache(
+    WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key)
 )
 
 _kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lambda words: words.nbytes + ENTRY_BYTES)
@@ -336,6 +322,16 @@ _kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lamb
 _kept_bigs: LruCache[ref[Pattern], BigPattern] = LruCache(WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES)
 
 _FULL = np.uint64(2**64 - 1)
+NO_SUMS: Sums = np.zeros(0, np.uint32)
+
+
+def _window_bytes(wide: int, high: int, weighted: bool) -> int:
+    return 4 * weighted * high * (wide + 1) + ((wide - 1) // WORD + 3) * (high + 2 * WORD) * 8
+
+
+def fits_at_reach(reach: int, weighted: bool) -> bool:
+    """Whether the bit rows of a pattern that reaches so many px are small enough at any aim."""
+    return _window_bytes(2 * reach + 3, 2 * reach + 3, weighted) <= PATTERN_BYTES_MOST
 
 
 def fits(patterns: Sequence[Pattern]) -> bool:
@@ -344,19 +340,9 @@ def fits(patterns: Sequence[Pattern]) -> bool:
     return max(sizes, default=0) <= PATTERN_BYTES_MOST and sum(sizes) <= PATTERNS_BYTES_MOST
 
 
-def pattern_bits_of(patterns: Sequence[Pattern], placements: int) -> PatternBits:
-    """Bit rows of patterns; those of the last calls are kept.
-
-    Parameters
-    ----------
-    placements : placements that a table of all shifts would serve; 0 if there is no use for it
-    """
-    often = bool(placements) and len(patterns) == 1 and patterns[0].window_bytes * WORD <= TABLE_BYTES_MOST
-    if often:
-        attributes = vars(patterns[0])
-        attributes["placed"] = placed = attributes.get("placed", 0) + placements
-        often = placed > OFTEN
-    return _kept.get((tuple(map(ref, patterns)), often), lambda: _made(patterns, often))
+def pattern_bits_of(patterns: Sequence[Pattern]) -> PatternBits:
+    """Bit rows of patterns; those of the last calls are kept."""
+    return _kept.get(tuple(map(ref, patterns)), lambda: _made(patterns))
 
 
 def big_of(pattern: Pattern) -> BigPattern:
@@ -364,18 +350,30 @@ def big_of(pattern: Pattern) -> BigPattern:
     return _kept_bigs.get(ref(pattern), lambda: big_pattern(pattern.spans))
 
 
-def _made(patterns: Sequence[Pattern], often: bool) -> PatternBits:
+def _made(patterns: Sequence[Pattern]) -> PatternBits:
     boxes = np.array([pattern.spans.box_xyxy or (0, 0, -1, -1) for pattern in patterns])
     strips = strips_of([pattern.strip for pattern in patterns], boxes)
     columns = [_pattern_words(pattern) for pattern in patterns]
     rows = np.array([words.shape[1] for words in columns])
-    if often:
-        words = columns[0]
-        shifts = np.arange(WORD, dtype=np.uint64)[:, None]
-        table = (words[:-1, None] >> shifts) | (words[1:, None] << (np.uint64(WORD) - shifts))
-        return PatternBits(boxes, np.array([WORD]), WORD * rows, table.reshape(-1), words.shape[1], strips)
     first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
-    return PatternBits(boxes, first, rows, np.concatenate([words.reshape(-1) for words in columns]), 0, strips)
+    sums = [sums_along_rows(pattern.spans, pattern.prefix) for pattern in patterns if pattern.prefix is not None]
+    first_sum = np.cumsum([0, *(one.size for one in sums[:-1])])
+    words = _joined([words.reshape(-1) for words in columns])
+    return PatternBits(boxes, first, rows, words, strips, _joined(sums) if sums else NO_SUMS, first_sum)
+
+
+def sums_along_rows(spans: Spans, prefix: Ints) -> Sums:
+    """Sums of the weights along each row of a pattern's box, from 0 on, modulo 2**32, row after row.
+
+    Parameters
+    ----------
+    prefix : prefix sums of the weights of its pixels, in span order
+    """
+    x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
+    weights = np.zeros((y_max - y + 1, x_max - x + 2), np.uint32)
+    xy = spans.pixels()
+    weights[xy[:, 1] - y, xy[:, 0] - x + 1] = np.diff(prefix)
+    return np.cumsum(weights, axis=1, dtype=np.uint32).reshape(-1)
 
 
 def _pattern_words(pattern: Pattern) -> Words:

@@ -259,7 +259,7 @@ class PositionCache:
             there, ordered = self._tiles
             cells = Cells(0, 0, 0, 0, 0, NOTHING_LISTED, NOTHING_LISTED)
             bounds = self._scene.bounds or (-FAR, -FAR, FAR, FAR)
-            worth = int(COMPILED.compose + COMPILED.item * len(stack))
+            worth = int(COMPILED.visible_made + COMPILED.visible_item * len(stack))
             self._place(
                 ordered, tiles.boxes(stack.box_xyxy)[there], cells, (*bounds, self._view.pierce, 0, worth, False)
             )
@@ -267,7 +267,8 @@ class PositionCache:
     def _compose(self, composed: VisibleSet) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
         seen, cells = composed.seen, composed.cells(self._reach)
-        ordered = OrderedTiles(seen.rank, composed.ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
+        ids = self._scene.items.stack().ids[seen.rank]
+        ordered = OrderedTiles(seen.rank, ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
         self._place(ordered, seen.box_xyxy, cells, (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
 
     def _place(self, ordered: OrderedTiles, boxes_xyxy: Ints, cells: Cells, told: tuple[int, ...]) -> None:

@@ -63,7 +63,7 @@ def fired_rays(
     each = (burst.count if burst else 1) * (several.count if several else 1)
     prefilter, broadphase, strategy = how
     chosen = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
-    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack, False)
+    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
     walks = chosen.way == "walk"
     candidates = choose(each * len(shots) if walks else 0)
     field = scene.distance_field() if chosen.way == "march" else None

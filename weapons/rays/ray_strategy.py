@@ -124,6 +124,9 @@ class Way(NamedTuple):
 
 WAYS = {"walk": Way(_never, _walk_ns), "cast": Way(_not_cast, _cast_ns), "march": Way(_not_marched, _march_ns)}
 
+ASKED = {"direct": "walk", "built": "march"}
+"""Ways that are meant by the strategies which areas and rays share."""
+
 
 class Choice(NamedTuple):
     """The way of a call, and why; `pending` if a later call like it, at the same scene, may march."""
@@ -148,11 +151,13 @@ def chosen_way(
     InputError
         If the strategy is not known.
     """
-    forced = WAYS.get(choice("strategy", strategy, STRATEGIES))
+    choice("strategy", strategy, STRATEGIES)
+    name = ASKED.get(strategy, strategy)
+    forced = WAYS.get(name)
     passed_over = forced.why_not(ray, scene) if forced else ""
     if forced and not passed_over:
-        return Choice(strategy, "asked for")
-    why = f"{strategy} is passed over: {passed_over}; " if passed_over else ""
+        return Choice(name, "asked for")
+    why = f"{name} is passed over: {passed_over}; " if passed_over else ""
     if asked or not len(stack) or not is_thin_first(ray):
         return Choice("walk", f"{why}every ray walks")
     sizes = Sizes(rays, prepared, stack)
