@@ -11,7 +11,7 @@ import oracle_rays
 import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
-from test_jumps import answer, single, some_ray
+from test_march import answer, single, some_ray
 from test_rays import check_columns
 
 from hitplanes import Pistol, Rifle, Rounds, Scene, Spread, Sweep, Weapon, fire, prepare

@@ -258,7 +258,7 @@ def test_a_plan_is_printed_as_it_is_shown(
 
 def test_what_a_scene_pays_for_is_as_the_table_tells() -> None:
     left_out = runpy.run_path(str(ROOT / "fixtures" / "left_out.py"))
-    rows = left_out["table"]("a disc, direct", False)
+    rows = left_out["table"]("a disc by tiles", False)
     chosen = [0, *(rows[0].index(name) for name in left_out["SHORT"])]
     some = [[row[i] for i in chosen] for row in rows]
     some = [row for row in some if set(row[1:]) - {"-", ""}]

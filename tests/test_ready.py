@@ -95,7 +95,7 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
                 mock.patch.multiple(position_cache, WALKS_LEAST=1 + seed % 3, WALKS_AT_FIRST=seed % 4)
             )
             if compiled and seed % 2:
-                costs = squares.COMPILED._replace(compose=seed % 1000, item=0)
+                costs = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
                 patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=costs))
             check_random_scene(seed)
 
@@ -172,7 +172,7 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 
 def small_and_composed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let compiled kernels begin with a small buffer, and compose soon what can be seen."""
-    costs = COMPILED._replace(compose=400, item=0)
+    costs = COMPILED._replace(visible_made=400, visible_item=0)
     for name, value in {"ROWS": 1, "COMPILED": costs}.items():
         monkeypatch.setattr(f"hitplanes.weapons.prepared.compiled.{name}", value)
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from ray_battles import some_battle
-from test_jumps import single
+from test_march import single
 from test_ready import changed, crowd, same
 
 from hitplanes import (

@@ -838,7 +838,7 @@ def test_the_plan_is_added_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     log.write_bytes(b"".join(map(line_of, shots)))
     assert main(["fire", str(GALLERY), str(log), "-o", str(tmp_path / "hits.jsonl"), "--plan"]) == 0
     out = capsys.readouterr().out
-    assert re.search(r"^  walk +[\d,]+\.\d us +[\d,]+  1 of 2 calls: samples through the stack, ", out, re.M)
+    assert re.search(r"^  weights +[\d,]+\.\d us +[\d,]+  1 of 2 calls: falloff of the hit pixels, ", out, re.M)
     assert re.search(r"^  stack +[\d,]+\.\d us +[\d,]+  2 of 2 calls: \d+ items, ", out, re.M)
     assert re.search(r"^  weights +left out +1 of 2 calls: the weapon has no falloff$", out, re.M)
     assert re.search(r"^  all +[\d,]+\.\d us +[\d,]+  2 calls$", out, re.M)

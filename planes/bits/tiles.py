@@ -252,10 +252,10 @@ class Tiles:
             known = self.bigs[stride] = BigTiles(stride)
         return known
 
-    def ordered(self, stack: Stack) -> OrderedTiles:
-        """The tiles at their places in the world, with the filter columns of their items; `stack` is their own."""
+    def ordered(self, stack: Stack, choosy: bool) -> OrderedTiles:
+        """The tiles of a stack at their places in the world; with the columns of filters if a shot may refuse items."""
         occluder = self.each(stack.occluder) if stack.has_occluders else NO_FLAGS
-        whose = self.each(stack.categories), self.each(stack.owner)
+        whose = (self.each(stack.categories), self.each(stack.owner)) if choosy else ()
         return OrderedTiles(self.rank, self.boxes(stack.box_xyxy), self.begin, self.words, occluder, *whose)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..common.backend import kernels_of
 from ..common.caches import LruCache, cached_attribute
 from ..common.checks import Bools, Ints
+from ..common.limits import ALL
 from ..grid.spans import Box
 from ..scene.items import Items, Stack
 from . import bit_rows, cells
@@ -83,6 +84,8 @@ class View(NamedTuple):
 
     def accepts(self, stack: Stack) -> Bools:
         """Which items (M,) of a stack such shots accept."""
+        if self.accept == ALL and not (self.exclude or stack.has_unmet):
+            return np.ones(len(stack), np.bool_)
         there = (stack.categories & self.accept) != 0
         for owner in self.exclude:
             there &= stack.owner != owner
@@ -102,8 +105,9 @@ class VisibleSet:
     def __init__(self, stack: Stack, tiles: Tiles, bounds: Box | None, view: View) -> None:
         there = view.accepts(stack)
         boxes = tiles.boxes(stack.box_xyxy)
-        objects = np.flatnonzero((there & ~stack.occluder)[tiles.rank])
-        blocks = (there & stack.occluder if view.pierce else there)[tiles.rank]
+        occluders = there & stack.occluder if stack.has_occluders else np.zeros_like(there)
+        objects = np.flatnonzero((there & ~occluders)[tiles.rank])
+        blocks = (occluders if view.pierce else there)[tiles.rank]
         rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
         self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
         self._cells: LruCache[tuple[int, ...], Cells] = LruCache(CELLS_BYTES, lambda made: made.nbytes)

@@ -200,7 +200,7 @@ class Scene:
         self._label_plane: LabelPlane | None = None
         self._distance_field: DistanceField | None = None
         self._indexes: dict[str, Index] = {}
-        self._compositions: VisibleSets | None = None
+        self._visible_sets: VisibleSets | None = None
 
     @classmethod
     def from_planes(
@@ -454,9 +454,9 @@ class Scene:
 
     def visible_sets(self) -> VisibleSets:
         """The visible sets of the objects, for shots at many of them."""
-        if self._compositions is None:
-            self._compositions = late.visible.VisibleSets()
-        return self._compositions
+        if self._visible_sets is None:
+            self._visible_sets = late.visible.VisibleSets()
+        return self._visible_sets
 
     def distance_field(self) -> DistanceField | None:
         """The distance field by which rays march; None if there is no label plane."""

@@ -12,6 +12,7 @@ from itertools import islice, repeat
 from typing import Any
 from unittest import mock
 
+import numpy as np
 from speed_clock import Cell, Side, race
 from speed_moving import Own, frames_of, masks_side, own_rows
 from speed_peers import Masks, first, rendered
@@ -89,12 +90,8 @@ def _counts(side: Side) -> Side:
 
     def answer(work: Any, units: int) -> Any:
         with (
-            mock.patch("hitplanes.planes.bits.bit_rows.nearest", lambda met, left, top: (left, left, top)),
-            mock.patch(
-                "hitplanes.planes.bits.bit_rows.nearest_visible",
-                lambda seen, beside, near, left, top: (left, left, top),
-            ),
-            mock.patch("hitplanes.planes.bits.front_to_back._row_order", lambda found, placed: slice(None)),
+            mock.patch("hitplanes.planes.bits.front_to_back.nearest", lambda met, left, top: (left, left, top)),
+            mock.patch("hitplanes.planes.bits.front_to_back.row_order", lambda *keys: np.arange(len(keys[0]))),
         ):
             return whole(work, units)
 

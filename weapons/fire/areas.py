@@ -125,8 +125,7 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
         plan.run("patterns", f"{len(placements.table.count)} distinct", placements.nbytes)
         if placements.table.prefix is not None:
             plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
-        met = direct(placements, part, context)
-        rows.append(rows_of_span_hits(met, placements, request.stack.ids, begin))
+        rows.append(rows_of_span_hits(direct(placements, part, context), placements, request.stack.ids, begin))
         plan.run("rows", "", rows[-1].nbytes)
     return rows
 
@@ -162,18 +161,25 @@ def _chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator
 def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
     """Rows by the tiles of the stack, front to back: each takes its pixels from the rest of each placed pattern."""
     stack, tiles, plan, parts = request.stack, request.scene.items.tiles(), context.plan, []
-    ordered = tiles.ordered(stack)
+    choosy, free = may_refuse(stack, request.shots), Rule(request.traits.pierces, request.scene.bounds)
+    ordered = tiles.ordered(stack, choosy)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ordered.box_xyxy.nbytes)
     most = NEAR_AT_ONCE if request.filtered else PLACEMENTS_AT_ONCE
     first = min(CHUNK_PAIRS // max(len(stack), 1), most) if request.filtered else most
     for begin, part, placements in _parts(request, first, most, context.candidates):
         windows, near = _windows(placements, plan), None
+        rule = _rule(request, part, placements) if choosy else free
         if request.filtered:
             placement, rank = near_pairs(placements, np.arange(len(placements)), placements.boxes, context)
             place, tile = tiles.of(rank)
             near = placement[place], tile
         found = kernels_of(front_to_back).front_to_back(
-            placed_of(placements), placements.pellets, windows, ordered, _rule(request, part, placements), near
+            placed_of(placements),
+            placements.pellets,
+            windows,
+            ordered,
+            rule,
+            near,
         )
         tests = f"{'' if request.filtered else 'boxes, '}{'strips, ' * bool(len(windows.strips))}filters and occluders"
         parts.append(_rows_of(placements, found, stack.ids).later(begin))
@@ -182,12 +188,10 @@ def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
 
 
 def _rule(request: Request, shots: Shots, placements: Placements) -> Rule:
-    """What ends the pixels of a part of the shots."""
+    """What ends the pixels of a part of the shots, which may refuse items."""
     pierce, bounds, view = request.traits.pierces, request.scene.bounds, request.view
     if view is None:
         return Rule(pierce, bounds, shots.accept[placements.shot], shots.exclude[placements.shot])
-    if not may_refuse(request.stack, shots):
-        return Rule(pierce, bounds)
     return Rule(pierce, bounds, view.accept, np.array([view.exclude], np.int64))
 
 

@@ -49,13 +49,13 @@ PIECE_BYTES = 400
 FAR = 2**42
 """A coordinate beyond all positions, px."""
 
-COMPOSE = -1
+MAKE_VISIBLE = -1
 """Returned by `_shot` instead of a number of rows: the visible set is worth making."""
 
 UNKNOWN = -2
 """Returned by `_shot` instead of a number of rows: the position is outside the range that is looked up."""
 
-LEFT, TOP, RIGHT, LOW, PIERCE, SPENT, WORTH, COMPOSED = range(8)
+LEFT, TOP, RIGHT, LOW, PIERCE, SPENT, WORTH, IS_VISIBLE = range(8)
 X, Y, BITS, WIDE, HIGH, BEGIN, LISTED, TILES, BOX, RANK, ITEM, BLOCKS, WORD_OF, WORDS, SCRATCH = range(8, 23)
 """Fields of a scene for shots:
 
@@ -186,16 +186,16 @@ def _shot(at_x, at_y, buffer_at):
     scene, shape = ints_at(buffer[SCENE]), ints_at(buffer[ROUND])
     box, near = carray(pointer(scene[BOX]), (scene[TILES], 4), np.int64), ints_at(scene[SCRATCH])
     left, top, right, bottom = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], x + shape[ROUND_RIGHT], y + shape[ROUND_LOW]
-    if scene[COMPOSED]:
+    if scene[IS_VISIBLE]:
         close = _listed(scene, box, x, y, left, top, right, bottom, near)
     else:
         close = _walked(scene, box, left, top, right, bottom, near)
         if scene[SPENT] > scene[WORTH]:
-            return COMPOSE
+            return MAKE_VISIBLE
     if close == 0:
         return 0
     room, rest = buffer[ROOM], words_at(buffer[ROUND] + 8 * PIXELS)
-    if not scene[COMPOSED]:
+    if not scene[IS_VISIBLE]:
         pixels, rest = rest, words_at(buffer_at + 8 * (FOUND + ROW * room))
         _left_of(shape, pixels, scene, left, top, rest)
     count = _met(scene, shape, box, near, close, rest, x, y)
@@ -244,9 +244,9 @@ class PositionCache:
     def follow(self, stack: Stack) -> None:
         """Read the scene as it is now."""
         with self._lock:
-            composed = self._scene.visible_sets().kept(self._view, self._scene.version)
-            if composed is not None:
-                self._compose(composed)
+            visible_set = self._scene.visible_sets().kept(self._view, self._scene.version)
+            if visible_set is not None:
+                self._use_visible(visible_set)
                 return
             tiles = self._scene.items.tiles()
             if stack.forms != self._forms:
@@ -264,9 +264,9 @@ class PositionCache:
                 ordered, tiles.boxes(stack.box_xyxy)[there], cells, (*bounds, self._view.pierce, 0, worth, False)
             )
 
-    def _compose(self, composed: VisibleSet) -> None:
+    def _use_visible(self, visible_set: VisibleSet) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
-        seen, cells = composed.seen, composed.cells(self._reach)
+        seen, cells = visible_set.seen, visible_set.cells(self._reach)
         ids = self._scene.items.stack().ids[seen.rank]
         ordered = OrderedTiles(seen.rank, ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
         self._place(ordered, seen.box_xyxy, cells, (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
@@ -309,13 +309,13 @@ class PositionCache:
         return look, PIECE_BYTES + numbers.nbytes
 
     def _room_for(self, count: int, buffer: Buffer, numbers: Ints) -> Buffer:
-        """Buffer for so many rows; for COMPOSE make the visible set and return the same buffer."""
+        """Buffer for so many rows; for MAKE_VISIBLE make the visible set and return the same buffer."""
         if count > 0:
             return self._buffer(numbers, 2 * count)
         with self._lock:
-            if count == COMPOSE and not self._here[COMPOSED]:
+            if count == MAKE_VISIBLE and not self._here[IS_VISIBLE]:
                 scene = self._scene
-                self._compose(scene.visible_sets().read(self._view, scene.items, scene.bounds))
+                self._use_visible(scene.visible_sets().read(self._view, scene.items, scene.bounds))
         return buffer
 
     def _buffer(self, pixels: Ints, rows: int) -> Buffer:
