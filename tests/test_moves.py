@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_compose import MASKS, add_one, change, front_to_back, random_scene
+from test_label_plane import MASKS, add_one, change, front_to_back, random_scene
 
 from hitplanes import History, InputError, Scene, Sprite
 from hitplanes.planes.bits.tiles import Tiles

@@ -53,31 +53,6 @@ def test_what_lies_in_front_at_a_pixel(kernels: ModuleType, seed: int, kind: typ
     assert xy.tolist() == np.stack([x, y], axis=1)[place].tolist()
 
 
-@QUIET
-@given(SEEDS, st.booleans())
-def test_what_lies_in_front_of_a_stack(kernels: ModuleType, seed: int, bounded: bool) -> None:
-    rng = np.random.default_rng(seed)
-    far = int(rng.choice([0, 0, 2**38]))
-    scene = Scene((30, 20), (far, far)) if bounded else Scene()
-    for _ in range(rng.integers(0, 25)):
-        mask = rng.random(rng.integers(1, 16, 2)) < 0.7
-        role, at = "occluder" if rng.random() < 0.3 else "hittable", far + rng.integers(-4, 34, 2)
-        scene.add(mask, at, role=role, layer=int(rng.integers(2)))
-    stack, count = scene.items.stack(), int(rng.choice([0, 1, 60]))
-    xy = far + rng.integers(-6, 36, (count, 2))
-    found = kernels.front_of(stack, scene.bounds, xy * 256 + rng.integers(-128, 128, (count, 2)))
-    told = []
-    for i, (x, y) in enumerate(xy.tolist()):
-        if bounded and not (far <= x < far + 30 and far <= y < far + 20):
-            continue
-        for rank, item in enumerate(stack.ids.tolist()):
-            mask, (left, top) = scene.mask(item)
-            if 0 <= y - top < mask.shape[0] and 0 <= x - left < mask.shape[1] and mask[y - top, x - left]:
-                told += [] if stack.occluder[rank] else [(i, item, [x, y])]
-                break
-    assert list(zip(found.place.tolist(), found.object.tolist(), found.xy.tolist(), strict=True)) == told
-
-
 @pytest.mark.parametrize("coarse", [False, True])
 def test_one_pixel_beyond_the_edges_there_is_nothing(kernels: ModuleType, coarse: bool) -> None:
     labels, objects = np.full((9, 16), 2, np.uint16), np.array([False, True])

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from ..bits.label_plane import CELL_BITS, FIELD, GUARDS, NOWHERE, Front
+from ..bits.label_plane import CELL_BITS, Front
 from ..common.checks import Bools, Floats, Ints, Labels
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB
 from ..grid.fixed_point import DOUBT, UNIT
 from ..grid.spans import Box
-from ..scene.items import Stack
-from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, OUT, ROWS_OUT
+from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
 from .cache import compiled
 
 TERMS = 8
@@ -217,71 +216,6 @@ def paint_item(
         begin += width
 
 
-@compiled()
-def follow_all(labels: Labels, x: int, y: int, rank: Ints, now: Ints, places: Ints, near: Ints, masks: Bools) -> int:
-    """Move many items; see `bits.label_plane.follow_all`."""
-    pixels = 0
-    for i in range(len(rank)):
-        pixels += follow(labels, x, y, rank[i], now[i, 0], now[i, 1], now[i, 2], now[i, 3], places, near, masks)
-    return pixels
-
-
-@compiled()
-def follow(
-    labels: Labels, x: int, y: int, rank: int, left: int, top: int, right: int, low: int, places: Ints, near: Ints,
-    masks: Bools,
-) -> int:  # fmt: skip
-    """Move one item to another box, and redraw what that changes; see `bits.label_plane.follow`."""
-    edge = x, y, x + labels.shape[1] - 1, y + labels.shape[0] - 1
-    old = _cut(places[rank, 0], places[rank, 1], places[rank, 2], places[rank, 3], edge)
-    new = _cut(left, top, right, low, edge)
-    places[rank, 0], places[rank, 1], places[rank, 2], places[rank, 3] = left, top, right, low
-    was, there = _step_pixels(old), _step_pixels(new)
-    near[rank] = _fields(new[0] - x, new[1] - y, new[2] - x, new[3] - y) if there else NOWHERE
-    around = min(old[0], new[0]), min(old[1], new[1]), max(old[2], new[2]), max(old[3], new[3])
-    if was and there and _step_pixels(around) <= was + there:
-        _draw(labels, x, y, around, places, near, masks)
-        return was + there
-    if was:
-        _draw(labels, x, y, old, places, near, masks)
-    if there:
-        _draw(labels, x, y, new, places, near, masks)
-    return was + there
-
-
-@njit(inline="always")
-def _cut(x: Any, y: Any, x_max: Any, y_max: Any, edge: Any) -> Any:
-    """Intersection of two boxes; it ends before it begins if it is empty."""
-    return max(x, edge[0]), max(y, edge[1]), min(x_max, edge[2]), min(y_max, edge[3])
-
-
-@njit(inline="always")
-def _step_pixels(box: Any) -> Any:
-    """Pixels of a box; 0 if it ends before it begins."""
-    return max(box[2] - box[0] + 1, 0) * max(box[3] - box[1] + 1, 0)
-
-
-@njit(inline="always")
-def _fields(x: Any, y: Any, x_max: Any, y_max: Any) -> Any:
-    """Four numbers of pixels of the plane as fields."""
-    return x >> 2 | y >> 2 << 15 | (FIELD - (x_max >> 2)) << 30 | (FIELD - (y_max >> 2)) << 45
-
-
-@compiled()
-def _draw(labels: Labels, x: int, y: int, box: Any, places: Ints, near: Ints, masks: Bools) -> None:
-    """Redraw a box with the items near it, back to front."""
-    left, top, right, low = box
-    labels[top - y : low - y + 1, left - x : right - x + 1] = 0
-    limits = _fields(right - x, low - y, left - x, top - y) | GUARDS
-    found, count = np.empty(len(near), np.int64), 0
-    for rank in range(len(near)):
-        if (limits - near[rank]) & GUARDS == GUARDS:
-            found[count] = rank
-            count += 1
-    for i in range(count - 1, -1, -1):
-        paint_item(labels, x, y, left, top, right, low, places[found[i]], masks)
-
-
 CELLS = types.Array(types.boolean, 2, "C", readonly=True)
 BITS = np.uint64(CELL_BITS)
 
@@ -320,34 +254,6 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
     xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
     count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
     return Front(place[:count], item[:count], xy[:count])
-
-
-# house: hit rule of areas
-@compiled(types.int64(*[BOXES] * 2, INTS, INTS, FLAGS, FLAGS, types.UniTuple(types.int64, 4), OUT, OUT, ROWS_OUT))
-def _front_of(at_256, box, offset, width, masks, occluder, bounds, place, rank, xy):
-    count = 0
-    for i in range(len(at_256)):
-        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
-        if x < bounds[0] or y < bounds[1] or x > bounds[2] or y > bounds[3]:
-            continue
-        for item in range(len(box)):
-            across = (box[item, 0] <= x) & (box[item, 2] >= x)
-            if not (across & (box[item, 1] <= y) & (box[item, 3] >= y)):
-                continue
-            if masks[offset[item] + (y - box[item, 1]) * width[item] + x - box[item, 0]]:
-                place[count], rank[count], xy[count, 0], xy[count, 1] = i, item, x, y
-                count += not occluder[item]
-                break
-    return count
-
-
-def front_of(stack: Stack, bounds: Box | None, at_256: Ints) -> Front:
-    """See `bits.label_plane.front_of`."""
-    place, rank = np.empty((2, len(at_256)), np.int64)
-    xy = np.empty(at_256.shape, np.int64)
-    what = stack.box_xyxy, stack.offset, stack.width, stack.masks, stack.occluder
-    count = _front_of(at_256, *what, EVERYWHERE if bounds is None else bounds, place, rank, xy)
-    return Front(place[:count], stack.ids.take(rank[:count]), xy[:count])
 
 
 ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)

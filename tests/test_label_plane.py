@@ -1,14 +1,15 @@
-"""Planes against a reference that asks each pixel by itself, after any change, and redrawn only where one was."""
+"""Label planes against a reference that asks each pixel by itself, in numpy and compiled, after any change."""
 
+import importlib
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hitplanes.planes.bits import label_plane as compose
+from hitplanes.planes.bits import label_plane as module
 from hitplanes.planes.bits.label_plane import LabelPlane, label_plane, plane_fits
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.scene.items import HITTABLE, OCCLUDER, ROLES, Role
@@ -20,6 +21,10 @@ MASKS = [np.random.default_rng(n).random((1 + n % 6, 1 + n % 7)) < 0.75 for n in
 MASKS += [np.ones((9, 9), np.bool_), np.pad(np.zeros((4, 4), np.bool_), 2, constant_values=True)]
 
 
+BOX = (-9, 4, 40, 33)
+NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.scene"]
+
+
 def front_to_back(scene: Scene) -> list[int]:
     """Greater layer, then occluders before objects, then the later added."""
     items = scene.items
@@ -27,7 +32,7 @@ def front_to_back(scene: Scene) -> list[int]:
     return sorted(deciding, key=lambda i: (-items.layer[i], items.role[i] != OCCLUDER, -i))
 
 
-def brute_codes(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.ndarray:
+def brute_labels(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.ndarray:
     """Ask each pixel what lies in front there, and whether anything lies behind it."""
     order = front_to_back(scene)
     covered = {}
@@ -83,17 +88,17 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
         scene.set(some, **(values if kind == "all" else {wanted: values[wanted]}))
 
 
-# The code plane
+# The label plane
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 12))
-def test_the_code_plane_follows_every_change(seed: int, count: int) -> None:
+def test_the_label_plane_follows_every_change(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, count)
     plane = LabelPlane(BOUNDS)
     for _ in range(8):
-        assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+        assert np.array_equal(plane.read(scene.items), brute_labels(scene))
         for _ in range(rng.integers(0, 4)):
             change(scene, rng)
     assert np.array_equal(plane.read(scene.items), LabelPlane(BOUNDS).read(scene.items))
@@ -134,7 +139,7 @@ def test_only_what_changed_is_redrawn() -> None:
     for values, pixels in changes:
         scene.set(0, **values)
         assert plane.cost(scene.items) == pixels, values
-        assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99))), values
+        assert np.array_equal(plane.read(scene.items), brute_labels(scene, (0, 0, 99, 99))), values
         assert plane.redrawn == pixels, values
         assert plane.cost(scene.items) == 0
     plane.read(scene.items)
@@ -166,12 +171,13 @@ def test_more_dirt_than_plane_is_a_whole_plane() -> None:
     plane.read(scene.items)
     scene.move(0, (3, 3))
     assert plane.cost(scene.items) == 36
-    assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 5, 5)))
+    assert np.array_equal(plane.read(scene.items), brute_labels(scene, (0, 0, 5, 5)))
     assert plane.redrawn == 36
 
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless it was asked about each change, and so knows all of them."""
     monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 3)
     scene = random_scene(np.random.default_rng(1), 6)
     plane = LabelPlane(BOUNDS)
@@ -180,8 +186,8 @@ def test_a_plane_that_lags_behind_the_journal_is_drawn_anew(asked: bool, monkeyp
         scene.move(1, (x, 5))
         if asked:
             plane.cost(scene.items)
-    assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
-    assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+    assert (plane.cost(scene.items) == SIZE[0] * SIZE[1]) is not asked
+    assert np.array_equal(plane.read(scene.items), brute_labels(scene))
 
 
 def test_masks_that_are_laid_out_anew_are_read_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +200,7 @@ def test_masks_that_are_laid_out_anew_are_read_from_there(monkeypatch: pytest.Mo
     atlases = set()
     for angle in range(0, 350, 7):
         scene.set(scene.ids(), angle=angle)
-        assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+        assert np.array_equal(plane.read(scene.items), brute_labels(scene))
         atlases.add(id(scene.items.atlas))
         assert scene.items.atlas.used <= 2 * scene.items.atlas.live + 100 + 2000
     assert len(atlases) > 1
@@ -210,11 +216,99 @@ def test_equal_masks_are_stored_once() -> None:
     assert scene.items.atlas.used == used == 100
 
 
+# Drawing
+
+
+@pytest.fixture(params=NAMES)
+def kernels(request: pytest.FixtureRequest) -> Any:
+    if ".jit." in request.param:
+        pytest.importorskip("numba")
+    return importlib.import_module(request.param)
+
+
+def heap(rng: np.random.Generator, count: int) -> Scene:
+    """Objects of any size, wider than 64 px too, most of them over the edge of BOX, on a few layers."""
+    scene = Scene()
+    masks = [rng.random((rng.integers(1, 40), rng.integers(1, 90))) < rng.choice([0.2, 0.9, 1]) for _ in range(5)]
+    for _ in range(count):
+        role = rng.choice(["hittable", "hittable", "occluder", "mover"])
+        place = rng.integers((-30, -20), (60, 50)) + rng.random(2)
+        scene.add(masks[rng.integers(5)], place, role=role, layer=int(rng.integers(3)))
+    return scene
+
+
+def boxes_in(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Boxes inside BOX, that overlap as they like."""
+    x, y = np.sort(rng.integers(BOX[0], BOX[2] + 1, (2, n)), axis=0), np.sort(rng.integers(4, 34, (2, n)), axis=0)
+    return np.stack([x[0], y[0], x[1], y[1]], axis=1)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32), st.sampled_from([0, 1, 3, 7, 8, 9, 16, 17, 40]), st.integers(0, 9))
+@pytest.mark.parametrize("kind", [np.uint16, np.uint32])
+def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, seed: int, count: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = heap(rng, count)
+    dirty, stack, truth = boxes_in(rng, n), scene.items.stack(), brute_labels(scene, BOX)
+    labels = np.full(truth.shape, 999, kind)
+    kernels.paint(labels, BOX[0], BOX[1], dirty, module.places_of(stack), stack.masks)
+    drawn = np.zeros(truth.shape, np.bool_)
+    for x, y, x_max, y_max in dirty.tolist():
+        drawn[y - BOX[1] : y_max - BOX[1] + 1, x - BOX[0] : x_max - BOX[0] + 1] = True
+    assert np.array_equal(labels, np.where(drawn, truth, 999))
+
+
+def test_planes_follow_many_moves(jit: bool) -> None:
+    """One object or many, near and far, once or twice before the plane is read."""
+    rng = np.random.default_rng(jit)
+    scene = random_scene(rng, 30)
+    plane, ids = LabelPlane((-6, 2, 17, 16)), scene.ids()
+    for _ in range(60):
+        for _ in range(rng.integers(1, 3)):
+            some = rng.choice(ids, rng.choice([1, 1, 2, 9]), replace=False)
+            now = scene.items.position_256[some] / 256
+            step = rng.choice([1, 30]) * rng.uniform(-1, 1, now.shape)
+            one = len(some) == 1
+            scene.move(int(some[0]) if one else some, (now + step)[0] if one else now + step)
+        assert np.array_equal(plane.read(scene.items), brute_labels(scene))
+    labels = label_plane(scene.items.stack(), BOX)
+    assert np.array_equal(labels, brute_labels(scene, BOX) >> 1)
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_a_short_step_is_drawn_as_one_box(many: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The boxes before and after are joined where that is no more to draw, also with those whose form changed."""
+    drawn: list[list[int]] = []
+    monkeypatch.setattr(module, "paint", lambda _, __, ___, dirty, *rest: drawn.extend(dirty.tolist()))
+    scene = Scene((100, 60))
+    ids = [scene.add(np.ones((4, 10), np.bool_), (20.5, 10.5))]
+    ids += [scene.add(np.ones((4, 10), np.bool_), role="mover")] if many else []
+    plane = scene.label_plane()
+    assert plane is not None
+    wanted: list[tuple[tuple[float, float], list[list[int]]]] = [
+        ((22.5, 11.5), [[16, 9, 27, 13]]),  # 60 px, and 80 in two
+        ((32.5, 11.5), [[18, 10, 37, 13]]),  # side by side
+        ((42.5, 12.5), [[28, 10, 37, 13], [38, 11, 47, 14]]),  # 100 px, and 80 in two
+        ((-1.5, 12.5), [[38, 11, 47, 14], [0, 11, 3, 14]]),
+        ((-20.5, 12.5), [[0, 11, 3, 14]]),
+        ((-21.5, 12.5), []),
+        ((98.5, 57.5), [[94, 56, 99, 59]]),
+        ((97.5, 58.5), [[93, 56, 99, 59]]),
+    ]
+    plane.read(scene.items)
+    drawn.clear()  # the plane as it is at first
+    for (x, y), boxes in wanted:
+        scene.move(ids if many else ids[0], (x, y))
+        plane.read(scene.items)
+        assert drawn == boxes
+        drawn.clear()
+
+
 # Sixteen and thirty-two bits
 
 
-def test_codes_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compose, "ITEMS_UINT16", 6)
+def test_labels_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "ITEMS_UINT16", 6)
     scene = random_scene(np.random.default_rng(3), 6)
     plane = LabelPlane(BOUNDS)
     assert plane.read(scene.items).dtype == np.uint16
@@ -222,10 +316,10 @@ def test_codes_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
     assert plane.cost(scene.items) == SIZE[0] * SIZE[1]
     labels = plane.read(scene.items)
     assert labels.dtype == np.uint32
-    assert np.array_equal(labels, brute_codes(scene))
+    assert np.array_equal(labels, brute_labels(scene))
     scene.move(2, (3, 3))
     assert plane.cost(scene.items) < SIZE[0] * SIZE[1]
-    assert np.array_equal(plane.read(scene.items), brute_codes(scene))
+    assert np.array_equal(plane.read(scene.items), brute_labels(scene))
 
 
 @pytest.mark.parametrize("count", [32_767, 32_768])
@@ -261,7 +355,7 @@ def test_the_label_plane_of_any_box(seed: int, corner: tuple[int, int], size: tu
     box = (*corner, corner[0] + size[0] - 1, corner[1] + size[1] - 1)
     labels = label_plane(scene.items.stack(), box)
     assert labels.dtype == np.int32
-    assert np.array_equal(labels, brute_codes(scene, box) >> 1)
+    assert np.array_equal(labels, brute_labels(scene, box) >> 1)
 
 
 def test_the_label_plane_of_one_role() -> None:
@@ -300,7 +394,7 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
             make()
 
 
-def test_a_world_without_bounds_has_no_code_plane() -> None:
+def test_a_world_without_bounds_has_no_label_plane() -> None:
     assert Scene().label_plane() is None
 
 
@@ -317,7 +411,7 @@ def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:
         assert plane.cost(scene.items) == costs[-1]
     assert costs[:3] == [200, 400, 600] and costs[-1] == 10_000
     assert plane.labels is None
-    assert np.array_equal(plane.read(scene.items), brute_codes(scene, (0, 0, 99, 99)))
+    assert np.array_equal(plane.read(scene.items), brute_labels(scene, (0, 0, 99, 99)))
 
 
 def test_a_plane_that_is_being_drawn_is_not_asked_what_it_lacks() -> None:
