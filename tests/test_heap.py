@@ -1,5 +1,6 @@
 """Large blocks that were freed are kept for the next step of a batch, where the C library lets them be."""
 
+import os
 import subprocess
 import sys
 
@@ -27,9 +28,12 @@ print(told().blocks > before)
 """
 
 
+@pytest.mark.parametrize("environment", [{}, {"MALLOC_TRIM_THRESHOLD_": "131072"}], ids=["plain", "as in a container"])
 @pytest.mark.parametrize(("at", "from_the_system"), [("(0, 0)", True), ("np.zeros((2, 2))", False)])
-def test_a_batch_lets_large_blocks_be_kept(at: str, from_the_system: bool) -> None:
-    run = subprocess.run([sys.executable, "-c", BLOCKS.format(at=at)], capture_output=True, text=True, check=False)
+def test_a_batch_lets_large_blocks_be_kept(at: str, from_the_system: bool, environment: dict[str, str]) -> None:
+    """Also where a variable of the environment switches off that the library learns it by itself."""
+    command = [sys.executable, "-c", BLOCKS.format(at=at)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **environment})
     if "no glibc" in run.stderr:
         pytest.skip("another C library")
     assert run.stdout.strip() == str(from_the_system), run.stderr
