@@ -1,6 +1,7 @@
 """The benchmark of speed runs, its JSON is whole, and a wrong row of any side ends it."""
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,11 +12,13 @@ import pytest
 
 import hitplanes
 from hitplanes import use_jit
+from hitplanes.planes.common.costs import Costs
 
 for library in ("pygame", "pymunk", "shapely"):
     pytest.importorskip(library)
 sys.path.append(str(Path(__file__).parent / "bench"))
 
+import calibrate  # noqa: E402
 import speed  # noqa: E402
 from speed_clock import Cell, DisagreementError, Side, Times, race  # noqa: E402
 from speed_peers import Baked, Masks  # noqa: E402
@@ -154,3 +157,16 @@ def test_a_row_of_many_objects_is_judged_beside_one_of_few() -> None:
     assert lines["moved object redrawn, M = 1000, us"]["reached"]
     few = judged(cells[:2], ["numpy"])
     assert all(line["measured"] is None for line in few)
+
+
+def test_calibration_measures_every_cost(tmp_path: Path, monkeypatch: Any) -> None:
+    """Each number is written anew, but those of ways that a form does not have; the rest of the module stays."""
+    monkeypatch.setattr(calibrate, "SHOTS", (1, 9))
+    monkeypatch.setattr(calibrate, "ITEMS", (5, 20))
+    path = tmp_path / "costs.py"
+    text = re.sub(r"=[\d.]+", "=0", calibrate.FILE.read_text())
+    path.write_text(text)
+    calibrate.main([str(path), "--rounds", "2"])
+    assert re.sub(r"=[\d.]+", "=0", path.read_text()) == text
+    numbers = dict(re.findall(r"(\w+ = Costs|\w+)[=(]([\d.]+|inf)", path.read_text()))
+    assert len(numbers) == len(Costs._fields) and all(float(number) > 0 for number in numbers.values())

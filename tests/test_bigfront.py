@@ -217,6 +217,7 @@ def test_shots_that_walked_before_all_moved_are_not_counted() -> None:
         scene.move(ids, [(6.0 * i, 100 + k) for i in range(9)])
 
 
+@pytest.mark.usefixtures("fixed_costs")
 def test_many_near_tiles_are_left_to_arrays() -> None:
     scene = Scene((400, 400))
     for k in range(40):

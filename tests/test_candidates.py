@@ -33,11 +33,12 @@ from hitplanes import (
 )
 from hitplanes.planes.broadphase import Grid
 from hitplanes.planes.broadphase.boxes import Index
+from hitplanes.planes.common import costs
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import INDEX_SLACK, STRUCTURES
 from hitplanes.planes.grid.spans import meets
 from hitplanes.planes.scene import items
-from hitplanes.weapons.fire import areas, strategy
+from hitplanes.weapons.fire import areas
 from hitplanes.weapons.fire.plan import Stage
 from hitplanes.weapons.fire.prefilter import Candidates, prefilter_of
 from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
@@ -249,10 +250,11 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
 
 def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: pytest.MonkeyPatch) -> None:
     """As long as no shot alone pays for it none is made; then what was lost adds up."""
-    monkeypatch.setattr(strategy, "BOX_PAIR_NS", 400.0)
+    now = costs.NUMPY._replace(box_pair=400.0)
+    monkeypatch.setattr(costs, "NUMPY", now)
     scene = crowd(7, 600, 900)
-    lost = 400.0 * len(scene.items.stack()) - strategy.BVH_PLACEMENT_NS - strategy.BVH_CALL_NS
-    due = math.floor(len(scene.items.stack()) * strategy.BVH_BUILT_NS / lost) + 1
+    lost = 400.0 * len(scene.items.stack()) - now.bvh_placement - now.bvh_call
+    due = math.floor(len(scene.items.stack()) * now.bvh_item / lost) + 1
     assert due > 2
     made = []
     for _ in range(due + 2):

@@ -617,6 +617,7 @@ def way(hits: Hits) -> str:
     return stages(hits)[0]["plan"]
 
 
+@pytest.mark.usefixtures("fixed_costs")
 def test_auto_makes_what_pays_and_says_why() -> None:
     """A hundred shots are not worth a visible set, 4000 are; what is there is read, but for a few shots."""
     scene = Scene((64, 64))
@@ -649,6 +650,7 @@ def test_what_is_too_large_for_bit_rows_is_counted_by_spans() -> None:
     assert len(fire(scene, large, at)) == 2
 
 
+@pytest.mark.usefixtures("fixed_costs")
 def test_the_same_call_at_the_same_scene_takes_the_same_way() -> None:
     """Whatever was fired at other scenes, with the same weapon or another, before or between."""
     rng = np.random.default_rng(5)

@@ -329,6 +329,7 @@ def test_shots_at_the_past_jump_there() -> None:
 # The choice
 
 
+@pytest.mark.usefixtures("fixed_costs")
 def test_rays_jump_where_it_pays() -> None:
     """A plane that has to be made is made for many rays, or for the last of many calls; a weapon that pierces walks."""
     rng = np.random.default_rng(13)
@@ -359,6 +360,7 @@ def way_of(plan: Plan) -> str:
     return way
 
 
+@pytest.mark.usefixtures("fixed_costs")
 @pytest.mark.parametrize("made", [False, True])
 @pytest.mark.parametrize("lost_us", [0, 5000, 10**6])
 def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, made: bool, lost_us: int) -> None:
@@ -391,6 +393,7 @@ def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, 
     assert ways == ({"march"} if always else {"cast", "march"})
 
 
+@pytest.mark.usefixtures("fixed_costs")
 def test_the_plan_tells_what_was_lost_without_a_field() -> None:
     scene = some_scene(np.random.default_rng(21), (400, 300))
     field = scene.distance_field()

@@ -40,9 +40,9 @@ from hitplanes import (
 )
 from hitplanes.planes.bits import tiles
 from hitplanes.planes.bits.tiles import pixels_of, rows_of_spans
+from hitplanes.planes.common import costs
 from hitplanes.planes.grid.fixed_point import pixel, snap
 from hitplanes.planes.grid.spans import Spans
-from hitplanes.weapons.fire.strategy import COMPILED
 from hitplanes.weapons.prepared import position_cache
 from hitplanes.weapons.prepared.one_shot import OneShot
 from hitplanes.weapons.prepared.position_cache import ODD, PIXEL
@@ -95,8 +95,8 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
                 mock.patch.multiple(position_cache, WALKS_LEAST=1 + seed % 3, WALKS_AT_FIRST=seed % 4)
             )
             if compiled and seed % 2:
-                costs = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
-                patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=costs))
+                now = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
+                patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=now))
             check_random_scene(seed)
 
     use_jit(compiled)
@@ -172,8 +172,8 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 
 def small_and_composed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let compiled kernels begin with a small buffer, and compose soon what can be seen."""
-    costs = COMPILED._replace(visible_made=400, visible_item=0)
-    for name, value in {"ROWS": 1, "COMPILED": costs}.items():
+    now = costs.COMPILED._replace(visible_made=400, visible_item=0)
+    for name, value in {"ROWS": 1, "COMPILED": now}.items():
         monkeypatch.setattr(f"hitplanes.weapons.prepared.compiled.{name}", value)
 
 
@@ -190,7 +190,7 @@ def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(tiles, "OFTEN", 1 if bounded else 3)
     monkeypatch.setattr(position_cache, "WALKS_LEAST", 2 if bounded else 3)
     monkeypatch.setattr(position_cache, "WALKS_AT_FIRST", 0)
-    monkeypatch.setattr(tiles, "ARRAYS_NS", 10**9 if bounded else 10**5)
+    monkeypatch.setattr(costs, "NUMPY", costs.NUMPY._replace(tiles_call=10**9 if bounded else 10**5))
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0

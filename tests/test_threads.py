@@ -33,8 +33,7 @@ def test_rows_hang_on_no_number_of_threads(threads: int, monkeypatch: pytest.Mon
     from hitplanes.planes.jit import areas, bit_rows
 
     rng = np.random.default_rng(threads)
-    monkeypatch.setattr(areas, "PART_NS", 1.0)
-    monkeypatch.setattr(areas, "PART_NS", 1.0)
+    monkeypatch.setattr(areas, "COMPILED", areas.COMPILED._replace(thread=1.0))
     monkeypatch.setattr(bit_rows, "ROOM", 0)
     monkeypatch.setattr(bit_rows, "ROOM_LEAST", 1)
     used: set[str] = set()

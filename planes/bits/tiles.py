@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..common import costs
 from ..common.checks import Bools, Ints
 from ..grid.spans import Box, Spans, ragged
 from ..scene.items import Stack
@@ -366,12 +367,6 @@ class TileAtlas:
         return np.asarray(columns[full, 0])
 
 
-PAIR_NS, BIT_NS = 3000.0, 0.16
-"""Time for each tile near a placement, ns, and for each bit of the pattern's rows."""
-
-ARRAYS_NS = 350_000.0
-"""Time that arrays take for a few placements, ns."""
-
 Hit = tuple[int, int, int, int, int, int]
 """Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels."""
 
@@ -399,7 +394,8 @@ class Ground(NamedTuple):
 
 def pays(pairs: int, wide: int, high: int) -> bool:
     """Whether integers are faster than arrays, for pairs of a tile and a pattern of `wide` columns and `high` rows."""
-    return pairs * (PAIR_NS + BIT_NS * stride_of(wide) * high) <= ARRAYS_NS
+    now = costs.NUMPY
+    return pairs * (now.integers_pair + now.integers_bit * stride_of(wide) * high) <= now.tiles_call
 
 
 def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:

@@ -10,6 +10,7 @@ from ..bits.bit_rows import WORD, PatternBits, Placed
 from ..bits.cells import Cells
 from ..bits.front_to_back import OrderedTiles, RoundHits, Rule
 from ..common.checks import Ints
+from ..common.costs import COMPILED
 from .bit_rows import (
     ALL,
     BOXES,
@@ -36,9 +37,6 @@ from .bit_rows import (
     shared,
 )
 from .cache import compiled
-
-PART_NS, PLACEMENT_NS, TILE_NS = 8e5, 150.0, 0.7
-"""Least work of a thread, ns; time of each placement, and of each pair of a placement and a tile, ns."""
 
 FEW = 4
 """Most placements that compare all tiles; for more, tiles are listed in cells of the world first."""
@@ -475,9 +473,10 @@ def front_to_back(
     accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
     found = None
     if near is None or isinstance(near, Cells):
-        listed = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
+        tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
+        least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
         found = rows_by(
-            _front_to_back, Y + 1, len(placed.origin_x), PART_NS / (each * (PLACEMENT_NS + TILE_NS * listed)),
+            _front_to_back, Y + 1, len(placed.origin_x), least,
             *placed, *windows, *tiles, *cells, rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
             accepted, NOBODY if rule.exclude is None else rule.exclude, each,
         )  # fmt: skip

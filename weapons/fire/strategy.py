@@ -14,6 +14,7 @@ from typing import NamedTuple
 from hitplanes.planes.bits.tiles import stride_of
 from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
+from hitplanes.planes.common.costs import costs
 from hitplanes.planes.common.limits import STRUCTURES
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -25,36 +26,6 @@ from .spans import QueryContext
 
 BROADPHASES = ("auto", *STRUCTURES)
 
-
-class Costs(NamedTuple):
-    """Times, ns, measured by `tests/bench/calibrate.py`; only their ratios matter."""
-
-    tiles_call: float  # a call by the tiles of the stack
-    tiles_placement: float  # each placement
-    tiles_pair: float  # each pair of a placement and an item
-    visible_call: float  # a call by the visible set
-    visible_placement: float  # each placement
-    visible_made: float  # making a visible set
-    visible_item: float  # each item of it
-    labels_call: float  # a call by the label plane
-    labels_drawn: float  # each item drawn into it at first
-    labels_pixel: float  # each pixel that is drawn anew
-
-
-IN_NUMPY = Costs(
-    tiles_call=350_000, tiles_placement=800, tiles_pair=4.0, visible_call=300_000, visible_placement=300,
-    visible_made=2_000_000, visible_item=2500, labels_call=300_000, labels_drawn=7500, labels_pixel=0.5,
-)  # fmt: skip
-COMPILED = Costs(
-    tiles_call=50_000, tiles_placement=170, tiles_pair=0.3, visible_call=45_000, visible_placement=50,
-    visible_made=100_000, visible_item=1500, labels_call=25_000, labels_drawn=400, labels_pixel=0.05,
-)  # fmt: skip
-"""Times in numpy, and with compiled kernels."""
-
-INTEGERS_CALL, INTEGERS_PLACEMENT, INTEGERS_PAIR, INTEGERS_BIT = 30_000.0, 2000.0, 3000.0, 0.16
-"""Time of a call counted in integers, ns; of each placement, each tile near it, and each bit of the pattern's rows."""
-
-BOX_PAIR_NS, BVH_CALL_NS, BVH_PLACEMENT_NS, BVH_MOVED_NS, BVH_BUILT_NS = 4.5, 80_000.0, 500.0, 250.0, 850.0
 
 INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 48, 64, 2**15
 """Largest reach of patterns, px, most placements, and most pairs of placements and items counted in integers."""
@@ -77,17 +48,13 @@ class Way(NamedTuple):
     engine: Callable[[Request, QueryContext], list[Rows]]
 
 
-def _costs() -> Costs:
-    return COMPILED if jit_is_on() else IN_NUMPY
-
-
-def _near(request: Request) -> float:
+def expected_near(stack: Stack, reach: int) -> float:
     """Expected number of items near a placement, if they are spread evenly over the box around all."""
-    if not len(request.stack):
+    if not len(stack):
         return 0.0
-    item_wh, world_wh = request.stack.sizes
-    share = ((item_wh + 2 * request.traits.reach + 1) / world_wh).clip(max=1.0)
-    return len(request.stack) * float(share.prod())
+    item_wh, world_wh = stack.sizes
+    share = ((item_wh + 2 * reach + 1) / world_wh).clip(max=1.0)
+    return len(stack) * float(share.prod())
 
 
 def _tiles_refuse(request: Request) -> str:
@@ -95,9 +62,9 @@ def _tiles_refuse(request: Request) -> str:
 
 
 def _tiles_cost(request: Request) -> tuple[float, float]:
-    costs = _costs()
-    each = costs.tiles_placement + len(request.stack) * costs.tiles_pair
-    return costs.tiles_call + request.placements * each, 0.0
+    now = costs()
+    each = now.tiles_placement + len(request.stack) * now.tiles_pair
+    return now.tiles_call + request.placements * each, 0.0
 
 
 def _visible_refuse(request: Request) -> str:
@@ -107,10 +74,10 @@ def _visible_refuse(request: Request) -> str:
 
 
 def _visible_cost(request: Request) -> tuple[float, float]:
-    costs, scene = _costs(), request.scene
+    now, scene = costs(), request.scene
     known = request.view is not None and scene.visible_sets().kept(request.view, scene.version) is not None
-    made = 0.0 if known else costs.visible_made + len(request.stack) * costs.visible_item
-    return costs.visible_call + request.placements * costs.visible_placement, made
+    made = 0.0 if known else now.visible_made + len(request.stack) * now.visible_item
+    return now.visible_call + request.placements * now.visible_placement, made
 
 
 def _labels_refuse(request: Request) -> str:
@@ -124,10 +91,10 @@ def _labels_refuse(request: Request) -> str:
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    costs, plane = _costs(), request.scene.label_plane()
+    now, plane = costs(), request.scene.label_plane()
     assert plane is not None  # else it refuses
-    drawn = len(request.stack) * costs.labels_drawn if plane.labels is None else 0.0
-    return costs.labels_call, plane.cost(request.scene.items) * costs.labels_pixel + drawn
+    drawn = len(request.stack) * now.labels_item if plane.labels is None else 0.0
+    return now.labels_call, plane.cost(request.scene.items) * now.labels_pixel + drawn
 
 
 def _integers_refuse(request: Request) -> str:
@@ -144,9 +111,10 @@ def _integers_refuse(request: Request) -> str:
 
 
 def _integers_cost(request: Request) -> tuple[float, float]:
-    size = 2 * request.traits.reach + 1
-    each = INTEGERS_PLACEMENT + _near(request) * (INTEGERS_PAIR + INTEGERS_BIT * stride_of(size) * size)
-    return INTEGERS_CALL + request.placements * each, 0.0
+    size, now = 2 * request.traits.reach + 1, costs()
+    pair = now.integers_pair + now.integers_bit * stride_of(size) * size
+    each = now.integers_placement + expected_near(request.stack, request.traits.reach) * pair
+    return now.integers_call + request.placements * each, 0.0
 
 
 def _spans_refuse(_: Request) -> str:
@@ -241,12 +209,13 @@ def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack
 
 def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
     """Whether a BVH, with its update, is faster than comparing all boxes; a missing one is built by rent or buy."""
-    one_by_one = placements * items * BOX_PAIR_NS
-    answer = placements * BVH_PLACEMENT_NS + BVH_CALL_NS
+    now = costs()
+    one_by_one = placements * items * now.box_pair
+    answer = placements * now.bvh_placement + now.bvh_call
     if answer >= one_by_one:
         return False
     index = scene.index("bvh")
     if index.boxes is not None:
-        return one_by_one > answer + index.owed(scene.items) * BVH_MOVED_NS
+        return one_by_one > answer + index.owed(scene.items) * now.bvh_moved
     index.missed += one_by_one - answer
-    return index.missed > items * BVH_BUILT_NS
+    return index.missed > items * now.bvh_item

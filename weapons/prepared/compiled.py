@@ -20,6 +20,7 @@ from hitplanes.planes.bits.bit_rows import WORD, Words
 from hitplanes.planes.bits.cells import Cells
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.checks import Bools, Ints
+from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.jit.areas import PAD, cut_off, laid, near_of, struck, take
@@ -29,7 +30,6 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
-from ..fire.strategy import COMPILED
 from ..kinds.weapon import Weapon, columns_of
 from .one_shot import Answer, Filter, Frame, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
@@ -37,11 +37,7 @@ from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 ROWS = 256
 """Initial capacity of a buffer, rows."""
 
-TILE_NS = 1
-"""Cost of each tile of the stack that a shot walks, ns."""
-
-MET_NS = 50
-"""Additional cost of each tile whose box meets that of the shot, ns."""
+EACH_TILE, EACH_NEAR = int(COMPILED.prepared_tile), int(COMPILED.prepared_near)
 
 PIECE_BYTES = 400
 """Memory of a round in addition to its pixels, bytes."""
@@ -100,7 +96,7 @@ NOTHING_LISTED = np.zeros(0, np.int64)
 def _walked(scene, box, left, top, right, bottom, near):
     """Write to `near` all tiles whose boxes meet a box, front to back, and count the time; return their number."""
     count = near_of(box, NOTHING_LISTED, NOTHING_LISTED, NOTHING_LISTED, left, top, right, bottom, near)
-    scene[SPENT] += TILE_NS * len(box) + MET_NS * count
+    scene[SPENT] += EACH_TILE * len(box) + EACH_NEAR * count
     return count
 
 

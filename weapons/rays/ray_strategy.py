@@ -1,4 +1,4 @@
-"""The strategies of rays: in which way what a ray hits is found, and every number of rays that was tuned by timing.
+"""The strategies of rays: in which way what a ray hits is found.
 
 - The walk (`ray_walk`) follows any ray. It is the reference, and all rays that pierce walk.
 - The cast tests a thin ray that ends at its first hit against the boxes and pixels of all items.
@@ -12,21 +12,17 @@ the same table.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
-import numpy as np
-
-from hitplanes.planes.bits import raycast
 from hitplanes.planes.bits.distance_field import DistanceField
-from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import choice
+from hitplanes.planes.common.costs import costs
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.strategy import STRATEGIES
 from ..kinds.rays import Projectile, RayWeapon
-
-# Measured with `tests/bench/rays.py` on one machine; the choice depends on the ratios of the costs only.
 
 RAYS_AT_ONCE = 2**14
 """Most rays of a chunk; the columns of so many fit the processor's cache."""
@@ -37,26 +33,6 @@ WALKED_AT_ONCE, CHUNK_GROWTH = 1024, 4
 STRETCH_PAIRS, STRETCH_GROWTH = 150, 2
 """Pairs of rays and boxes expected in the first stretch of a walk, at least one a ray, which cost as much as a stretch;
 ratio of the lengths of two stretches in a row."""
-
-LABEL_PIXEL_NS, FIELD_PIXEL_NS = 0.5, 5.5
-"""Each pixel of a label plane that is redrawn, and of a distance field that is made."""
-
-
-class Costs(NamedTuple):
-    """Costs of a way, ns: of a call, each ray of a batch, each pair of a ray and an item, and a prepared ray."""
-
-    call: float
-    ray: float
-    pair: float
-    prepared: float
-
-
-WALK = Costs(call=700_000, ray=12_000, pair=0, prepared=np.inf)
-WALK_ITEM_NS, WALK_MET_NS = 20.0, 3000.0
-"""Walk: in addition each item of a call, and each box in which a ray is expected to start."""
-
-CAST, COMPILED_CAST = Costs(270_000, 75_000, 30, 75_000), Costs(170_000, 600, 1.3, 600)
-MARCH = Costs(call=190_000, ray=400, pair=0, prepared=10_000)
 
 
 class Sizes(NamedTuple):
@@ -70,24 +46,21 @@ class Sizes(NamedTuple):
 def _walk_ns(sizes: Sizes) -> float:
     """Cost of the walk, ns, among items that are spread evenly over the box around all; a prepared ray never walks."""
     if sizes.prepared:
-        return WALK.prepared
+        return inf
     item_wh, world_wh = sizes.stack.sizes
-    items = len(sizes.stack)
+    items, now = len(sizes.stack), costs()
     met = min(items * float((item_wh / world_wh).prod()), items)
-    return _ns(WALK, sizes) + items * WALK_ITEM_NS + sizes.rays * met * WALK_MET_NS
+    return now.walk_call + items * now.walk_item + sizes.rays * (now.walk_ray + met * now.walk_met)
 
 
 def _cast_ns(sizes: Sizes) -> float:
-    return _ns(CAST if kernels_of(raycast) is raycast else COMPILED_CAST, sizes)
+    now = costs()
+    return now.cast_call * (not sizes.prepared) + sizes.rays * (now.cast_ray + len(sizes.stack) * now.cast_pair)
 
 
 def _march_ns(sizes: Sizes) -> float:
-    return _ns(MARCH, sizes)
-
-
-def _ns(costs: Costs, sizes: Sizes) -> float:
-    first = costs.prepared if sizes.prepared else costs.call + sizes.rays * costs.ray
-    return first + sizes.rays * len(sizes.stack) * costs.pair
+    now = costs()
+    return now.march_prepared if sizes.prepared else now.march_call + sizes.rays * now.march_ray
 
 
 def ends_at_first(ray: RayWeapon) -> bool:
@@ -185,6 +158,6 @@ def _rented_or_bought(other: Choice, field: DistanceField, scene: Scene, saved_n
     if field.is_made(scene.items):
         return other._replace(way="march")
     field.lost_ns += saved_ns
-    build = field.labels.cost(scene.items) * LABEL_PIXEL_NS + field.labels.size * FIELD_PIXEL_NS
+    build = field.labels.cost(scene.items) * costs().labels_pixel + field.labels.size * costs().field_pixel
     why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.lost_ns / 1e3:.0f} us lost so far"
     return other._replace(way="march", why=why) if field.lost_ns > build else Choice(other.way, why, pending=True)
