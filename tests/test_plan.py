@@ -146,7 +146,7 @@ OF_MARCH = [
     *OF_ALL,
     (RAYFIRE, "chosen_candidates", "plan", 100),
     (RAYFIRE, "leave_out_absent", "plan", 200),
-    (RAYFIRE, "chosen_way", "plan", 400),
+    (RAYFIRE, "chosen_ray_way", "plan", 400),
     (RAYFIRE, "rays_of", "rays", 10**3),
     (label_plane.LabelPlane, "read", "label plane", 10**4),
     (distance_field.DistanceField, "read", "distance field", 10**5),
@@ -518,7 +518,7 @@ OF_FIRE = (
     "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"
     " kinds.rays kinds.weapon late"
 )
-OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_strategy rays.ray_walk"
+OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk"
 
 
 def loaded(before: str, code: str) -> set[str]:

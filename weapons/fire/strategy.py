@@ -1,4 +1,4 @@
-"""The strategy table of areas: for each way when it serves, what it costs, and its engine; and the choice of one.
+"""The strategy tables of areas and rays: for each way when it serves, what it costs, and its engine; and the choice.
 
 A way is chosen by the call and by the scene, so that the same call at the same scene takes the same way. The plan says
 why. What a way needs of the scene is made once calls have lost as much time without it as it takes to make (rent or
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from hitplanes.planes.bits.tiles import stride_of
 from hitplanes.planes.common.backend import jit_is_on
@@ -19,10 +19,14 @@ from hitplanes.planes.common.limits import STRUCTURES
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from ..kinds.rays import RayWeapon, is_thin_first
 from .areas import OF_ALL, Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
 from .spans import QueryContext
+
+if TYPE_CHECKING:
+    from hitplanes.planes.bits.distance_field import DistanceField
 
 BROADPHASES = ("auto", *STRUCTURES)
 
@@ -139,9 +143,6 @@ BY_NAME = {way.name: way for way in WAYS}
 ASKED = {"direct": ("tiles", "spans"), "built": ("labels", "visible", "tiles", "spans")}
 """Ways of the strategies that name several; the first that serves is taken."""
 
-STRATEGIES = ("auto", *ASKED, *(way.name for way in WAYS), "walk", "cast", "march")
-"""Names that a call may ask for; the last three are ways of rays. A way that cannot serve a call is passed over."""
-
 
 def chosen_way(strategy: str, request: Request) -> tuple[Way, str]:
     """The way that answers a call, and why: the one asked for if it serves, else the cheapest."""
@@ -174,6 +175,132 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
         lost = known.lost(request.view, version)
         passed_over += f"{way.name} would take {made / 1e3:.0f} us to make, {lost / 1e3:.0f} us lost so far; "
     return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
+
+
+class Sizes(NamedTuple):
+    """What costs depend on: how many rays a call has, or that it is of one prepared ray; and the items."""
+
+    rays: int
+    prepared: bool
+    stack: Stack
+
+
+def _walk_ns(sizes: Sizes) -> float:
+    """Cost of the walk, ns, among items that are spread evenly over the box around all; a prepared ray never walks."""
+    if sizes.prepared:
+        return inf
+    item_wh, world_wh = sizes.stack.sizes
+    items, now = len(sizes.stack), costs()
+    met = min(items * float((item_wh / world_wh).prod()), items)
+    return now.walk_call + items * now.walk_item + sizes.rays * (now.walk_ray + met * now.walk_met)
+
+
+def _cast_ns(sizes: Sizes) -> float:
+    now = costs()
+    return now.cast_call * (not sizes.prepared) + sizes.rays * (now.cast_ray + len(sizes.stack) * now.cast_pair)
+
+
+def _march_ns(sizes: Sizes) -> float:
+    now = costs()
+    return now.march_prepared if sizes.prepared else now.march_call + sizes.rays * now.march_ray
+
+
+def _never(_: RayWeapon, __: Scene) -> str:
+    return ""
+
+
+def _not_cast(ray: RayWeapon, _: Scene) -> str:
+    return "" if is_thin_first(ray) else "only thin rays that end at their first hit do"
+
+
+def _not_marched(ray: RayWeapon, scene: Scene) -> str:
+    return _not_cast(ray, scene) or ("" if scene.distance_field() else "no bounds that fit one plane")
+
+
+class RayWay(NamedTuple):
+    """A way of rays: why it cannot serve a weapon at a scene, or ""; and what it costs, ns.
+
+    Its engine is of the same name in `first_hit.ENGINES`; the walk's is `ray_walk.trace`.
+    """
+
+    why_not: Callable[[RayWeapon, Scene], str]
+    cost: Callable[[Sizes], float]
+
+
+RAY_WAYS = {
+    "walk": RayWay(_never, _walk_ns),
+    "cast": RayWay(_not_cast, _cast_ns),
+    "march": RayWay(_not_marched, _march_ns),
+}
+"""All ways of rays. The walk is the reference, and follows any ray; the others serve thin rays that end at a hit."""
+
+RAYS_ASKED = {"direct": "walk", "built": "march"}
+"""Ways that are meant by the strategies which areas and rays share."""
+
+STRATEGIES = ("auto", *ASKED, *BY_NAME, *RAY_WAYS)
+"""Names that a call may ask for. A way that cannot serve a call is passed over."""
+
+
+class RayChoice(NamedTuple):
+    """The way of a call, and why; `pending` if a later call like it, at the same scene, may march."""
+
+    way: str
+    why: str
+    pending: bool = False
+
+
+def chosen_ray_way(
+    strategy: str, asked: bool, ray: RayWeapon, scene: Scene, stack: Stack, rays: int, prepared: bool = False
+) -> RayChoice:
+    """Choose the way of so many rays of a weapon.
+
+    Parameters
+    ----------
+    strategy : argument of `fire`; a way that cannot serve is passed over, and any other name counts as "auto"
+    asked : whether the caller named a pre-filter or a broad phase, which only the walk uses
+
+    Raises
+    ------
+    InputError
+        If the strategy is not known.
+    """
+    choice("strategy", strategy, STRATEGIES)
+    name = RAYS_ASKED.get(strategy, strategy)
+    forced = RAY_WAYS.get(name)
+    passed_over = forced.why_not(ray, scene) if forced else ""
+    if forced and not passed_over:
+        return RayChoice(name, "asked for")
+    why = f"{name} is passed over: {passed_over}; " if passed_over else ""
+    if asked or not len(stack) or not is_thin_first(ray):
+        return RayChoice("walk", f"{why}every ray walks")
+    sizes = Sizes(rays, prepared, stack)
+    walk, cast, march = (way.cost(sizes) for way in RAY_WAYS.values())
+    why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
+    field, saved_ns = scene.distance_field(), min(cast, walk) - march
+    if field is not None:
+        why += f", {march / 1e3:.0f} us by march"
+    other = RayChoice("cast" if cast < walk else "walk", why)
+    return other if field is None or saved_ns <= 0 else _rented_or_bought(other, field, scene, saved_ns)
+
+
+def way_of_rest(way: str, stack: Stack, rays: int) -> str:
+    """Way of the rays that another way left over."""
+    sizes = Sizes(rays, False, stack)
+    casts = way == "march" and len(stack) and _cast_ns(sizes) < _walk_ns(sizes)
+    return "cast" if casts else "walk"
+
+
+def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:
+    """March if the distance field is made, or as soon as calls have lost as much time without it as it takes to make.
+
+    So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
+    """
+    if field.is_made(scene.items):
+        return other._replace(way="march")
+    field.lost_ns += saved_ns
+    build = field.labels.cost(scene.items) * costs().labels_pixel + field.labels.size * costs().field_pixel
+    why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.lost_ns / 1e3:.0f} us lost so far"
+    return other._replace(way="march", why=why) if field.lost_ns > build else RayChoice(other.way, why, pending=True)
 
 
 def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack: Stack, asked: int) -> Candidates:

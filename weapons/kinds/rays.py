@@ -196,3 +196,13 @@ class Sweep(Weapon):
         super().__post_init__()
         if self.ray.length_256 is None:
             raise InputError("ray: expected a weapon with a range, got one that ends where it is aimed")
+
+
+def ends_at_first(ray: RayWeapon) -> bool:
+    """Whether rays of a weapon end at the first object that they touch, and take no time."""
+    return ray.hits_most == 1 and ray.budget_256 is None and not isinstance(ray, Projectile)
+
+
+def is_thin_first(ray: RayWeapon) -> bool:
+    """Whether rays of a weapon are thin and end at their first hit, so that they need not walk."""
+    return ends_at_first(ray) and not ray.radius_256

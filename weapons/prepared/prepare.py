@@ -21,6 +21,7 @@ from ..fire.call import category_bits, fire
 from ..fire.hits import Hits
 from ..kinds.areas import has_no_range, parts_of, ray_parts_of
 from ..kinds.placements import checked_shots
+from ..kinds.rays import is_thin_first
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Answer, Filter, Frame, Present, Told, answer_of, frame_of, rounds_of
@@ -254,7 +255,6 @@ def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: obje
     kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
     parts = ray_parts_of(weapon)
     if parts is not None:
-        from ..rays.ray_strategy import is_thin_first
         from .prepared_ray import ReadyRay
 
         alone = parts[0] is None and parts[1] is None and is_thin_first(parts[2])

@@ -1,6 +1,6 @@
 """Prepared weapon of one thin ray that ends at its first hit: each shot is cast at the items, or marches.
 
-The way is chosen as `fire` chooses it (see `rays.ray_strategy`). A ray that marches is cast if it comes to an item that
+The way is chosen as `fire` chooses it (see `fire.strategy`). A ray that marches is cast if it comes to an item that
 the filter refuses, or to several pixels at once.
 
 position, aim -> start and step, 1/256 px -> what is touched first -> a row, or none
@@ -25,13 +25,13 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow, Hits
+from ..fire.strategy import chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from ..rays.contacts import rays_of
 from ..rays.first_hit import PREPARED, FirstHits, ends_of_touched
 from ..rays.ray_hits import Passes, RayHits, Stops, weights_at
-from ..rays.ray_strategy import chosen_way
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
@@ -101,7 +101,7 @@ class ReadyRay(Ready):
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
         """What a ray touches first, by the way chosen now; the next rays go the same way unless it is pending."""
-        chosen = chosen_way("auto", False, self._ray, self.scene, self._stack, 1, prepared=True)
+        chosen = chosen_ray_way("auto", False, self._ray, self.scene, self._stack, 1, prepared=True)
         given = self.scene, self._stack, self._accepts
         first = cast = PREPARED["cast"](*given)
         if chosen.way == "march":

@@ -259,7 +259,7 @@ ENGINES: dict[str, Callable[[Rays, RayWeapon, Shots, Range], tuple[Terminations,
     "cast": ends_by_cast,
     "march": ends_by_march,
 }
-"""Functions that find the ends of rays, by the names of `ray_strategy.WAYS`."""
+"""Functions that find the ends of rays, by the names of `strategy.RAY_WAYS`."""
 
 
 def caster(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:

@@ -21,25 +21,20 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse
-from ..fire.strategy import chosen_candidates
+from ..fire.strategy import RAY_WAYS, RayChoice, chosen_candidates, chosen_ray_way, way_of_rest
 from ..kinds.placements import Shots
-from ..kinds.rays import RayWeapon
+from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
 from .contacts import Contacts, Parts, Rays, Terminations, rays_of
 from .first_hit import ENGINES, FirstHits
 from .ray_hits import Passes, RayHits, Stops, Told, passes_of, pixels_of, rows_of_passes, stops_of
-from .ray_strategy import (
-    CHUNK_GROWTH,
-    RAYS_AT_ONCE,
-    WALKED_AT_ONCE,
-    WAYS,
-    Choice,
-    chosen_way,
-    ends_at_first,
-    is_thin_first,
-    way_of_rest,
-)
 from .ray_walk import Range, expected_cells, trace
+
+RAYS_AT_ONCE = 2**14
+"""Most rays of a chunk; the columns of so many fit the processor's cache."""
+
+WALKED_AT_ONCE, CHUNK_GROWTH = 1024, 4
+"""Most rays that walk together, and the largest ratio of the numbers of two chunks in a row."""
 
 C = TypeVar("C", Passes, Stops)
 Choose = Callable[[int], Candidates]
@@ -62,7 +57,7 @@ def fired_rays(
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
     prefilter, broadphase, strategy = how
-    chosen = chosen_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
+    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
     walks = chosen.way == "walk"
     candidates = choose(each * len(shots) if walks else 0)
@@ -109,7 +104,7 @@ def _later(columns: C, first_shot: int) -> C:
 
 
 def _leave_out_unused(
-    plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, how: tuple[str, Choice]
+    plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, how: tuple[str, RayChoice]
 ) -> None:
     """Add the stages that this scene and this weapon did not need to the plan; `how` is what was asked and chosen."""
     filtered = plan.has_run("pre-filter")
@@ -119,7 +114,7 @@ def _leave_out_unused(
     leave_out_imagery(plan, scene)
 
 
-def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: Choice) -> Iterator[tuple[str, str]]:
+def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: RayChoice) -> Iterator[tuple[str, str]]:
     """Stages that rays did not need, and why; `why_unindexed` is None unless some rays went through the pre-filter."""
     idle = "no ray was left to walk"
     for name in ("pre-filter", "walk", "stops"):
@@ -127,7 +122,7 @@ def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: Ch
     yield "broad phase", why_unindexed or idle
     if ends_at_first(ray):
         yield "passes", "told when they are asked for, as the stops are"
-    for name in WAYS:
+    for name in RAY_WAYS:
         if name not in (chosen.way, "walk") and (is_thin_first(ray) or name == strategy):
             yield name, chosen.why
     yield "cells between items", "only those inside their boxes are looked at"

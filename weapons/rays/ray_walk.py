@@ -36,7 +36,10 @@ from .contacts import (
     stretches,
     terminations_of,
 )
-from .ray_strategy import STRETCH_GROWTH, STRETCH_PAIRS
+
+STRETCH_PAIRS, STRETCH_GROWTH = 150, 2
+"""Pairs of rays and boxes expected in the first stretch of a walk, at least one a ray, which cost as much as a stretch;
+ratio of the lengths of two stretches in a row."""
 
 SLACK = 2.0**-20
 """Tolerance of the float test that finds the stretch in which a ray enters a box: a fraction of its length, and px."""
