@@ -10,6 +10,7 @@ from test_bitfire import some_scene, some_shots
 
 from hitplanes import Box, Disc, Rounds, Scene, Sprite, Stencil, Weapon, fire, prepare, use_jit
 from hitplanes.planes.bits.tiles import BigTiles, big_pattern
+from hitplanes.planes.common import costs
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.prepared import position_cache
 
@@ -118,103 +119,59 @@ def test_masks_that_are_no_longer_used_leave_no_integers(monkeypatch: pytest.Mon
     assert dropped > 3
 
 
-def test_where_all_moves_no_square_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shots walk; when the scene stands still for twice as many of them as before, squares are made."""
+@pytest.mark.usefixtures("fixed_costs")
+def test_squares_are_made_once_the_visible_set_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shots walk, and what they lose is counted anew after each change, until they lost as much as the set takes."""
     scene, rng = Scene((400, 400)), np.random.default_rng(1)
     ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
-    made: list[tuple[int, int]] = []
-    real = position_cache.PositionCache._found
-    monkeypatch.setattr(
-        position_cache.PositionCache, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j)
-    )
-    ready = prepare(scene, Disc(20))
+    made: list[tuple[int, ...]] = []
+    real = position_cache.PositionCache._square
+    monkeypatch.setattr(position_cache.PositionCache, "_square", lambda *told: made.append(told[2:]) or real(*told))
+    ready: Any = prepare(scene, Disc(20))
 
     def shots(count: int) -> None:
         for x, y in rng.uniform(0, 400, (count, 2)).tolist():
-            assert ready.fire((x, y)) == fire(scene, Disc(20), (x, y))
+            assert ready.fire((x, y)) == fire(scene, Disc(20), (x, y), strategy="spans")
 
-    shots(9)
-    assert made
-    for _ in range(5):
+    for _ in range(30):
         scene.move(ids, rng.uniform(0, 400, (60, 2)))
-        made.clear()
         shots(9)
     assert not made
-    scene.move(ids[:3], rng.uniform(0, 400, (3, 2)))  # a change of a few is not one of all
-    shots(20)
-    assert made
+    cost = costs.NUMPY.visible_made + 60 * costs.NUMPY.visible_item
+    shots(int(cost / costs.NUMPY.integers_placement) + 1)
+    assert made and any(ready._squares.made.values())
+    scene.move(ids[0], (5, 5))
     made.clear()
-    scene.move(ids, rng.uniform(0, 400, (60, 2)))
-    for _ in range(position_cache.WALKS_LEAST + 1):
-        assert ready.fire((5, 5)) == fire(scene, Disc(20), (5, 5))
-    assert made == [(0, 0)]
+    shots(9)
+    assert not made and not any(ready._squares.made.values())
 
 
-@pytest.mark.parametrize(
-    ("count", "moved", "times", "all_of_it"),
-    [(1, 1, 1, True), (8, 8, 1, True), (12, 8, 1, False), (60, 16, 1, True), (60, 8, 3, False)],
-)
-def test_what_counts_as_all_that_moved(
-    count: int, moved: int, times: int, all_of_it: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """All of a few, or more than a quarter of many; one that moved several times is one."""
-    scene = Scene((400, 400))
-    ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(count)]
-    walked: list[int] = []
-    real = position_cache.hit_by_one
-    monkeypatch.setattr(position_cache, "hit_by_one", lambda *told: walked.append(1) or real(*told))
-    ready = prepare(scene, Disc(20))
-    for k in range(4):
-        assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
-        assert len(walked) == (k if all_of_it else 0)
-        for _ in range(times):
-            scene.move(ids[:moved], [(6.0 * i, 100 + k) for i in range(moved)])
-
-
-def test_at_a_scene_that_stands_still_nothing_is_walked() -> None:
-    """Nor are all masks made into tiles for it: a square needs what lies near it."""
-    scene = Scene((4000, 4000))
-    for k in range(5):
-        scene.add(Sprite.box(3000, 40), (2000, 400 * k))
-    far = scene.add(Sprite.circle(9), (3900, 3900))
-    for weapon in (Disc(20), Disc(90)):
-        ready = prepare(scene, weapon)
-        for k in range(5):
-            assert len(ready.fire((500, 10 + k))) == 1
-            scene.move(far, (3900 - k, 3900))
-        assert not scene.items._tiles
+def test_a_visible_set_that_is_there_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of `fire`, if it was made of the scene as it is."""
+    monkeypatch.setattr(position_cache, "hit_by_one", lambda *_: pytest.fail("walked"))
+    scene, rng = Scene((400, 400)), np.random.default_rng(1)
+    ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
+    ready = prepare(scene, Disc(20), exclude=3)
+    for _ in range(3):
+        scene.move(ids, rng.uniform(0, 400, (60, 2)))
+        truth = fire(scene, Disc(20), (200, 200), exclude=3, strategy="visible")
+        assert ready.fire((200, 200)) == truth
 
 
 def test_where_much_is_near_large_patterns_go_the_way_of_fire() -> None:
-    """Where all moves neither integers nor squares are made of what arrays answer sooner."""
+    """Whether shots walk, or look up squares."""
     scene, rng = Scene((400, 400)), np.random.default_rng(1)
     ids = [scene.add(Sprite.circle(9), rng.uniform(0, 400, 2)) for _ in range(60)]
-    ready = prepare(scene, Disc(150))
-    assert ready.fire((200, 200)).plan.ran[0].name == "prepared"
+    ready: Any = prepare(scene, Disc(150))
     for k in range(9):
         scene.move(ids, rng.uniform(0, 400, (60, 2)))
-        for at, first in (((200, 200 + k), "shots"), ((-90, -90), "prepared")):
-            hits = ready.fire(at)
-            assert hits == fire(scene, Disc(150), at)
-            assert hits.plan.ran[0].name == first
-    for _ in range(99):
-        assert ready.fire((-90, -90)) == fire(scene, Disc(150), (-90, -90))
-    assert ready.fire((200, 200)).plan.ran[0].name == "shots"
+        for strategy in ("spans", "visible"):
+            for at, first in (((200, 200 + k), "shots"), ((-90, -90), "prepared")):
+                truth = fire(scene, Disc(150), at, strategy=strategy)
+                hits = ready.fire(at)
+                assert hits == truth and hits.plan.ran[0].name == first
     scene.move(ids, [(390, 390)] * 60)  # nothing is crowded now
-    for _ in range(300):
-        assert not ready.fire((20, 20))
-    assert any(vars(ready)["_squares"].made.values())
-
-
-def test_shots_that_walked_before_all_moved_are_not_counted() -> None:
-    scene = Scene((400, 400))
-    ids = [scene.add(Sprite.circle(9), (6.0 * k, 100)) for k in range(9)]
-    ready: Any = prepare(scene, Disc(20))
-    for k in range(9):
-        for _ in range(position_cache.WALKS_LEAST - 1):
-            assert ready.fire((70, 90)) == fire(scene, Disc(20), (70, 90))
-        assert not k or not any(ready._squares.made.values())
-        scene.move(ids, [(6.0 * i, 100 + k) for i in range(9)])
+    assert not ready.fire((20, 20))
 
 
 @pytest.mark.usefixtures("fixed_costs")

@@ -91,9 +91,8 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
     def check(seed: int) -> None:
         with ExitStack() as patches:
             patches.enter_context(mock.patch.object(tiles, "OFTEN", 2))
-            patches.enter_context(
-                mock.patch.multiple(position_cache, WALKS_LEAST=1 + seed % 3, WALKS_AT_FIRST=seed % 4)
-            )
+            now = costs.NUMPY._replace(visible_made=10_000 * (seed % 3), visible_item=0)
+            patches.enter_context(mock.patch.object(costs, "NUMPY", now))
             if compiled and seed % 2:
                 now = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
                 patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=now))
@@ -188,9 +187,8 @@ def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.Monke
 
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tiles, "OFTEN", 1 if bounded else 3)
-    monkeypatch.setattr(position_cache, "WALKS_LEAST", 2 if bounded else 3)
-    monkeypatch.setattr(position_cache, "WALKS_AT_FIRST", 0)
-    monkeypatch.setattr(costs, "NUMPY", costs.NUMPY._replace(tiles_call=10**9 if bounded else 10**5))
+    now = costs.NUMPY._replace(tiles_call=10**9 if bounded else 10**5, visible_made=10_000, visible_item=0)
+    monkeypatch.setattr(costs, "NUMPY", now)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)
     ready, rows = prepare(scene, weapon, **options), 0
@@ -264,35 +262,6 @@ def test_a_shot_of_the_past_is_still_what_it_was(jit: bool) -> None:
             got.why_not()
         with pytest.raises(InputError, match="fire again"):
             got.by_owner()
-
-
-def test_only_what_lies_near_a_change_is_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = Scene((2000, 2000))
-    for x in range(50, 2000, 100):
-        for y in range(50, 2000, 100):
-            scene.add(Sprite.circle(20), (x, y))
-    ready = prepare(scene, Disc(10))
-    every = [(x, y) for x in range(16, 2000, 32) for y in range(16, 2000, 32)]
-    for at in every:
-        ready.fire(at)
-    made: list[tuple[int, int]] = []
-    real = position_cache.PositionCache._found
-    monkeypatch.setattr(
-        position_cache.PositionCache, "_found", lambda own, i, j: made.append((i, j)) or real(own, i, j)
-    )
-    for at in every:
-        ready.fire(at)
-    assert not made
-    scene.move(0, (60, 50))
-    for at in every:
-        ready.fire(at)
-    assert 4 <= len(made) <= 36
-    assert max(max(place) for place in made) <= 4
-    made.clear()
-    scene.add(Sprite.circle(20), (70, 50), role="mover")
-    for at in every[:500]:
-        ready.fire(at)
-    assert not made
 
 
 def test_a_scene_that_forgot_what_changed(monkeypatch: pytest.MonkeyPatch) -> None:

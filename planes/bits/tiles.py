@@ -392,10 +392,9 @@ class Ground(NamedTuple):
     bounds: Box | None
 
 
-def pays(pairs: int, wide: int, high: int) -> bool:
-    """Whether integers are faster than arrays, for pairs of a tile and a pattern of `wide` columns and `high` rows."""
-    now = costs.NUMPY
-    return pairs * (now.integers_pair + now.integers_bit * stride_of(wide) * high) <= now.tiles_call
+def integers_ns(pairs: float, wide: int, high: int) -> float:
+    """Time to count pairs of a tile and a pattern of `wide` columns and `high` rows, ns."""
+    return pairs * (costs.NUMPY.integers_pair + costs.NUMPY.integers_bit * stride_of(wide) * high)
 
 
 def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints, Ints], ground: Ground) -> list[Hit]:

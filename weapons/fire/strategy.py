@@ -11,7 +11,7 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
-from hitplanes.planes.bits.tiles import stride_of
+from hitplanes.planes.bits.tiles import integers_ns
 from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
 from hitplanes.planes.common.costs import costs
@@ -116,8 +116,7 @@ def _integers_refuse(request: Request) -> str:
 
 def _integers_cost(request: Request) -> tuple[float, float]:
     size, now = 2 * request.traits.reach + 1, costs()
-    pair = now.integers_pair + now.integers_bit * stride_of(size) * size
-    each = now.integers_placement + expected_near(request.stack, request.traits.reach) * pair
+    each = now.integers_placement + integers_ns(expected_near(request.stack, request.traits.reach), size, size)
     return now.integers_call + request.placements * each, 0.0
 
 

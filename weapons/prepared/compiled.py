@@ -31,7 +31,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
 from ..kinds.weapon import Weapon, columns_of
-from .one_shot import Answer, Filter, Frame, Round, answer_of
+from .one_shot import Answer, Filter, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 
 ROWS = 256
@@ -226,10 +226,10 @@ class Buffer(NamedTuple):
 class PositionCache:
     """Compiled form of `position_cache.PositionCache`, without squares: a kernel walks the stack or the visible set."""
 
-    def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, frame: Frame) -> None:
+    def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, reach: int) -> None:
         self.quick = None  # each shot is looked up
         self._scene, self._tell = scene, answer_of(weapon)[1]
-        self._reach = np.array([-frame.reach, -frame.reach, frame.reach, frame.reach])
+        self._reach = np.array([-reach, -reach, reach, reach])
         self._view = kept.view(pierce)
         self._forms = -1
         self._tiles: tuple[Bools, OrderedTiles]

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hitplanes.planes.bits.span_walk import OF_PATTERNS
-from hitplanes.planes.bits.tiles import Depths, rows_of_spans
 from hitplanes.planes.bits.visible import View
 from hitplanes.planes.common.caches import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
@@ -27,14 +26,8 @@ from ..kinds.areas import parts_of, pierces
 from ..kinds.placements import Placements, Shots, checked_shots, placements_for
 from ..kinds.weapon import Weapon
 
-WHOLE = 96
-"""Largest side of a pattern that is looked up as a whole, px; larger ones are mostly empty where an object is."""
-
-TILE = 64
-"""Side of the chunks of a larger pattern, px."""
-
-PARTS_MAX = 256
-"""Most chunks of a pattern that are looked up one by one; with more of them numpy is as fast."""
+REACH_MOST = 500
+"""Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
 
 TURNED_PX = 2
 """Margin for the pixels of a pattern that turns, beyond its reach: pixels that its axis meets, and rounding."""
@@ -49,36 +42,17 @@ class Round(NamedTuple):
     spans: Spans
 
 
-PatternChunk = tuple[int, int, int, Depths]
-"""A chunk of a round: x and y where it is looked up, relative to the round's pixel; its pixels as integer rows; and
-their order by distance."""
+def reach_of(weapon: Weapon) -> int | None:
+    """Greatest distance of a pixel of an area weapon from that of its round, px.
 
-
-@dataclass(frozen=True)
-class Frame:
-    """Bounds of the pixels of every round of a weapon, for the look-up as integer rows.
-
-    All pixels lie within `reach` px of the round's pixel. A chunk lies in a box of `side` px that begins at
-    (corner, corner) from the pixel where it is looked up; if `tiled`, a pattern is cut into several chunks.
+    None if it is too large, or if the pixels depend on the fraction of the position.
     """
-
-    reach: int
-    corner: int
-    side: int
-    tiled: bool
-
-
-def frame_of(weapon: Weapon) -> Frame | None:
-    """Frame of an area weapon; None if it is too large, or if its pixels depend on the fraction of the position."""
     burst, spread, plain = parts_of(weapon)
     if burst and (snap(burst.recoil_xy) % SUB).any():
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
     reach += int(snap(spread.radius)) // SUB if spread else 0
-    side = 2 * reach + 1
-    if side <= WHOLE:
-        return Frame(reach, -reach, side, False)
-    return Frame(reach, 0, TILE, True) if (side // TILE + 1) ** 2 <= PARTS_MAX else None
+    return reach if reach <= REACH_MOST else None
 
 
 def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
@@ -97,31 +71,6 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
         if len(spans):
             found.append(Round(x, y, number, spans))
     return found
-
-
-def pattern_chunks(spans: Spans, frame: Frame, stride: int) -> list[PatternChunk]:
-    """Chunks of one round: the whole of it, or its tiles."""
-    box = spans.box_xyxy
-    if box is None:
-        return []
-    if not frame.tiled:
-        rows = rows_of_spans(spans, (frame.corner, frame.corner), stride)
-        return [(0, 0, rows, Depths(rows, stride, frame.corner, frame.corner))]
-    found: list[PatternChunk] = []
-    for top in range(box[1], box[3] + 1, TILE):
-        for left in range(box[0], box[2] + 1, TILE):
-            part = _clipped(spans, left, top)
-            if len(part):
-                rows = rows_of_spans(part, (left, top), stride)
-                found.append((left, top, rows, Depths(rows, stride, left, top)))
-    return found
-
-
-def _clipped(spans: Spans, left: int, top: int) -> Spans:
-    """Pixels within one tile."""
-    first, last = np.maximum(spans.x_first, left), np.minimum(spans.x_last, left + TILE - 1)
-    some = (first <= last) & (spans.y >= top) & (spans.y < top + TILE)
-    return Spans(spans.y[some], first[some], last[some])
 
 
 Told = tuple[object, object, object]

@@ -24,7 +24,7 @@ from ..kinds.placements import checked_shots
 from ..kinds.rays import is_thin_first
 from ..kinds.weapon import Weapon
 from . import position_cache
-from .one_shot import Answer, Filter, Frame, Present, Told, answer_of, frame_of, rounds_of
+from .one_shot import Answer, Filter, Present, Told, answer_of, reach_of, rounds_of
 from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
 
 AIMS_BYTES = 32 * 2**20
@@ -46,19 +46,19 @@ class Ready:
     A shot looks up data that is made once, when a shot first needs it:
 
     - the pattern of each aim, and of each shot number of a `Spread`, as bits;
-    - the visible pixels of the objects near each square of 32 px of shot positions (see `position_cache`).
+    - the visible set, which `fire` uses, too, once it has paid for itself; before, shots walk the tiles of the items;
+    - the visible tiles near each square of 32 px of shot positions (see `position_cache`).
 
-    With compiled kernels there are no squares: one call of a kernel walks the items or, once it is made, the visible
-    set (see `compiled`).
+    With compiled kernels there are no squares: one call of a kernel looks up the cells of the visible set (see
+    `compiled`).
 
-    Every shot compares versions. If the scene has changed, the squares near the old and new places of what changed are
-    discarded first (all squares, if the changes are not known), so that no answer is of an older scene. The choice
-    between numpy and compiled kernels is made at the same time.
+    Every shot compares versions. If the scene has changed, all that was looked up is discarded first, so that no answer
+    is of an older scene. The choice between numpy and compiled kernels is made at the same time.
 
-    Patterns of up to 96 px, and up to 1000 px in chunks, are looked up; thin rays that end at their first hit are cast
-    (see `prepared_ray`). These are left to `fire`:
+    Patterns of up to 1000 px are looked up; thin rays that end at their first hit are cast (see `prepared_ray`). These
+    are left to `fire`:
 
-    - all other rays, larger patterns, and in numpy patterns near which there are many items
+    - all other rays, larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
     - batches and bad input
 
@@ -82,10 +82,10 @@ class Ready:
 class ReadyPattern(Ready):
     """Prepared weapon whose pattern is looked up."""
 
-    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, frame: Frame) -> None:
+    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, reach: int) -> None:
         super().__init__(scene, weapon, kept)
         _, spread, plain = parts_of(weapon)
-        self._frame, self._directed, self._drawn = frame, plain.directed, spread is not None
+        self._reach, self._directed, self._drawn = reach, plain.directed, spread is not None
         self._pierce, self._answer = plain.pierce, answer_of(weapon)[0]
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
@@ -210,7 +210,7 @@ class ReadyPattern(Ready):
             kernels = kernels_of(position_cache)
             if kernels is not self._kernels:
                 self._kernels = kernels
-                self._squares = kernels.PositionCache(self.scene, self.weapon, self._pierce, self._filter, self._frame)
+                self._squares = kernels.PositionCache(self.scene, self.weapon, self._pierce, self._filter, self._reach)
                 self._aims, self._told, self._quick = {}, {}, {}
             stack = self._items.stack()
             self._squares.follow(stack)
@@ -259,5 +259,5 @@ def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: obje
 
         alone = parts[0] is None and parts[1] is None and is_thin_first(parts[2])
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
-    frame = frame_of(weapon)
-    return Ready(scene, weapon, kept) if frame is None else ReadyPattern(scene, weapon, kept, frame)
+    reach = reach_of(weapon)
+    return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
