@@ -95,7 +95,7 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
             patches.enter_context(mock.patch.object(costs, "NUMPY", now))
             if compiled and seed % 2:
                 now = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
-                patches.enter_context(mock.patch.multiple(squares, ROWS=1, COMPILED=now))
+                patches.enter_context(mock.patch.object(squares, "COMPILED", now))
             check_random_scene(seed)
 
     use_jit(compiled)
@@ -169,18 +169,17 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 }
 
 
-def small_and_composed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let compiled kernels begin with a small buffer, and compose soon what can be seen."""
+def visible_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let compiled kernels make the visible set soon."""
     now = costs.COMPILED._replace(visible_made=400, visible_item=0)
-    for name, value in {"ROWS": 1, "COMPILED": now}.items():
-        monkeypatch.setattr(f"hitplanes.weapons.prepared.compiled.{name}", value)
+    monkeypatch.setattr("hitplanes.weapons.prepared.compiled.COMPILED", now)
 
 
 @pytest.mark.parametrize("name", WEAPONS)
 def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
     if jit:
-        small_and_composed(monkeypatch)
+        visible_soon(monkeypatch)
     for bounded in (True, False):
         check_weapon(name, bounded, monkeypatch)
 

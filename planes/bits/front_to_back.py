@@ -227,6 +227,7 @@ def _first(tiles: OrderedTiles, tile: Ints, top: Ints) -> Ints:
     return first
 
 
+# house: hit rule of areas
 def _hide(rows: Words, tiles: OrderedTiles, near: Near, pierce: bool) -> None:
     """Clear the pixels (n, height) that are covered by a tile in front at which they end."""
     of, front, right = _fronts(tiles, near, rows.shape[1])

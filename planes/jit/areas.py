@@ -136,36 +136,6 @@ def _sort(numbers, count):
 
 
 @njit
-def laid(windows, first, columns, step, rows, rest):
-    """Copy the rows of a pattern to `rest`, between its empty rows; return the number of pixels."""
-    pixels = 0
-    for column in range(columns):
-        source, target = np.uint64(first + column * step), np.uint64(PAD + column * step)
-        for i in range(rows):
-            row = np.uint64(i)
-            rest[target + row] = windows[source + row]
-            pixels += bits_of(windows[source + row])
-    return pixels
-
-
-@njit
-def cut_off(rest, columns, step, left, top, rows, x, y, x_max, y_max):
-    """Clear the pixels of a pattern beyond the bounds; return the number of pixels that are left."""
-    pixels = 0
-    for column in range(columns):
-        first = left - 63 + 64 * column  # of the world
-        low, high = max(x - first, 0), min(x_max - first, 63)
-        kept = np.uint64(0)
-        if low <= 63 and high >= low:
-            kept = (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
-        for row in range(rows):
-            word = column * step + PAD + row
-            rest[word] = rest[word] & kept if y <= top + row <= y_max else np.uint64(0)
-            pixels += bits_of(rest[word])
-    return pixels
-
-
-@njit
 def take(tiles, tile, rest, word, step, shift, low, high):
     """Clear the pixels of a tile in the rest of a pattern, in rows `low` to `high`; return how many were cleared."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
@@ -334,31 +304,36 @@ def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
     pixels_of(first, last, origin_x, origin_y, key, x, y)
 
 
-@compiled(
-    types.UniTuple(types.int64, 3)(
-            types.int64, types.int64, types.int64, ROWS_OUT,
-            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
-            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
-            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
-    )
-)  # fmt: skip
-def _front_to_back(
+# house: hit rule of areas
+@njit
+def match(
     turn, end, count, out, pattern, x, y, origin_x, origin_y,
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
     rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
     begin, listed,
-    pierce, bounds, accept, exclude, each,
+    pierce, bounds, accept, exclude, each, near, words, row_of, part_of, hit, together,
 ):  # fmt: skip
-    room, most, longest, several = out.shape[1], 0, 0, each > 1 and len(box) > 0
-    for kind in range(len(first)):
-        longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
-    near, bins, binned, grid = np.empty(len(box), np.int64), begin[:0], listed[:0], begin[:0]
+    """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
+
+    The arguments are the columns of `Placed`, `PatternBits`, `OrderedTiles`, `Cells` and `Rule`.
+
+    Parameters
+    ----------
+    near, words : scratch memory: (T,), and as many words as the largest pattern has
+    row_of, part_of : (M,) and (T,) of -1, for rounds of several pellets
+    hit, together : scratch memory for these: (T,), and TOGETHER words a tile
+
+    Returns
+    -------
+    the round where it stopped for want of room, or -1 if it cannot decide one; rows written; most rows of a round
+    """
+    room, most, several = out.shape[1], 0, each > 1 and len(box) > 0
+    bins, binned, grid = begin[:0], listed[:0], begin[:0]
     if not cells_wide and (end - turn) * each > FEW and len(box):
         bins, binned, grid = _binned(box)
     whole = pierce and not len(occluder) and bounds[0] == EVERYWHERE[0]  # nothing is taken away from patterns
-    words = pattern_words if whole else np.empty(longest, np.uint64)
-    row_of, part_of = np.full(rank[-1] + 1 if several else 0, -1), np.full(len(box) * several, -1)
-    hit, together = np.empty(len(box) * several, np.int64), np.empty(len(box) * several * TOGETHER, np.uint64)
+    if whole:
+        words = pattern_words
     ranks, keys, xs, ys = out[RANK], out[KEY], out[X], out[Y]
     while turn < end:
         row, hits, full = count - 1, 0, False
@@ -453,6 +428,37 @@ def _front_to_back(
             in_row_order(count, row + 1, origin_x[turn], origin_y[turn], out, ranks, keys, xs, ys)
         most, count, turn = max(most, row + 1 - count), row + 1, turn + 1
     return turn, count, most
+
+
+@compiled(
+    types.UniTuple(types.int64, 3)(
+            types.int64, types.int64, types.int64, ROWS_OUT,
+            *[INTS] * 5, BOXES, INTS, INTS, types.uint64[::1], BOXES, SUMS, INTS,
+            INTS, BOXES, INTS, WORDS, FLAGS, INTS, INTS, *[types.int64] * 5, INTS, INTS,
+            types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
+    )
+)  # fmt: skip
+def _front_to_back(
+    turn, end, count, out, pattern, x, y, origin_x, origin_y,
+    pattern_box, first, following, pattern_words, strips, sums, first_sum,
+    rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
+    begin, listed,
+    pierce, bounds, accept, exclude, each,
+):  # fmt: skip
+    longest = 0
+    for kind in range(len(first)):
+        longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
+    near, words = np.empty(len(box), np.int64), np.empty(longest, np.uint64)
+    some = len(box) if each > 1 else 0
+    row_of, part_of = np.full(rank[-1] + 1 if some else 0, -1), np.full(some, -1)
+    hit, together = np.empty(some, np.int64), np.empty(some * TOGETHER, np.uint64)
+    return match(
+        turn, end, count, out, pattern, x, y, origin_x, origin_y,
+        pattern_box, first, following, pattern_words, strips, sums, first_sum,
+        rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
+        begin, listed,
+        pierce, bounds, accept, exclude, each, near, words, row_of, part_of, hit, together,
+    )  # fmt: skip
 
 
 NONE = np.zeros(0, np.int64)

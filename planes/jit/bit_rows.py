@@ -90,59 +90,12 @@ def is_beyond(strips, pattern, x, y, left, top, right, bottom):
 
 
 @njit(inline="always")
-def _sooner(a, b, distance2, y, x):
-    if distance2[a] != distance2[b]:
-        return distance2[a] < distance2[b]
-    if y[a] != y[b]:
-        return y[a] < y[b]
-    return x[a] < x[b] if x[a] != x[b] else a < b
-
-
-@njit
-def sort_places(order, distance2, y, x):
-    """Sort places of rows by (distance2, y, x, place): Shell (1959), as rows are mostly few and in sorted runs."""
-    step = 1
-    while step < len(order) // 3:
-        step = 3 * step + 1
-    while step:
-        for i in range(step, len(order)):
-            row, j = order[i], i
-            while j >= step and _sooner(row, order[j - step], distance2, y, x):
-                order[j] = order[j - step]
-                j -= step
-            order[j] = row
-        step //= 3
-
-
-@njit(inline="always")
 def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
     """Replace keys and relative columns of rows `first` .. `last` - 1 by squared distances and pixels."""
     for i in range(first, last):
         x[i] += origin_x
         y[i] = origin_y + ((distance2[i] >> 1) & (2 * SIDE - 1)) - SIDE
         distance2[i] >>= SIDE_BITS
-
-
-# house: row order
-@njit(inline="always")
-def in_order(first, last, origin_x, origin_y, seen, samples, distance2, x, y):
-    """Sort rows `first` .. `last` - 1 of a placement by their keys, then replace the keys: see `pixels_of`.
-
-    More than FEW_ROWS rows are left unsorted for `rows_by`, or for the caller.
-
-    Parameters
-    ----------
-    origin_x, origin_y : the pixel from which distances are counted
-    distance2, x : keys, which become squared distances, and columns of the nearest pixels, relative to the origin
-    y : output
-    """
-    for i in range(first + 1, last if last - first <= FEW_ROWS else 0):
-        item, count, key, across, j = seen[i], samples[i], distance2[i], x[i], i
-        while j > first and distance2[j - 1] > key:
-            seen[j], samples[j], distance2[j], x[j] = seen[j - 1], samples[j - 1], distance2[j - 1], x[j - 1]
-            j -= 1
-        seen[j], samples[j], distance2[j], x[j] = item, count, key, across
-    pixels_of(first, last, origin_x, origin_y, distance2, x, y)
 
 
 Kernel = Callable[..., tuple[int, int, int]]

@@ -1,9 +1,9 @@
-"""Compiled kernels of prepared weapons: one call of a kernel answers a shot.
+"""Compiled form of the position cache: one call of the kernel of areas answers a shot.
 
 A shot walks the stack from front to back at first. When the shots have spent as much time on that as the visible set
 costs, it is made, and its tiles are listed by cells of shot positions.
 
-A kernel gets the address of a buffer that holds the addresses of the scene and of the pixels of a round. It does not
+Arrays are handed over by address, because unpacking them would take ten times as long as a shot. The kernel does not
 release the interpreter's lock, because that would take as long as a shot; so all calls can share one scratch memory.
 """
 
@@ -14,19 +14,19 @@ import threading
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray, njit, types
+from numba import carray, types
 
-from hitplanes.planes.bits.bit_rows import WORD, Words
+from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.cells import Cells
+from hitplanes.planes.bits.front_to_back import NO_NUMBERS, OrderedTiles
 from hitplanes.planes.bits.visible import VisibleSet
-from hitplanes.planes.common.checks import Bools, Ints
+from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.grid.spans import Spans
-from hitplanes.planes.jit.areas import PAD, cut_off, laid, near_of, struck, take
-from hitplanes.planes.jit.bit_rows import FEW_ROWS, cell_at, in_order, key_of, shared, sort_places
-from hitplanes.planes.jit.cache import address, compiled, ints_at, pointer, words_at
-from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.jit.areas import KEY, NOBODY, RANK, SAMPLES, X, Y, match
+from hitplanes.planes.jit.bit_rows import EVERYWHERE, FEW_ROWS, cell_at
+from hitplanes.planes.jit.cache import address, compiled, flags_at, ints_at, pointer, words_at
+from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
@@ -34,191 +34,91 @@ from ..kinds.weapon import Weapon, columns_of
 from .one_shot import Answer, Filter, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 
-ROWS = 256
-"""Initial capacity of a buffer, rows."""
-
-EACH_TILE, EACH_NEAR = int(COMPILED.prepared_tile), int(COMPILED.prepared_near)
+EACH_TILE, EACH_SHOT = int(COMPILED.prepared_tile), int(COMPILED.prepared_near)
 
 PIECE_BYTES = 400
 """Memory of a round in addition to its pixels, bytes."""
-
-FAR = 2**42
-"""A coordinate beyond all positions, px."""
 
 MAKE_VISIBLE = -1
 """Returned by `_shot` instead of a number of rows: the visible set is worth making."""
 
 UNKNOWN = -2
-"""Returned by `_shot` instead of a number of rows: the position is outside the range that is looked up."""
+"""Returned by `_shot` instead of a number of rows: the shot is left to `fire`."""
 
-LEFT, TOP, RIGHT, LOW, PIERCE, SPENT, WORTH, IS_VISIBLE = range(8)
-X, Y, BITS, WIDE, HIGH, BEGIN, LISTED, TILES, BOX, RANK, ITEM, BLOCKS, WORD_OF, WORDS, SCRATCH = range(8, 23)
+PIERCE, SPENT, WORTH, IS_VISIBLE, LEFT, TOP, RIGHT, LOW, CELLS = *range(8), slice(8, 13)
+TILES, OCCLUDERS, LISTED, BEGIN, ITEM, RANK_OF, BOX, WORD_OF, WORDS, BLOCKS, NEAR, OUT = range(13, 25)
 """Fields of a scene for shots:
 
-- bounds; whether shots pierce; time spent on walking; cost of the visible set; whether that is in use
-- X to HIGH: the grid of cells; BEGIN, LISTED: addresses of the lists of tiles by cell
-- TILES: number of tiles; BOX to WORDS: addresses of their columns; SCRATCH: address of scratch memory, 6 numbers a tile
+- whether shots pierce; time spent on walking; cost of the visible set; whether that is in use; the bounds
+- CELLS: the grid of cells; TILES, OCCLUDERS: number of tiles, and of flags of occluders, which may be 0
+- LISTED, BEGIN: addresses of the lists of tiles by cell
+- ITEM to BLOCKS: addresses of the columns of the tiles; NEAR, OUT: addresses of scratch memory and of rows
 """
 
-ROUND_LEFT, ROUND_TOP, ROUND_RIGHT, ROUND_LOW, STEP, COLUMNS, PIXELS = range(7)
-"""Fields of a round: its box relative to its pixel; words a column; columns of 64 px; first of the words."""
+SHAPE, FIRST, STEP, LENGTH, PIXELS = slice(0, 4), 4, 5, 6, 7
+"""Fields of a round: its box relative to its pixel; place of its first word; words a column; all words; the words."""
 
-SCENE, ROUND, ROOM, FOUND = range(4)
-"""Fields of a buffer: addresses of the scene and the round; capacity in rows; first of the rows. Scratch memory for the
-clipped pixels of the round follows the rows."""
+SCENE, ROUND, FOUND = range(3)
+"""Fields of a buffer: addresses of the scene and the round; first of the rows. Scratch memory follows the rows."""
 
 ROW = 5
 """Numbers of a row: item, samples, squared distance, x, y."""
 
-FIRST, ROW_BYTES = 8 * FOUND, 8 * ROW
+FOUND_AT, ROW_BYTES = 8 * FOUND, 8 * ROW
 read = struct.Struct("5q").unpack_from
-
-
-@njit
-def _listed(scene, box, x, y, left, top, right, bottom, near):
-    """Write to `near` the tiles in the cell of a pixel whose boxes meet a box, front to back; return their number."""
-    cell, count = cell_at(x, y, scene[X], scene[Y], scene[BITS], scene[WIDE], scene[HIGH]), 0
-    if cell < 0:
-        return 0
-    begin, listed = ints_at(scene[BEGIN]), ints_at(scene[LISTED])
-    for entry in range(begin[cell], begin[cell + 1]):
-        tile = listed[entry]
-        across = (box[tile, 0] <= right) & (box[tile, 2] >= left)
-        near[count] = tile
-        count += across & (box[tile, 1] <= bottom) & (box[tile, 3] >= top)
-    return count
-
-
-NOTHING_LISTED = np.zeros(0, np.int64)
-
-
-@njit
-def _walked(scene, box, left, top, right, bottom, near):
-    """Write to `near` all tiles whose boxes meet a box, front to back, and count the time; return their number."""
-    count = near_of(box, NOTHING_LISTED, NOTHING_LISTED, NOTHING_LISTED, left, top, right, bottom, near)
-    scene[SPENT] += EACH_TILE * len(box) + EACH_NEAR * count
-    return count
-
-
-@njit
-def _left_of(shape, pixels, scene, left, top, rest):
-    """Copy the pixels of a round that lie within the bounds."""
-    rows, bottom, right = shape[ROUND_LOW] - shape[ROUND_TOP] + 1, shape[ROUND_LOW], shape[ROUND_RIGHT]
-    laid(pixels, PAD, shape[COLUMNS], shape[STEP], rows, rest)
-    right, bottom = left + right - shape[ROUND_LEFT], top + bottom - shape[ROUND_TOP]
-    if left < scene[LEFT] or top < scene[TOP] or right > scene[RIGHT] or bottom > scene[LOW]:
-        bounds = scene[LEFT], scene[TOP], scene[RIGHT], scene[LOW]
-        cut_off(rest, shape[COLUMNS], shape[STEP], left, top, rows, *bounds)
-
-
-# house: hit rule of areas
-@njit
-def _met(scene, shape, box, near, close, rest, x, y):
-    """Number of items that a round hits in the tiles listed in `near`.
-
-    The columns of the hits follow the list of tiles: keys, x of the nearest pixel, items, samples, and room for its y.
-    """
-    rank, items, blocks, first = (
-        ints_at(scene[RANK]),
-        ints_at(scene[ITEM]),
-        ints_at(scene[BLOCKS]),
-        ints_at(scene[WORD_OF]),
-    )
-    tiles, step, room = words_at(scene[WORDS]), shape[STEP], scene[TILES]
-    key, across = near[room:], near[2 * room :]
-    item, samples = near[3 * room :], near[4 * room :]
-    left, top, bottom, count, last = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], y + shape[ROUND_LOW], 0, -1
-    for i in range(close):
-        at = near[i]
-        low, high = max(box[at, 1], top), min(box[at, 3], bottom)
-        offset = box[at, 0] - left + WORD - 1
-        tile, word, shift = first[at] - box[at, 1], PAD + (offset >> 6) * step - top, offset & 63
-        if blocks[at]:
-            take(tiles, tile, rest, word, step, shift, low, high)
-            continue
-        if scene[PIERCE]:
-            n, distance2, dx, dy = shared(tiles, tile, rest, word, step, shift, low, high, x - box[at, 0], y)
-        else:
-            n, distance2, dx, dy = struck(tiles, tile, rest, word, step, shift, low, high, x - box[at, 0], y)
-        if n == 0:
-            continue
-        nearest = key_of(distance2, dx, dy)
-        if rank[at] != last:
-            key[count], across[count], item[count], samples[count], last = nearest, dx, items[at], n, rank[at]
-            count += 1
-            continue
-        samples[count - 1] += n
-        if nearest < key[count - 1]:
-            key[count - 1], across[count - 1] = nearest, dx
-    return count
-
-
-@njit
-def _tell(met, every, count, x, y, buffer_at, room):
-    """Sort the hits that `_met` found and write them to the buffer."""
-    key, across, item = met[every:], met[2 * every :], met[3 * every :]
-    samples, down = met[4 * every :], met[5 * every :]
-    in_order(0, count, x, y, item, samples, key, across, down)
-    order = met  # reuses the list of tiles
-    for row in range(count):
-        order[row] = row
-    if count > FEW_ROWS:
-        sort_places(order[:count], key, down, across)
-    found = carray(pointer(buffer_at + 8 * FOUND), (room, ROW), np.int64)
-    for row in range(count):
-        at = order[row]
-        found[row, 0], found[row, 1], found[row, 2] = item[at], samples[at], key[at]
-        found[row, 3], found[row, 4] = across[at], down[at]
+NO_SUMS, NO_STRIPS, ZERO = np.zeros(0, np.uint32), np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 
 
 # house: way of areas
 @compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
 def _shot(at_x, at_y, buffer_at):
-    """Number of rows of a round at a position; the rows are written to the buffer if it has room for all of them."""
+    """Number of rows of a round at a position, which are written to the buffer."""
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
-    x, y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
     buffer = ints_at(buffer_at)
     scene, shape = ints_at(buffer[SCENE]), ints_at(buffer[ROUND])
-    box, near = carray(pointer(scene[BOX]), (scene[TILES], 4), np.int64), ints_at(scene[SCRATCH])
-    left, top, right, bottom = x + shape[ROUND_LEFT], y + shape[ROUND_TOP], x + shape[ROUND_RIGHT], y + shape[ROUND_LOW]
+    count = scene[TILES]
+    pixel_x, pixel_y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
+    cells, begin, zero = scene[CELLS], ints_at(scene[BEGIN]), NO_NUMBERS
     if scene[IS_VISIBLE]:
-        close = _listed(scene, box, x, y, left, top, right, bottom, near)
+        cell = cell_at(pixel_x, pixel_y, cells[0], cells[1], cells[2], cells[3], cells[4])
+        if cell < 0 or begin[cell] == begin[cell + 1]:
+            return 0
     else:
-        close = _walked(scene, box, left, top, right, bottom, near)
+        scene[SPENT] += EACH_TILE * count + EACH_SHOT
         if scene[SPENT] > scene[WORTH]:
             return MAKE_VISIBLE
-    if close == 0:
-        return 0
-    room, rest = buffer[ROOM], words_at(buffer[ROUND] + 8 * PIXELS)
-    if not scene[IS_VISIBLE]:
-        pixels, rest = rest, words_at(buffer_at + 8 * (FOUND + ROW * room))
-        _left_of(shape, pixels, scene, left, top, rest)
-    count = _met(scene, shape, box, near, close, rest, x, y)
-    if count <= room:
-        _tell(near, scene[TILES], count, x, y, buffer_at, room)
-    return count
+    x, y = buffer[FOUND : FOUND + 1], buffer[FOUND + 1 : FOUND + 2]  # until rows are written there
+    x[0], y[0] = pixel_x, pixel_y
+    out = carray(pointer(scene[OUT]), (Y + 1, FEW_ROWS), np.int64)
+    rest = words_at(buffer_at + 8 * (FOUND + ROW * FEW_ROWS))
+    turn, rows, _ = match(
+        0, 1, 0, out, ZERO, x, y, x, y,
+        carray(pointer(buffer[ROUND]), (1, 4), np.int64), shape[FIRST : FIRST + 1], shape[STEP : STEP + 1],
+        words_at(buffer[ROUND] + 8 * PIXELS), NO_STRIPS, NO_SUMS, ZERO,
+        ints_at(scene[RANK_OF])[:count], carray(pointer(scene[BOX]), (count, 4), np.int64), ints_at(scene[WORD_OF]),
+        words_at(scene[WORDS]), flags_at(scene[BLOCKS])[: scene[OCCLUDERS]], zero, zero,
+        cells[0], cells[1], cells[2], cells[3], cells[4], begin, ints_at(scene[LISTED]),
+        scene[PIERCE] > 0, (scene[LEFT], scene[TOP], scene[RIGHT], scene[LOW]), zero, NOBODY, 1,
+        ints_at(scene[NEAR]), rest, out[0], out[0], out[0], rest,
+    )  # fmt: skip
+    if turn < 1:
+        return UNKNOWN
+    found, item = carray(pointer(buffer_at + FOUND_AT), (FEW_ROWS, ROW), np.int64), ints_at(scene[ITEM])
+    for row in range(rows):
+        found[row, 0], found[row, 1], found[row, 2] = item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
+        found[row, 3], found[row, 4] = out[X, row], out[Y, row]
+    return rows
 
 
 shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
-class OrderedTiles(NamedTuple):
-    """Columns of tiles, front to back: rank and id of the item, whether it is an occluder, first row in `words`."""
-
-    rank: Ints
-    item: Ints
-    blocks: Ints
-    begin: Ints
-    words: Words
-
-
 class Buffer(NamedTuple):
-    """Memory to which a kernel writes rows: its address, capacity in rows, bytes, and the array that owns them."""
+    """Memory to which a kernel writes rows: its address, bytes, and the array that owns them."""
 
     address: int
-    room: int
     view: memoryview
     numbers: Ints
 
@@ -232,8 +132,10 @@ class PositionCache:
         self._reach = np.array([-reach, -reach, reach, reach])
         self._view = kept.view(pierce)
         self._forms = -1
-        self._tiles: tuple[Bools, OrderedTiles]
-        self._here = np.zeros(SCRATCH + 1, np.int64)  # changed in place, because buffers have its address
+        self._there: Ints
+        self._tiles: OrderedTiles
+        self._out = np.empty((Y + 1, FEW_ROWS), np.int64)
+        self._here = np.zeros(OUT + 1, np.int64)  # changed in place, because buffers have its address
         self._kept: tuple[Any, ...] = ()
         self._lock = threading.Lock()
 
@@ -242,43 +144,43 @@ class PositionCache:
         with self._lock:
             visible_set = self._scene.visible_sets().kept(self._view, self._scene.version)
             if visible_set is not None:
-                self._use_visible(visible_set)
+                self._use_visible(visible_set, stack)
                 return
             tiles = self._scene.items.tiles()
             if stack.forms != self._forms:
-                there = self._view.accepts(stack)[tiles.rank]
-                rank = tiles.rank[there]
-                ordered = OrderedTiles(
-                    rank, stack.ids[rank], stack.occluder[rank].astype(np.int64), tiles.begin[there], tiles.words
-                )
-                self._forms, self._tiles = stack.forms, (there, ordered)
-            there, ordered = self._tiles
-            cells = Cells(0, 0, 0, 0, 0, NOTHING_LISTED, NOTHING_LISTED)
-            bounds = self._scene.bounds or (-FAR, -FAR, FAR, FAR)
+                there = self._view.accepts(stack)[tiles.rank].nonzero()[0]
+                rank, *_, occluder = tiles.ordered(stack, False)[:5]
+                blocks = occluder[there] if stack.has_occluders else occluder
+                self._tiles = OrderedTiles(rank[there], NO_BOXES, tiles.begin[there], tiles.words, blocks)
+                self._forms, self._there = stack.forms, there
+            boxes_xyxy = tiles.boxes(stack.box_xyxy)
+            if len(self._there) < len(boxes_xyxy):
+                boxes_xyxy = boxes_xyxy.take(self._there, axis=0)
+            ordered = self._tiles._replace(box_xyxy=boxes_xyxy)
             worth = int(COMPILED.visible_made + COMPILED.visible_item * len(stack))
-            self._place(
-                ordered, tiles.boxes(stack.box_xyxy)[there], cells, (*bounds, self._view.pierce, 0, worth, False)
-            )
+            bounds = self._scene.bounds or EVERYWHERE
+            cells = Cells(0, 0, 0, 0, 0, NO_NUMBERS, NO_NUMBERS)
+            self._place(ordered, cells, stack, (self._view.pierce, 0, worth, False, *bounds))
 
-    def _use_visible(self, visible_set: VisibleSet) -> None:
+    def _use_visible(self, visible_set: VisibleSet, stack: Stack) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
-        seen, cells = visible_set.seen, visible_set.cells(self._reach)
-        ids = self._scene.items.stack().ids[seen.rank]
-        ordered = OrderedTiles(seen.rank, ids, np.zeros(len(seen.rank), np.int64), seen.begin, seen.words)
-        self._place(ordered, seen.box_xyxy, cells, (-FAR, -FAR, FAR, FAR, True, 0, 0, True))
+        self._place(visible_set.seen, visible_set.cells(self._reach), stack, (True, 0, 0, True, *EVERYWHERE))
 
-    def _place(self, ordered: OrderedTiles, boxes_xyxy: Ints, cells: Cells, told: tuple[int, ...]) -> None:
+    def _place(self, tiles: OrderedTiles, cells: Cells, stack: Stack, told: tuple[int, ...]) -> None:
         """Write the addresses of the tiles to the fields of the scene."""
-        columns = tuple(map(np.ascontiguousarray, (cells.begin, cells.listed, boxes_xyxy, *ordered)))
-        scratch = np.empty(6 * len(boxes_xyxy), np.int64)
-        begin, listed, *rest = map(address, columns)
-        here = [*told, *cells[:5], begin, listed, len(boxes_xyxy), *rest, address(scratch)]
+        columns = tuple(map(np.ascontiguousarray, (cells.listed, cells.begin, stack.ids, *tiles[:5])))
+        listed, begin, item, rank, box, word_of, words, blocks = map(address, columns)
+        near = np.empty(len(tiles.rank), np.int64)
+        here = (
+            *told, *cells[:5], len(tiles.rank), len(tiles.occluder), listed, begin, item, rank, box, word_of, words,
+            blocks, address(near), address(self._out),
+        )  # fmt: skip
         self._here[:] = np.array(here, np.int64)
-        self._kept = columns, scratch  # last, because another thread may still read the old columns
+        self._kept = columns, near  # last, because another thread may still read the old columns
 
     def look(self, one: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
-        numbers, number, tell = _numbers(one.spans), one.number, self._tell
+        numbers, number, tell = _numbers(one), one.number, self._tell
         buffers: list[Buffer] = []
 
         def look(x: float, y: float, hits: Answer) -> None:
@@ -286,16 +188,16 @@ class PositionCache:
             try:
                 buffer = buffers.pop()  # each thread takes its own
             except IndexError:
-                buffer = self._buffer(numbers, ROWS)
+                buffer = self._buffer(numbers)
             count = shot(x, y, buffer[0])
             if count:
-                _, room, view, _ = buffer
-                if not 0 < count <= room:
-                    buffers.append(self._room_for(count, buffer, numbers))
+                if count < 0:
+                    buffers.append(buffer)
                     if count == UNKNOWN:
                         raise KeyError
+                    self._make_visible()
                     return look(x, y, hits)
-                at, end = FIRST, FIRST + ROW_BYTES * count
+                view, at, end = buffer[1], FOUND_AT, FOUND_AT + ROW_BYTES * count
                 while at < end:  # faster than a range
                     item, n, distance2, column, row = read(view, at)
                     tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (column, row), distance2)))
@@ -304,23 +206,21 @@ class PositionCache:
 
         return look, PIECE_BYTES + numbers.nbytes
 
-    def _room_for(self, count: int, buffer: Buffer, numbers: Ints) -> Buffer:
-        """Buffer for so many rows; for MAKE_VISIBLE make the visible set and return the same buffer."""
-        if count > 0:
-            return self._buffer(numbers, 2 * count)
+    def _make_visible(self) -> None:
         with self._lock:
-            if count == MAKE_VISIBLE and not self._here[IS_VISIBLE]:
+            if not self._here[IS_VISIBLE]:
                 scene = self._scene
-                self._use_visible(scene.visible_sets().read(self._view, scene.items, scene.bounds))
-        return buffer
+                visible_set = scene.visible_sets().read(self._view, scene.items, scene.bounds)
+                self._use_visible(visible_set, scene.items.stack())
 
-    def _buffer(self, pixels: Ints, rows: int) -> Buffer:
-        numbers = np.zeros(FOUND + ROW * rows + len(pixels), np.int64)
-        numbers[:FOUND] = address(self._here), address(pixels), rows
-        return Buffer(address(numbers), rows, memoryview(numbers).cast("B"), numbers)
+    def _buffer(self, pixels: Ints) -> Buffer:
+        numbers = np.zeros(FOUND + ROW * FEW_ROWS + len(pixels), np.int64)
+        numbers[:FOUND] = address(self._here), address(pixels)
+        return Buffer(address(numbers), memoryview(numbers).cast("B"), numbers)
 
 
-def _numbers(spans: Spans) -> Ints:
+def _numbers(one: Round) -> Ints:
     """Fields of a round, as `_shot` reads them."""
-    words = columns_of(spans)
-    return np.concatenate([spans.box_xyxy, words.shape[::-1], words.reshape(-1).view(np.int64)])
+    words = columns_of(one.spans)
+    head = (*(one.spans.box_xyxy or (0, 0, -1, -1)), WORD, words.shape[1], words.size)
+    return np.concatenate([np.array(head, np.int64), words.reshape(-1).view(np.int64)])
