@@ -128,6 +128,7 @@ class BroadPhase(ABC):
         self._count = len(rows)
         self._rows = rows
         self._here = np.ones(len(rows), np.bool_)
+        self._home, self._place = np.zeros((2, len(rows)), np.int64)  # where a structure lists each box, if it needs to
         self.written = 0
         """Entries and nodes written so far to build and change the structure, a measure of cost without a clock."""
 
@@ -263,8 +264,9 @@ class BroadPhase(ABC):
         """Make room for n rows; the room doubles, so that rows inserted one by one are rarely copied."""
         if n > len(self._rows):
             more = max(n, 2 * len(self._rows)) - len(self._rows)
-            self._rows = np.concatenate((self._rows, np.zeros((more, 2 * self.dim))))
-            self._here = np.concatenate((self._here, np.zeros(more, np.bool_)))
+            for name in ("_rows", "_here", "_home", "_place"):
+                column = getattr(self, name)
+                setattr(self, name, np.concatenate((column, np.zeros((more, *column.shape[1:]), column.dtype))))
 
     def _check_table(self) -> None:
         rows = self.boxes
@@ -305,10 +307,6 @@ class BruteForce(BroadPhase):
         self._rows[ids] = rows
 
 
-PENDING = 32
-"""Most lists of changes that wait for the next answer; more are joined into one."""
-
-
 INDEX_GROWTH = 4
 """Growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes."""
 
@@ -335,7 +333,7 @@ class Index:
         self.boxes: BroadPhase | None = None
         self.followed = 0
         self.missed = 0.0
-        self._pending: list[Ints] = []
+        self._pending = np.zeros(0, np.int64)
         self._seen = -1
         self._made_of = 0
         self._place_of = np.zeros(0, np.int64)
@@ -361,8 +359,8 @@ class Index:
                 self._place_of[ids] = np.arange(len(ids))
                 self._made_of = len(ids)
             elif self.followed:
-                self._follow(self.boxes, items, np.unique(np.concatenate(self._pending)))
-            self._pending = []
+                self._follow(self.boxes, items, self._pending)
+            self._pending = self._pending[:0]
             return self.boxes
 
     def query(self, items: Items, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
@@ -376,18 +374,14 @@ class Index:
             if changed is None:
                 self.boxes = None
             else:
-                self._pending.append(changed)
-            if len(self._pending) > PENDING:
-                self._pending = [np.unique(np.concatenate(self._pending))]
+                self._pending = np.union1d(self._pending, changed)
         self._seen = items.version
         if self.boxes is not None and (
             len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
             or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
         ):
             self.boxes = None
-        if self.boxes is None:
-            return len(items.stack())
-        return sum(map(len, self._pending))
+        return len(items.stack()) if self.boxes is None else len(self._pending)
 
     def _follow(self, boxes: BroadPhase, items: Items, changed: Ints) -> None:
         """Insert, remove or move the boxes of items that changed."""

@@ -99,8 +99,6 @@ class Bvh(BroadPhase):
         self._measures = slack is None
         self.slack = 0.0 if slack is None else real("slack", slack, 0, LARGEST)
         self._trees: list[Tree] = []
-        self._home = np.empty(0, np.int64)
-        self._place = np.empty(0, np.int64)
         if self._count:
             self._enter(self.ids)
 
@@ -127,38 +125,36 @@ class Bvh(BroadPhase):
         assert np.array_equal(np.sort(listed), self.ids), "trees do not list each box once"
 
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        found: list[Pairs] = []
-        number = 0
-        for tree in self._trees:
-            found += self._in_tree(tree, queries, number, work)
-            number += sum(map(len, tree.levels))
-        query, box = piled(found)
-        return query, box
-
-    def _in_tree(self, tree: Tree, queries: Floats, number: int, work: Work | None) -> list[Pairs]:
         """Descend with all queries at once; a large front is halved, which bounds the memory."""
         found: list[Pairs] = []
-        offsets = number + np.cumsum([0, *map(len, tree.levels)])
-        query, node = np.divmod(np.arange(len(queries) * len(tree.levels[0])), len(tree.levels[0]))
-        stack = [(0, query, node)]
+        stack = []
+        for tree in self._trees:
+            query, node = np.divmod(np.arange(len(queries) * len(tree.levels[0])), len(tree.levels[0]))
+            stack.append((tree, 0, query, node))
         while stack:
-            level, query, node = stack.pop()
+            tree, level, query, node = stack.pop()
             if len(query) > CHUNK_SAMPLES:
                 half = len(query) // 2
-                stack += [(level, query[half:], node[half:]), (level, query[:half], node[:half])]
+                stack += [(tree, level, query[half:], node[half:]), (tree, level, query[:half], node[:half])]
                 continue
             good = np.flatnonzero(meets(tree.levels[level].take(node, axis=0), queries.take(query, axis=0)))
             if work is not None:
                 work.compared += len(query)
-                work.visits.append((query.take(good), offsets[level] + node.take(good)))
+                work.visits.append((query.take(good), self._number_of(tree, level) + node.take(good)))
             query, node = query.take(good), node.take(good)
             if not len(query):
                 continue
             if level + 1 < len(tree.levels):
-                stack.append((level + 1, np.repeat(query, 4), ((node[:, None] << 2) + np.arange(4)).ravel()))
+                stack.append((tree, level + 1, np.repeat(query, 4), ((node[:, None] << 2) + np.arange(4)).ravel()))
             else:
                 found += self._in_leaves(tree, queries, query, node, work)
-        return found
+        query, box = piled(found)
+        return query, box
+
+    def _number_of(self, tree: Tree, level: int) -> int:
+        """Number of the first node of a level of a tree."""
+        before = self._trees[: self._trees.index(tree)]
+        return sum(len(nodes) for each in before for nodes in each.levels) + sum(map(len, tree.levels[:level]))
 
     def _in_leaves(self, tree: Tree, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
         found: list[Pairs] = []
@@ -177,8 +173,6 @@ class Bvh(BroadPhase):
         return sum(len(level) for tree in self._trees for level in tree.levels)
 
     def _enter(self, ids: Ints) -> None:
-        short = np.zeros(len(self._rows) - len(self._home), np.int64)
-        self._home, self._place = np.concatenate((self._home, short)), np.concatenate((self._place, short))
         while self._trees and len(self._trees[-1].living) <= max(2 * len(ids), BVH_SMALL):
             ids = np.concatenate((self._trees.pop().living, ids))
         self._plant(len(self._trees), ids)

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from ..broadphase import Bvh
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
-from ..common.limits import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
-from ..volumes.exact import Signs, orient2d, orient3d
+from ..common.limits import CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
+from ..volumes.exact import Signs, chunked, orient2d, orient3d
 
 Corners = Floats
 """Triangles of n rows, as columns (3, 3, n): corner, axis, row."""
@@ -26,7 +26,6 @@ Corners = Floats
 Sides = Ints
 """Sides of a plane on which three corners lie, as one number (n,) for their signs: 9 s0 + 3 s1 + s2 + 13."""
 
-COLUMNS = 18
 SIDES = [(s0, s1, s2) for s0, s1, s2 in product((-1, 0, 1), repeat=3)]
 IN_PLANE = SIDES.index((0, 0, 0))
 KEPT = ((1, 2), (2, 0), (0, 1))
@@ -63,10 +62,7 @@ def triangles_meet(a: npt.ArrayLike, b: npt.ArrayLike, conservative: bool = Fals
     except ValueError:
         raise InputError(f"b: expected axes that broadcast with {first.shape}, got {second.shape}") from None
     columns = [p[..., i, k] for p in (first, second) for i, k in product(range(3), repeat=2)]
-    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
-    modes: Any = [["readonly"]] * COLUMNS + [["writeonly", "allocate"]]
-    types: Any = [np.float64] * COLUMNS + [np.bool_]
-    chunks = np.nditer([*columns, None], flags, modes, types, buffersize=CHUNK_ROWS)
+    chunks = chunked(columns, np.bool_)
     with chunks, np.errstate(all="ignore"):
         for *rows, found in chunks:
             pair = np.stack(rows).reshape(2, 3, 3, len(found))

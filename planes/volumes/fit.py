@@ -73,7 +73,7 @@ def hull(pixels: object) -> Polygons:
     InputError
         If there is no pixel, or the mask is too large or not a mask.
     """
-    return _polygon(np.array(_corners(pixels)) / 2)
+    return Polygons(np.array(_corners(pixels)) / 2, [0])
 
 
 def box(pixels: object) -> Aabbs:
@@ -165,7 +165,7 @@ def convex(pixels: object, n: int) -> Polygons:
     It is the hull without the edges whose removal adds the least area, one after the other.
     """
     lines = edge_lines(_corners(pixels))
-    return _polygon(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))))
+    return Polygons(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))), [0])
 
 
 def concave(mask: object, tolerance: float) -> Floats:
@@ -205,10 +205,6 @@ def _extents(pixels: object) -> Extents:
 def _corners(pixels: object) -> list[Point]:
     """Corners of the hull, in half pixels."""
     return hull_points(_extents(pixels))
-
-
-def _polygon(points: Floats) -> Polygons:
-    return Polygons(points, [0])
 
 
 def _circle(corners: list[Point], center: tuple[float, float]) -> Circles:
@@ -276,56 +272,30 @@ def _center(basis: list[Point]) -> Center:
 
 
 def _support(points: list[Point]) -> list[Point]:
-    """The two or three points that define the least circle of at most four; the first point lies on its edge.
-
-    A circle on a diameter, or about a triangle without an obtuse angle, is the least if it contains all points.
-    """
+    """The two or three points that define the least circle of at most four; the first point lies on its edge."""
     first, *rest = points
-    pairs = [[first, q] for q in rest]
-    triples = [[first, q, r] for q, r in itertools.combinations(rest, 2)]
-    for basis in pairs + [t for t in triples if _is_acute(t)]:
+    found = []
+    for others in (*itertools.combinations(rest, 1), *itertools.combinations(rest, 2)):
+        basis = [first, *others]
         center = _center(basis)
-        if all(_scaled_square(center, p) <= _scaled_square(center, first) for p in points):
-            return basis
-    raise AssertionError(f"no least circle around {points}")
-
-
-def _is_acute(triangle: list[Point]) -> bool:
-    """Whether a triangle has area and no obtuse angle."""
-    (ax, ay), (bx, by), (cx, cy) = triangle
-    p, q, u, v = bx - ax, by - ay, cx - ax, cy - ay
-    at_a = p * u + q * v
-    return p * v != q * u and at_a >= 0 and p * p + q * q >= at_a and u * u + v * v >= at_a
+        square = _scaled_square(center, first)
+        if center[2] and all(_scaled_square(center, p) <= square for p in points):
+            found.append((Fraction(square, center[2] ** 2), basis))
+    return min(found)[1]
 
 
 def _least_sides(ring: list[Point]) -> list[Line]:
-    """Four lines of the least box, by rotating calipers: one jaw lies on each edge of the hull in turn."""
-    lines, n = edge_lines(ring), len(ring)
-    best: tuple[int, int, list[Line]] | None = None
-    right = far = left = 0
-    for i, (a, b, c) in enumerate(lines):
-        along, inward = (-b, a), (-a, -b)
-        right = _farthest(ring, along, max(right, i + 1))
-        far = _farthest(ring, inward, max(far, right))
-        left = _farthest(ring, (b, -a), max(left, far))
-        ends = [_dot(v, ring[j % n]) for v, j in ((along, right), (inward, far), ((b, -a), left))]
-        area, square = (ends[0] + ends[2]) * (ends[1] + c), a * a + b * b
-        if best is None or area * best[1] < best[0] * square:
-            best = area, square, [(a, b, c), (*along, ends[0]), (*inward, ends[1]), (b, -a, ends[2])]
+    """Four lines of the least box: one lies on an edge of the hull, so each edge is tried."""
+    lines, points = edge_lines(ring), np.array(ring).T
+    best: tuple[Fraction, list[Line]] | None = None
+    for a, b, c in lines:
+        ways = ((-b, a), (-a, -b), (b, -a))
+        right, far, left = (np.array(ways) @ points).max(axis=1).tolist()
+        area = Fraction((right + left) * (far + c), a * a + b * b)
+        if best is None or area < best[0]:
+            best = area, [(a, b, c), *((*way, end) for way, end in zip(ways, (right, far, left), strict=True))]
     assert best is not None
-    return best[2]
-
-
-def _dot(v: Point, p: Point) -> int:
-    return v[0] * p[0] + v[1] * p[1]
-
-
-def _farthest(ring: list[Point], direction: Point, start: int) -> int:
-    """Walk around the ring from `start` while the points lie farther in a direction."""
-    n, i = len(ring), start
-    while _dot(direction, ring[(i + 1) % n]) > _dot(direction, ring[i % n]):
-        i += 1
-    return i
+    return best[1]
 
 
 KINDS = ("circle", "oriented box", "boxes", "polygon")
@@ -391,10 +361,8 @@ class Bounds:
         more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
         every = np.concatenate([self._masks, used[new]])
         order = np.argsort(every)
-        self._masks, self._row = (
-            every[order],
-            np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
-        )
+        self._masks = every[order]
+        self._row = np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order]
         return more if self._volumes is None else joined([self._volumes, more])
 
 

@@ -334,16 +334,9 @@ class _Simpler:
 
     def _is_free(self, i: int, a: int, c: int) -> bool:
         """Whether no other corner lies in the closed, added triangle."""
-        three = (self.at[a], self.at[i], self.at[c])
-        xs, ys = self.corners[:, 0], self.corners[:, 1]
-        low, high = tuple(map(min, *three)), tuple(map(max, *three))
-        boxed = self.left & (xs >= low[0]) & (xs <= high[0]) & (ys >= low[1]) & (ys <= high[1])
-        p, q, r = three
-        for other in np.flatnonzero(boxed).tolist():
-            at = self.at[other]
-            if other not in (a, i, c) and turn(p, q, at) <= 0 and turn(q, r, at) <= 0 and turn(r, p, at) <= 0:
-                return False
-        return True
+        others = self.left.copy()
+        others[[a, i, c]] = False
+        return not _any_within((self.at[c], self.at[i], self.at[a]), self.corners[others])
 
 
 def _distance(points: npt.NDArray[np.int64], a: Point, c: Point) -> float:
@@ -413,25 +406,25 @@ def _is_clear(ring: list[Point], i: int, tip: Point) -> bool:
     a, b, c, d = _four(ring, i)
     n = len(ring)
     others = np.array([ring[(i + 3 + k) % n] for k in range(n - 4)], np.int64).reshape(-1, 2)
-    for triangle in ((a, tip, b), (b, tip, c), (c, tip, d)):
-        low, high = np.min(triangle, axis=0), np.max(triangle, axis=0)
-        close = others[((others >= low) & (others <= high)).all(axis=1)]
-        sides = [_turns(triangle[k], triangle[(k + 1) % 3], close) for k in range(3)]
-        if (np.min(sides, axis=0) >= 0).any():
-            return False
+    if any(_any_within(triangle, others) for triangle in ((a, tip, b), (b, tip, c), (c, tip, d))):
+        return False
     path = np.concatenate([[d], others, [a]])  # edges from d around to a
     return not (_cut_by(a, tip, path[:-1]) or _cut_by(tip, d, path[1:]))
 
 
-def _turns(a: Point, b: Point, points: Ints) -> Ints:
-    found: Ints = (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
-    return found
+def _any_within(triangle: tuple[Point, Point, Point], points: Ints) -> bool:
+    """Whether a point lies in a closed triangle that turns from +x toward +y."""
+    p, q, r = triangle
+    low, high = tuple(map(min, p, q, r)), tuple(map(max, p, q, r))
+    x, y = points.T
+    at = points[(x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])].T
+    return bool(((turn(p, q, at) >= 0) & (turn(q, r, at) >= 0) & (turn(r, p, at) >= 0)).any())
 
 
 def _cut_by(a: Point, b: Point, path: Ints) -> bool:
     """Whether a polyline crosses a segment; touching counts."""
     start, end = path[:-1], path[1:]
-    sides = np.sign(_turns(a, b, path))
+    sides = np.sign(turn(a, b, path.T))
     begins, ends = (start - a)[:, ::-1] * (end - start), (start - b)[:, ::-1] * (end - start)
     of_a, of_b = (np.sign(v[:, 1] - v[:, 0]) for v in (begins, ends))
     low, high = np.minimum(a, b), np.maximum(a, b)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, InputError, Ints
 from ..grid.spans import ragged
-from .exact import orient2d
+from .exact import orient2d, point_segment_sign, segment_segment_sign
 
 Numbers = npt.NDArray[Any]
 Corner = tuple[float, float]
@@ -137,8 +137,8 @@ def convex_parts(points: list[Corner]) -> list[list[int]]:
     ----------
     Meisters, *Polygons have ears* (1975); Hertel and Mehlhorn, *Fast triangulation of simple polygons* (1983).
     """
+    _refuse_crossing(points)
     whole = _whole(points)
-    _refuse_crossing(whole)
     parts = dict(enumerate(_triangles(whole)))
     owner = {edge: i for i, part in parts.items() for edge in _edges(part)}
     for u, v in list(owner):
@@ -194,39 +194,26 @@ def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
     return not any(turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in others)
 
 
-def _refuse_crossing(whole: list[Whole]) -> None:
+def _refuse_crossing(points: list[Corner]) -> None:
     """Refuse a polygon in which edges touch, except neighbours in one point."""
-    n = len(whole)
+    n = len(points)
     if n < 3:
         raise InputError(f"points: expected three or more, got {n}")
-    edges = [(whole[i], whole[(i + 1) % n]) for i in range(n)]
-    for i in range(n):
-        for j in range(i + 1, n):
-            (a, b), (c, d) = edges[i], edges[j]
-            if j == i + 1 or (i == 0 and j == n - 1):
-                p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
-                bad = turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
-            else:
-                bad = _meet(a, b, c, d)
-            if bad:
-                raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
+    begin = np.array(points)
+    end, beyond = np.roll(begin, -1, axis=0), np.roll(begin, -2, axis=0)
+    folded = np.minimum(point_segment_sign(beyond, begin, end, 0), point_segment_sign(begin, end, beyond, 0)) <= 0
+    for i in range(n - 1):
+        bad = segment_segment_sign(begin[i], end[i], begin[i + 1 :], end[i + 1 :], 0) <= 0
+        bad[0] = folded[i]
+        if i == 0:
+            bad[-1] = folded[-1]
+        if bad.any():
+            j = i + 1 + int(np.argmax(bad))
+            raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
 
 
-def _meet(a: Whole, b: Whole, c: Whole, d: Whole) -> bool:
-    turns = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
-    if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
-        return True
-    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
-    return any(turn == 0 and _within(*end) for turn, end in zip(turns, ends, strict=True))
-
-
-def _within(a: Whole, b: Whole, p: Whole) -> bool:
-    """Whether a point on the line through a and b lies between them."""
-    return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in range(2))
-
-
-def turn(a: Whole, b: Whole, c: Whole) -> int:
-    """Twice the signed area of a triangle; positive if it turns from +x towards +y."""
+def turn(a: Any, b: Any, c: Any) -> Any:
+    """Twice the signed area of a triangle; positive if it turns from +x towards +y; c may hold columns of points."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
