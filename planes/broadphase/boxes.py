@@ -200,9 +200,11 @@ class BroadPhase(ABC):
     def cell_boxes(self) -> Cells:
         """Nodes that a query may visit."""
 
-    @abstractmethod
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
+        rows = self.boxes
+        assert np.isfinite(rows).all(), "a box is not finite"
+        assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
 
     @abstractmethod
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
@@ -212,17 +214,15 @@ class BroadPhase(ABC):
     def _node_count(self) -> int:
         """Number of nodes that `work` may name."""
 
-    @abstractmethod
-    def _enter(self, ids: Ints) -> None:
+    def _enter(self, ids: Ints) -> None:  # noqa: B027
         """Insert boxes that are new in the table."""
 
-    @abstractmethod
-    def _leave(self, ids: Ints) -> None:
+    def _leave(self, ids: Ints) -> None:  # noqa: B027
         """Remove boxes that are still in the table."""
 
-    @abstractmethod
     def _shift(self, ids: Ints, rows: Floats) -> None:
         """Write new rows into the table and update the structure."""
+        self._rows[ids] = rows
 
     def _meeting(self, queries: Floats, query: Ints, ids: Ints, work: Work | None) -> Bools:
         """Test candidates against the present boxes."""
@@ -268,11 +268,6 @@ class BroadPhase(ABC):
                 column = getattr(self, name)
                 setattr(self, name, np.concatenate((column, np.zeros((more, *column.shape[1:]), column.dtype))))
 
-    def _check_table(self) -> None:
-        rows = self.boxes
-        assert np.isfinite(rows).all(), "a box is not finite"
-        assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
-
 
 class BruteForce(BroadPhase):
     """Brute force: every query against every box. It is the reference, and the fastest for a few dozen boxes."""
@@ -284,10 +279,6 @@ class BruteForce(BroadPhase):
         rows = hull.reshape(-1, 2 * self.dim)
         return Cells(np.arange(len(rows)), rows, np.ones(len(rows), np.bool_))
 
-    def check(self) -> None:
-        """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
-
     def _find(self, queries: Floats, work: Work | None) -> Pairs:
         every = np.arange(len(queries))
         if work is not None and len(self):
@@ -296,15 +287,6 @@ class BruteForce(BroadPhase):
 
     def _node_count(self) -> int:
         return min(len(self), 1)
-
-    def _enter(self, ids: Ints) -> None:
-        pass
-
-    def _leave(self, ids: Ints) -> None:
-        pass
-
-    def _shift(self, ids: Ints, rows: Floats) -> None:
-        self._rows[ids] = rows
 
 
 INDEX_GROWTH = 4

@@ -111,7 +111,7 @@ class Bvh(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         for number, tree in enumerate(self._trees):
             tree.check()
             living = tree.living
@@ -266,13 +266,11 @@ class PartsBvh:
 
     def pairs(self) -> Ints:
         """Find the objects that overlap each other: (2, K) int64 [i, j] with i < j, sorted."""
-        first, second = self._bounds.pairs()
-        group, part = ragged(self._starts[first + 1] - self._starts[first])
-        left = self._parts.take(self._starts[first[group]] + part, axis=0)
-        again, other = ragged((self._starts[second + 1] - self._starts[second])[group])
-        right = self._parts.take(self._starts[second[group]].take(again) + other, axis=0)
-        good = group[again[meets(left.take(again, axis=0), right)]]
-        return _once(np.stack((first[good], second[good])))
+        ids = self._bounds.ids
+        group, part = ragged(self._starts[ids + 1] - self._starts[ids])
+        query, second, _ = self.query_parts(self._parts[self._starts[ids[group]] + part])
+        first = ids[group[query]]
+        return np.unique(np.stack((first, second))[:, first < second], axis=1)
 
     def insert(self, boxes: object, starts: object) -> Ints:
         """Add objects and return their ids, (N,) int64."""

@@ -140,7 +140,7 @@ class Grid(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         ids = self.ids
         assert (self._place[ids] == self._span(self._rows[ids])).all(), "a box is listed where it was"
         large = _sizes(self._place[ids]) > OVERSIZED_CELLS

@@ -82,7 +82,7 @@ class Quadtree(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         nodes, ids = self._nodes, self.ids
         used = np.flatnonzero(nodes["depth"] >= 0)
         inner = used[nodes["child"][used] >= 0]

@@ -329,8 +329,7 @@ class Bounds:
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
         self._volumes: Volumes | None = None
-        self._masks = np.zeros(0, np.int64)
-        self._row = np.zeros(0, np.int64)
+        self._row: dict[int, int] = {}
         self._lock = threading.Lock()
 
     def rows(
@@ -345,25 +344,16 @@ class Bounds:
         ids : (n,) the items
         items : number of masks that may be in use; many more are not kept
         """
-        used, first, of = np.unique(masks, return_index=True, return_inverse=True)
+        used = dict(zip(masks.tolist(), ids.tolist(), strict=True))
         with self._lock:
-            if len(self._masks) + len(used) > 2 * items + BOUNDS_SLACK:
-                self._masks, self._row, self._volumes = masks[:0], masks[:0], None
-            volumes = self._volumes = self._with(used, ids[first], sprites, variants)
-            return volumes, np.asarray(self._row[np.searchsorted(self._masks, used)][of])
-
-    def _with(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
-        """The volumes after those of new masks are added."""
-        new = ~np.isin(used, self._masks)
-        if self._volumes is not None and not new.any():
-            return self._volumes
-        items = ids[new].tolist()
-        more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
-        every = np.concatenate([self._masks, used[new]])
-        order = np.argsort(every)
-        self._masks = every[order]
-        self._row = np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order]
-        return more if self._volumes is None else joined([self._volumes, more])
+            if len(self._row) + len(used) > 2 * items + BOUNDS_SLACK:
+                self._row, self._volumes = {}, None
+            new = {mask: item for mask, item in used.items() if mask not in self._row}
+            if new or self._volumes is None:
+                more = bounding(self.kind, [sprites[i] for i in new.values()], [variants[i] for i in new.values()])
+                self._volumes = more if self._volumes is None else joined([self._volumes, more])
+                self._row |= zip(new, itertools.count(len(self._row)))
+            return self._volumes, np.array([self._row[mask] for mask in masks.tolist()], np.int64)
 
 
 def shifted(volumes: Volumes, xy: Ints) -> Volumes:

@@ -70,7 +70,11 @@ def _cut(mask: Bools, k: int) -> tuple[Ints, Ints]:
     few, made = list(parts.values()), 1
     while heap and len(parts) < BOXES_MAX:
         number = heapq.heappop(heap)[-1]
-        for half in _halves(mask, parts.pop(number)):
+        part = parts.pop(number)
+        x, y, x_end, y_end = part.box
+        at = (x + part.at, y_end) if part.axis else (x_end, y + part.at)  # where the first half ends
+        begin = (x + part.at, y) if part.axis else (x, y + part.at)  # where the second half begins
+        for half in (_part(mask, x, y, *at), _part(mask, *begin, x_end, y_end)):
             parts[made] = half
             if half.false:
                 heapq.heappush(heap, (-half.saved, -half.false, made))
@@ -78,13 +82,6 @@ def _cut(mask: Bools, k: int) -> tuple[Ints, Ints]:
         if len(parts) <= k:
             few = list(parts.values())
     return np.array([part.box for part in few]), np.array([part.box for part in parts.values()])
-
-
-def _halves(mask: Bools, part: _Part) -> tuple[_Part, _Part]:
-    x, y, x_end, y_end = part.box
-    if part.axis == 0:
-        return _part(mask, x, y, x_end, y + part.at), _part(mask, x, y + part.at, x_end, y_end)
-    return _part(mask, x, y, x + part.at, y_end), _part(mask, x + part.at, y, x_end, y_end)
 
 
 def _part(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> _Part:
