@@ -153,19 +153,20 @@ class BroadPhase(ABC):
         (2, K) int64 [query, id], sorted
         """
         rows = box_rows("boxes", boxes, self.dim)
-        return sorted_pairs(*self._find(rows, None), self._count)
+        query, found = piled(self._find(rows, None))
+        return sorted_pairs(query, found, self._count)
 
     def pairs(self) -> Ints:
         """Find the boxes that overlap each other: (2, K) int64 ids [i, j] with i < j, sorted."""
         ids = self.ids
-        query, found = self._find(self._rows[ids], None)
+        query, found = piled(self._find(self._rows[ids], None))
         first = ids[query]
         keep = first < found
         return sorted_pairs(first[keep], found[keep], self._count)
 
     def work(self, boxes: object) -> Work:
         """Nodes and boxes that a query of these boxes visits and tests."""
-        work = Work(self._node_count())
+        work = Work(len(self.cell_boxes().number))
         self._find(box_rows("boxes", boxes, self.dim), work)
         return work
 
@@ -207,12 +208,8 @@ class BroadPhase(ABC):
         assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
 
     @abstractmethod
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        """Overlapping (query, id), each pair once, in any order."""
-
-    @abstractmethod
-    def _node_count(self) -> int:
-        """Number of nodes that `work` may name."""
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
+        """Overlapping (query, id), each pair once, in any order and any pieces."""
 
     def _enter(self, ids: Ints) -> None:  # noqa: B027
         """Insert boxes that are new in the table."""
@@ -230,7 +227,7 @@ class BroadPhase(ABC):
             work.tests.append((query, ids))
         return meets(queries.take(query, axis=0), self._rows.take(ids, axis=0))
 
-    def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> Pairs:
+    def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> list[Pairs]:
         """Test every named query against every named box, some millions of pairs at a time."""
         wide = max(1, min(len(ids), CHUNK_PAIRS))
         tall = max(1, CHUNK_PAIRS // wide)
@@ -244,8 +241,7 @@ class BroadPhase(ABC):
                     work.tests.append((np.repeat(rows, len(chunk)), np.tile(chunk, len(rows))))
                 q, b = np.nonzero(meets(queries[rows][:, None], boxes))
                 found.append((rows[q], chunk[b]))
-        query, box = piled(found)
-        return query, box
+        return found
 
     def _living(self, ids: object) -> Ints:
         array = integers("ids", ids, (None,), 0, 2**62)
@@ -279,14 +275,11 @@ class BruteForce(BroadPhase):
         rows = hull.reshape(-1, 2 * self.dim)
         return Cells(np.arange(len(rows)), rows, np.ones(len(rows), np.bool_))
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         every = np.arange(len(queries))
         if work is not None and len(self):
             work.visits.append((every, np.zeros_like(every)))
         return self._meeting_all(queries, every, self.ids, work)
-
-    def _node_count(self) -> int:
-        return min(len(self), 1)
 
 
 INDEX_GROWTH = 4

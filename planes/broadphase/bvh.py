@@ -12,7 +12,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from ..grid.spans import meets, pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, box_rows, piled
+from .boxes import BroadPhase, Cells, Pairs, Work, box_rows
 
 LARGEST = float(np.finfo(np.float64).max)
 
@@ -124,10 +124,10 @@ class Bvh(BroadPhase):
         listed = np.concatenate([np.empty(0, np.int64), *(tree.living for tree in self._trees)])
         assert np.array_equal(np.sort(listed), self.ids), "trees do not list each box once"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         """Descend with all queries at once; a large front is halved, which bounds the memory."""
         found: list[Pairs] = []
-        stack = []
+        stack: list[tuple[Tree, int, Ints, Ints]] = []
         for tree in self._trees:
             query, node = np.divmod(np.arange(len(queries) * len(tree.levels[0])), len(tree.levels[0]))
             stack.append((tree, 0, query, node))
@@ -148,8 +148,7 @@ class Bvh(BroadPhase):
                 stack.append((tree, level + 1, np.repeat(query, 4), ((node[:, None] << 2) + np.arange(4)).ravel()))
             else:
                 found += self._in_leaves(tree, queries, query, node, work)
-        query, box = piled(found)
-        return query, box
+        return found
 
     def _number_of(self, tree: Tree, level: int) -> int:
         """Number of the first node of a level of a tree."""
@@ -168,9 +167,6 @@ class Bvh(BroadPhase):
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
             found.append((asked.take(good), box.take(good)))
         return found
-
-    def _node_count(self) -> int:
-        return sum(len(level) for tree in self._trees for level in tree.levels)
 
     def _enter(self, ids: Ints) -> None:
         while self._trees and len(self._trees[-1].living) <= max(2 * len(ids), BVH_SMALL):

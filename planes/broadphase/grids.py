@@ -13,7 +13,7 @@ import numpy as np
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from ..grid.spans import pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, piled
+from .boxes import BroadPhase, Cells, Pairs, Work
 
 FIRST_BITS = 3
 """Lowest bits of an entry, one per axis, set if the cell is the box's first on that axis. The other bits are its id."""
@@ -160,21 +160,20 @@ class Grid(BroadPhase):
         due = np.stack(self._listed(ids[~large]))
         assert np.array_equal(_in_order(listed), _in_order(due)), "cells do not list the boxes that reach into them"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         span = self._span(queries)
         sizes = _sizes(span)
         wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].entry) // 8)
-        found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)] if wide.any() else []
+        found = self._meeting_all(queries, np.flatnonzero(wide), self.ids, work) if wide.any() else []
         narrow = np.flatnonzero(~wide)
-        found.append(self._meeting_all(queries, narrow, self._beside, work))
+        found += self._meeting_all(queries, narrow, self._beside, work)
         for piece in pieces(sizes[narrow].astype(np.int64), CHUNK_SAMPLES):
             rows = narrow[piece]
             group, at = _written_out(span[rows])
             first = _first(at, span[rows, 0], group)
             for home in (MAIN, FRESH):
                 found += self._in_cells(queries, rows.take(group), at, first, home, work)
-        query, box = piled(found)
-        return query, box
+        return found
 
     def _in_cells(
         self, queries: Floats, query: Ints, at: Ints, first: Ints, home: int, work: Work | None
@@ -206,9 +205,6 @@ class Grid(BroadPhase):
             good = np.flatnonzero(self._meeting(queries, asked, box, work))
             found.append((asked.take(good), box.take(good)))
         return found
-
-    def _node_count(self) -> int:
-        return sum(len(listing.key) for listing in self._listings)
 
     def _enter(self, ids: Ints) -> None:
         ids = self._measured(ids)

@@ -103,7 +103,7 @@ class Quadtree(BroadPhase):
         assert nodes["length"].sum() == self._live, "the pool is miscounted"
         assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         every = np.arange(len(queries))
         stack = [(every, np.zeros_like(every))]
         leaves: list[Pairs] = []
@@ -126,7 +126,7 @@ class Quadtree(BroadPhase):
         query, leaf = piled(leaves)
         return self._in_leaves(queries, query, leaf, work)
 
-    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> Pairs:
+    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
         """Search leaves; a pair counts only in the cell of its first common point, so that it is found once."""
         found: list[Pairs] = []
         length = self._nodes["length"].take(leaf)
@@ -144,11 +144,7 @@ class Quadtree(BroadPhase):
             own &= (gate[:, 1] < corner[:, 1]) & (corner[:, 1] <= gate[:, 3])
             mine = np.flatnonzero(own)
             found.append((asked.take(mine), box.take(mine)))
-        asked, box = piled(found)
-        return asked, box
-
-    def _node_count(self) -> int:
-        return int(np.count_nonzero(self._nodes["depth"] >= 0))
+        return found
 
     def _enter(self, ids: Ints) -> None:
         self._outside += self._count_out(self._rows[ids])

@@ -156,7 +156,7 @@ def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     same = same[_share_corner(a.take(same, axis=2), b.take(same, axis=2))]
     found[same], keep[same] = True, False
     left = np.flatnonzero(keep)
-    a, b, first, bound = a.take(left, axis=2), b.take(left, axis=2), first[left], bound[left]
+    a, b, first = a.take(left, axis=2), b.take(left, axis=2), first[left]
     # 3. The plane of the first; 4. no, where all corners of the second lie strictly on one side of it.
     second = _sides(a, b, bound, conservative)
     keep = ~_APART[second]
@@ -174,14 +174,17 @@ def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     return found
 
 
-def _bound(a: Corners, b: Corners) -> Floats:
-    """Bound of the error of a determinant, as in orient3d, from the largest difference of coordinates on one axis."""
-    low, high = np.minimum(a.min(axis=0), b.min(axis=0)), np.maximum(a.max(axis=0), b.max(axis=0))
-    reach = (high - low).max(axis=0)
-    return np.asarray(6 * ORIENT3D_ERROR * reach * (reach * reach + FLOAT_TINY) + FLOAT_TINY)
+def _bound(a: Corners, b: Corners) -> float:
+    """Bound of the errors of determinants, as in orient3d, from the largest difference of coordinates on one axis."""
+    reach = 0.0
+    for axis in range(3):
+        low = min(p[:, axis].min(initial=np.inf) for p in (a, b))
+        high = max(p[:, axis].max(initial=-np.inf) for p in (a, b))
+        reach = max(reach, float(high - low))
+    return 6 * ORIENT3D_ERROR * reach * (reach * reach + FLOAT_TINY) + FLOAT_TINY
 
 
-def _sides(plane: Corners, corners: Corners, bound: Floats, conservative: bool) -> Sides:
+def _sides(plane: Corners, corners: Corners, bound: float, conservative: bool) -> Sides:
     """Sides of the plane of a triangle on which three corners lie.
 
     The determinants are those of orient3d; the normal of the plane is computed once for all three.
@@ -195,8 +198,8 @@ def _sides(plane: Corners, corners: Corners, bound: Floats, conservative: bool) 
         np.add(np.add(x, y, out=x), z, out=value)
     signs = (values > 0).view(np.int8) - (values < 0).view(np.int8)
     size = np.abs(values, out=values)
-    i, row = np.nonzero(~((size > bound) & (size < FLOAT_HUGE)))
-    if len(row):
+    if not (size.min(initial=np.inf) > bound and size.max(initial=0) < FLOAT_HUGE):
+        i, row = np.nonzero(~((size > bound) & (size < FLOAT_HUGE)))
         seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
         signs[i[seen], row[seen]] = 0
         i, row = i[~seen], row[~seen]

@@ -181,8 +181,7 @@ def read_scene(folder: Path) -> SceneFile:
             for row, entry in enumerate(data.get("objects", {}).get(section, [])):
                 place = f"objects.{section}[{row}]"
                 with within(place):
-                    scene.objects.append(_object(entry, role, folder, sprites))
-                    scene.objects[-1].place = place
+                    scene.objects.append(_object(entry, role, place, folder, sprites))
         return scene
 
 
@@ -242,7 +241,7 @@ def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:
     return "[" + ",".join(pad + laid_out(v, depth + 1, whole=whole) for v in value) + end + "]"
 
 
-def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
+def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
     given = typed("object", entry, dict)
     kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
@@ -253,16 +252,9 @@ def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite])
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
         sprites[shared] = READERS[kind]({key: data[key] for key in source}, folder, source)
-    return FileObject(
-        role=role,
-        sprite=sprites[shared],
-        position_xy=data["position_xy"],
-        pose={key: data[key] for key in POSE if key in data},
-        name=data.get("name"),
-        categories=data.get("categories"),
-        owner=data.get("owner"),
-        id=data.get("id"),
-    )
+    pose = {key: data[key] for key in POSE if key in data}
+    options = {key: data.get(key) for key in ("name", "categories", "owner", "id")}
+    return FileObject(role, sprites[shared], data["position_xy"], pose, place=place, **options)
 
 
 def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
@@ -297,11 +289,8 @@ def _inside(folder: Path, text: str) -> Path:
 def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
     data: dict[str, Any] = {"id": entry.id, "name": entry.name, **source}
     data |= {"position_xy": list(entry.position_xy), **entry.pose}
-    if entry.categories is not None:
-        data["categories"] = entry.categories
-    if entry.owner is not None:
-        data["owner"] = entry.owner
-    return data
+    given = {"categories": entry.categories, "owner": entry.owner}
+    return data | {key: value for key, value in given.items() if value is not None}
 
 
 def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
@@ -419,14 +408,8 @@ def _add_entry(scene: Scene, entry: FileObject) -> None:
             if entry.id < scene.items.count:
                 raise InputError(f"id: expected each id once, got {entry.id} again")
             scene.items.skip_to(entry.id)
-        scene.add(
-            entry.sprite,
-            entry.position_xy,
-            role=entry.role,
-            name=entry.name,
-            categories=entry.categories,
-            **entry.pose,
-        )
+        options = {"role": entry.role, "name": entry.name, "categories": entry.categories, **entry.pose}
+        scene.add(entry.sprite, entry.position_xy, **options)
 
 
 def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:

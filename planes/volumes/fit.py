@@ -93,7 +93,7 @@ def least_circle(pixels: object) -> Circles:
     none is outside. This takes few rounds, each over the corners of the hull.
     """
     corners = _corners(pixels)
-    return _circle(corners, _center_px(corners))
+    return _circle(corners, _least_center(corners))
 
 
 def pivot_circle(pixels: object, pivot_xy: Sequence[float]) -> Circles:
@@ -119,7 +119,7 @@ def capsule(pixels: object) -> Capsules:
     begin, end = (a + d) / 2, (b + c) / 2
     inward = np.linspace(0, 0.5, AXES)[:, None] * (end - begin)
     found = min(zip(begin + inward, end - inward, strict=True), key=lambda axis: _capsule_area(corners, *axis))
-    circle = _circle(corners, _center_px(corners))
+    circle = _circle(corners, _least_center(corners))
     if math.pi * circle.radius[0] ** 2 <= _capsule_area(corners, *found):
         return Capsules(circle.center, circle.center, circle.radius)
     begin, end = found
@@ -239,20 +239,15 @@ Center = tuple[int, int, int]
 """(x, y, d) with d > 0 stands for (x / d, y / d)."""
 
 
-def _least_center(points: list[Point]) -> Center:
-    """Centre of the least circle around points, exactly."""
+def _least_center(points: list[Point]) -> tuple[float, float]:
+    """Centre of the least circle around points in half pixels: px, rounded only once."""
     basis = points[:2]
     while True:
-        center = _center(basis)
+        center = x, y, d = _center(basis)
         far = max(points, key=lambda p: _scaled_square(center, p))
         if _scaled_square(center, far) <= _scaled_square(center, basis[0]):
-            return center
+            return x / (2 * d), y / (2 * d)
         basis = _support([far, *basis])
-
-
-def _center_px(points: list[Point]) -> tuple[float, float]:
-    x, y, d = _least_center(points)
-    return x / (2 * d), y / (2 * d)
 
 
 def _scaled_square(center: Center, point: Point) -> int:
@@ -365,23 +360,17 @@ def shifted(volumes: Volumes, xy: Ints) -> Volumes:
     if isinstance(volumes, Parts):
         row = rows_of(volumes.starts, len(volumes.parts))[1]
         return volumes._same(shifted(volumes.parts, xy[row]), volumes.starts)._of(volumes.original)
-    if isinstance(volumes, Hulls):
-        return _shifted_hulls(volumes, xy)
+    if isinstance(volumes, Hulls):  # a hull that would be rounded is grown first, by more than rounding can take back
+        core = volumes.core()
+        by = xy[rows_of(core.starts, len(core.points))[1]]
+        off = np.maximum.reduceat(_rounding(core.points, by).max(axis=1), core.starts)
+        if off.any():
+            return type(volumes).around(_grown(core, 2 * off) + by, core.starts)._of(volumes.original)
     there = volumes.translated(xy)
     if isinstance(there, Circles):
         rounded = _rounding(volumes.core().points, xy).sum(axis=1)
         return _grown_circles(there, rounded)._of(volumes.original)
     return there
-
-
-def _shifted_hulls(volumes: Hulls, xy: Ints) -> Hulls:
-    """Moved hulls; a hull that would be rounded is grown first, by more than rounding can take back."""
-    core = volumes.core()
-    by = xy[rows_of(core.starts, len(core.points))[1]]
-    rounded = np.maximum.reduceat(_rounding(core.points, by).max(axis=1), core.starts)
-    if not rounded.any():
-        return volumes.translated(xy)
-    return type(volumes).around(_grown(core, 2 * rounded) + by, core.starts)._of(volumes.original)
 
 
 def _rounding(points: Floats, by: Ints) -> Floats:

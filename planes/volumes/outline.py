@@ -170,7 +170,7 @@ def outline(mask: Bools, tolerance: float) -> Floats:
         block *= 2
     corners = np.minimum(np.array(ring) * block, (right - left, bottom - top)) + np.array([left, top])
     simpler = _Simpler(corners, tolerance)
-    return np.array(_without_edges(simpler.points(), simpler.offs(), tolerance)) / SUB - 0.5
+    return np.array(_without_edges(simpler.points, simpler.offs, tolerance)) / SUB - 0.5
 
 
 def _blocks(mask: Bools, block: int) -> Bools:
@@ -298,14 +298,11 @@ class _Simpler:
             self._offer(i)
         while self.heap:
             self._leave_out(*heapq.heappop(self.heap)[1:])
-
-    def points(self) -> list[Point]:
+        kept = np.flatnonzero(self.left).tolist()
+        self.points: list[Point] = [(self.at[i][0] * SUB, self.at[i][1] * SUB) for i in kept]
         """Remaining corners, in order, in 1/256 px."""
-        return [(x * SUB, y * SUB) for x, y in self.corners[self.left].tolist()]
-
-    def offs(self) -> list[float]:
+        self.offs = [self._off(i, self.after[i]) for i in kept]
         """Distance from the edge at each remaining corner to the farthest corner removed there, px."""
-        return [self._off(i, self.after[i]) for i in np.flatnonzero(self.left).tolist()]
 
     def _offer(self, i: int) -> None:
         """Put an inner corner on the heap if the edge of its neighbours is near enough to all corners between them."""
