@@ -24,6 +24,7 @@ from ..volumes.volumes import Aabbs, Volumes
 
 Pairs = tuple[Ints, Ints]
 AXES = "xyz"
+LARGEST = float(np.finfo(np.float64).max)
 
 
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:

@@ -12,9 +12,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from ..grid.spans import meets, pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, box_rows
-
-LARGEST = float(np.finfo(np.float64).max)
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
 
 
 class Tree:
@@ -240,7 +238,7 @@ class PartsBvh:
     """
 
     def __init__(self, boxes: object, starts: object) -> None:
-        self._parts, self._starts = _parts_of(boxes, starts, None)
+        self._parts, self._starts = _checked_parts(boxes, starts, None)
         self._bounds = Bvh(_hulls(self._parts, self._starts[:-1]))
 
     def __len__(self) -> int:
@@ -254,23 +252,28 @@ class PartsBvh:
         """Find the parts that overlap each of these boxes: (3, K) int64 [query, object, part of it], sorted."""
         rows = box_rows("boxes", boxes, self._bounds.dim)
         query, owner = self._bounds.query(rows)
-        group, part = ragged(self._starts[owner + 1] - self._starts[owner])
+        group, part, row = self._parts_of(owner)
         query, owner = query.take(group), owner.take(group)
-        parts = self._parts.take(self._starts.take(owner) + part, axis=0)
-        good = np.flatnonzero(meets(rows.take(query, axis=0), parts))
+        good = np.flatnonzero(meets(rows.take(query, axis=0), self._parts.take(row, axis=0)))
         return np.stack((query, owner, part)).take(good, axis=1)
 
     def pairs(self) -> Ints:
         """Find the objects that overlap each other: (2, K) int64 [i, j] with i < j, sorted."""
-        ids = self._bounds.ids
-        group, part = ragged(self._starts[ids + 1] - self._starts[ids])
-        query, second, _ = self.query_parts(self._parts[self._starts[ids[group]] + part])
-        first = ids[group[query]]
-        return np.unique(np.stack((first, second))[:, first < second], axis=1)
+        first, second = self._bounds.pairs()
+        group, _, left = self._parts_of(first)
+        again, _, right = self._parts_of(second[group])
+        met = meets(self._parts.take(left.take(again), axis=0), self._parts.take(right, axis=0))
+        good = group[again[met]]
+        return _once(np.stack((first[good], second[good])))
+
+    def _parts_of(self, objects: Ints) -> tuple[Ints, Ints, Ints]:
+        """All parts of objects: (place of the object, number of the part, row)."""
+        group, part = ragged(self._starts[objects + 1] - self._starts[objects])
+        return group, part, self._starts[objects].take(group) + part
 
     def insert(self, boxes: object, starts: object) -> Ints:
         """Add objects and return their ids, (N,) int64."""
-        parts, begins = _parts_of(boxes, starts, self._bounds.dim)
+        parts, begins = _checked_parts(boxes, starts, self._bounds.dim)
         self._starts = np.concatenate((self._starts, len(self._parts) + begins[1:]))
         self._parts = np.concatenate((self._parts, parts))
         return self._bounds.insert(_hulls(parts, begins[:-1]))
@@ -282,10 +285,10 @@ class PartsBvh:
     def move(self, ids: object, boxes: object) -> None:
         """Give all parts of the objects `ids` (N,) new boxes: as many rows as they have parts, object by object."""
         moved = self._bounds._living(ids)
-        length = self._starts[moved + 1] - self._starts[moved]
-        parts, begins = _parts_of(boxes, np.append(0, np.cumsum(length)), self._bounds.dim)
-        group, part = ragged(length)
-        self._parts[self._starts[moved][group] + part] = parts
+        group, _, row = self._parts_of(moved)
+        begins = np.searchsorted(group, np.arange(len(moved) + 1))
+        parts, _ = _checked_parts(boxes, begins, self._bounds.dim)
+        self._parts[row] = parts
         self._bounds.move(moved, _hulls(parts, begins[:-1]))
 
     def check(self) -> None:
@@ -297,7 +300,7 @@ class PartsBvh:
         assert np.array_equal(self._bounds.boxes, hulls[ids]), "an object's bounds are not its parts' hull"
 
 
-def _parts_of(boxes: object, starts: object, dim: int | None) -> tuple[Floats, Ints]:
+def _checked_parts(boxes: object, starts: object, dim: int | None) -> tuple[Floats, Ints]:
     rows = box_rows("boxes", boxes, dim)
     begins = integers("starts", starts, (None,), 0, 2**62)
     if not len(begins) or begins[0] != 0 or begins[-1] != len(rows):

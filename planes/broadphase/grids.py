@@ -13,7 +13,7 @@ import numpy as np
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from ..grid.spans import pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work
 
 FIRST_BITS = 3
 """Lowest bits of an entry, one per axis, set if the cell is the box's first on that axis. The other bits are its id."""
@@ -24,7 +24,6 @@ NOWHERE, BESIDE, MAIN, FRESH = range(4)
 KEY_BITS = {2: 31, 3: 21}
 """Bits of a key for the cell number on each axis, by dimension; cells beyond share the last number."""
 
-LARGEST = float(np.finfo(np.float64).max)
 SMALLEST = float(np.finfo(np.float64).tiny)
 
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from ..common.checks import Bools, Floats, InputError, Ints, integer
 from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
 from ..grid.spans import pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
 
 Nodes = dict[str, npt.NDArray[Any]]
 """Rows of nodes, one array per field of FIELDS."""
@@ -39,7 +39,6 @@ FIELDS: dict[str, tuple[type, int]] = {
     "length": (np.int64, 0),
 }
 Paths = tuple[Ints, Ints, Bools]
-LARGEST = float(np.finfo(np.float64).max)
 BULK = 64
 """The root cell leaves out one box in this many on each side, and is then doubled: outliers do not stretch it."""
 

@@ -153,7 +153,7 @@ def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     first = _sides(b, a, bound, conservative)
     keep = ~_APART[first]
     same = np.flatnonzero(_TOUCHED[first])
-    same = same[_share_corner(a.take(same, axis=2), b.take(same, axis=2))]
+    same = same[(a.take(same, axis=2)[:, None] == b.take(same, axis=2)).all(axis=2).any(axis=(0, 1))]  # share a corner
     found[same], keep[same] = True, False
     left = np.flatnonzero(keep)
     a, b, first = a.take(left, axis=2), b.take(left, axis=2), first[left]
@@ -213,10 +213,6 @@ def _plainly_in(triangle: Corners, points: Floats) -> Bools:
     return np.asarray(same.all(axis=1).any(axis=0) | same.all(axis=0).any(axis=0))
 
 
-def _share_corner(a: Corners, b: Corners) -> Bools:
-    return np.asarray((a[:, None] == b).all(axis=2).any(axis=(0, 1)))
-
-
 def _intervals_meet(a: Corners, b: Corners, rows: Ints, way: Ints, conservative: bool) -> Bools:
     """Compare the ends of the intervals on the line of both planes; way is 27 first + second sides.
 
@@ -243,7 +239,7 @@ def _picked(corners: Corners, which: Ints, rows: Ints) -> Floats:
 
 def _special(a: Corners, b: Corners, first: Sides, second: Sides, conservative: bool) -> Bools:
     """Decide the rows in which a triangle lies in the other's plane, or has no area."""
-    found = _boxes_meet(a, b)
+    found: Bools = ((a.min(axis=0) <= b.max(axis=0)) & (b.min(axis=0) <= a.max(axis=0))).all(axis=0)  # their boxes do
     if conservative:
         return found
     one, two = (np.ascontiguousarray(p.transpose(2, 0, 1)) for p in (a, b))
@@ -253,11 +249,6 @@ def _special(a: Corners, b: Corners, first: Sides, second: Sides, conservative: 
     within = np.flatnonzero(found & (first == IN_PLANE) & (second == IN_PLANE))
     found[within] = _coplanar_meet(one[within], two[within])
     return found
-
-
-def _boxes_meet(a: Corners, b: Corners) -> Bools:
-    lows, highs = (a.min(axis=0), b.min(axis=0)), (a.max(axis=0), b.max(axis=0))
-    return np.asarray(((lows[0] <= highs[1]) & (lows[1] <= highs[0])).all(axis=0))
 
 
 def _pierces(segment: Floats, sides: Sides, triangle: Floats) -> Bools:

@@ -81,10 +81,13 @@ def polygon(rings: Sequence[Ints]) -> Spans:
     first, last = -(-top[:, 1] // SUB), low[:, 1] // SUB
     edge, place = ragged(np.maximum(last - first + 1, 0))
     y = first[edge] + place
-    flat = top[edge, 1] == low[edge, 1]
-    left, right = _crossings(top[edge], low[edge], y)
+    (x0, y0), (x1, y1) = top[edge].T, low[edge].T
+    flat, per = y0 == y1, np.maximum(y1 - y0, 1)
+    at = x0 * per + (SUB * y - y0) * (x1 - x0)  # where edges and rows cross; a flat edge extends from end to end
+    left, right = np.where(flat, np.minimum(x0, x1), at), np.where(flat, np.maximum(x0, x1), at)
+    left, right = -(-left // (SUB * per)), right // (SUB * per)
     touching = (y, left, right)
-    crossing = ~flat & (SUB * y < low[edge, 1])  # half-open in y: a vertex between two edges counts once
+    crossing = ~flat & (SUB * y < y1)  # half-open in y: a vertex between two edges counts once
     y, x = y[crossing], left[crossing]
     order = np.lexsort((x, y))
     y, x = y[order], x[order]
@@ -165,20 +168,6 @@ def _rows(low: int, high: int) -> Ints:
 def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
     """Centres of rows y from low to high."""
     return y, -(-low // SUB), high // SUB
-
-
-def _crossings(top: Ints, low: Ints, y: Ints) -> tuple[Ints, Ints]:
-    """Crossings of edges and rows: the first centre at or right of each, and the last at or left of it.
-
-    A flat edge extends from end to end.
-    """
-    dy = low[:, 1] - top[:, 1]
-    per = np.maximum(dy, 1)
-    x = top[:, 0] * per + (SUB * y - top[:, 1]) * (low[:, 0] - top[:, 0])
-    flat = dy == 0
-    left = np.where(flat, np.minimum(top[:, 0], low[:, 0]), x)
-    right = np.where(flat, np.maximum(top[:, 0], low[:, 0]), x)
-    return -(-left // (SUB * per)), right // (SUB * per)
 
 
 def _half_plane(slope: int, limit: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:

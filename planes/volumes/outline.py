@@ -43,12 +43,8 @@ def cover(mask: Bools, k: int) -> Ints:
         rows, first, last = extents(mask)
         return np.array([[first.min(), rows[0], last.max() + 1, rows[-1] + 1]])
     few, many = _cut(mask, k)
-    return min((few, _area(few)), _join(many, k), key=lambda found: found[1])[0]
-
-
-def _area(boxes: Ints) -> int:
-    """Number of pixels of disjoint boxes."""
-    return int((boxes[:, 2:] - boxes[:, :2]).prod(axis=1).sum())
+    area = int((few[:, 2:] - few[:, :2]).prod(axis=1).sum())  # the boxes are disjoint
+    return min((few, area), _join(many, k), key=lambda found: found[1])[0]
 
 
 @dataclass(frozen=True)

@@ -291,18 +291,10 @@ def _any_part(sets: Parts, rows: Rows, test: Callable[[Ints, Ints], Bools]) -> B
     return np.logical_or.reduceat(test(of, starts[of] + place), starts_of(counts))
 
 
-def _circles_circles(a: Circles, b: Circles, conservative: bool) -> Bools:
-    return circles_sign(a.center, a.radius, b.center, b.radius, conservative) <= 0
-
-
 def _circles_aabbs(a: Circles, b: Aabbs, conservative: bool) -> Bools:
     """Test the point of the box nearest to the centre; its coordinates are input coordinates, so it is exact."""
     nearest = np.clip(a.center, b.min, b.max)
     return circles_sign(a.center, a.radius, nearest, 0.0, conservative) <= 0
-
-
-def _circles_capsules(a: Circles, b: Capsules, conservative: bool) -> Bools:
-    return point_segment_sign(a.center, b.a_xy, b.b_xy, a.radius, b.radius, conservative) <= 0
 
 
 def _aabbs_aabbs(a: Aabbs, b: Aabbs, conservative: bool) -> Bools:
@@ -381,10 +373,12 @@ _HULLS: tuple[type[Volumes], ...] = (Aabbs, Obbs, Polygons)
 _PAIRS: dict[tuple[type[Volumes], type[Volumes]], Test] = {
     **dict.fromkeys(itertools.product((Circles, Capsules), _HULLS), _round_hulls),
     **dict.fromkeys(itertools.combinations_with_replacement(_HULLS, 2), _hulls_hulls),
-    (Circles, Circles): _circles_circles,
-    (Circles, Aabbs): _circles_aabbs,
-    (Circles, Capsules): _circles_capsules,
     (Aabbs, Aabbs): _aabbs_aabbs,
+    (Circles, Circles): lambda a, b, quick: circles_sign(a.center, a.radius, b.center, b.radius, quick) <= 0,
+    (Circles, Aabbs): _circles_aabbs,
+    (Circles, Capsules): lambda a, b, quick: (
+        point_segment_sign(a.center, b.a_xy, b.b_xy, a.radius, b.radius, quick) <= 0
+    ),
     (Capsules, Capsules): _capsules_capsules,
 }
 TABLE = _PAIRS | {

@@ -155,7 +155,7 @@ class Columns(Volumes):
         return [getattr(self, name) for name in self._point_columns] + ([] if self.radius is None else [self.radius])
 
     def core(self) -> Core:
-        """The points of the columns."""
+        """Points in order: one of a circle, two of a capsule, min and max of a box in 3-D."""
         points = np.stack([getattr(self, name) for name in self._point_columns], axis=1)
         radius = np.zeros(len(self)) if self.radius is None else self.radius
         return Core(points.reshape(-1, self.d), *_even(len(self), len(self._point_columns)), radius)
