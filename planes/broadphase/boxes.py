@@ -314,17 +314,29 @@ class Index:
         self._made_of = 0
         self._place_of = np.zeros(0, np.int64)
         self._item_of = np.zeros(0, np.int64)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     def owed(self, items: Items) -> int:
         """Number of boxes that must be updated before the next query; each change is read once."""
         with self._lock:
-            return self._owed(items)
+            if self.boxes is not None and self._seen != items.version:
+                changed = items.changed_ids(self._seen)
+                if changed is None:
+                    self.boxes = None
+                else:
+                    self._pending = np.union1d(self._pending, changed)
+            self._seen = items.version
+            if self.boxes is not None and (
+                len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
+                or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
+            ):
+                self.boxes = None
+            return len(items.stack()) if self.boxes is None else len(self._pending)
 
     def read(self, items: Items) -> BroadPhase:
         """Update the structure to the present version, and return it."""
         with self._lock:
-            self.followed = self._owed(items)
+            self.followed = self.owed(items)
             if self.boxes is None:
                 from .. import broadphase
 
@@ -343,21 +355,6 @@ class Index:
         """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (row, item id)."""
         row, place = self.read(items).query(boxes_xyxy.astype(np.float64))
         return row, self._item_of[place]
-
-    def _owed(self, items: Items) -> int:
-        if self.boxes is not None and self._seen != items.version:
-            changed = items.changed_ids(self._seen)
-            if changed is None:
-                self.boxes = None
-            else:
-                self._pending = np.union1d(self._pending, changed)
-        self._seen = items.version
-        if self.boxes is not None and (
-            len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
-            or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
-        ):
-            self.boxes = None
-        return len(items.stack()) if self.boxes is None else len(self._pending)
 
     def _follow(self, boxes: BroadPhase, items: Items, changed: Ints) -> None:
         """Insert, remove or move the boxes of items that changed."""

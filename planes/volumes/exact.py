@@ -321,10 +321,6 @@ def _orient2d(columns: list[Numbers]) -> Valued:
     return left - right, ((left,), (right,))
 
 
-def _orient2d_bound(left: Any, right: Any) -> Any:
-    return ORIENT2D_ERROR * (left + right) + FLOAT_TINY
-
-
 def _orient3d(columns: list[Numbers]) -> Valued:
     a, b, c = ([columns[3 * i + k] - columns[9 + k] for k in range(3)] for i in range(3))
     terms = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -401,7 +397,7 @@ def _ends_exact(columns: list[Numbers]) -> Numbers:
     return np.asarray(np.minimum.reduce([_sign(_point_segment_exact(part)) for part in _four_ends(columns)]))
 
 
-_ORIENT2D = Predicate(_orient2d, _orient2d_bound)
+_ORIENT2D = Predicate(_orient2d, lambda left, right: ORIENT2D_ERROR * (left + right) + FLOAT_TINY)
 _ORIENT3D = Predicate(_orient3d, _orient3d_bound)
 _CIRCLES = Predicate(_circles, _circles_bound)
 _POINT_SEGMENT = Predicate(_point_segment, _point_segment_bound, _point_segment_exact)

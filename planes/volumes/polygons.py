@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, InputError, Ints
-from ..grid.spans import ragged
+from ..grid.spans import meets, ragged
 from .exact import orient2d, point_segment_sign, segment_segment_sign
 
 Numbers = npt.NDArray[Any]
@@ -78,7 +78,9 @@ def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
     """
     if not len(starts):
         return points, starts
-    sense = _checked_sense(points, starts)
+    _, after = neighbours(starts, len(points))
+    same: Bools = (points == points[after]).all(axis=1)  # equal neighbours would hide turns
+    sense = np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
     counts, row = rows_of(starts, len(points))
     place = np.arange(len(points)) - starts[row]
     points = points[np.where(sense[row] < 0, starts[row] + counts[row] - 1 - place, np.arange(len(points)))]
@@ -88,13 +90,6 @@ def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
     for i in np.flatnonzero(sense == 0).tolist():
         parts[i] = np.array(hull([(x, y) for x, y in parts[i].tolist()]))
     return np.concatenate(parts), starts_of([len(part) for part in parts])
-
-
-def _checked_sense(points: Floats, starts: Ints) -> Ints:
-    """Turning sense of convex rows; also 0 for rows with equal neighbours, which would hide turns."""
-    _, after = neighbours(starts, len(points))
-    same: Bools = (points == points[after]).all(axis=1)
-    return np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
 
 
 def hull(points: list[Corner]) -> list[Corner]:
@@ -202,14 +197,13 @@ def _refuse_crossing(points: list[Corner]) -> None:
     begin = np.array(points)
     end, beyond = np.roll(begin, -1, axis=0), np.roll(begin, -2, axis=0)
     folded = np.minimum(point_segment_sign(beyond, begin, end, 0), point_segment_sign(begin, end, beyond, 0)) <= 0
-    for i in range(n - 1):
-        bad = segment_segment_sign(begin[i], end[i], begin[i + 1 :], end[i + 1 :], 0) <= 0
-        bad[0] = folded[i]
-        if i == 0:
-            bad[-1] = folded[-1]
-        if bad.any():
-            j = i + 1 + int(np.argmax(bad))
-            raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
+    boxes = np.concatenate([np.minimum(begin, end), np.maximum(begin, end)], axis=1)
+    i, j = np.nonzero(np.triu(meets(boxes[:, None], boxes), 1))
+    crossing = segment_segment_sign(begin[i], end[i], begin[j], end[j], 0) <= 0
+    last = (i == 0) & (j == n - 1)
+    bad = np.flatnonzero(np.where(last, folded[j], np.where(j == i + 1, folded[i], crossing)))
+    if len(bad):
+        raise InputError(f"points: expected edges that do not cross or touch, got edges {i[bad[0]]} and {j[bad[0]]}")
 
 
 def turn(a: Any, b: Any, c: Any) -> Any:
