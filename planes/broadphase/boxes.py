@@ -24,6 +24,7 @@ from ..volumes.volumes import Aabbs, Volumes
 
 Pairs = tuple[Ints, Ints]
 AXES = "xyz"
+LARGEST = float(np.finfo(np.float64).max)
 
 
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
@@ -128,6 +129,7 @@ class BroadPhase(ABC):
         self._count = len(rows)
         self._rows = rows
         self._here = np.ones(len(rows), np.bool_)
+        self._home, self._place = np.zeros((2, len(rows)), np.int64)  # where a structure lists each box, if it needs to
         self.written = 0
         """Entries and nodes written so far to build and change the structure, a measure of cost without a clock."""
 
@@ -152,19 +154,20 @@ class BroadPhase(ABC):
         (2, K) int64 [query, id], sorted
         """
         rows = box_rows("boxes", boxes, self.dim)
-        return sorted_pairs(*self._find(rows, None), self._count)
+        query, found = piled(self._find(rows, None))
+        return sorted_pairs(query, found, self._count)
 
     def pairs(self) -> Ints:
         """Find the boxes that overlap each other: (2, K) int64 ids [i, j] with i < j, sorted."""
         ids = self.ids
-        query, found = self._find(self._rows[ids], None)
+        query, found = piled(self._find(self._rows[ids], None))
         first = ids[query]
         keep = first < found
         return sorted_pairs(first[keep], found[keep], self._count)
 
     def work(self, boxes: object) -> Work:
         """Nodes and boxes that a query of these boxes visits and tests."""
-        work = Work(self._node_count())
+        work = Work(len(self.cell_boxes().number))
         self._find(box_rows("boxes", boxes, self.dim), work)
         return work
 
@@ -199,29 +202,25 @@ class BroadPhase(ABC):
     def cell_boxes(self) -> Cells:
         """Nodes that a query may visit."""
 
-    @abstractmethod
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
+        rows = self.boxes
+        assert np.isfinite(rows).all(), "a box is not finite"
+        assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
 
     @abstractmethod
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        """Overlapping (query, id), each pair once, in any order."""
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
+        """Overlapping (query, id), each pair once, in any order and any pieces."""
 
-    @abstractmethod
-    def _node_count(self) -> int:
-        """Number of nodes that `work` may name."""
-
-    @abstractmethod
-    def _enter(self, ids: Ints) -> None:
+    def _enter(self, ids: Ints) -> None:  # noqa: B027
         """Insert boxes that are new in the table."""
 
-    @abstractmethod
-    def _leave(self, ids: Ints) -> None:
+    def _leave(self, ids: Ints) -> None:  # noqa: B027
         """Remove boxes that are still in the table."""
 
-    @abstractmethod
     def _shift(self, ids: Ints, rows: Floats) -> None:
         """Write new rows into the table and update the structure."""
+        self._rows[ids] = rows
 
     def _meeting(self, queries: Floats, query: Ints, ids: Ints, work: Work | None) -> Bools:
         """Test candidates against the present boxes."""
@@ -229,7 +228,7 @@ class BroadPhase(ABC):
             work.tests.append((query, ids))
         return meets(queries.take(query, axis=0), self._rows.take(ids, axis=0))
 
-    def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> Pairs:
+    def _meeting_all(self, queries: Floats, which: Ints, ids: Ints, work: Work | None) -> list[Pairs]:
         """Test every named query against every named box, some millions of pairs at a time."""
         wide = max(1, min(len(ids), CHUNK_PAIRS))
         tall = max(1, CHUNK_PAIRS // wide)
@@ -243,8 +242,7 @@ class BroadPhase(ABC):
                     work.tests.append((np.repeat(rows, len(chunk)), np.tile(chunk, len(rows))))
                 q, b = np.nonzero(meets(queries[rows][:, None], boxes))
                 found.append((rows[q], chunk[b]))
-        query, box = piled(found)
-        return query, box
+        return found
 
     def _living(self, ids: object) -> Ints:
         array = integers("ids", ids, (None,), 0, 2**62)
@@ -263,13 +261,9 @@ class BroadPhase(ABC):
         """Make room for n rows; the room doubles, so that rows inserted one by one are rarely copied."""
         if n > len(self._rows):
             more = max(n, 2 * len(self._rows)) - len(self._rows)
-            self._rows = np.concatenate((self._rows, np.zeros((more, 2 * self.dim))))
-            self._here = np.concatenate((self._here, np.zeros(more, np.bool_)))
-
-    def _check_table(self) -> None:
-        rows = self.boxes
-        assert np.isfinite(rows).all(), "a box is not finite"
-        assert (rows[:, : self.dim] <= rows[:, self.dim :]).all(), "a box has its min beyond its max"
+            for name in ("_rows", "_here", "_home", "_place"):
+                column = getattr(self, name)
+                setattr(self, name, np.concatenate((column, np.zeros((more, *column.shape[1:]), column.dtype))))
 
 
 class BruteForce(BroadPhase):
@@ -282,31 +276,11 @@ class BruteForce(BroadPhase):
         rows = hull.reshape(-1, 2 * self.dim)
         return Cells(np.arange(len(rows)), rows, np.ones(len(rows), np.bool_))
 
-    def check(self) -> None:
-        """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
-
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         every = np.arange(len(queries))
         if work is not None and len(self):
             work.visits.append((every, np.zeros_like(every)))
         return self._meeting_all(queries, every, self.ids, work)
-
-    def _node_count(self) -> int:
-        return min(len(self), 1)
-
-    def _enter(self, ids: Ints) -> None:
-        pass
-
-    def _leave(self, ids: Ints) -> None:
-        pass
-
-    def _shift(self, ids: Ints, rows: Floats) -> None:
-        self._rows[ids] = rows
-
-
-PENDING = 32
-"""Most lists of changes that wait for the next answer; more are joined into one."""
 
 
 INDEX_GROWTH = 4
@@ -335,22 +309,34 @@ class Index:
         self.boxes: BroadPhase | None = None
         self.followed = 0
         self.missed = 0.0
-        self._pending: list[Ints] = []
+        self._pending = np.zeros(0, np.int64)
         self._seen = -1
         self._made_of = 0
         self._place_of = np.zeros(0, np.int64)
         self._item_of = np.zeros(0, np.int64)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     def owed(self, items: Items) -> int:
         """Number of boxes that must be updated before the next query; each change is read once."""
         with self._lock:
-            return self._owed(items)
+            if self.boxes is not None and self._seen != items.version:
+                changed = items.changed_ids(self._seen)
+                if changed is None:
+                    self.boxes = None
+                else:
+                    self._pending = np.union1d(self._pending, changed)
+            self._seen = items.version
+            if self.boxes is not None and (
+                len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
+                or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
+            ):
+                self.boxes = None
+            return len(items.stack()) if self.boxes is None else len(self._pending)
 
     def read(self, items: Items) -> BroadPhase:
         """Update the structure to the present version, and return it."""
         with self._lock:
-            self.followed = self._owed(items)
+            self.followed = self.owed(items)
             if self.boxes is None:
                 from .. import broadphase
 
@@ -361,33 +347,14 @@ class Index:
                 self._place_of[ids] = np.arange(len(ids))
                 self._made_of = len(ids)
             elif self.followed:
-                self._follow(self.boxes, items, np.unique(np.concatenate(self._pending)))
-            self._pending = []
+                self._follow(self.boxes, items, self._pending)
+            self._pending = self._pending[:0]
             return self.boxes
 
     def query(self, items: Items, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (row, item id)."""
         row, place = self.read(items).query(boxes_xyxy.astype(np.float64))
         return row, self._item_of[place]
-
-    def _owed(self, items: Items) -> int:
-        if self.boxes is not None and self._seen != items.version:
-            changed = items.changed_ids(self._seen)
-            if changed is None:
-                self.boxes = None
-            else:
-                self._pending.append(changed)
-            if len(self._pending) > PENDING:
-                self._pending = [np.unique(np.concatenate(self._pending))]
-        self._seen = items.version
-        if self.boxes is not None and (
-            len(self._item_of) > 2 * len(self.boxes) + INDEX_SLACK
-            or len(items.stack()) > INDEX_GROWTH * self._made_of + 16
-        ):
-            self.boxes = None
-        if self.boxes is None:
-            return len(items.stack())
-        return sum(map(len, self._pending))
 
     def _follow(self, boxes: BroadPhase, items: Items, changed: Ints) -> None:
         """Insert, remove or move the boxes of items that changed."""

@@ -12,9 +12,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from ..grid.spans import meets, pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, box_rows, piled
-
-LARGEST = float(np.finfo(np.float64).max)
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
 
 
 class Tree:
@@ -99,8 +97,6 @@ class Bvh(BroadPhase):
         self._measures = slack is None
         self.slack = 0.0 if slack is None else real("slack", slack, 0, LARGEST)
         self._trees: list[Tree] = []
-        self._home = np.empty(0, np.int64)
-        self._place = np.empty(0, np.int64)
         if self._count:
             self._enter(self.ids)
 
@@ -113,7 +109,7 @@ class Bvh(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         for number, tree in enumerate(self._trees):
             tree.check()
             living = tree.living
@@ -126,39 +122,36 @@ class Bvh(BroadPhase):
         listed = np.concatenate([np.empty(0, np.int64), *(tree.living for tree in self._trees)])
         assert np.array_equal(np.sort(listed), self.ids), "trees do not list each box once"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        found: list[Pairs] = []
-        number = 0
-        for tree in self._trees:
-            found += self._in_tree(tree, queries, number, work)
-            number += sum(map(len, tree.levels))
-        query, box = piled(found)
-        return query, box
-
-    def _in_tree(self, tree: Tree, queries: Floats, number: int, work: Work | None) -> list[Pairs]:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         """Descend with all queries at once; a large front is halved, which bounds the memory."""
         found: list[Pairs] = []
-        offsets = number + np.cumsum([0, *map(len, tree.levels)])
-        query, node = np.divmod(np.arange(len(queries) * len(tree.levels[0])), len(tree.levels[0]))
-        stack = [(0, query, node)]
+        stack: list[tuple[Tree, int, Ints, Ints]] = []
+        for tree in self._trees:
+            query, node = np.divmod(np.arange(len(queries) * len(tree.levels[0])), len(tree.levels[0]))
+            stack.append((tree, 0, query, node))
         while stack:
-            level, query, node = stack.pop()
+            tree, level, query, node = stack.pop()
             if len(query) > CHUNK_SAMPLES:
                 half = len(query) // 2
-                stack += [(level, query[half:], node[half:]), (level, query[:half], node[:half])]
+                stack += [(tree, level, query[half:], node[half:]), (tree, level, query[:half], node[:half])]
                 continue
             good = np.flatnonzero(meets(tree.levels[level].take(node, axis=0), queries.take(query, axis=0)))
             if work is not None:
                 work.compared += len(query)
-                work.visits.append((query.take(good), offsets[level] + node.take(good)))
+                work.visits.append((query.take(good), self._number_of(tree, level) + node.take(good)))
             query, node = query.take(good), node.take(good)
             if not len(query):
                 continue
             if level + 1 < len(tree.levels):
-                stack.append((level + 1, np.repeat(query, 4), ((node[:, None] << 2) + np.arange(4)).ravel()))
+                stack.append((tree, level + 1, np.repeat(query, 4), ((node[:, None] << 2) + np.arange(4)).ravel()))
             else:
                 found += self._in_leaves(tree, queries, query, node, work)
         return found
+
+    def _number_of(self, tree: Tree, level: int) -> int:
+        """Number of the first node of a level of a tree."""
+        before = self._trees[: self._trees.index(tree)]
+        return sum(len(nodes) for each in before for nodes in each.levels) + sum(map(len, tree.levels[:level]))
 
     def _in_leaves(self, tree: Tree, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
         found: list[Pairs] = []
@@ -173,12 +166,7 @@ class Bvh(BroadPhase):
             found.append((asked.take(good), box.take(good)))
         return found
 
-    def _node_count(self) -> int:
-        return sum(len(level) for tree in self._trees for level in tree.levels)
-
     def _enter(self, ids: Ints) -> None:
-        short = np.zeros(len(self._rows) - len(self._home), np.int64)
-        self._home, self._place = np.concatenate((self._home, short)), np.concatenate((self._place, short))
         while self._trees and len(self._trees[-1].living) <= max(2 * len(ids), BVH_SMALL):
             ids = np.concatenate((self._trees.pop().living, ids))
         self._plant(len(self._trees), ids)
@@ -250,7 +238,7 @@ class PartsBvh:
     """
 
     def __init__(self, boxes: object, starts: object) -> None:
-        self._parts, self._starts = _parts_of(boxes, starts, None)
+        self._parts, self._starts = _checked_parts(boxes, starts, None)
         self._bounds = Bvh(_hulls(self._parts, self._starts[:-1]))
 
     def __len__(self) -> int:
@@ -264,25 +252,28 @@ class PartsBvh:
         """Find the parts that overlap each of these boxes: (3, K) int64 [query, object, part of it], sorted."""
         rows = box_rows("boxes", boxes, self._bounds.dim)
         query, owner = self._bounds.query(rows)
-        group, part = ragged(self._starts[owner + 1] - self._starts[owner])
+        group, part, row = self._parts_of(owner)
         query, owner = query.take(group), owner.take(group)
-        parts = self._parts.take(self._starts.take(owner) + part, axis=0)
-        good = np.flatnonzero(meets(rows.take(query, axis=0), parts))
+        good = np.flatnonzero(meets(rows.take(query, axis=0), self._parts.take(row, axis=0)))
         return np.stack((query, owner, part)).take(good, axis=1)
 
     def pairs(self) -> Ints:
         """Find the objects that overlap each other: (2, K) int64 [i, j] with i < j, sorted."""
         first, second = self._bounds.pairs()
-        group, part = ragged(self._starts[first + 1] - self._starts[first])
-        left = self._parts.take(self._starts[first[group]] + part, axis=0)
-        again, other = ragged((self._starts[second + 1] - self._starts[second])[group])
-        right = self._parts.take(self._starts[second[group]].take(again) + other, axis=0)
-        good = group[again[meets(left.take(again, axis=0), right)]]
+        group, _, left = self._parts_of(first)
+        again, _, right = self._parts_of(second[group])
+        met = meets(self._parts.take(left.take(again), axis=0), self._parts.take(right, axis=0))
+        good = group[again[met]]
         return _once(np.stack((first[good], second[good])))
+
+    def _parts_of(self, objects: Ints) -> tuple[Ints, Ints, Ints]:
+        """All parts of objects: (place of the object, number of the part, row)."""
+        group, part = ragged(self._starts[objects + 1] - self._starts[objects])
+        return group, part, self._starts[objects].take(group) + part
 
     def insert(self, boxes: object, starts: object) -> Ints:
         """Add objects and return their ids, (N,) int64."""
-        parts, begins = _parts_of(boxes, starts, self._bounds.dim)
+        parts, begins = _checked_parts(boxes, starts, self._bounds.dim)
         self._starts = np.concatenate((self._starts, len(self._parts) + begins[1:]))
         self._parts = np.concatenate((self._parts, parts))
         return self._bounds.insert(_hulls(parts, begins[:-1]))
@@ -294,10 +285,10 @@ class PartsBvh:
     def move(self, ids: object, boxes: object) -> None:
         """Give all parts of the objects `ids` (N,) new boxes: as many rows as they have parts, object by object."""
         moved = self._bounds._living(ids)
-        length = self._starts[moved + 1] - self._starts[moved]
-        parts, begins = _parts_of(boxes, np.append(0, np.cumsum(length)), self._bounds.dim)
-        group, part = ragged(length)
-        self._parts[self._starts[moved][group] + part] = parts
+        group, _, row = self._parts_of(moved)
+        begins = np.searchsorted(group, np.arange(len(moved) + 1))
+        parts, _ = _checked_parts(boxes, begins, self._bounds.dim)
+        self._parts[row] = parts
         self._bounds.move(moved, _hulls(parts, begins[:-1]))
 
     def check(self) -> None:
@@ -309,7 +300,7 @@ class PartsBvh:
         assert np.array_equal(self._bounds.boxes, hulls[ids]), "an object's bounds are not its parts' hull"
 
 
-def _parts_of(boxes: object, starts: object, dim: int | None) -> tuple[Floats, Ints]:
+def _checked_parts(boxes: object, starts: object, dim: int | None) -> tuple[Floats, Ints]:
     rows = box_rows("boxes", boxes, dim)
     begins = integers("starts", starts, (None,), 0, 2**62)
     if not len(begins) or begins[0] != 0 or begins[-1] != len(rows):

@@ -13,7 +13,7 @@ import numpy as np
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
 from ..grid.spans import pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, piled
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work
 
 FIRST_BITS = 3
 """Lowest bits of an entry, one per axis, set if the cell is the box's first on that axis. The other bits are its id."""
@@ -24,7 +24,6 @@ NOWHERE, BESIDE, MAIN, FRESH = range(4)
 KEY_BITS = {2: 31, 3: 21}
 """Bits of a key for the cell number on each axis, by dimension; cells beyond share the last number."""
 
-LARGEST = float(np.finfo(np.float64).max)
 SMALLEST = float(np.finfo(np.float64).tiny)
 
 
@@ -85,9 +84,8 @@ class Grid(BroadPhase):
 
     def _clear(self) -> None:
         """Forget all cells."""
-        self._low = np.empty((0, self.dim), np.int32)
-        self._high = np.empty((0, self.dim), np.int32)
-        self._home = np.empty(0, np.int8)
+        self._home[:] = NOWHERE
+        self._place = np.zeros((len(self._rows), 2, self.dim), np.int64)
         self._listings = [Listing.of(np.empty(0, np.int64), np.empty(0, np.int64))] * 2
         self._beside = np.empty(0, np.int64)
         self._stale = 0
@@ -105,7 +103,8 @@ class Grid(BroadPhase):
     def owners(self, cell: object) -> Ints:
         """Sorted ids of the boxes that overlap a cell, (d,) whole numbers."""
         at = integers("cell", cell, (self.dim,), -self._reach, self._reach)
-        found = [self._beside[((self._low[self._beside] <= at) & (at <= self._high[self._beside])).all(axis=1)]]
+        first, last = self._place[self._beside].swapaxes(0, 1)
+        found = [self._beside[((first <= at) & (at <= last)).all(axis=1)]]
         for home, listing in zip((MAIN, FRESH), self._listings, strict=True):
             start, length = (int(v[0]) for v in listing.runs(self._keys(at[None])))
             listed = listing.entry[start : start + length] >> FIRST_BITS
@@ -123,7 +122,7 @@ class Grid(BroadPhase):
         ids = self._living([integer("box", box, 0, 2**62)])
         if self._home[ids[0]] == BESIDE:
             raise InputError(f"box: expected one over at most {OVERSIZED_CELLS} cells, got {box}, which is over more")
-        _, at = _written_out(self._low[ids], self._high[ids])
+        _, at = _written_out(self._place[ids])
         return at[np.lexsort(at.T[::-1])]
 
     def cell_boxes(self) -> Cells:
@@ -140,11 +139,10 @@ class Grid(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         ids = self.ids
-        low, high = self._span(self._rows[ids])
-        assert (self._low[ids] == low).all() and (self._high[ids] == high).all(), "a box is listed where it was"
-        large = _sizes(low, high) > OVERSIZED_CELLS
+        assert (self._place[ids] == self._span(self._rows[ids])).all(), "a box is listed where it was"
+        large = _sizes(self._place[ids]) > OVERSIZED_CELLS
         assert np.array_equal(np.sort(self._beside), ids[large]), "the list beside the grid is not the large boxes"
         homes = self._home[ids]
         assert ((homes == BESIDE) == large).all(), "a large box has a home in the grid"
@@ -161,20 +159,20 @@ class Grid(BroadPhase):
         due = np.stack(self._listed(ids[~large]))
         assert np.array_equal(_in_order(listed), _in_order(due)), "cells do not list the boxes that reach into them"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
-        low, high = self._span(queries)
-        sizes = _sizes(low, high)
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
+        span = self._span(queries)
+        sizes = _sizes(span)
         wide = sizes > max(OVERSIZED_CELLS, len(self._listings[0].entry) // 8)
-        found = [self._meeting_all(queries, np.flatnonzero(wide), self.ids, work)] if wide.any() else []
+        found = self._meeting_all(queries, np.flatnonzero(wide), self.ids, work) if wide.any() else []
         narrow = np.flatnonzero(~wide)
-        found.append(self._meeting_all(queries, narrow, self._beside, work))
+        found += self._meeting_all(queries, narrow, self._beside, work)
         for piece in pieces(sizes[narrow].astype(np.int64), CHUNK_SAMPLES):
             rows = narrow[piece]
-            group, at = _written_out(low[rows], high[rows])
+            group, at = _written_out(span[rows])
+            first = _first(at, span[rows, 0], group)
             for home in (MAIN, FRESH):
-                found += self._in_cells(queries, rows.take(group), at, _first(at, low[rows], group), home, work)
-        query, box = piled(found)
-        return query, box
+                found += self._in_cells(queries, rows.take(group), at, first, home, work)
+        return found
 
     def _in_cells(
         self, queries: Floats, query: Ints, at: Ints, first: Ints, home: int, work: Work | None
@@ -207,19 +205,10 @@ class Grid(BroadPhase):
             found.append((asked.take(good), box.take(good)))
         return found
 
-    def _node_count(self) -> int:
-        return sum(len(listing.key) for listing in self._listings)
-
     def _enter(self, ids: Ints) -> None:
         ids = self._measured(ids)
-        short = len(self._rows) - len(self._home)
-        self._home = np.concatenate((self._home, np.zeros(short, np.int8)))
-        self._low, self._high = (
-            np.concatenate((part, np.zeros((short, self.dim), np.int32))) for part in (self._low, self._high)
-        )
-        low, high = self._span(self._rows[ids])
-        self._low[ids], self._high[ids] = low, high
-        large = _sizes(low, high) > OVERSIZED_CELLS
+        self._place[ids] = self._span(self._rows[ids])
+        large = _sizes(self._place[ids]) > OVERSIZED_CELLS
         self._home[ids] = np.where(large, BESIDE, FRESH)
         self._beside = np.concatenate((self._beside, ids[large]))
         both = zip(self._listings[1].entries(), self._listed(ids[~large]), strict=True)
@@ -237,13 +226,13 @@ class Grid(BroadPhase):
 
     def _listed(self, ids: Ints) -> Pairs:
         """Cells of boxes that are not oversized, as (key, entry)."""
-        low = self._low[ids].astype(np.int64)
-        group, at = _written_out(low, self._high[ids])
-        return self._keys(at), ids[group] << FIRST_BITS | _first(at, low, group)
+        span = self._place[ids]
+        group, at = _written_out(span)
+        return self._keys(at), ids[group] << FIRST_BITS | _first(at, span[:, 0], group)
 
     def _leave(self, ids: Ints) -> None:
         homes = self._home[ids]
-        self._stale += int(_sizes(self._low[ids], self._high[ids])[homes == MAIN].sum())
+        self._stale += int(_sizes(self._place[ids])[homes == MAIN].sum())
         self._home[ids] = NOWHERE
         if (homes == BESIDE).any():
             self._beside = self._beside[self._home[self._beside] == BESIDE]
@@ -256,8 +245,7 @@ class Grid(BroadPhase):
             self._settle(key, entry)
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
-        low, high = self._span(rows)
-        goes = ((low != self._low[ids]) | (high != self._high[ids])).any(axis=1)
+        goes = (self._span(rows) != self._place[ids]).any(axis=(1, 2))
         if goes.any():
             self._leave(ids[goes])
         self._rows[ids] = rows
@@ -274,12 +262,11 @@ class Grid(BroadPhase):
         self.written += len(main.entry)
         self._stale = 0
 
-    def _span(self, rows: Floats) -> Pairs:
-        """First and last cell of boxes on each axis, (N, d) each."""
+    def _span(self, rows: Floats) -> Ints:
+        """First and last cell of boxes on each axis, (N, 2, d)."""
         with np.errstate(over="ignore"):
             at = np.floor((rows.reshape(-1, 2, self.dim) - self.origin) / self.cell)
-        both = np.clip(at, -self._reach, self._reach).astype(np.int64)
-        return both[:, 0], both[:, 1]
+        return np.clip(at, -self._reach, self._reach).astype(np.int64)
 
     def _keys(self, at: Ints) -> Ints:
         """Keys of cells (N, d), one whole number each."""
@@ -289,15 +276,14 @@ class Grid(BroadPhase):
         return key
 
 
-def _sizes(low: Ints, high: Ints) -> Floats:
-    """Number of cells from low to high; floats, because it may exceed 2**63."""
-    return np.asarray(np.prod(high.astype(np.float64) - low + 1, axis=1))
+def _sizes(span: Ints) -> Floats:
+    """Number of cells of boxes; floats, because it may exceed 2**63."""
+    return np.asarray(np.prod(span[:, 1].astype(np.float64) - span[:, 0] + 1, axis=1))
 
 
-def _written_out(low: Ints, high: Ints) -> Pairs:
+def _written_out(span: Ints) -> Pairs:
     """List every cell of a few boxes, as (box number, cell (K, d))."""
-    low, high = low.astype(np.int64), high.astype(np.int64)
-    sides = high - low + 1
+    low, sides = span[:, 0], span[:, 1] - span[:, 0] + 1
     group, place = ragged(np.prod(sides, axis=1))
     at = np.empty((len(group), low.shape[1]), np.int64)
     for axis in reversed(range(low.shape[1])):

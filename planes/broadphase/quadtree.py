@@ -12,6 +12,7 @@ So the tree depends on the boxes and the root cell, but not on the order of inse
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from ..common.checks import Bools, Floats, InputError, Ints, integer
 from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
 from ..grid.spans import pieces, ragged
-from .boxes import BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
 
 Nodes = dict[str, npt.NDArray[Any]]
 """Rows of nodes, one array per field of FIELDS."""
@@ -38,7 +39,6 @@ FIELDS: dict[str, tuple[type, int]] = {
     "length": (np.int64, 0),
 }
 Paths = tuple[Ints, Ints, Bools]
-LARGEST = float(np.finfo(np.float64).max)
 BULK = 64
 """The root cell leaves out one box in this many on each side, and is then doubled: outliers do not stretch it."""
 
@@ -81,7 +81,7 @@ class Quadtree(BroadPhase):
 
     def check(self) -> None:
         """Raise AssertionError naming the first invariant that does not hold."""
-        self._check_table()
+        super().check()
         nodes, ids = self._nodes, self.ids
         used = np.flatnonzero(nodes["depth"] >= 0)
         inner = used[nodes["child"][used] >= 0]
@@ -90,19 +90,19 @@ class Quadtree(BroadPhase):
         assert (nodes["parent"][children] == np.repeat(inner, 4)).all(), "a child does not know its parent"
         assert (nodes["depth"][children] == np.repeat(nodes["depth"][inner] + 1, 4)).all(), "a depth is wrong"
         assert len(used) + 4 * len(self._free) == len(nodes["depth"]), "a row is neither in use nor free"
-        which, node, straddle = self._paths(self._rows[ids])
+        box, node, straddle = self._paths(ids, self._rows[ids])
         reaching, crossing = (np.bincount(part, minlength=len(nodes["depth"])) for part in (node, node[straddle]))
         assert np.array_equal(nodes["total"][used], reaching[used]), "a total is wrong"
         assert np.array_equal(nodes["straddle"][used], crossing[used]), "straddling boxes are miscounted"
         assert np.array_equal(self._overfull(used), nodes["child"][used] >= 0), "a cell should split or merge"
         leaf = nodes["child"][node] < 0
-        due = sorted_pairs(node[leaf], ids[which[leaf]], self._count)
+        due = sorted_pairs(node[leaf], box[leaf], self._count)
         listed = sorted_pairs(*self._entries(self._leaf_numbers()), self._count)
         assert np.array_equal(due, listed), "leaves do not list the boxes that reach into them"
         assert nodes["length"].sum() == self._live, "the pool is miscounted"
         assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
 
-    def _find(self, queries: Floats, work: Work | None) -> Pairs:
+    def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
         every = np.arange(len(queries))
         stack = [(every, np.zeros_like(every))]
         leaves: list[Pairs] = []
@@ -112,12 +112,11 @@ class Quadtree(BroadPhase):
                 half = len(query) // 2
                 stack += [(query[half:], node[half:]), (query[:half], node[:half])]
                 continue
-            if work is not None:
-                work.visits.append((query, node))
             child = self._nodes["child"].take(node)
             leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
             leaves.append((query.take(leaf), node.take(leaf)))
             if work is not None:
+                work.visits.append((query, node))
                 work.compared += 4 * len(inner)
             query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
             row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
@@ -126,7 +125,7 @@ class Quadtree(BroadPhase):
         query, leaf = piled(leaves)
         return self._in_leaves(queries, query, leaf, work)
 
-    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> Pairs:
+    def _in_leaves(self, queries: Floats, query: Ints, leaf: Ints, work: Work | None) -> list[Pairs]:
         """Search leaves; a pair counts only in the cell of its first common point, so that it is found once."""
         found: list[Pairs] = []
         length = self._nodes["length"].take(leaf)
@@ -144,23 +143,17 @@ class Quadtree(BroadPhase):
             own &= (gate[:, 1] < corner[:, 1]) & (corner[:, 1] <= gate[:, 3])
             mine = np.flatnonzero(own)
             found.append((asked.take(mine), box.take(mine)))
-        asked, box = piled(found)
-        return asked, box
-
-    def _node_count(self) -> int:
-        return int(np.count_nonzero(self._nodes["depth"] >= 0))
+        return found
 
     def _enter(self, ids: Ints) -> None:
         self._outside += self._count_out(self._rows[ids])
         if not self._rebuilt():
-            nothing = ids[:0]
-            self._change(nothing, self._paths(self._rows[nothing]), ids, self._paths(self._rows[ids]))
+            self._change(self._paths(ids[:0], self._rows[:0]), self._paths(ids, self._rows[ids]))
 
     def _leave(self, ids: Ints) -> None:
         self._outside -= self._count_out(self._rows[ids])
         self._least = min(self._least, self._outside)
-        nothing = ids[:0]
-        self._change(ids, self._paths(self._rows[ids]), nothing, self._paths(self._rows[nothing]))
+        self._change(self._paths(ids, self._rows[ids]), self._paths(ids[:0], self._rows[:0]))
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         old = self._rows[ids]
@@ -171,8 +164,7 @@ class Quadtree(BroadPhase):
             return
         goes = self._rerouted(old, rows)
         if goes.any():
-            ids = ids[goes]
-            self._change(ids, self._paths(old[goes]), ids, self._paths(rows[goes]))
+            self._change(self._paths(ids[goes], old[goes]), self._paths(ids[goes], rows[goes]))
 
     def _build(self) -> None:
         """Build the tree anew, with a root cell that suits the present boxes."""
@@ -215,38 +207,35 @@ class Quadtree(BroadPhase):
     def _reached(self, box: Ints, node: Ints) -> Bools:
         return _quarters(self._rows.take(box, axis=0), self._nodes["mid"].take(node, axis=0))
 
-    def _paths(self, rows: Floats) -> Paths:
-        """Every (box, node, whether it straddles) on the way from the root to the leaves."""
-        which = np.arange(len(rows))
-        node = np.zeros_like(which)
-        steps: list[Paths] = []
-        while len(which) or not steps:
-            mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
-            reached = _quarters(rows.take(which, axis=0), mid)
-            steps.append((which, node, _straddling(reached)))
-            inner = np.flatnonzero(child >= 0)
-            row, quarter = np.divmod(np.flatnonzero(reached.take(inner, axis=0)), 4)
-            row = inner.take(row)
-            which, node = which.take(row), child.take(row) + quarter
-        all_which, all_node, straddle = (np.concatenate(parts) for parts in zip(*steps, strict=True))
-        return all_which, all_node, straddle
-
-    def _rerouted(self, old: Floats, rows: Floats) -> Bools:
-        """Whether moved boxes take another path, or straddle other middles."""
-        goes = np.zeros(len(rows), np.bool_)
+    def _steps(self, rows: Floats) -> Iterator[tuple[Ints, Ints, Bools]]:
+        """Every (box, node, quarters that it reaches) on the way from the root to the leaves, level by level."""
         which = np.arange(len(rows))
         node = np.zeros_like(which)
         while len(which):
             mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
-            before, after = _quarters(old.take(which, axis=0), mid), _quarters(rows.take(which, axis=0), mid)
-            goes[which.take(np.flatnonzero(before != after) >> 2)] = True
-            on = np.flatnonzero((child >= 0) & ~goes.take(which))
-            row, quarter = np.divmod(np.flatnonzero(before.take(on, axis=0)), 4)
-            row = on.take(row)
+            reached = _quarters(rows.take(which, axis=0), mid)
+            yield which, node, reached
+            inner = np.flatnonzero(child >= 0)
+            row, quarter = np.divmod(np.flatnonzero(reached.take(inner, axis=0)), 4)
+            row = inner.take(row)
             which, node = which.take(row), child.take(row) + quarter
+
+    def _paths(self, ids: Ints, rows: Floats) -> Paths:
+        """Every (id, node, whether it straddles) on the way from the root to the leaves."""
+        steps = [(ids[which], node, _straddling(reached)) for which, node, reached in self._steps(rows)]
+        none = (ids[:0], ids[:0], np.zeros(0, np.bool_))
+        found, node, straddle = (np.concatenate(parts) for parts in zip(none, *steps, strict=True))
+        return found, node, straddle
+
+    def _rerouted(self, old: Floats, rows: Floats) -> Bools:
+        """Whether moved boxes take another path, or straddle other middles."""
+        goes = np.zeros(len(rows), np.bool_)
+        for which, node, before in self._steps(old):
+            after = _quarters(rows.take(which, axis=0), self._nodes["mid"].take(node, axis=0))
+            goes[which.take(np.flatnonzero(before != after) >> 2)] = True
         return goes
 
-    def _change(self, gone: Ints, before: Paths, come: Ints, after: Paths) -> None:
+    def _change(self, before: Paths, after: Paths) -> None:
         """Take boxes off their old paths and put them on new ones, then merge and split cells as needed."""
         nodes = self._nodes
         for (_, node, straddle), sign in ((before, -1), (after, 1)):
@@ -257,9 +246,9 @@ class Quadtree(BroadPhase):
         leaves = touched[nodes["child"][touched] < 0]
         node, box = self._entries(leaves)
         off, on = (nodes["child"][path[1]] < 0 for path in (before, after))
-        keep = ~np.isin(node * self._count + box, before[1][off] * self._count + gone[before[0][off]])
+        keep = ~np.isin(node * self._count + box, before[1][off] * self._count + before[0][off])
         node = np.concatenate((node[keep], after[1][on]))
-        box = np.concatenate((box[keep], come[after[0][on]]))
+        box = np.concatenate((box[keep], after[0][on]))
         inner = touched[nodes["child"][touched] >= 0]
         node, box, leaves = self._merge(inner[~self._overfull(inner)], node, box, leaves)
         self._settle(node, box, leaves)
@@ -267,12 +256,7 @@ class Quadtree(BroadPhase):
     def _merge(self, tops: Ints, node: Ints, box: Ints, leaves: Ints) -> tuple[Ints, Ints, Ints]:
         """Turn cells into leaves; return the entries and leaves to be written, with those of the cells."""
         nodes = self._nodes
-        up = nodes["parent"][tops]
-        inside = np.zeros(len(tops), np.bool_)
-        while (up >= 0).any():  # a cell inside another merged cell needs no merge of its own
-            inside |= np.isin(up, tops)
-            up = np.where(up >= 0, nodes["parent"][up], -1)
-        tops = tops[~inside]
+        tops = np.setdiff1d(tops, self._below(tops)[0])  # a cell inside another merged cell needs no merge of its own
         if not len(tops):
             return node, box, leaves
         below, top, firsts = self._below(tops)
@@ -307,14 +291,13 @@ class Quadtree(BroadPhase):
 
     def _settle(self, node: Ints, box: Ints, leaves: Ints) -> None:
         """Write the entries of leaves, and split leaves that hold too many, level by level."""
-        done = []
+        done = [(node[:0], box[:0], leaves[:0])]
         while len(leaves):
             splits = leaves[self._overfull(leaves)]
             self._live -= int(self._nodes["length"][splits].sum())
             self._nodes["length"][splits] = 0
-            goes = np.isin(node, splits) if len(splits) else np.zeros(len(node), np.bool_)
-            stay = np.setdiff1d(leaves, splits)
-            done.append((node[~goes], box[~goes], stay))
+            goes = np.isin(node, splits)
+            done.append((node[~goes], box[~goes], np.setdiff1d(leaves, splits)))
             if not len(splits):
                 break
             self._split(splits)
@@ -326,9 +309,8 @@ class Quadtree(BroadPhase):
             place = np.searchsorted(leaves, node)
             self._nodes["total"][leaves] = np.bincount(place, minlength=len(leaves))
             self._nodes["straddle"][leaves] = np.bincount(place[straddle], minlength=len(leaves))
-        if done:
-            all_node, all_box, all_leaves = (np.concatenate(parts) for parts in zip(*done, strict=True))
-            self._write(all_node, all_box, np.sort(all_leaves))
+        all_node, all_box, all_leaves = (np.concatenate(parts) for parts in zip(*done, strict=True))
+        self._write(all_node, all_box, np.sort(all_leaves))
 
     def _split(self, splits: Ints) -> None:
         """Give cells four empty children; the length of a free row is 0."""

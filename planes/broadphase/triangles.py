@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..broadphase import Bvh
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, integers, reals
-from ..common.limits import CHUNK_ROWS, CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
-from ..volumes.exact import Signs, orient2d, orient3d
+from ..common.limits import CHUNK_SAMPLES, FLOAT_HUGE, FLOAT_TINY, ORIENT3D_ERROR
+from ..volumes.exact import chunked, orient2d, orient3d
+from ..volumes.overlap import overlap
+from ..volumes.volumes import Polygons
 
 Corners = Floats
 """Triangles of n rows, as columns (3, 3, n): corner, axis, row."""
@@ -26,7 +27,6 @@ Corners = Floats
 Sides = Ints
 """Sides of a plane on which three corners lie, as one number (n,) for their signs: 9 s0 + 3 s1 + s2 + 13."""
 
-COLUMNS = 18
 SIDES = [(s0, s1, s2) for s0, s1, s2 in product((-1, 0, 1), repeat=3)]
 IN_PLANE = SIDES.index((0, 0, 0))
 KEPT = ((1, 2), (2, 0), (0, 1))
@@ -63,10 +63,7 @@ def triangles_meet(a: npt.ArrayLike, b: npt.ArrayLike, conservative: bool = Fals
     except ValueError:
         raise InputError(f"b: expected axes that broadcast with {first.shape}, got {second.shape}") from None
     columns = [p[..., i, k] for p in (first, second) for i, k in product(range(3), repeat=2)]
-    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
-    modes: Any = [["readonly"]] * COLUMNS + [["writeonly", "allocate"]]
-    types: Any = [np.float64] * COLUMNS + [np.bool_]
-    chunks = np.nditer([*columns, None], flags, modes, types, buffersize=CHUNK_ROWS)
+    chunks = chunked(columns, np.bool_)
     with chunks, np.errstate(all="ignore"):
         for *rows, found in chunks:
             pair = np.stack(rows).reshape(2, 3, 3, len(found))
@@ -151,12 +148,12 @@ def _triangles(field: str, values: npt.ArrayLike) -> Floats:
 def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     """Take one chunk through the seven steps; a decided row leaves the chunk."""
     found = np.zeros(a.shape[-1], np.bool_)
-    bound = _bound(_chunk_reach(a, b))
+    bound = _bound(a, b)
     # 1. The plane of the second; 2. no, where all corners of the first lie strictly on one side of it.
     first = _sides(b, a, bound, conservative)
     keep = ~_APART[first]
     same = np.flatnonzero(_TOUCHED[first])
-    same = same[_share_corner(a.take(same, axis=2), b.take(same, axis=2))]
+    same = same[(a.take(same, axis=2)[:, None] == b.take(same, axis=2)).all(axis=2).any(axis=(0, 1))]  # share a corner
     found[same], keep[same] = True, False
     left = np.flatnonzero(keep)
     a, b, first = a.take(left, axis=2), b.take(left, axis=2), first[left]
@@ -177,24 +174,13 @@ def _meet(a: Corners, b: Corners, conservative: bool) -> Bools:
     return found
 
 
-def _chunk_reach(a: Corners, b: Corners) -> float:
-    """Largest difference of two coordinates on one axis, over all rows."""
+def _bound(a: Corners, b: Corners) -> float:
+    """Bound of the errors of determinants, as in orient3d, from the largest difference of coordinates on one axis."""
     reach = 0.0
     for axis in range(3):
         low = min(p[:, axis].min(initial=np.inf) for p in (a, b))
         high = max(p[:, axis].max(initial=-np.inf) for p in (a, b))
         reach = max(reach, float(high - low))
-    return reach
-
-
-def _row_reach(a: Corners, b: Corners) -> Floats:
-    """Largest difference of two coordinates on one axis, row by row."""
-    low, high = np.minimum(a.min(axis=0), b.min(axis=0)), np.maximum(a.max(axis=0), b.max(axis=0))
-    return np.asarray((high - low).max(axis=0))
-
-
-def _bound(reach: Any) -> Any:
-    """Bound of the error of a determinant, as in orient3d, from the largest difference of coordinates."""
     return 6 * ORIENT3D_ERROR * reach * (reach * reach + FLOAT_TINY) + FLOAT_TINY
 
 
@@ -213,32 +199,18 @@ def _sides(plane: Corners, corners: Corners, bound: float, conservative: bool) -
     signs = (values > 0).view(np.int8) - (values < 0).view(np.int8)
     size = np.abs(values, out=values)
     if not (size.min(initial=np.inf) > bound and size.max(initial=0) < FLOAT_HUGE):
-        sure = (size > bound) & (size < FLOAT_HUGE)
-        rows = np.flatnonzero(~(sure[0] & sure[1] & sure[2]))
-        chosen = plane.take(rows, axis=2), corners.take(rows, axis=2)
-        signs[:, rows] = _doubtful(signs.take(rows, axis=1), size.take(rows, axis=1), *chosen, conservative)
+        i, row = np.nonzero(~((size > bound) & (size < FLOAT_HUGE)))
+        seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
+        signs[i[seen], row[seen]] = 0
+        i, row = i[~seen], row[~seen]
+        signs[i, row] = orient3d(p[:, row].T, q[:, row].T, corners[i, :, row], r[:, row].T, conservative)
     return np.asarray(9 * signs[0] + 3 * signs[1] + signs[2] + IN_PLANE, np.int64)
-
-
-def _doubtful(signs: Signs, size: Floats, plane: Corners, corners: Corners, conservative: bool) -> Signs:
-    """Signs (3, n) of rows that the chunk's bound leaves in doubt, by a row's own bound, `_plainly_in` or orient3d."""
-    i, row = np.nonzero(~((size > _bound(_row_reach(plane, corners))) & (size < FLOAT_HUGE)))
-    seen = _plainly_in(plane.take(row, axis=2), corners[i, :, row].T)
-    signs[i[seen], row[seen]] = 0
-    i, row = i[~seen], row[~seen]
-    p, q, r = (plane[k, :, row] for k in range(3))
-    signs[i, row] = orient3d(p, q, corners[i, :, row], r, conservative)
-    return signs
 
 
 def _plainly_in(triangle: Corners, points: Floats) -> Bools:
     """Whether points (3, n) surely lie in the plane of a triangle: they are corners, or level with it on an axis."""
     same = triangle == points
     return np.asarray(same.all(axis=1).any(axis=0) | same.all(axis=0).any(axis=0))
-
-
-def _share_corner(a: Corners, b: Corners) -> Bools:
-    return np.asarray((a[:, None] == b).all(axis=2).any(axis=(0, 1)))
 
 
 def _intervals_meet(a: Corners, b: Corners, rows: Ints, way: Ints, conservative: bool) -> Bools:
@@ -267,7 +239,7 @@ def _picked(corners: Corners, which: Ints, rows: Ints) -> Floats:
 
 def _special(a: Corners, b: Corners, first: Sides, second: Sides, conservative: bool) -> Bools:
     """Decide the rows in which a triangle lies in the other's plane, or has no area."""
-    found = _boxes_meet(a, b)
+    found: Bools = ((a.min(axis=0) <= b.max(axis=0)) & (b.min(axis=0) <= a.max(axis=0))).all(axis=0)  # their boxes do
     if conservative:
         return found
     one, two = (np.ascontiguousarray(p.transpose(2, 0, 1)) for p in (a, b))
@@ -277,11 +249,6 @@ def _special(a: Corners, b: Corners, first: Sides, second: Sides, conservative: 
     within = np.flatnonzero(found & (first == IN_PLANE) & (second == IN_PLANE))
     found[within] = _coplanar_meet(one[within], two[within])
     return found
-
-
-def _boxes_meet(a: Corners, b: Corners) -> Bools:
-    lows, highs = (a.min(axis=0), b.min(axis=0)), (a.max(axis=0), b.max(axis=0))
-    return np.asarray(((lows[0] <= highs[1]) & (lows[1] <= highs[0])).all(axis=0))
 
 
 def _pierces(segment: Floats, sides: Sides, triangle: Floats) -> Bools:
@@ -296,10 +263,9 @@ def _pierces(segment: Floats, sides: Sides, triangle: Floats) -> Bools:
 
 
 def _coplanar_meet(a: Floats, b: Floats) -> Bools:
-    """The coplanar case: drop an axis that is not in the common plane, then look for an edge that separates.
+    """The coplanar case: drop an axis that is not in the common plane, and test the hulls in 2-D.
 
-    Two segments without a common plane are apart. Triangles on one line have no such edge; for them the boxes have
-    decided.
+    Two segments without a common plane are apart.
     """
     found = np.ones(len(a), np.bool_)
     axis = _axis(a)
@@ -312,7 +278,9 @@ def _coplanar_meet(a: Floats, b: Floats) -> Bools:
         none = np.flatnonzero(axis[flat] < 0)
         axis[flat[none]] = _axis(np.stack([point[none] for point in three], axis=1))
     rows = np.flatnonzero(found)
-    found[rows] = ~_parted(_dropped(a[rows], axis[rows]), _dropped(b[rows], axis[rows]))
+    points = (_dropped(p[rows], axis[rows]).reshape(-1, 2) for p in (a, b))
+    one, two = (Polygons.around(p, 3 * np.arange(len(rows))) for p in points)
+    found[rows] = overlap(one, two)
     return found
 
 
@@ -344,23 +312,6 @@ def _ends(segments: Floats) -> tuple[Floats, Floats]:
     order = np.lexsort(segments.transpose(2, 0, 1)[::-1], axis=-1)
     rows = np.arange(len(segments))
     return segments[rows, order[:, 0]], segments[rows, order[:, 2]]
-
-
-def _parted(a: Floats, b: Floats) -> Bools:
-    """Whether a triangle in 2-D (m, 3, 2) lies strictly beyond an edge of the other; a decided row leaves the batch.
-
-    A segment has an edge on either side.
-    """
-    parted = np.zeros(len(a), np.bool_)
-    for one, two in ((a, b), (b, a)):
-        turn = orient2d(one[:, 0], one[:, 1], one[:, 2])
-        for i in range(3):
-            left = np.flatnonzero(~parted)
-            p, q = one[left, i, None], one[left, (i + 1) % 3, None]
-            side = orient2d(p, q, two[left])
-            right_of, left_of = (side < 0).all(axis=1), (side > 0).all(axis=1)
-            parted[left] = (right_of & (turn[left] >= 0)) | (left_of & (turn[left] <= 0))
-    return parted
 
 
 def _alone(sides: tuple[int, ...]) -> tuple[int, bool]:

@@ -8,7 +8,7 @@ import stat
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -102,6 +102,15 @@ def read_png(path: str | Path, field: str = "image") -> Image:
         return _rgba(header, _decoded(header, chunks[b"IDAT"]), chunks)
 
 
+@contextmanager
+def possible(what: str) -> Iterator[None]:
+    """Turn errors of the file system into an `InputError` that begins with `what`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{what}: {error.strerror}") from error
+
+
 def read_text(path: Path) -> str:
     """Read a text file in UTF-8.
 
@@ -111,18 +120,15 @@ def read_text(path: Path) -> str:
         If it is missing, too large, not UTF-8, or not a regular file, such as a pipe.
     """
     path = path_of("path", path)
-    try:
+    with possible("cannot read it"):
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise InputError("cannot read it: it is a pipe or a device")
         if path.stat().st_size > TEXT_BYTES_MAX:
             raise InputError(f"cannot read it: expected at most {TEXT_BYTES_MAX} bytes, got {path.stat().st_size}")
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"expected JSON in UTF-8: {error}") from error
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"cannot read it: {error.strerror}") from error
+        try:
+            return path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise InputError(f"expected JSON in UTF-8: {error}") from error
 
 
 def write_png(path: str | Path, image: Image) -> None:
@@ -167,11 +173,8 @@ def _is_no_file(path: Path) -> bool:
 def check_output(path: str | Path) -> Path:
     """Refuse a path where no file can be written; called before any work is done."""
     path = path_of("output", path)
-    try:
-        is_other = _is_no_file(path)
-        has_folder = path.parent.is_dir()
-    except OSError as error:
-        raise InputError(f"output: cannot write {path}: {error.strerror}") from error
+    with possible(f"output: cannot write {path}"):
+        is_other, has_folder = _is_no_file(path), path.parent.is_dir()
     if not path.name or is_other:
         raise InputError(f"output: cannot write {path}: expected the name of a file")
     if not has_folder:
@@ -186,10 +189,9 @@ def write_bytes(path: Path, data: bytes) -> None:
 
     aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")  # writers at the same time have different ones
     try:
-        aside.write_bytes(data)
-        put_in_place(aside, path)
-    except OSError as error:
-        raise InputError(f"output: cannot write {path}: {error.strerror}") from error
+        with possible(f"output: cannot write {path}"):
+            aside.write_bytes(data)
+            put_in_place(aside, path)
     finally:
         with suppress(OSError):
             aside.unlink()
@@ -238,7 +240,7 @@ def _synced_folder(folder: Path) -> None:
 def _contents(path: Path, field: str) -> bytes:
     """Bytes of a file; only its start is read if that is not the start of a PNG within the limits."""
     what = f"{field}: expected a PNG file, got {path.name!r}"
-    try:
+    with possible(what):
         if path.exists() and not path.is_file():
             raise InputError(f"{what}, which is a folder, a pipe or a device")
         with path.open("rb") as file:
@@ -249,10 +251,6 @@ def _contents(path: Path, field: str) -> bytes:
             if size > FILE_BYTES_MAX:
                 raise InputError(f"{what} of {size} bytes, more than any that a mask may come from")
             return start + file.read()
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"{what}: {error.strerror}") from error
 
 
 def _header(start: bytes, size: int) -> _Header:

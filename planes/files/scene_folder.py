@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -49,7 +50,7 @@ from ..common.tables import (
 from ..scene.items import Role
 from ..scene.scene import Scene
 from ..scene.sprite import FLIPS, Sprite, rows_of
-from .png import read_png, read_text, write_png, write_text
+from .png import possible, read_png, read_text, write_png, write_text
 
 FORMAT = "hitplanes-scene/1"
 FILE_NAME = "scene.json"
@@ -180,8 +181,7 @@ def read_scene(folder: Path) -> SceneFile:
             for row, entry in enumerate(data.get("objects", {}).get(section, [])):
                 place = f"objects.{section}[{row}]"
                 with within(place):
-                    scene.objects.append(_object(entry, role, folder, sprites))
-                    scene.objects[-1].place = place
+                    scene.objects.append(_object(entry, role, place, folder, sprites))
         return scene
 
 
@@ -190,10 +190,8 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
     for entry in scene.objects:
         with within(f"object {entry.id}"):
             _image_name(entry.sprite)
-    try:
+    with possible(f"folder: cannot make {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
     saved: dict[int, dict[str, Any]] = {}
     images: dict[str, str | None] = {}
     sections: dict[str, list[dict[str, Any]]] = {section: [] for section in SECTIONS}
@@ -202,9 +200,8 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
             saved[entry.sprite.uid] = _saved_source(entry.sprite, folder, images)
         section = next(name for name, role in SECTIONS.items() if role is entry.role)
         sections[section].append(_object_json(entry, saved[entry.sprite.uid]))
-    bounds = None
-    if scene.size_wh is not None:
-        bounds = {"origin_xy": list(scene.origin_xy), "size_wh": list(scene.size_wh)}
+    size_wh = scene.size_wh
+    bounds = None if size_wh is None else {"origin_xy": list(scene.origin_xy), "size_wh": list(size_wh)}
     data = {
         "format": FORMAT,
         "name": scene.name,
@@ -218,9 +215,8 @@ def write_scene(folder: Path, scene: SceneFile) -> None:
         SCENE.forms["weapons"].check("weapons", scene.weapons)
         text = laid_out(data)
     except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(
-            f"scene: expected weapons and shots of plain JSON, got a value that is not: {error}"
-        ) from error
+        what = "expected weapons and shots of plain JSON, got a value that is not"
+        raise InputError(f"scene: {what}: {error}") from error
     write_text(folder / FILE_NAME, text + "\n")
 
 
@@ -245,7 +241,7 @@ def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:
     return "[" + ",".join(pad + laid_out(v, depth + 1, whole=whole) for v in value) + end + "]"
 
 
-def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
+def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[str, Sprite]) -> FileObject:
     given = typed("object", entry, dict)
     kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
@@ -256,16 +252,9 @@ def _object(entry: object, role: Role, folder: Path, sprites: dict[str, Sprite])
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
         sprites[shared] = READERS[kind]({key: data[key] for key in source}, folder, source)
-    return FileObject(
-        role=role,
-        sprite=sprites[shared],
-        position_xy=data["position_xy"],
-        pose={key: data[key] for key in POSE if key in data},
-        name=data.get("name"),
-        categories=data.get("categories"),
-        owner=data.get("owner"),
-        id=data.get("id"),
-    )
+    pose = {key: data[key] for key in POSE if key in data}
+    options = {key: data.get(key) for key in ("name", "categories", "owner", "id")}
+    return FileObject(role, sprites[shared], data["position_xy"], pose, place=place, **options)
 
 
 def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
@@ -274,28 +263,14 @@ def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) ->
     return Sprite.from_image(image, **options, **data.get("frames", {}), source=source)
 
 
-def _polygon_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
-    return Sprite.polygon(data["polygon"], data.get("holes", ()), color=data.get("color"))
-
-
-def _circle_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
-    return Sprite.circle(data["circle"], color=data.get("color"))
-
-
-def _box_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
-    return Sprite.box(*data["box_wh"], color=data.get("color"))
-
-
-def _mask_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
-    return Sprite.from_mask(data["mask"], pivot_xy=data.get("pivot_xy"), color=data.get("color"), source=source)
-
-
 READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
     "image": _image_sprite,
-    "polygon": _polygon_sprite,
-    "circle": _circle_sprite,
-    "box_wh": _box_sprite,
-    "mask": _mask_sprite,
+    "polygon": lambda data, *_: Sprite.polygon(data["polygon"], data.get("holes", ()), color=data.get("color")),
+    "circle": lambda data, *_: Sprite.circle(data["circle"], color=data.get("color")),
+    "box_wh": lambda data, *_: Sprite.box(*data["box_wh"], color=data.get("color")),
+    "mask": lambda data, _, source: Sprite.from_mask(
+        data["mask"], pivot_xy=data.get("pivot_xy"), color=data.get("color"), source=source
+    ),
 }
 
 
@@ -314,24 +289,20 @@ def _inside(folder: Path, text: str) -> Path:
 def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
     data: dict[str, Any] = {"id": entry.id, "name": entry.name, **source}
     data |= {"position_xy": list(entry.position_xy), **entry.pose}
-    if entry.categories is not None:
-        data["categories"] = entry.categories
-    if entry.owner is not None:
-        data["owner"] = entry.owner
-    return data
+    given = {"categories": entry.categories, "owner": entry.owner}
+    return data | {key: value for key, value in given.items() if value is not None}
 
 
 def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
     """Source of a sprite as JSON; its image is written to the folder without overwriting another file."""
+    color = {} if sprite.color is None else {"color": list(sprite.color)}
     if sprite.outline is not None:
-        color = {} if sprite.color is None else {"color": list(sprite.color)}
         return {**(sprite.source or {}), **color}
     masks = [frame.mask for frame in sprite.frames]
     options: dict[str, Any] = {}
     if sprite.pivot_256 is not None:
         options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
     if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
-        color = {} if sprite.color is None else {"color": list(sprite.color)}
         return {"mask": rows_of(masks[0]), **options, **color}
     known = sprite.source or {}
     if sprite.frames[0].image is not None and "alpha_threshold" in known:
@@ -437,14 +408,8 @@ def _add_entry(scene: Scene, entry: FileObject) -> None:
             if entry.id < scene.items.count:
                 raise InputError(f"id: expected each id once, got {entry.id} again")
             scene.items.skip_to(entry.id)
-        scene.add(
-            entry.sprite,
-            entry.position_xy,
-            role=entry.role,
-            name=entry.name,
-            categories=entry.categories,
-            **entry.pose,
-        )
+        options = {"role": entry.role, "name": entry.name, "categories": entry.categories, **entry.pose}
+        scene.add(entry.sprite, entry.position_xy, **options)
 
 
 def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
@@ -459,21 +424,16 @@ def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
 
 def empty_folder(folder: Path) -> bool:
     """Make a folder unless it exists and is empty; return whether it was made."""
-    try:
+    with possible(f"folder: cannot make {folder}"), suppress(FileExistsError):
         folder.mkdir()
         return True
-    except FileExistsError:
-        if not folder.is_dir():
-            raise InputError(f"folder: expected a new folder, got the file {folder}") from None
-        try:
-            held = sorted(path.name for path in folder.iterdir())
-        except OSError as error:
-            raise InputError(f"folder: cannot read {folder}: {error.strerror}") from error
-        if held:
-            raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it") from None
-        return False
-    except OSError as error:
-        raise InputError(f"folder: cannot make {folder}: {error.strerror}") from error
+    if not folder.is_dir():
+        raise InputError(f"folder: expected a new folder, got the file {folder}")
+    with possible(f"folder: cannot read {folder}"):
+        held = sorted(path.name for path in folder.iterdir())
+    if held:
+        raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it")
+    return False
 
 
 def own_folder(folder: Path, names: Sequence[str]) -> None:
@@ -484,13 +444,11 @@ def own_folder(folder: Path, names: Sequence[str]) -> None:
     InputError
         If it cannot be made, or holds other files.
     """
-    try:
+    with possible(f"--output: cannot make {folder}"):
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"--output: expected a folder, got the file {folder}")
         folder.mkdir(exist_ok=True)
         held = sorted(path.name for path in folder.iterdir() if path.name not in names)
-    except FileExistsError:
-        raise InputError(f"--output: expected a folder, got the file {folder}") from None
-    except OSError as error:
-        raise InputError(f"--output: cannot make {folder}: {error.strerror}") from error
     if held:
         got = f"got {folder} with {held[0]!r} in it"
         raise InputError(f"--output: expected a new folder, or that of an earlier run, {got}")
@@ -505,7 +463,5 @@ def cleared(folder: Path, names: Sequence[str]) -> None:
         If one cannot be removed.
     """
     for name in names:
-        try:
+        with possible(f"--output: cannot remove {folder / name}"):
             (folder / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise InputError(f"--output: cannot remove {folder / name}: {error.strerror}") from error

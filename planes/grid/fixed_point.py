@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..common.backend import kernels_of
-from ..common.checks import Floats, InputError, Ints, all_within, rising
+from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
 from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
 
 UNIT = 1 << TRIG_BITS
@@ -30,6 +30,18 @@ def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
     The angle is folded into [0, 45] by differences that are exact in float64, so a quarter turn exactly swaps the two
     numbers, and a mirror exactly changes a sign.
     """
+    rest, steep, left, down = _folded(degrees)
+    radians = np.radians(rest)
+    near, far = np.cos(radians) * UNIT, np.sin(radians) * UNIT
+    whole_near, whole_far = np.rint(near), np.rint(far)
+    doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
+    x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
+    c, s = np.where(steep, y, x), np.where(steep, x, y)
+    return np.where(left, -c, c), np.where(down, -s, s), np.flatnonzero(doubt)
+
+
+def _folded(degrees: Floats | float) -> tuple[Floats, Bools, Bools, Bools]:
+    """Angles in [0, 45], and whether the two numbers are swapped, the first is negative, and the second is."""
     folded = np.abs(degrees)
     if folded.max(initial=0) >= 360:
         folded = np.fmod(folded, 360.0)
@@ -38,13 +50,7 @@ def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
     left = folded > 90
     folded = np.where(left, 180 - folded, folded)
     steep = folded > 45
-    radians = np.radians(np.where(steep, 90 - folded, folded))
-    near, far = np.cos(radians) * UNIT, np.sin(radians) * UNIT
-    whole_near, whole_far = np.rint(near), np.rint(far)
-    doubt = np.maximum(np.abs(near - whole_near), np.abs(far - whole_far)) > 0.5 - DOUBT
-    x, y = whole_near.astype(np.int64), whole_far.astype(np.int64)
-    c, s = np.where(steep, y, x), np.where(steep, x, y)
-    return np.where(left, -c, c), np.where(down ^ (degrees < 0), -s, s), np.flatnonzero(doubt)
+    return np.where(steep, 90 - folded, folded), steep, left, np.asarray(down ^ (np.asarray(degrees) < 0))
 
 
 ONE = 1 << TRIG_BITS
@@ -152,14 +158,9 @@ def over_one(numerator: Whole) -> Whole:
 
 def _exactly(degrees: float) -> tuple[int, int]:
     """`unit` of one angle, computed in integers."""
-    folded = math.fmod(abs(degrees), 360.0)
-    down = folded > 180
-    folded = 360 - folded if down else folded
-    left = folded > 90
-    folded = 180 - folded if left else folded
-    steep = folded > 45
-    s, c = (_taylor(90 - folded if steep else folded, first) for first in (1 - steep, int(steep)))
-    return -c if left else c, -s if down ^ (degrees < 0) else s
+    rest, steep, left, down = _folded(degrees)
+    s, c = (_taylor(float(rest), first) for first in (1 - int(steep), int(steep)))
+    return -c if left else c, -s if down else s
 
 
 def _taylor(degrees: float, first: int) -> int:

@@ -81,10 +81,13 @@ def polygon(rings: Sequence[Ints]) -> Spans:
     first, last = -(-top[:, 1] // SUB), low[:, 1] // SUB
     edge, place = ragged(np.maximum(last - first + 1, 0))
     y = first[edge] + place
-    flat = top[edge, 1] == low[edge, 1]
-    left, right = _crossings(top[edge], low[edge], y)
+    (x0, y0), (x1, y1) = top[edge].T, low[edge].T
+    flat, per = y0 == y1, np.maximum(y1 - y0, 1)
+    at = x0 * per + (SUB * y - y0) * (x1 - x0)  # where edges and rows cross; a flat edge extends from end to end
+    left, right = np.where(flat, np.minimum(x0, x1), at), np.where(flat, np.maximum(x0, x1), at)
+    left, right = -(-left // (SUB * per)), right // (SUB * per)
     touching = (y, left, right)
-    crossing = ~flat & (SUB * y < low[edge, 1])  # half-open in y: a vertex between two edges counts once
+    crossing = ~flat & (SUB * y < y1)  # half-open in y: a vertex between two edges counts once
     y, x = y[crossing], left[crossing]
     order = np.lexsort((x, y))
     y, x = y[order], x[order]
@@ -105,8 +108,8 @@ def beam(a: Ints, b: Ints, radius: int) -> Spans:
     v = SUB * y - ay
     along, across = dx * ax - dy * v, dy * ax + dx * v
     x_min, x_max = ax * np.ones_like(y) + min(0, dx) - radius, ax * np.ones_like(y) + max(0, dx) + radius
-    for slope, low, high in ((dx, along, along + length2), (dy, across - side, across + side)):
-        x_min, x_max = _between(slope, low, high, x_min, x_max)
+    for slope, limit in ((dx, along + length2), (-dx, -along), (dy, across + side), (-dy, side - across)):
+        x_min, x_max = _half_plane(slope, limit, x_min, x_max)
     return _union([*parts, _closed(y, x_min, x_max)])
 
 
@@ -138,16 +141,9 @@ def segment(a: Ints, b: Ints) -> Spans:
 
 
 def _segment_runs(a: Ints, b: Ints) -> Runs:
-    (x0, y0), (x1, y1) = sorted([np.asarray(a).tolist(), np.asarray(b).tolist()], key=lambda p: (p[1], p[0]))
-    y = np.arange(-((HALF - y0) // SUB), (y1 + HALF) // SUB + 1)
-    dx, dy = x1 - x0, y1 - y0
-    if dy == 0:
-        low, high, per = np.full_like(y, x0), np.full_like(y, x1), 1
-    else:
-        enter = x0 * dy + (np.maximum(y0, SUB * y - HALF) - y0) * dx
-        leave = x0 * dy + (np.minimum(y1, SUB * y + HALF) - y0) * dx
-        low, high, per = np.minimum(enter, leave), np.maximum(enter, leave), dy
-    return y, -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+    ends = np.array([a, b], np.int64)
+    y = _rows(int(ends[:, 1].min()) - HALF, int(ends[:, 1].max()) + HALF)
+    return y, *Lines(ends[:1], ends[1:] - ends[:1], 0)._thin_runs(np.zeros_like(y), y)
 
 
 def _disc_runs(center: Ints, radius: int) -> Runs:
@@ -174,31 +170,8 @@ def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
     return y, -(-low // SUB), high // SUB
 
 
-def _crossings(top: Ints, low: Ints, y: Ints) -> tuple[Ints, Ints]:
-    """Crossings of edges and rows: the first centre at or right of each, and the last at or left of it.
-
-    A flat edge extends from end to end.
-    """
-    dy = low[:, 1] - top[:, 1]
-    per = np.maximum(dy, 1)
-    x = top[:, 0] * per + (SUB * y - top[:, 1]) * (low[:, 0] - top[:, 0])
-    flat = dy == 0
-    left = np.where(flat, np.minimum(top[:, 0], low[:, 0]), x)
-    right = np.where(flat, np.maximum(top[:, 0], low[:, 0]), x)
-    return -(-left // (SUB * per)), right // (SUB * per)
-
-
-def _between(slope: int, low: Ints, high: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:
-    """Narrow [x_min, x_max] to low <= slope * x <= high."""
-    if slope == 0:
-        return np.where((low <= 0) & (high >= 0), x_min, x_max + 1), x_max
-    if slope < 0:
-        slope, low, high = -slope, -high, -low
-    return np.maximum(x_min, -(-low // slope)), np.minimum(x_max, high // slope)
-
-
 def _half_plane(slope: int, limit: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:
-    """Narrow [x_min, x_max] to slope * x <= limit; limits are Python integers of any size."""
+    """Narrow [x_min, x_max] to slope * x <= limit; limits may be Python integers of any size."""
     if slope == 0:
         return np.where(limit >= 0, x_min, x_max + 1), x_max
     if slope > 0:
@@ -302,20 +275,12 @@ class Lines:
 
         For thick segments these include some cells that are not touched; `times` gives them an empty interval.
         """
-        steep = self.steep
-        if steep.any() and not steep.all():
-            flat, upright = np.flatnonzero(~steep), np.flatnonzero(steep)
-            parts = [(rows, self.take(rows).candidates(boxes_xyxy[rows])) for rows in (flat, upright)]
-            return (
-                np.concatenate([rows[line] for rows, (line, _, _) in parts]),
-                np.concatenate([x for _, (_, x, _) in parts]),
-                np.concatenate([y for _, (_, _, y) in parts]),
-            )
-        if len(steep) and steep[0]:
-            line, y, x = self._along(1, boxes_xyxy)
-        else:
-            line, x, y = self._along(0, boxes_xyxy)
-        return line, x, y
+        steep = self.steep[:, None]
+        start, step = (np.where(steep, v[:, ::-1], v) for v in (self.start, self.step))
+        flat = Lines(start, step, self.radius, self.common)
+        line, u, v = flat._along(np.where(steep, boxes_xyxy[:, [1, 0, 3, 2]], boxes_xyxy))
+        swapped = self.steep[line]
+        return line, np.where(swapped, v, u), np.where(swapped, u, v)
 
     def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """Times at which segments enter and leave cells; a cell that is not touched is left before it is entered."""
@@ -362,50 +327,41 @@ class Lines:
         across = np.maximum(np.abs(step), 1)[:, ::-1]
         return np.asarray(np.where((sign != 0) & ((ahead - HALF) * across == entry[:, None]), -sign, 0))
 
-    def _along(self, major: int, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
-        """Cells as (segment, coordinate along the longer axis of the segment, coordinate along the other)."""
-        minor = 1 - major
-        start, step = self.start[:, minor], self.step[:, minor]
+    def _along(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
+        """`candidates` of segments that are not steep, row by row."""
+        start, step = self.start[:, 1], self.step[:, 1]
         reach = self.radius + HALF
         low, high = np.minimum(start, start + step) - reach, np.maximum(start, start + step) + reach
-        first = np.maximum(-(-low // SUB), boxes_xyxy[:, minor])
-        last = np.minimum(high // SUB, boxes_xyxy[:, minor + 2])
+        first = np.maximum(-(-low // SUB), boxes_xyxy[:, 1])
+        last = np.minimum(high // SUB, boxes_xyxy[:, 3])
         line, place = ragged(np.maximum(last - first + 1, 0))
-        v = first[line] + place
-        u_first, u_last = (self._thick_runs if self.radius else self._thin_runs)(major, line, v)
-        u_first = np.maximum(u_first, boxes_xyxy[line, major])
-        u_last = np.minimum(u_last, boxes_xyxy[line, major + 2])
-        run, u = each_pixel(u_first, np.maximum(u_last, u_first - 1))
-        return line[run], u, v[run]
+        y = first[line] + place
+        x_first, x_last = (self._thick_runs if self.radius else self._thin_runs)(line, y)
+        x_first, x_last = np.maximum(x_first, boxes_xyxy[line, 0]), np.minimum(x_last, boxes_xyxy[line, 2])
+        run, x = each_pixel(x_first, np.maximum(x_last, x_first - 1))
+        return line[run], x, y[run]
 
-    def _thin_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
-        """First and last cell of segments in rows v of the minor axis."""
-        minor = 1 - major
-        begin, step = self.start[line, minor], self.step[line, minor]
-        u, along = self.start[line, major], self.step[line, major]
-        low, high = np.minimum(begin, begin + step), np.maximum(begin, begin + step)
-        per, slope = np.maximum(np.abs(step), 1), along * np.sign(step)
-        enter = u * per + (np.maximum(low, SUB * v - HALF) - begin) * slope
-        leave = u * per + (np.minimum(high, SUB * v + HALF) - begin) * slope
-        level = step == 0
-        enter, leave = np.where(level, u, enter), np.where(level, u + along, leave)
+    def _thin_runs(self, line: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """First and last cell of segments in rows y."""
+        (x0, y0), (dx, dy) = self.start[line].T, self.step[line].T
+        low, high = np.minimum(y0, y0 + dy), np.maximum(y0, y0 + dy)
+        per, slope = np.maximum(np.abs(dy), 1), dx * np.sign(dy)
+        enter = x0 * per + (np.maximum(low, SUB * y - HALF) - y0) * slope
+        leave = x0 * per + (np.minimum(high, SUB * y + HALF) - y0) * slope
+        enter, leave = np.where(dy == 0, x0, enter), np.where(dy == 0, x0 + dx, leave)
         low, high = np.minimum(enter, leave), np.maximum(enter, leave)
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
-    def _thick_runs(self, major: int, line: Ints, v: Ints) -> tuple[Ints, Ints]:
-        """Cells around thick segments in rows v: no fewer than there are."""
-        minor = 1 - major
+    def _thick_runs(self, line: Ints, y: Ints) -> tuple[Ints, Ints]:
+        """Cells around thick segments in rows y: no fewer than there are."""
+        (x0, y0), (dx, dy) = self.start[line].T, self.step[line].T
         reach = max(self.radius, DIAGONAL)
-        begin, along = self.start[line, major], self.step[line, major]
-        low, high = np.minimum(begin, begin + along) - reach, np.maximum(begin, begin + along) + reach
-        # |(p - start) x step| <= reach * length bounds p along the major axis, unless the segment is level.
-        cross, side = (SUB * v - self.start[line, minor]) * along, self.wide_sides[line]
-        step = self.step[line, minor]
-        per, sign = np.maximum(np.abs(step), 1), np.where(step < 0, -1, 1)
-        cross = cross * sign
-        sloping = step != 0
-        low = np.where(sloping, np.maximum(low, begin - ((side - cross) // per)), low)
-        high = np.where(sloping, np.minimum(high, begin + ((cross + side) // per)), high)
+        low, high = np.minimum(x0, x0 + dx) - reach, np.maximum(x0, x0 + dx) + reach
+        # |(p - start) x step| <= reach * length bounds p along x, unless the segment is level.
+        side, per = self.wide_sides[line], np.maximum(np.abs(dy), 1)
+        cross = (SUB * y - y0) * dx * np.where(dy < 0, -1, 1)
+        low = np.where(dy != 0, np.maximum(low, x0 - ((side - cross) // per)), low)
+        high = np.where(dy != 0, np.minimum(high, x0 + ((cross + side) // per)), high)
         return -(-low // SUB), high // SUB
 
     def _thin_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:

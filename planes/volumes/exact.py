@@ -12,7 +12,8 @@ refused in the last stage.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,28 +37,27 @@ Numbers = npt.NDArray[Any]
 Given = list[tuple[str, Floats]]
 """Columns, each with the name of its argument."""
 
-NO_ROWS = np.zeros(0, np.int64)
+SIGN_ROWS = 8192
+"""Rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back to the system."""
 
-WORK_ROWS = 20
-"""Number of work arrays of a chunk that a predicate may use."""
+Valued = tuple[Any, tuple[Sequence[Numbers], ...]]
+"""A determinant, and arrays for each magnitude on which its error depends."""
 
 
 @dataclass(frozen=True)
 class Predicate:
     """A sign, computed in floats with an error bound, and in integers.
 
-    value : function of (columns, work) that returns the determinant, in a row of work, and magnitudes (n,) or (k, n)
+    value : function of the columns that returns the determinant and the magnitudes
     bound : function of the largest of each magnitude that returns a bound of the error
-    exact : function of columns of Python integers that returns a number of that sign
-    signed : for each magnitude, whether it may be negative
+    exact : function of columns of Python integers that returns a number of that sign; None if `value` is one
 
     All columns are lengths in one unit, and the sign does not depend on the unit.
     """
 
-    value: Callable[[list[Floats], Floats], tuple[Floats, tuple[Floats, ...]]]
+    value: Callable[[list[Numbers]], Valued]
     bound: Callable[..., Any]
-    exact: Callable[[list[Numbers]], Numbers]
-    signed: tuple[bool, ...]
+    exact: Callable[[list[Numbers]], Numbers] | None = None
 
 
 def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative: bool = False) -> Signs:
@@ -235,19 +235,14 @@ def _columns(field: str, points: npt.ArrayLike, d: int) -> Given:
 
 
 def _signs(predicate: Predicate, given: Given, conservative: bool) -> Signs:
-    """Signs of the broadcast rows, a chunk at a time in the same memory, and then of the rows in doubt."""
+    """Signs of the broadcast rows, a chunk at a time, and then of the rows in doubt."""
     quick = flag("conservative", conservative)
     _refuse_axes(given)
-    work = np.empty((WORK_ROWS, CHUNK_ROWS))
-    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
-    modes: Any = [["readonly"]] * len(given) + [["writeonly", "allocate"]]
-    types: Any = [np.float64] * len(given) + [np.int8]
     doubts, kept, done = [], [], 0
-    operands = [*(column for _, column in given), None]
-    chunks = np.nditer(operands, flags, modes, types, order="C", buffersize=CHUNK_ROWS)
+    chunks = chunked([column for _, column in given], np.int8, SIGN_ROWS)
     with chunks, np.errstate(all="ignore"):
         for *rows, signs in chunks:
-            if len(signs) and len(doubt := _chunk(predicate, rows, work[:, : len(signs)], signs)):
+            if len(signs) and len(doubt := _chunk(predicate, rows, signs)):
                 doubts.append(done + doubt)
                 kept.append([row[doubt] for row in rows])
             done += len(signs)
@@ -261,6 +256,14 @@ def _signs(predicate: Predicate, given: Given, conservative: bool) -> Signs:
                 signs[left] = 0 if quick else _exact(predicate, hard)
             found.reshape(-1)[places] = signs
     return found
+
+
+def chunked(columns: list[Floats], kind: type, rows: int = CHUNK_ROWS) -> Any:
+    """Chunks of columns that broadcast, each with a part of an array of one kind to be filled: the last operand."""
+    flags: Any = ["external_loop", "buffered", "zerosize_ok"]
+    modes: Any = [["readonly"]] * len(columns) + [["writeonly", "allocate"]]
+    types: Any = [np.float64] * len(columns) + [kind]
+    return np.nditer([*columns, None], flags, modes, types, order="C", buffersize=rows)
 
 
 def _refuse_axes(given: Given) -> None:
@@ -281,22 +284,21 @@ def _refuse_infinite(names: list[str], columns: Floats, rows: Ints) -> None:
         raise InputError(f"{names[k]}: expected finite numbers, got {columns[k, i]} in row {rows[i]}")
 
 
-def _chunk(predicate: Predicate, columns: list[Floats], work: Floats, signs: Signs) -> Ints:
+def _chunk(predicate: Predicate, columns: list[Floats], signs: Signs) -> Ints:
     """Fill in the signs of one chunk, and return the rows that one bound for all leaves in doubt."""
-    value, magnitudes = predicate.value(columns, work)
+    value, magnitudes = predicate.value(columns)
     np.subtract((value > 0).view(np.int8), (value < 0).view(np.int8), out=signs)
-    bound = predicate.bound(*(max(m.max(), -m.min() if predicate.signed[i] else 0.0) for i, m in enumerate(magnitudes)))
-    size = np.abs(value, out=value)
+    bound = predicate.bound(*(max(max(v.max(), -v.min()) for v in values) for values in magnitudes))
+    size = np.abs(value)
     if size.min() > bound and bound < BOUND_HUGE:
-        return NO_ROWS
+        return np.zeros(0, np.int64)
     return np.flatnonzero(~((size > bound) & (size < FLOAT_HUGE)))
 
 
 def _row_signs(predicate: Predicate, columns: list[Floats]) -> tuple[Signs, Ints]:
     """Signs by a bound for each row, and the rows that are still in doubt."""
-    n = len(columns[0])
-    value, magnitudes = predicate.value(columns, np.empty((WORK_ROWS, n)))
-    bounds = predicate.bound(*(np.abs(m).reshape(-1, n).max(axis=0) for m in magnitudes))
+    value, magnitudes = predicate.value(columns)
+    bounds = predicate.bound(*(np.abs(values).max(axis=0) for values in magnitudes))
     size = np.abs(value)
     return _sign(value), np.flatnonzero(~((size > bounds) & (size < FLOAT_HUGE)))
 
@@ -306,40 +308,23 @@ def _exact(predicate: Predicate, columns: Floats) -> Signs:
     mantissas, exponents = np.frexp(columns)
     shifts = exponents - exponents.min(axis=0)
     numbers = (mantissas * 2.0**53).astype(np.int64).astype(object) << shifts.astype(object)
-    return _sign(predicate.exact(list(numbers)))
+    return _sign(predicate.exact(list(numbers)) if predicate.exact else predicate.value(list(numbers))[0])
 
 
 def _sign(value: Numbers) -> Signs:
     return np.asarray((value > 0).astype(np.int8) - (value < 0).astype(np.int8))
 
 
-def _orient2d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+def _orient2d(columns: list[Numbers]) -> Valued:
     ax, ay, bx, by, cx, cy = columns
-    left, right, other = work[0], work[1], work[2]
-    np.multiply(np.subtract(ax, cx, out=left), np.subtract(by, cy, out=other), out=left)
-    np.multiply(np.subtract(ay, cy, out=right), np.subtract(bx, cx, out=other), out=right)
-    return np.subtract(left, right, out=other), (left, right)
+    left, right = (ax - cx) * (by - cy), (ay - cy) * (bx - cx)
+    return left - right, ((left,), (right,))
 
 
-def _orient2d_bound(left: Any, right: Any) -> Any:
-    return ORIENT2D_ERROR * (left + right) + FLOAT_TINY
-
-
-def _orient2d_exact(columns: list[Numbers]) -> Numbers:
-    ax, ay, bx, by, cx, cy = columns
-    return np.asarray((ax - cx) * (by - cy) - (ay - cy) * (bx - cx))
-
-
-def _orient3d_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
-    a, b, c = work[0:3], work[3:6], work[6:9]
-    for i in range(9):
-        np.subtract(columns[i], columns[9 + i % 3], out=work[i])
-    total, term, other = work[9], work[10], work[11]
-    total.fill(0)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.subtract(np.multiply(b[i], c[j], out=term), np.multiply(b[j], c[i], out=other), out=term)
-        np.add(total, np.multiply(a[k], term, out=term), out=total)
-    return total, (a, b, c)
+def _orient3d(columns: list[Numbers]) -> Valued:
+    a, b, c = ([columns[3 * i + k] - columns[9 + k] for k in range(3)] for i in range(3))
+    terms = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    return sum(a[k] * (b[i] * c[j] - b[j] * c[i]) for i, j, k in terms), (a, b, c)
 
 
 def _orient3d_bound(a: Any, b: Any, c: Any) -> Any:
@@ -347,23 +332,11 @@ def _orient3d_bound(a: Any, b: Any, c: Any) -> Any:
     return 6 * ORIENT3D_ERROR * a * (b * c + FLOAT_TINY) + FLOAT_TINY
 
 
-def _orient3d_exact(columns: list[Numbers]) -> Numbers:
-    d = columns[9:]
-    a, b, c = ([columns[3 * i + k] - d[k] for k in range(3)] for i in range(3))
-    terms = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    return np.asarray(sum(a[k] * (b[i] * c[j] - b[j] * c[i]) for i, j, k in terms))
-
-
-def _circles_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+def _circles(columns: list[Numbers]) -> Valued:
     *coordinates, r1, r2 = columns
-    d = len(coordinates) // 2
-    total, other = work[0], work[1]
-    np.square(np.subtract(coordinates[0], coordinates[d], out=total), out=total)
-    for k in range(1, d):
-        np.square(np.subtract(coordinates[k], coordinates[d + k], out=other), out=other)
-        np.add(total, other, out=total)
-    np.square(np.add(r1, r2, out=other), out=other)
-    return np.subtract(total, other, out=total), (other, total)
+    d, radius2 = len(coordinates) // 2, (r1 + r2) ** 2
+    value = sum((coordinates[k] - coordinates[d + k]) ** 2 for k in range(d)) - radius2
+    return value, ((radius2,), (value,))
 
 
 def _circles_bound(radius2: Any, value: Any) -> Any:
@@ -371,56 +344,32 @@ def _circles_bound(radius2: Any, value: Any) -> Any:
     return 10 * ROUNDING * radius2 + FLOAT_TINY + 0 * value
 
 
-def _circles_exact(columns: list[Numbers]) -> Numbers:
-    *coordinates, r1, r2 = columns
-    d = len(coordinates) // 2
-    return np.asarray(sum((coordinates[k] - coordinates[d + k]) ** 2 for k in range(d)) - (r1 + r2) ** 2)
-
-
-def _point_segment_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+def _point_segment(columns: list[Numbers]) -> Valued:
     px, py, ax, ay, bx, by, r1, r2 = columns
-    f, d, (length2, radius, value, other) = work[0:2], work[2:4], work[4:8]
-    _way(ax, ay, px, py, f)
-    _squared(_way(ax, ay, bx, by, d), length2, other)
-    _distance2(f, d, length2, value, work[8:10])
-    np.square(np.add(r1, r2, out=radius), out=other)
-    return np.subtract(value, other, out=value), (f, radius, length2)
+    f, d, radius = (px - ax, py - ay), (bx - ax, by - ay), r1 + r2
+    length2 = d[0] * d[0] + d[1] * d[1]
+    return squared_distance(f, d, length2) - radius * radius, (f, (radius,), (length2,))
 
 
-def _ends_value(columns: list[Floats], work: Floats) -> tuple[Floats, tuple[Floats, ...]]:
+def _ends(columns: list[Numbers]) -> Valued:
     """Least of the four distances from the ends of two segments to the other segment."""
-    ax, ay, bx, by, cx, cy, dx, dy, r1, r2 = columns
-    f, ab, cd, lengths2, (value, least, radius, other) = work[0:8], work[8:10], work[10:12], work[12:14], work[14:18]
-    _squared(_way(ax, ay, bx, by, ab), lengths2[0], other)
-    _squared(_way(cx, cy, dx, dy, cd), lengths2[1], other)
-    least.fill(np.inf)
-    for k, (px, py, qx, qy) in enumerate(((ax, ay, cx, cy), (ax, ay, dx, dy), (cx, cy, ax, ay), (cx, cy, bx, by))):
-        way = _way(px, py, qx, qy, f[2 * k : 2 * k + 2])
-        _distance2(way, ab if k < 2 else cd, lengths2[k // 2], value, work[18:20])
-        np.minimum(least, value, out=least)
-    np.square(np.add(r1, r2, out=radius), out=other)
-    return np.subtract(least, other, out=value), (f, radius, lengths2)
+    found, magnitudes = zip(*(_point_segment(part) for part in _four_ends(columns)), strict=True)
+    ways, radii, lengths2 = zip(*magnitudes, strict=True)
+    return functools.reduce(np.minimum, found), (sum(ways, ()), radii[0], lengths2[0] + lengths2[2])
 
 
-def _way(ax: Floats, ay: Floats, bx: Floats, by: Floats, out: Floats) -> Floats:
-    np.subtract(bx, ax, out=out[0])
-    np.subtract(by, ay, out=out[1])
-    return out
+def _four_ends(columns: list[Numbers]) -> list[list[Numbers]]:
+    """Columns for `_point_segment` of each end of two segments and the other segment."""
+    a, b, c, d = (columns[2 * k : 2 * k + 2] for k in range(4))
+    return [[*p, *q, *s, *columns[8:]] for p, q, s in ((c, a, b), (d, a, b), (a, c, d), (b, c, d))]
 
 
-def _squared(d: Floats, out: Floats, other: Floats) -> None:
-    np.add(np.square(d[0], out=out), np.square(d[1], out=other), out=out)
-
-
-def _distance2(f: Floats, d: Floats, length2: Floats, out: Floats, work: Floats) -> None:
+def squared_distance(f: Any, d: Any, length2: Numbers) -> Floats:
     """Squared distance of a point to a segment; f leads from its start to the point, d from its start to its end."""
-    share, other = work
-    np.add(np.multiply(f[0], d[0], out=share), np.multiply(f[1], d[1], out=other), out=share)
-    np.divide(share, np.maximum(length2, FLOAT_TINY, out=other), out=share)
-    np.minimum(np.maximum(share, 0, out=share), 1, out=share)
-    np.square(np.subtract(f[0], np.multiply(share, d[0], out=out), out=out), out=out)
-    np.square(np.subtract(f[1], np.multiply(share, d[1], out=other), out=other), out=other)
-    np.add(out, other, out=out)
+    share = (f[0] * d[0] + f[1] * d[1]) / np.maximum(length2, FLOAT_TINY)
+    share = np.minimum(np.maximum(share, 0), 1)
+    x, y = f[0] - share * d[0], f[1] - share * d[1]
+    return np.asarray(x * x + y * y)
 
 
 def _point_segment_bound(f: Any, radius: Any, length2: Any) -> Any:
@@ -445,14 +394,11 @@ def _point_segment_exact(columns: list[Numbers]) -> Numbers:
 
 def _ends_exact(columns: list[Numbers]) -> Numbers:
     """Least of four signs; the values have different degrees and cannot be compared."""
-    a, b, c, d = (columns[2 * k : 2 * k + 2] for k in range(4))
-    rows = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
-    values = [_point_segment_exact([*p, *q, *s, *columns[8:]]) for p, q, s in rows]
-    return np.asarray(np.minimum.reduce([_sign(v) for v in values]))
+    return np.asarray(np.minimum.reduce([_sign(_point_segment_exact(part)) for part in _four_ends(columns)]))
 
 
-_ORIENT2D = Predicate(_orient2d_value, _orient2d_bound, _orient2d_exact, (True, True))
-_ORIENT3D = Predicate(_orient3d_value, _orient3d_bound, _orient3d_exact, (True, True, True))
-_CIRCLES = Predicate(_circles_value, _circles_bound, _circles_exact, (False, False))
-_POINT_SEGMENT = Predicate(_point_segment_value, _point_segment_bound, _point_segment_exact, (True, True, False))
-_ENDS = Predicate(_ends_value, _point_segment_bound, _ends_exact, (True, True, False))
+_ORIENT2D = Predicate(_orient2d, lambda left, right: ORIENT2D_ERROR * (left + right) + FLOAT_TINY)
+_ORIENT3D = Predicate(_orient3d, _orient3d_bound)
+_CIRCLES = Predicate(_circles, _circles_bound)
+_POINT_SEGMENT = Predicate(_point_segment, _point_segment_bound, _point_segment_exact)
+_ENDS = Predicate(_ends, _point_segment_bound, _ends_exact)

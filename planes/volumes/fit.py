@@ -73,7 +73,7 @@ def hull(pixels: object) -> Polygons:
     InputError
         If there is no pixel, or the mask is too large or not a mask.
     """
-    return _polygon(np.array(_corners(pixels)) / 2)
+    return Polygons(np.array(_corners(pixels)) / 2, [0])
 
 
 def box(pixels: object) -> Aabbs:
@@ -93,7 +93,7 @@ def least_circle(pixels: object) -> Circles:
     none is outside. This takes few rounds, each over the corners of the hull.
     """
     corners = _corners(pixels)
-    return _circle(corners, _center_px(corners))
+    return _circle(corners, _least_center(corners))
 
 
 def pivot_circle(pixels: object, pivot_xy: Sequence[float]) -> Circles:
@@ -119,7 +119,7 @@ def capsule(pixels: object) -> Capsules:
     begin, end = (a + d) / 2, (b + c) / 2
     inward = np.linspace(0, 0.5, AXES)[:, None] * (end - begin)
     found = min(zip(begin + inward, end - inward, strict=True), key=lambda axis: _capsule_area(corners, *axis))
-    circle = _circle(corners, _center_px(corners))
+    circle = _circle(corners, _least_center(corners))
     if math.pi * circle.radius[0] ** 2 <= _capsule_area(corners, *found):
         return Capsules(circle.center, circle.center, circle.radius)
     begin, end = found
@@ -165,7 +165,7 @@ def convex(pixels: object, n: int) -> Polygons:
     It is the hull without the edges whose removal adds the least area, one after the other.
     """
     lines = edge_lines(_corners(pixels))
-    return _polygon(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))))
+    return Polygons(outward_corners(fewer_lines(lines, integer("n", n, 4, 4 * MASK_SIDE_MAX))), [0])
 
 
 def concave(mask: object, tolerance: float) -> Floats:
@@ -207,10 +207,6 @@ def _corners(pixels: object) -> list[Point]:
     return hull_points(_extents(pixels))
 
 
-def _polygon(points: Floats) -> Polygons:
-    return Polygons(points, [0])
-
-
 def _circle(corners: list[Point], center: tuple[float, float]) -> Circles:
     return Circles([center], _radius_about(corners, center, center))
 
@@ -243,20 +239,15 @@ Center = tuple[int, int, int]
 """(x, y, d) with d > 0 stands for (x / d, y / d)."""
 
 
-def _least_center(points: list[Point]) -> Center:
-    """Centre of the least circle around points, exactly."""
+def _least_center(points: list[Point]) -> tuple[float, float]:
+    """Centre of the least circle around points in half pixels: px, rounded only once."""
     basis = points[:2]
     while True:
-        center = _center(basis)
+        center = x, y, d = _center(basis)
         far = max(points, key=lambda p: _scaled_square(center, p))
         if _scaled_square(center, far) <= _scaled_square(center, basis[0]):
-            return center
+            return x / (2 * d), y / (2 * d)
         basis = _support([far, *basis])
-
-
-def _center_px(points: list[Point]) -> tuple[float, float]:
-    x, y, d = _least_center(points)
-    return x / (2 * d), y / (2 * d)
 
 
 def _scaled_square(center: Center, point: Point) -> int:
@@ -276,56 +267,30 @@ def _center(basis: list[Point]) -> Center:
 
 
 def _support(points: list[Point]) -> list[Point]:
-    """The two or three points that define the least circle of at most four; the first point lies on its edge.
-
-    A circle on a diameter, or about a triangle without an obtuse angle, is the least if it contains all points.
-    """
+    """The two or three points that define the least circle of at most four; the first point lies on its edge."""
     first, *rest = points
-    pairs = [[first, q] for q in rest]
-    triples = [[first, q, r] for q, r in itertools.combinations(rest, 2)]
-    for basis in pairs + [t for t in triples if _is_acute(t)]:
+    found = []
+    for others in (*itertools.combinations(rest, 1), *itertools.combinations(rest, 2)):
+        basis = [first, *others]
         center = _center(basis)
-        if all(_scaled_square(center, p) <= _scaled_square(center, first) for p in points):
-            return basis
-    raise AssertionError(f"no least circle around {points}")
-
-
-def _is_acute(triangle: list[Point]) -> bool:
-    """Whether a triangle has area and no obtuse angle."""
-    (ax, ay), (bx, by), (cx, cy) = triangle
-    p, q, u, v = bx - ax, by - ay, cx - ax, cy - ay
-    at_a = p * u + q * v
-    return p * v != q * u and at_a >= 0 and p * p + q * q >= at_a and u * u + v * v >= at_a
+        square = _scaled_square(center, first)
+        if center[2] and all(_scaled_square(center, p) <= square for p in points):
+            found.append((Fraction(square, center[2] ** 2), basis))
+    return min(found)[1]
 
 
 def _least_sides(ring: list[Point]) -> list[Line]:
-    """Four lines of the least box, by rotating calipers: one jaw lies on each edge of the hull in turn."""
-    lines, n = edge_lines(ring), len(ring)
-    best: tuple[int, int, list[Line]] | None = None
-    right = far = left = 0
-    for i, (a, b, c) in enumerate(lines):
-        along, inward = (-b, a), (-a, -b)
-        right = _farthest(ring, along, max(right, i + 1))
-        far = _farthest(ring, inward, max(far, right))
-        left = _farthest(ring, (b, -a), max(left, far))
-        ends = [_dot(v, ring[j % n]) for v, j in ((along, right), (inward, far), ((b, -a), left))]
-        area, square = (ends[0] + ends[2]) * (ends[1] + c), a * a + b * b
-        if best is None or area * best[1] < best[0] * square:
-            best = area, square, [(a, b, c), (*along, ends[0]), (*inward, ends[1]), (b, -a, ends[2])]
+    """Four lines of the least box: one lies on an edge of the hull, so each edge is tried."""
+    lines, points = edge_lines(ring), np.array(ring).T
+    best: tuple[Fraction, list[Line]] | None = None
+    for a, b, c in lines:
+        ways = ((-b, a), (-a, -b), (b, -a))
+        right, far, left = (np.array(ways) @ points).max(axis=1).tolist()
+        area = Fraction((right + left) * (far + c), a * a + b * b)
+        if best is None or area < best[0]:
+            best = area, [(a, b, c), *((*way, end) for way, end in zip(ways, (right, far, left), strict=True))]
     assert best is not None
-    return best[2]
-
-
-def _dot(v: Point, p: Point) -> int:
-    return v[0] * p[0] + v[1] * p[1]
-
-
-def _farthest(ring: list[Point], direction: Point, start: int) -> int:
-    """Walk around the ring from `start` while the points lie farther in a direction."""
-    n, i = len(ring), start
-    while _dot(direction, ring[(i + 1) % n]) > _dot(direction, ring[i % n]):
-        i += 1
-    return i
+    return best[1]
 
 
 KINDS = ("circle", "oriented box", "boxes", "polygon")
@@ -359,8 +324,7 @@ class Bounds:
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
         self._volumes: Volumes | None = None
-        self._masks = np.zeros(0, np.int64)
-        self._row = np.zeros(0, np.int64)
+        self._row: dict[int, int] = {}
         self._lock = threading.Lock()
 
     def rows(
@@ -375,27 +339,16 @@ class Bounds:
         ids : (n,) the items
         items : number of masks that may be in use; many more are not kept
         """
-        used, first, of = np.unique(masks, return_index=True, return_inverse=True)
+        used = dict(zip(masks.tolist(), ids.tolist(), strict=True))
         with self._lock:
-            if len(self._masks) + len(used) > 2 * items + BOUNDS_SLACK:
-                self._masks, self._row, self._volumes = masks[:0], masks[:0], None
-            volumes = self._volumes = self._with(used, ids[first], sprites, variants)
-            return volumes, np.asarray(self._row[np.searchsorted(self._masks, used)][of])
-
-    def _with(self, used: Ints, ids: Ints, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
-        """The volumes after those of new masks are added."""
-        new = ~np.isin(used, self._masks)
-        if self._volumes is not None and not new.any():
-            return self._volumes
-        items = ids[new].tolist()
-        more = bounding(self.kind, [sprites[i] for i in items], [variants[i] for i in items])
-        every = np.concatenate([self._masks, used[new]])
-        order = np.argsort(every)
-        self._masks, self._row = (
-            every[order],
-            np.concatenate([self._row, len(self._row) + np.arange(len(items))])[order],
-        )
-        return more if self._volumes is None else joined([self._volumes, more])
+            if len(self._row) + len(used) > 2 * items + BOUNDS_SLACK:
+                self._row, self._volumes = {}, None
+            new = {mask: item for mask, item in used.items() if mask not in self._row}
+            if new or self._volumes is None:
+                more = bounding(self.kind, [sprites[i] for i in new.values()], [variants[i] for i in new.values()])
+                self._volumes = more if self._volumes is None else joined([self._volumes, more])
+                self._row |= zip(new, itertools.count(len(self._row)))
+            return self._volumes, np.array([self._row[mask] for mask in masks.tolist()], np.int64)
 
 
 def shifted(volumes: Volumes, xy: Ints) -> Volumes:
@@ -407,23 +360,17 @@ def shifted(volumes: Volumes, xy: Ints) -> Volumes:
     if isinstance(volumes, Parts):
         row = rows_of(volumes.starts, len(volumes.parts))[1]
         return volumes._same(shifted(volumes.parts, xy[row]), volumes.starts)._of(volumes.original)
-    if isinstance(volumes, Hulls):
-        return _shifted_hulls(volumes, xy)
+    if isinstance(volumes, Hulls):  # a hull that would be rounded is grown first, by more than rounding can take back
+        core = volumes.core()
+        by = xy[rows_of(core.starts, len(core.points))[1]]
+        off = np.maximum.reduceat(_rounding(core.points, by).max(axis=1), core.starts)
+        if off.any():
+            return type(volumes).around(_grown(core, 2 * off) + by, core.starts)._of(volumes.original)
     there = volumes.translated(xy)
     if isinstance(there, Circles):
         rounded = _rounding(volumes.core().points, xy).sum(axis=1)
         return _grown_circles(there, rounded)._of(volumes.original)
     return there
-
-
-def _shifted_hulls(volumes: Hulls, xy: Ints) -> Hulls:
-    """Moved hulls; a hull that would be rounded is grown first, by more than rounding can take back."""
-    core = volumes.core()
-    by = xy[rows_of(core.starts, len(core.points))[1]]
-    rounded = np.maximum.reduceat(_rounding(core.points, by).max(axis=1), core.starts)
-    if not rounded.any():
-        return volumes.translated(xy)
-    return type(volumes).around(_grown(core, 2 * rounded) + by, core.starts)._of(volumes.original)
 
 
 def _rounding(points: Floats, by: Ints) -> Floats:

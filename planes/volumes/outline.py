@@ -43,12 +43,8 @@ def cover(mask: Bools, k: int) -> Ints:
         rows, first, last = extents(mask)
         return np.array([[first.min(), rows[0], last.max() + 1, rows[-1] + 1]])
     few, many = _cut(mask, k)
-    return min((few, _area(few)), _join(many, k), key=lambda found: found[1])[0]
-
-
-def _area(boxes: Ints) -> int:
-    """Number of pixels of disjoint boxes."""
-    return int((boxes[:, 2:] - boxes[:, :2]).prod(axis=1).sum())
+    area = int((few[:, 2:] - few[:, :2]).prod(axis=1).sum())  # the boxes are disjoint
+    return min((few, area), _join(many, k), key=lambda found: found[1])[0]
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,11 @@ def _cut(mask: Bools, k: int) -> tuple[Ints, Ints]:
     few, made = list(parts.values()), 1
     while heap and len(parts) < BOXES_MAX:
         number = heapq.heappop(heap)[-1]
-        for half in _halves(mask, parts.pop(number)):
+        part = parts.pop(number)
+        x, y, x_end, y_end = part.box
+        at = (x + part.at, y_end) if part.axis else (x_end, y + part.at)  # where the first half ends
+        begin = (x + part.at, y) if part.axis else (x, y + part.at)  # where the second half begins
+        for half in (_part(mask, x, y, *at), _part(mask, *begin, x_end, y_end)):
             parts[made] = half
             if half.false:
                 heapq.heappush(heap, (-half.saved, -half.false, made))
@@ -78,13 +78,6 @@ def _cut(mask: Bools, k: int) -> tuple[Ints, Ints]:
         if len(parts) <= k:
             few = list(parts.values())
     return np.array([part.box for part in few]), np.array([part.box for part in parts.values()])
-
-
-def _halves(mask: Bools, part: _Part) -> tuple[_Part, _Part]:
-    x, y, x_end, y_end = part.box
-    if part.axis == 0:
-        return _part(mask, x, y, x_end, y + part.at), _part(mask, x, y + part.at, x_end, y_end)
-    return _part(mask, x, y, x + part.at, y_end), _part(mask, x + part.at, y, x_end, y_end)
 
 
 def _part(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> _Part:
@@ -173,7 +166,7 @@ def outline(mask: Bools, tolerance: float) -> Floats:
         block *= 2
     corners = np.minimum(np.array(ring) * block, (right - left, bottom - top)) + np.array([left, top])
     simpler = _Simpler(corners, tolerance)
-    return np.array(_without_edges(simpler.points(), simpler.offs(), tolerance)) / SUB - 0.5
+    return np.array(_without_edges(simpler.points, simpler.offs, tolerance)) / SUB - 0.5
 
 
 def _blocks(mask: Bools, block: int) -> Bools:
@@ -301,14 +294,11 @@ class _Simpler:
             self._offer(i)
         while self.heap:
             self._leave_out(*heapq.heappop(self.heap)[1:])
-
-    def points(self) -> list[Point]:
+        kept = np.flatnonzero(self.left).tolist()
+        self.points: list[Point] = [(self.at[i][0] * SUB, self.at[i][1] * SUB) for i in kept]
         """Remaining corners, in order, in 1/256 px."""
-        return [(x * SUB, y * SUB) for x, y in self.corners[self.left].tolist()]
-
-    def offs(self) -> list[float]:
+        self.offs = [self._off(i, self.after[i]) for i in kept]
         """Distance from the edge at each remaining corner to the farthest corner removed there, px."""
-        return [self._off(i, self.after[i]) for i in np.flatnonzero(self.left).tolist()]
 
     def _offer(self, i: int) -> None:
         """Put an inner corner on the heap if the edge of its neighbours is near enough to all corners between them."""
@@ -334,16 +324,9 @@ class _Simpler:
 
     def _is_free(self, i: int, a: int, c: int) -> bool:
         """Whether no other corner lies in the closed, added triangle."""
-        three = (self.at[a], self.at[i], self.at[c])
-        xs, ys = self.corners[:, 0], self.corners[:, 1]
-        low, high = tuple(map(min, *three)), tuple(map(max, *three))
-        boxed = self.left & (xs >= low[0]) & (xs <= high[0]) & (ys >= low[1]) & (ys <= high[1])
-        p, q, r = three
-        for other in np.flatnonzero(boxed).tolist():
-            at = self.at[other]
-            if other not in (a, i, c) and turn(p, q, at) <= 0 and turn(q, r, at) <= 0 and turn(r, p, at) <= 0:
-                return False
-        return True
+        others = self.left.copy()
+        others[[a, i, c]] = False
+        return not _any_within((self.at[c], self.at[i], self.at[a]), self.corners[others])
 
 
 def _distance(points: npt.NDArray[np.int64], a: Point, c: Point) -> float:
@@ -413,25 +396,25 @@ def _is_clear(ring: list[Point], i: int, tip: Point) -> bool:
     a, b, c, d = _four(ring, i)
     n = len(ring)
     others = np.array([ring[(i + 3 + k) % n] for k in range(n - 4)], np.int64).reshape(-1, 2)
-    for triangle in ((a, tip, b), (b, tip, c), (c, tip, d)):
-        low, high = np.min(triangle, axis=0), np.max(triangle, axis=0)
-        close = others[((others >= low) & (others <= high)).all(axis=1)]
-        sides = [_turns(triangle[k], triangle[(k + 1) % 3], close) for k in range(3)]
-        if (np.min(sides, axis=0) >= 0).any():
-            return False
+    if any(_any_within(triangle, others) for triangle in ((a, tip, b), (b, tip, c), (c, tip, d))):
+        return False
     path = np.concatenate([[d], others, [a]])  # edges from d around to a
     return not (_cut_by(a, tip, path[:-1]) or _cut_by(tip, d, path[1:]))
 
 
-def _turns(a: Point, b: Point, points: Ints) -> Ints:
-    found: Ints = (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
-    return found
+def _any_within(triangle: tuple[Point, Point, Point], points: Ints) -> bool:
+    """Whether a point lies in a closed triangle that turns from +x toward +y."""
+    p, q, r = triangle
+    low, high = tuple(map(min, p, q, r)), tuple(map(max, p, q, r))
+    x, y = points.T
+    at = points[(x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])].T
+    return bool(((turn(p, q, at) >= 0) & (turn(q, r, at) >= 0) & (turn(r, p, at) >= 0)).any())
 
 
 def _cut_by(a: Point, b: Point, path: Ints) -> bool:
     """Whether a polyline crosses a segment; touching counts."""
     start, end = path[:-1], path[1:]
-    sides = np.sign(_turns(a, b, path))
+    sides = np.sign(turn(a, b, path.T))
     begins, ends = (start - a)[:, ::-1] * (end - start), (start - b)[:, ::-1] * (end - start)
     of_a, of_b = (np.sign(v[:, 1] - v[:, 0]) for v in (begins, ends))
     low, high = np.minimum(a, b), np.maximum(a, b)

@@ -10,6 +10,7 @@ points (2, k, n): x and y, k points a row, n rows.
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +19,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, flag, reals
 from ..common.limits import CHUNK_ROWS, DISTANCE_ERROR, FLOAT_HUGE, FLOAT_TINY, LENGTH_TINY, SIDE_ERROR
 from ..grid.spans import ragged
-from .exact import Signs, circles_sign, orient2d, point_segment_sign, segment_segment_sign
+from .exact import Signs, circles_sign, orient2d, point_segment_sign, segment_segment_sign, squared_distance
 from .polygons import rows_of, starts_of
 from .volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons, Volumes
 
@@ -128,22 +129,14 @@ def _distance_sign(a: Floats, b: Floats, reach: Floats, radius: Floats) -> Signs
         if count == 1 and corners.shape[1] > 1:
             continue  # the distances from the other's edges to this point suffice
         for k in range(1 if count == 2 else count):
-            p, q = edges[:, k, None], edges[:, (k + 1) % count, None]
-            np.minimum(least, _distance2(corners, p, q).min(axis=0), out=least)
+            p, d = edges[:, k, None], edges[:, (k + 1) % count, None] - edges[:, k, None]
+            far = squared_distance(corners - p, d, d[0] * d[0] + d[1] * d[1])
+            np.minimum(least, far.min(axis=0), out=least)
     value = least - radius * radius
     error = DISTANCE_ERROR * reach + LENGTH_TINY
     bound = error * (2 * radius + error)
     bound[~(reach * reach < FLOAT_HUGE)] = np.inf
     return np.subtract((value > bound).view(np.int8), (value < -bound).view(np.int8))
-
-
-def _distance2(p: Floats, a: Floats, b: Floats) -> Floats:
-    """Squared distances of points to segments."""
-    (fx, fy), (dx, dy) = p - a, b - a
-    share = (fx * dx + fy * dy) / np.maximum(dx * dx + dy * dy, FLOAT_TINY)
-    share = np.minimum(np.maximum(share, 0), 1)
-    x, y = fx - share * dx, fy - share * dy
-    return np.asarray(x * x + y * y)
 
 
 def edge_parts(first: Core, second: Core, rows: Ints, k: int, conservative: bool) -> Bools:
@@ -298,18 +291,10 @@ def _any_part(sets: Parts, rows: Rows, test: Callable[[Ints, Ints], Bools]) -> B
     return np.logical_or.reduceat(test(of, starts[of] + place), starts_of(counts))
 
 
-def _circles_circles(a: Circles, b: Circles, conservative: bool) -> Bools:
-    return circles_sign(a.center, a.radius, b.center, b.radius, conservative) <= 0
-
-
 def _circles_aabbs(a: Circles, b: Aabbs, conservative: bool) -> Bools:
     """Test the point of the box nearest to the centre; its coordinates are input coordinates, so it is exact."""
     nearest = np.clip(a.center, b.min, b.max)
     return circles_sign(a.center, a.radius, nearest, 0.0, conservative) <= 0
-
-
-def _circles_capsules(a: Circles, b: Capsules, conservative: bool) -> Bools:
-    return point_segment_sign(a.center, b.a_xy, b.b_xy, a.radius, b.radius, conservative) <= 0
 
 
 def _aabbs_aabbs(a: Aabbs, b: Aabbs, conservative: bool) -> Bools:
@@ -384,26 +369,21 @@ def _near(one: Core, two: Core, rows: Ints, conservative: bool) -> Bools:
     return found
 
 
-def _swapped(test: Test) -> Test:
-    return lambda a, b, conservative: test(b, a, conservative)
-
-
+_HULLS: tuple[type[Volumes], ...] = (Aabbs, Obbs, Polygons)
 _PAIRS: dict[tuple[type[Volumes], type[Volumes]], Test] = {
-    (Circles, Circles): _circles_circles,
-    (Circles, Aabbs): _circles_aabbs,
-    (Circles, Capsules): _circles_capsules,
-    (Circles, Obbs): _round_hulls,
-    (Circles, Polygons): _round_hulls,
+    **dict.fromkeys(itertools.product((Circles, Capsules), _HULLS), _round_hulls),
+    **dict.fromkeys(itertools.combinations_with_replacement(_HULLS, 2), _hulls_hulls),
     (Aabbs, Aabbs): _aabbs_aabbs,
-    (Aabbs, Obbs): _hulls_hulls,
-    (Aabbs, Polygons): _hulls_hulls,
-    (Obbs, Obbs): _hulls_hulls,
-    (Obbs, Polygons): _hulls_hulls,
-    (Polygons, Polygons): _hulls_hulls,
-    (Capsules, Aabbs): _round_hulls,
-    (Capsules, Obbs): _round_hulls,
-    (Capsules, Polygons): _round_hulls,
+    (Circles, Circles): lambda a, b, quick: circles_sign(a.center, a.radius, b.center, b.radius, quick) <= 0,
+    (Circles, Aabbs): _circles_aabbs,
+    (Circles, Capsules): lambda a, b, quick: (
+        point_segment_sign(a.center, b.a_xy, b.b_xy, a.radius, b.radius, quick) <= 0
+    ),
     (Capsules, Capsules): _capsules_capsules,
 }
-TABLE = _PAIRS | {(b, a): _swapped(test) for (a, b), test in _PAIRS.items() if a is not b}
+TABLE = _PAIRS | {
+    (b, a): lambda a, b, conservative, test=test: test(b, a, conservative)
+    for (a, b), test in _PAIRS.items()
+    if a is not b
+}
 """The test of each of the fifteen pairs, in both orders."""

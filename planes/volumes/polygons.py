@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, InputError, Ints
-from ..grid.spans import ragged
-from .exact import orient2d
+from ..grid.spans import meets, ragged
+from .exact import orient2d, point_segment_sign, segment_segment_sign
 
 Numbers = npt.NDArray[Any]
 Corner = tuple[float, float]
@@ -78,7 +78,9 @@ def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
     """
     if not len(starts):
         return points, starts
-    sense = _checked_sense(points, starts)
+    _, after = neighbours(starts, len(points))
+    same: Bools = (points == points[after]).all(axis=1)  # equal neighbours would hide turns
+    sense = np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
     counts, row = rows_of(starts, len(points))
     place = np.arange(len(points)) - starts[row]
     points = points[np.where(sense[row] < 0, starts[row] + counts[row] - 1 - place, np.arange(len(points)))]
@@ -88,13 +90,6 @@ def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
     for i in np.flatnonzero(sense == 0).tolist():
         parts[i] = np.array(hull([(x, y) for x, y in parts[i].tolist()]))
     return np.concatenate(parts), starts_of([len(part) for part in parts])
-
-
-def _checked_sense(points: Floats, starts: Ints) -> Ints:
-    """Turning sense of convex rows; also 0 for rows with equal neighbours, which would hide turns."""
-    _, after = neighbours(starts, len(points))
-    same: Bools = (points == points[after]).all(axis=1)
-    return np.where(np.logical_or.reduceat(same, starts), 0, convex_rows(points, starts))
 
 
 def hull(points: list[Corner]) -> list[Corner]:
@@ -137,8 +132,8 @@ def convex_parts(points: list[Corner]) -> list[list[int]]:
     ----------
     Meisters, *Polygons have ears* (1975); Hertel and Mehlhorn, *Fast triangulation of simple polygons* (1983).
     """
+    _refuse_crossing(points)
     whole = _whole(points)
-    _refuse_crossing(whole)
     parts = dict(enumerate(_triangles(whole)))
     owner = {edge: i for i, part in parts.items() for edge in _edges(part)}
     for u, v in list(owner):
@@ -194,39 +189,25 @@ def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
     return not any(turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in others)
 
 
-def _refuse_crossing(whole: list[Whole]) -> None:
+def _refuse_crossing(points: list[Corner]) -> None:
     """Refuse a polygon in which edges touch, except neighbours in one point."""
-    n = len(whole)
+    n = len(points)
     if n < 3:
         raise InputError(f"points: expected three or more, got {n}")
-    edges = [(whole[i], whole[(i + 1) % n]) for i in range(n)]
-    for i in range(n):
-        for j in range(i + 1, n):
-            (a, b), (c, d) = edges[i], edges[j]
-            if j == i + 1 or (i == 0 and j == n - 1):
-                p, q, s = (a, b, d) if j == i + 1 else (c, d, b)
-                bad = turn(p, q, s) == 0 and (_within(p, q, s) or _within(q, s, p))
-            else:
-                bad = _meet(a, b, c, d)
-            if bad:
-                raise InputError(f"points: expected edges that do not cross or touch, got edges {i} and {j}")
+    begin = np.array(points)
+    end, beyond = np.roll(begin, -1, axis=0), np.roll(begin, -2, axis=0)
+    folded = np.minimum(point_segment_sign(beyond, begin, end, 0), point_segment_sign(begin, end, beyond, 0)) <= 0
+    boxes = np.concatenate([np.minimum(begin, end), np.maximum(begin, end)], axis=1)
+    i, j = np.nonzero(np.triu(meets(boxes[:, None], boxes), 1))
+    crossing = segment_segment_sign(begin[i], end[i], begin[j], end[j], 0) <= 0
+    last = (i == 0) & (j == n - 1)
+    bad = np.flatnonzero(np.where(last, folded[j], np.where(j == i + 1, folded[i], crossing)))
+    if len(bad):
+        raise InputError(f"points: expected edges that do not cross or touch, got edges {i[bad[0]]} and {j[bad[0]]}")
 
 
-def _meet(a: Whole, b: Whole, c: Whole, d: Whole) -> bool:
-    turns = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
-    if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
-        return True
-    ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
-    return any(turn == 0 and _within(*end) for turn, end in zip(turns, ends, strict=True))
-
-
-def _within(a: Whole, b: Whole, p: Whole) -> bool:
-    """Whether a point on the line through a and b lies between them."""
-    return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in range(2))
-
-
-def turn(a: Whole, b: Whole, c: Whole) -> int:
-    """Twice the signed area of a triangle; positive if it turns from +x towards +y."""
+def turn(a: Any, b: Any, c: Any) -> Any:
+    """Twice the signed area of a triangle; positive if it turns from +x towards +y; c may hold columns of points."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 

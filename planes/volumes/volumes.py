@@ -141,31 +141,49 @@ class Volumes(ABC):
         return self
 
 
-class Circles(Volumes):
+class Columns(Volumes):
+    """Volumes of as many points each, in the columns `_point_columns`, and of the column `radius` if they have one."""
+
+    _point_columns: tuple[str, ...]
+    radius: Floats | None = None
+
+    def __len__(self) -> int:
+        return len(getattr(self, self._point_columns[0]))
+
+    def _columns(self) -> list[Floats]:
+        """Arguments that make these volumes."""
+        return [getattr(self, name) for name in self._point_columns] + ([] if self.radius is None else [self.radius])
+
+    def core(self) -> Core:
+        """Points in order: one of a circle, two of a capsule, min and max of a box in 3-D."""
+        points = np.stack([getattr(self, name) for name in self._point_columns], axis=1)
+        radius = np.zeros(len(self)) if self.radius is None else self.radius
+        return Core(points.reshape(-1, self.d), *_even(len(self), len(self._point_columns)), radius)
+
+    def _moved(self, move: Move, factor: Floats) -> Self:
+        points = [move(getattr(self, name), np.arange(len(self))) for name in self._point_columns]
+        return type(self)(*points, *([] if self.radius is None else [self.radius * factor]))
+
+    def _chosen(self, rows: Ints) -> Self:
+        return type(self)(*(column[rows] for column in self._columns()))
+
+
+class Circles(Columns):
     """Circles or spheres: center (N, d) with d 2 or 3, radius (N,) of 0 or more."""
+
+    _point_columns = ("center",)
+    radius: Floats
 
     def __init__(self, center: object, radius: object) -> None:
         self.center = _points("center", center)
         self.d = self.center.shape[1]
         self.radius = _radii(radius, len(self.center))
 
-    def __len__(self) -> int:
-        return len(self.center)
 
-    def core(self) -> Core:
-        """One point."""
-        return Core(self.center, *_even(len(self), 1), self.radius)
-
-    def _moved(self, move: Move, factor: Floats) -> Self:
-        return type(self)(move(self.center, np.arange(len(self))), self.radius * factor)
-
-    def _chosen(self, rows: Ints) -> Self:
-        return type(self)(self.center[rows], self.radius[rows])
-
-
-class Aabbs(Volumes):
+class Aabbs(Columns):
     """Axis-aligned boxes: min and max (N, d) with d 2 or 3, min <= max; they may be flat, or points."""
 
+    _point_columns = ("min", "max")
     _finite = True
 
     def __init__(self, min: object, max: object) -> None:  # noqa: A002
@@ -190,9 +208,6 @@ class Aabbs(Volumes):
             return super().beyond()
         return np.flatnonzero(~(np.isfinite(self.min) & np.isfinite(self.max)).all(axis=1))
 
-    def __len__(self) -> int:
-        return len(self.min)
-
     def corners(self) -> Floats:
         """Corners (N, 4, 2) of boxes in 2-D, in order."""
         made = np.empty((len(self), 4, 2))
@@ -206,20 +221,14 @@ class Aabbs(Volumes):
 
     def core(self) -> Core:
         """Four corners in 2-D, min and max in 3-D."""
-        points = self.corners() if self.d == 2 else np.stack([self.min, self.max], axis=1)
-        return Core(points.reshape(-1, self.d), *_even(len(self), points.shape[1]), np.zeros(len(self)))
-
-    def _moved(self, move: Move, factor: Floats) -> Self:
-        rows = np.arange(len(self))
-        return type(self)(move(self.min, rows), move(self.max, rows))
+        if self.d == 3:
+            return super().core()
+        return Core(self.corners().reshape(-1, 2), *_even(len(self), 4), np.zeros(len(self)))
 
     def _turned(self, move: Move) -> Volumes:
         return Obbs.from_corners(
             move(self.corners().reshape(-1, 2), np.repeat(np.arange(len(self)), 4)).reshape(-1, 4, 2)
         )
-
-    def _chosen(self, rows: Ints) -> Self:
-        return type(self)(self.min[rows], self.max[rows])
 
 
 class Hulls(Volumes):
@@ -238,8 +247,13 @@ class Hulls(Volumes):
     @classmethod
     def around(cls, points: Floats, starts: Ints) -> Self:
         """Make the hulls of ragged rows of points (M, 2), which begin at `starts` (N,)."""
+        return cls._made(*outlines(reals("points", points, (None, 2)), starts))
+
+    @classmethod
+    def _made(cls, points: Floats, starts: Ints) -> Self:
+        """Make hulls of outlines."""
         made = cls.__new__(cls)
-        made.points, made.starts = outlines(reals("points", points, (None, 2)), starts)
+        made.points, made.starts = points, starts
         return made
 
     def translated(self, xy: object) -> Self:
@@ -249,17 +263,13 @@ class Hulls(Volumes):
         points = self.points + by
         if not ((points - by == self.points) & (points - self.points == by)).all():
             return super().translated(xy)
-        made = type(self).__new__(type(self))
-        made.points, made.starts = points, self.starts
-        return made._of(self.original)
+        return self._made(points, self.starts)._of(self.original)
 
     def _moved(self, move: Move, factor: Floats) -> Self:
         return self.around(move(self.points, rows_of(self.starts, len(self.points))[1]), self.starts)
 
     def _chosen(self, rows: Ints) -> Self:
-        made = type(self).__new__(type(self))
-        made.points, made.starts = rows_taken(self.points, self.starts, rows)
-        return made
+        return self._made(*rows_taken(self.points, self.starts, rows))
 
 
 class Obbs(Hulls):
@@ -298,7 +308,7 @@ class Polygons(Hulls):
     """Convex polygons: points (M, 2), and as `starts` the first point of each row (N,); either turning sense."""
 
     def __init__(self, points: object, starts: object) -> None:
-        given, first = ragged_points(points, starts)
+        given, first = _ragged_points(points, starts)
         row, (_, after) = rows_of(first, len(given))[1], neighbours(first, len(given))
         kept = (given != given[after]).any(axis=1)
         counts = np.bincount(row[kept], minlength=len(first))
@@ -306,33 +316,21 @@ class Polygons(Hulls):
             raise InputError(f"points: expected three distinct points or more in row {i}, got {max(counts[i], 1)}")
         given, first = given[kept], starts_of(counts)
         for i in np.flatnonzero(convex_rows(given, first) == 0).tolist():
-            raise InputError(
-                f"points: expected a convex polygon with an area in row {i}, got {shown(_row(given, first, i))}"
-            )
+            got = shown(np.split(given, first[1:])[i].tolist())
+            raise InputError(f"points: expected a convex polygon with an area in row {i}, got {got}")
         self.points, self.starts = outlines(given, first)
 
 
-class Capsules(Volumes):
+class Capsules(Columns):
     """Capsules: segments from a_xy to b_xy (N, 2), which may be points, grown by a radius (N,) of 0 or more."""
+
+    _point_columns = ("a_xy", "b_xy")
+    radius: Floats
 
     def __init__(self, a_xy: object, b_xy: object, radius: object) -> None:
         self.a_xy = reals("a_xy", a_xy, (None, 2))
         self.b_xy = reals("b_xy", b_xy, (len(self.a_xy), 2))
         self.radius = _radii(radius, len(self.a_xy))
-
-    def __len__(self) -> int:
-        return len(self.a_xy)
-
-    def core(self) -> Core:
-        """Two points."""
-        return Core(np.stack([self.a_xy, self.b_xy], axis=1).reshape(-1, 2), *_even(len(self), 2), self.radius)
-
-    def _moved(self, move: Move, factor: Floats) -> Self:
-        rows = np.arange(len(self))
-        return type(self)(move(self.a_xy, rows), move(self.b_xy, rows), self.radius * factor)
-
-    def _chosen(self, rows: Ints) -> Self:
-        return type(self)(self.a_xy[rows], self.b_xy[rows], self.radius[rows])
 
 
 def _points(field: str, values: object) -> Floats:
@@ -354,7 +352,7 @@ def _vectors(field: str, values: object, n: int, d: int) -> Floats:
     return reals(field, array, (n, d))
 
 
-def checked_starts(starts: object, total: int) -> Ints:
+def _checked_starts(starts: object, total: int) -> Ints:
     """Check indices of the first point or part of each row: they begin at 0 and rise."""
     first = integers("starts", starts, (None,), 0, max(total - 1, 0))
     if (len(first) and first[0] != 0) or (np.diff(first) < 1).any() or (total and not len(first)):
@@ -362,19 +360,14 @@ def checked_starts(starts: object, total: int) -> Ints:
     return first
 
 
-def ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
+def _ragged_points(points: object, starts: object) -> tuple[Floats, Ints]:
     """Check points (M, 2) of ragged rows and the index of each row's first point."""
     given = reals("points", points, (None, 2))
-    return given, checked_starts(starts, len(given))
+    return given, _checked_starts(starts, len(given))
 
 
 def _even(n: int, count: int) -> tuple[Ints, Ints]:
     return np.arange(n) * count, np.full(n, count)
-
-
-def _row(points: Floats, starts: Ints, i: int) -> list[list[float]]:
-    rows: list[list[float]] = np.split(points, starts[1:])[i].tolist()
-    return rows
 
 
 def _sum_outward(a: Floats, b: Floats, toward: float) -> Floats:
@@ -394,7 +387,7 @@ class Parts(Volumes):
         if not isinstance(parts, Volumes):
             raise InputError(f"parts: expected volumes of one kind, got {type(parts).__name__}")
         self.parts, self.d = parts, parts.d
-        self.starts = checked_starts(starts, len(parts))
+        self.starts = _checked_starts(starts, len(parts))
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -447,7 +440,7 @@ class ConcavePolygons(Parts):
     """
 
     def __init__(self, points: object, starts: object) -> None:
-        given, first = ragged_points(points, starts)
+        given, first = _ragged_points(points, starts)
         corners: list[Floats] = []
         lengths = []
         for i, row in enumerate(np.split(given, first[1:]) if len(first) else []):
@@ -478,20 +471,9 @@ def joined(volumes: Sequence[Volumes]) -> Volumes:
     if isinstance(first, Parts):
         counts = np.concatenate([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)])
         return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), starts_of(counts))
-    names = _COLUMNS[type(first)]
-    columns = [np.concatenate([getattr(v, name) for v in volumes]) for name in names]
-    if not isinstance(first, Hulls):
-        return type(first)(*columns)
-    made = type(first).__new__(type(first))
-    before = starts_of([len(v.points) for v in volumes if isinstance(v, Hulls)])
-    made.points, made.starts = columns[0], columns[1] + np.repeat(before, [len(v) for v in volumes])
-    return made
-
-
-_COLUMNS: dict[type[Volumes], tuple[str, ...]] = {
-    Circles: ("center", "radius"),
-    Aabbs: ("min", "max"),
-    Capsules: ("a_xy", "b_xy", "radius"),
-    Obbs: ("points", "starts"),
-    Polygons: ("points", "starts"),
-}
+    if isinstance(first, Columns):
+        columns = zip(*(v._columns() for v in volumes if isinstance(v, Columns)), strict=True)
+        return type(first)(*(np.concatenate(column) for column in columns))
+    hulls = [v for v in volumes if isinstance(v, Hulls)]
+    before = np.repeat(starts_of([len(v.points) for v in hulls]), [len(v) for v in hulls])
+    return hulls[0]._made(np.concatenate([v.points for v in hulls]), np.concatenate([v.starts for v in hulls]) + before)
