@@ -463,7 +463,9 @@ def test_no_call_is_made_for_what_a_scene_has_not(monkeypatch: pytest.MonkeyPatc
     fire(yard(), Disc(9), SHOTS, strategy="built")
     assert called == {"leave_out_absent": 1}
     assert fire(yard(), Disc(9.03125), SHOTS).verdict_counts()["hit"]
-    assert called == {"leave_out_absent": 1, "weight": 1}  # of the verdicts, that are asked for
+    assert called == {"leave_out_absent": 1}
+    assert fire(yard(), Disc(9.03125), SHOTS, strategy="spans").verdict_counts()["hit"]
+    assert called == {"leave_out_absent": 1, "weight": 2}  # of the rows, and of the verdicts that are asked for
     called.clear()
     fire(yard(), Disc(9), SHOTS, strategy="spans", exclude=[[5], *[[4]] * 8], prefilter="box")
     assert called == {"refused": 1, "weight": 1}

@@ -18,6 +18,7 @@ from ..grid.spans import Box, begins, meets_strip
 
 Words = npt.NDArray[np.uint64]
 Sums = npt.NDArray[np.uint32]
+NO_SUMS: Sums = np.zeros(0, np.uint32)
 Kind = TypeVar("Kind", bound=np.generic)
 
 WORD = 64

@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hitplanes.planes.bits import front_to_back, label_plane
-from hitplanes.planes.bits.bit_rows import PatternBits, Placed
+from hitplanes.planes.bits.bit_rows import NO_SUMS, PatternBits, Placed
 from hitplanes.planes.bits.cells import met_boxes
-from hitplanes.planes.bits.front_to_back import RoundHits, Rule
-from hitplanes.planes.bits.span_walk import OF_PATTERNS
+from hitplanes.planes.bits.front_to_back import NO_FLAGS, OrderedTiles, RoundHits, Rule
+from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
 from hitplanes.planes.bits.tiles import Ground, hit_by_few
 from hitplanes.planes.bits.visible import SHOT_BITS, View
 from hitplanes.planes.common.backend import kernels_of
@@ -37,7 +37,7 @@ from ..kinds.weapon import Weapon, big_of, fits, fits_at_reach, pattern_bits_of
 from .hits import Rows, rows_of_span_hits
 from .plan import Plan
 from .prefilter import Candidates, may_refuse, refused
-from .spans import QueryContext, direct, near_pairs
+from .spans import QueryContext, direct, inside, near_pairs
 
 PLACEMENTS_AT_ONCE = 2**15
 """Most placements of a part of a batch: 256 KB for each of their columns."""
@@ -130,15 +130,50 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
     return rows
 
 
-def verdicts_of(weapon: Weapon, shots: Shots, context: QueryContext) -> Ints:
-    """Samples (N, 5) of shots by verdict; the stack is the one that they were fired at."""
-    boxes = Candidates(context.candidates.items, context.stack)
+def verdicts_by_spans(request: Request, context: QueryContext) -> Ints:
+    """Samples (N, 5) of shots by verdict, by the reference; the stack is the one that they were fired at."""
+    boxes, weapon, shots = Candidates(context.candidates.items, context.stack), request.weapon, request.shots
     then = QueryContext(context.stack, context.bounds, context.pierce, boxes, Plan())
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for _, part in _chunks(shots, placements_for(weapon, shots.take(0, 1)), boxes):
         counts = direct(placements_for(weapon, part), part, then).counts
         verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     return np.concatenate(verdicts)
+
+
+def verdicts_by_tiles(request: Request, context: QueryContext) -> Ints:
+    """Samples (N, 5) of shots by verdict, by bit rows: the first item that a sample meets decides what becomes of it.
+
+    So occluders are counted like objects, and no shot pierces. A shot that refuses items is counted again as one that
+    accepts all: what it then meets besides is filtered. The tiles of a stack that the scene has left behind are gone,
+    unless items only moved; then the reference counts.
+    """
+    stack, items = request.stack, request.scene.items
+    if items.stack().forms != stack.forms or not request.traits.fits:
+        return verdicts_by_spans(request, context)
+    choosy, free = may_refuse(stack, request.shots), Rule(False, context.bounds)
+    tiles = items.tiles().ordered(stack, choosy)._replace(occluder=NO_FLAGS)
+    then = QueryContext(stack, context.bounds, False, Candidates(items, stack), Plan())
+    verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
+    for _, part, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, then.candidates):
+        counts = inside(placements, placements.boxes, then).reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1)
+        rule = _rule(request, part, placements)._replace(pierce=False) if choosy else free
+        own = _first_met(placements, tiles, rule, stack, len(part))
+        every = _first_met(placements, tiles, free, stack, len(part)) if choosy else own
+        counts[:, (Verdict.HIT, Verdict.OCCLUDED)] = own
+        counts[:, Verdict.FILTERED] = every.sum(axis=1) - own.sum(axis=1)
+        counts[:, Verdict.EMPTY] -= every.sum(axis=1)
+        verdicts.append(counts)
+    return np.concatenate(verdicts)
+
+
+def _first_met(placements: Placements, tiles: OrderedTiles, rule: Rule, stack: Stack, shots: int) -> Ints:
+    """Samples (N, 2) of shots that meet an object first, and an occluder first."""
+    windows = pattern_bits_of(placements.table.patterns)._replace(sums=NO_SUMS)
+    found = kernels_of(front_to_back).front_to_back(placed_of(placements), placements.pellets, windows, tiles, rule)
+    shot, _ = placements.shot_of(found.turn)
+    column = 2 * shot + stack.occluder[found.rank]
+    return np.bincount(column, found.samples, 2 * shots).astype(np.int64).reshape(-1, 2)
 
 
 def _chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:

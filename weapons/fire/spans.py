@@ -65,7 +65,7 @@ class SpanHits:
 def direct(volley: Placements, shots: Shots, context: QueryContext) -> SpanHits:
     """Walk the stack under every placement, but only where an item may be."""
     boxes = volley.boxes
-    counts = _inside(volley, boxes, context)
+    counts = inside(volley, boxes, context)
     if not len(context.stack):
         return _met(volley, Runs.joined([]), [], counts, context.plan)
     placement, rank = near_pairs(volley, np.arange(len(boxes)), boxes, context)
@@ -148,7 +148,7 @@ def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> 
     counts[:, Verdict.EMPTY] -= added.sum(axis=1)
 
 
-def _inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
+def inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
     """Counts (P, 5) before the walk: samples inside the bounds are EMPTY, the others OUTSIDE."""
     counts = np.zeros((len(boxes), len(OF_PATTERNS)), np.int64)
     counts[:, Verdict.EMPTY] = volley.count

@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import WORD, PatternBits, Sums, Words
+from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, big_pattern
 from hitplanes.planes.common.caches import LruCache
@@ -322,7 +322,6 @@ _kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lamb
 _kept_bigs: LruCache[ref[Pattern], BigPattern] = LruCache(WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES)
 
 _FULL = np.uint64(2**64 - 1)
-NO_SUMS: Sums = np.zeros(0, np.uint32)
 
 
 def _window_bytes(wide: int, high: int, weighted: bool) -> int:
