@@ -6,7 +6,7 @@ item is its place in the stack, 0 in front.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
 from typing import Any
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..common.checks import Bools, Ints
-from ..grid.spans import each_pixel, ragged
+from ..common.checks import Ints
+from ..grid.spans import Columns, each_pixel, ragged
 from ..scene.items import Stack
 
 Kinds = npt.NDArray[np.uint8]
@@ -47,7 +47,7 @@ VERDICT_OF = np.array(
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class Runs(Columns):
     """Runs of samples, sorted by (placement, y, x_first), disjoint within a placement.
 
     Parameters
@@ -62,29 +62,10 @@ class Runs:
     x_last: Ints
     ordinal: Ints
 
-    def __len__(self) -> int:
-        return len(self.placement)
-
-    @classmethod
-    def joined(cls, parts: list[Runs]) -> Runs:
-        """Runs of several parts, one after another."""
-        none = np.zeros(0, np.int64)
-        every = [cls(none, none, none, none, none), *parts]
-        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
-
-    def take(self, chosen: Ints | Bools | slice) -> Runs:
-        """The chosen runs, in order."""
-        return Runs(*(getattr(self, f.name)[chosen] for f in fields(self)))
-
     @property
     def lengths(self) -> Ints:
         """Samples of each run."""
         return self.x_last - self.x_first + 1
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return 5 * self.y.nbytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +84,7 @@ class Pairs:
 
 
 @dataclass(frozen=True, eq=False)
-class Events:
+class Events(Columns):
     """Events of the walk, in stretches of runs: kind, rank of the item, number of the run, and columns."""
 
     kind: npt.NDArray[np.integer[Any]]
@@ -111,22 +92,6 @@ class Events:
     run: Ints
     x_first: Ints
     x_last: Ints
-
-    @classmethod
-    def joined(cls, parts: list[Events]) -> Events:
-        """Events of several parts, one after another."""
-        none = np.zeros(0, np.int64)
-        every = [cls(none, none, none, none, none), *parts]
-        return cls(*(np.concatenate([getattr(e, f.name) for e in every]) for f in fields(cls)))
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return self.kind.nbytes + 4 * self.run.nbytes
-
-    def take(self, chosen: Ints | Bools) -> Events:
-        """The chosen events."""
-        return Events(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
 # house: hit rule of areas

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,33 @@ import numpy.typing as npt
 from ..common.checks import Bools, Floats, Ints
 
 Box = tuple[int, int, int, int]
+
+
+class Columns:
+    """Base of dataclasses whose fields are columns of equal length."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __len__(self) -> int:
+        return len(getattr(self, next(iter(self.__dataclass_fields__))))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(int(getattr(self, name).nbytes) for name in self.__dataclass_fields__)
+
+    def take(self, rows: Ints | Bools | slice) -> Self:
+        """Some of the rows, in order."""
+        return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Rows of several parts, one after another; the columns of no parts are int64."""
+        if len(parts) == 1:
+            return parts[0]
+        none = [np.zeros(0, np.int64)] * (not parts)
+        names = cls.__dataclass_fields__
+        return cls(*(np.concatenate([*none, *(getattr(part, name) for part in parts)]) for name in names))
 
 
 def begins(group: Ints) -> Bools:

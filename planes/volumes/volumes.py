@@ -141,7 +141,7 @@ class Volumes(ABC):
         return self
 
 
-class Columns(Volumes):
+class ColumnVolumes(Volumes):
     """Volumes of as many points each, in the columns `_point_columns`, and of the column `radius` if they have one."""
 
     _point_columns: tuple[str, ...]
@@ -168,7 +168,7 @@ class Columns(Volumes):
         return type(self)(*(column[rows] for column in self._columns()))
 
 
-class Circles(Columns):
+class Circles(ColumnVolumes):
     """Circles or spheres: center (N, d) with d 2 or 3, radius (N,) of 0 or more."""
 
     _point_columns = ("center",)
@@ -180,7 +180,7 @@ class Circles(Columns):
         self.radius = _radii(radius, len(self.center))
 
 
-class Aabbs(Columns):
+class Aabbs(ColumnVolumes):
     """Axis-aligned boxes: min and max (N, d) with d 2 or 3, min <= max; they may be flat, or points."""
 
     _point_columns = ("min", "max")
@@ -321,7 +321,7 @@ class Polygons(Hulls):
         self.points, self.starts = outlines(given, first)
 
 
-class Capsules(Columns):
+class Capsules(ColumnVolumes):
     """Capsules: segments from a_xy to b_xy (N, 2), which may be points, grown by a radius (N,) of 0 or more."""
 
     _point_columns = ("a_xy", "b_xy")
@@ -471,8 +471,8 @@ def joined(volumes: Sequence[Volumes]) -> Volumes:
     if isinstance(first, Parts):
         counts = np.concatenate([rows_of(v.starts, len(v.parts))[0] for v in volumes if isinstance(v, Parts)])
         return first._same(joined([v.parts for v in volumes if isinstance(v, Parts)]), starts_of(counts))
-    if isinstance(first, Columns):
-        columns = zip(*(v._columns() for v in volumes if isinstance(v, Columns)), strict=True)
+    if isinstance(first, ColumnVolumes):
+        columns = zip(*(v._columns() for v in volumes if isinstance(v, ColumnVolumes)), strict=True)
         return type(first)(*(np.concatenate(column) for column in columns))
     hulls = [v for v in volumes if isinstance(v, Hulls)]
     before = np.repeat(starts_of([len(v.points) for v in hulls]), [len(v) for v in hulls])

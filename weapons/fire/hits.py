@@ -10,13 +10,13 @@ import numpy as np
 
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.caches import cached_attribute
-from hitplanes.planes.common.checks import InputError, Ints, integer
+from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans, merged_runs
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
-from ..kinds.placements import ONES, ZEROS, Columns, Placements, Shots
+from ..kinds.placements import ONES, ZEROS, Placements, ShotColumns, Shots
 from ..kinds.weapon import Weapon
 from .plan import Plan
 from .spans import SpanHits
@@ -56,7 +56,7 @@ class OwnerRow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Rows(Columns):
+class Rows(ShotColumns):
     """Columns of rows, ordered by (shot, round, distance2, first y, first x, place in the stack).
 
     A column that is not given is made from DEFAULTS when it is read.
@@ -109,7 +109,7 @@ class Rows(Columns):
         """Bytes of the columns that were given or made."""
         return 8 * len(self.shot) * (len(vars(self)) + 1)  # `first_xy` has two numbers a row
 
-    def take(self, rows: Ints | slice) -> Rows:
+    def take(self, rows: Ints | Bools | slice) -> Rows:
         """Some of the rows."""
         return Rows.of({name: column[rows] for name, column in vars(self).items()})
 

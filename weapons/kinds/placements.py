@@ -19,25 +19,23 @@ from hitplanes.planes.common.checks import InputError, Ints, array_of, each, int
 from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, unit_toward
+from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.scene import one_place, points
 
 from .areas import AreaWeapon, has_no_range, parts_of, pattern_of
 from .weapon import PatternTable, Weapon
 
-C = TypeVar("C", bound="Columns")
+C = TypeVar("C", bound="ShotColumns")
 
 ZEROS, ONES = (np.broadcast_to(np.int64(value), 2**48) for value in (0, 1))
 """Constants whose slices are columns of one value that take no memory."""
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns of equal length; the first is `shot`."""
+class ShotColumns(Columns):
+    """Columns of equal length, sorted by the first, `shot`."""
 
     shot: Ints
-
-    def __len__(self) -> int:
-        return len(self.shot)
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -45,15 +43,6 @@ class Columns:
         return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     __hash__ = None  # type: ignore[assignment]
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return sum(int(column.nbytes) for column in vars(self).values())
-
-    def take(self: C, rows: Ints | slice) -> C:
-        """Some of the rows."""
-        return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def of_shot(self: C, shot: int) -> C:
         """Rows of one shot."""
@@ -64,13 +53,6 @@ class Columns:
         names = [f.name for f in fields(self)]
         columns = [getattr(self, name).tolist() for name in names]
         return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
-
-    @classmethod
-    def joined(cls: type[C], parts: Sequence[C]) -> C:
-        """Rows of one or more parts, one after another."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
     # house: row order
     @classmethod

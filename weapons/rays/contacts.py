@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
@@ -25,7 +25,7 @@ from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
 from hitplanes.planes.grid.fixed_point import pixel, scaled, snap, turned, unit
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
-from hitplanes.planes.grid.spans import Box, merged_runs, pieces, ragged
+from hitplanes.planes.grid.spans import Box, Columns, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack, clipped
 
 from ..fire.plan import Plan
@@ -36,7 +36,7 @@ from ..kinds.rays import Projectile, RayWeapon, Sweep
 
 
 @dataclass(frozen=True, eq=False)
-class Rays:
+class Rays(Columns):
     """Columns of rays, sorted by (shot, round, pellet).
 
     Parameters
@@ -52,23 +52,6 @@ class Rays:
     shot: Ints
     round: Ints
     pellet: Ints
-
-    def __len__(self) -> int:
-        return len(self.shot)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return sum(int(column.nbytes) for column in vars(self).values())
-
-    def take(self, first: int, last: int) -> Rays:
-        """Rays first .. last - 1."""
-        part = slice(first, last)
-        return replace(self, **{name: getattr(self, name)[part] for name in self.__dataclass_fields__})
-
-    def pick(self, rows: Ints) -> Rays:
-        """Rays by their numbers."""
-        return replace(self, **{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
 
 Parts = tuple[Rounds | None, Spread | Sweep | None, RayWeapon]
@@ -334,7 +317,7 @@ def reasons_at(stack: Stack, rank: Ints) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class Terminations:
+class Terminations(Columns):
     """Columns of the ends of rays.
 
     Parameters
@@ -355,18 +338,6 @@ class Terminations:
     rank: Ints
     alone: Bools
     fraction: Floats
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the columns."""
-        return sum(int(column.nbytes) for column in vars(self).values())
-
-    @classmethod
-    def joined(cls, parts: Sequence[Terminations]) -> Terminations:
-        """Ends of all lists, one after the other."""
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
     def replaced(self, rays: Bools, other: Terminations) -> Terminations:
         """Copy in which the ends of the rays of a mask (R,) are those of another list."""

@@ -139,7 +139,7 @@ def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: s
         rest = way_of_rest(way, through.stack, len(left))
         through = replace(through, candidates=choose(len(left) if rest == "walk" else 0))
         through.plan.run("plan", "")
-        ends.put(left, _first_ends(rays.pick(left), ray, shots, through, rest, choose))
+        ends.put(left, _first_ends(rays.take(left), ray, shots, through, rest, choose))
     return ends
 
 
@@ -158,7 +158,7 @@ def _walked(
         most = min(most, CHUNK_PAIRS // max(len(through.stack), 1))
     step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, through.stack))))
     while begin < max(len(rays), 1):
-        some = rays.take(begin, begin + step)
+        some = rays.take(slice(begin, begin + step))
         met, ends, lines, relative = trace(some, ray, shots, through)
         through.plan.run("walk", "")
         yield some, met, ends, lines, relative

@@ -22,7 +22,7 @@ from .. import late
 from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan
 from ..kinds.areas import ray_parts_of
-from ..kinds.placements import Columns, Shots
+from ..kinds.placements import ShotColumns, Shots
 from ..kinds.weapon import Weapon, smoothed
 from .contacts import Contacts, Parts, Rays, Reason, Terminations, last_of_each, stretches
 
@@ -39,7 +39,7 @@ On straight edges and circles its mean error is 4 degrees."""
 
 
 @dataclass(frozen=True, eq=False)
-class Passes(Columns):
+class Passes(ShotColumns):
     """Passes of rays through objects, sorted by (shot, round, pellet, order).
 
     Parameters
@@ -76,7 +76,7 @@ class Passes(Columns):
 
 
 @dataclass(frozen=True, eq=False)
-class Stops(Columns):
+class Stops(ShotColumns):
     """Stops of rays, where a bullet hole goes, sorted by (shot, round, pellet).
 
     Parameters

@@ -35,7 +35,7 @@ from ..fire.call import fire
 from ..fire.hits import Hits
 from ..fire.plan import PlanSum
 from ..kinds.areas import arsenal_of
-from ..kinds.placements import Columns
+from ..kinds.placements import ShotColumns
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
 from .shot_log import Salvo, ShotReader, body_of, read_lines
@@ -319,7 +319,7 @@ PASSES = (
 """Columns of a pass of a ray; a name that ends in _xy stands for two numbers."""
 
 STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
-"""Columns of the end of a ray; a name that ends in _xy stands for two numbers."""
+"""ShotColumns of the end of a ray; a name that ends in _xy stands for two numbers."""
 
 LINES_FIRST, LINES_MAX = 16, 16384
 """Lines of the first chunk, small as each shot may hit thousands of objects, and of the largest useful chunk."""
@@ -508,7 +508,7 @@ def _answers(hits: Hits) -> Iterator[bytes]:
         yield f'"rows":{rows[first:last]},"verdicts":{verdicts}'.replace(" ", "").encode()
 
 
-def _lists(columns: Columns, names: Sequence[str]) -> list[list[float]]:
+def _lists(columns: ShotColumns, names: Sequence[str]) -> list[list[float]]:
     """Return columns as rows of numbers; a column of points becomes two."""
     every = [getattr(columns, name) for name in names]
     flat = [array.T.tolist() if array.ndim == 2 else [array.tolist()] for array in every]

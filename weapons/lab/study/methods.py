@@ -22,12 +22,12 @@ from hitplanes.planes.scene.sprite import Sprite
 
 from ...fire.call import fire
 from ...fire.hits import Hits
-from ...kinds.placements import Columns, Words, mix64
+from ...kinds.placements import ShotColumns, Words, mix64
 from ...kinds.weapon import Weapon
 
 
 @dataclass(frozen=True, eq=False)
-class Decisions(Columns):
+class Decisions(ShotColumns):
     """Pairs (shot, object) that are hit; all other pairs are misses.
 
     Parameters
