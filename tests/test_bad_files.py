@@ -322,11 +322,7 @@ WORDS_NOT_YET = [
     pytest.param(words_of(*ONE, "--aim", "north"), "--aim", id="aim, a word"),
     pytest.param(words_of(*ONE, "--seed", "1.5"), "--seed", id="seed, half"),
     pytest.param(words_of(*ONE, "--seed", "9" * 5000), "--seed", id="seed, 5000 digits"),
-    pytest.param(
-        words_of("-o", "r.png", "--json", "loop.json"),
-        "--json|output",
-        id="facts, link to itself",
-    ),
+    pytest.param(words_of("-o", "r.png", "--json", "loop.json"), "--json|output", id="facts, link to itself"),
 ]
 
 

@@ -232,8 +232,7 @@ def pytest_runtest_protocol(item, nextitem):
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["-p no:cacheprovider", "-p no:xdist", "-p no:terminal", "--rootdir=..", "-qq", "--no-summary"],
+    "words", ["-p no:cacheprovider", "-p no:xdist", "-p no:terminal", "--rootdir=..", "-qq", "--no-summary"]
 )
 def test_runs_of_other_kinds(game: pytest.Pytester, words: str) -> None:
     assert game.runpytest_inprocess("--hits-stale", *words.split()).ret == 0

@@ -27,10 +27,7 @@ MAX_PX = 2.0**40  # the largest position
 near_ties = st.integers(-(2**20), 2**20).map(lambda n: n / 1024)
 positions = st.one_of(near_ties, st.floats(-MAX_PX, MAX_PX), st.floats(-100, 100))
 # Angles on a binary grid: a quarter turn can be added to them, or they can be taken from one, without rounding.
-grid_angles = st.one_of(
-    st.integers(-3600, 3600).map(float),
-    st.integers(-(2**40), 2**40).map(lambda n: n * 2.0**-20),
-)
+grid_angles = st.one_of(st.integers(-3600, 3600).map(float), st.integers(-(2**40), 2**40).map(lambda n: n * 2.0**-20))
 any_angle = st.one_of(
     grid_angles,
     st.floats(-720, 720),

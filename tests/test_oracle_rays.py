@@ -222,9 +222,7 @@ def test_what_is_just_enough_is_used_up() -> None:
     """All is spent on the first: the ray ends where it leaves it."""
     a, b = drawn("..aaa..bb.", "a", 0), drawn("..aaa..bb.", "b", 1)
     found = shot((0, 0), (9, 0), a, b, budget_256=3 * PX)
-    assert [(one.object, one.cells, one.material) for one in found.passes] == [
-        (0, [(2, 0), (3, 0), (4, 0)], 3.0),
-    ]
+    assert [(one.object, one.cells, one.material) for one in found.passes] == [(0, [(2, 0), (3, 0), (4, 0)], 3.0)]
     assert (found.stop.reason, px(found, found.stop.time), found.walked) == ("budget", 4.5, 5)
     assert (found.stop.item, found.stop.cell_xy) == (0, (4, 0))
     for budget, objects in ((-1, [0]), (1, [0, 1])):

@@ -17,21 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import (
-    Box,
-    Disc,
-    History,
-    Laser,
-    Pistol,
-    Point,
-    Rifle,
-    Scene,
-    Spread,
-    Sprite,
-    Weapon,
-    fire,
-    report_of,
-)
+from hitplanes import Box, Disc, History, Laser, Pistol, Point, Rifle, Scene, Spread, Sprite, Weapon, fire, report_of
 from hitplanes.planes.bits import bit_rows, distance_field, front_to_back, label_plane, visible
 from hitplanes.planes.broadphase import boxes
 from hitplanes.planes.scene import items, render

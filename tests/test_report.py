@@ -284,12 +284,7 @@ def test_what_is_no_list_of_hits_is_refused() -> None:
 
 @pytest.mark.parametrize(
     ("at", "view"),
-    [
-        ((5000, 150), (4736, 0, 5264, 299)),
-        ((2 * 10**5, 50), None),
-        ((-9000, 50), None),
-        ((5000, -5000), None),
-    ],
+    [((5000, 150), (4736, 0, 5264, 299)), ((2 * 10**5, 50), None), ((-9000, 50), None), ((5000, -5000), None)],
 )
 def test_a_view_of_a_wide_world_lies_in_it_and_is_no_sliver(at: tuple[int, int], view: tuple[int, ...] | None) -> None:
     scene = Scene((10**5, 300))

@@ -319,11 +319,7 @@ POINTS = st.tuples(*2 * [st.integers(-1500, 1500)])
     positions,
 )
 def test_placed_polygon_is_the_reference(
-    rings: list[list[tuple[int, int]]],
-    flip: str,
-    scale: tuple[float, float],
-    angle: float,
-    position: tuple[int, int],
+    rings: list[list[tuple[int, int]]], flip: str, scale: tuple[float, float], angle: float, position: tuple[int, int]
 ) -> None:
     first, *holes = [np.array(ring) / 256 for ring in rings]
     expected = oracle.placed_polygon(rings, turn_of(flip, scale, angle), position)

@@ -87,8 +87,7 @@ aimed = st.one_of(
     st.builds(lambda shot, x, y: {**shot, "toward": [shot["at"][0] + x, y]}, usual, st.integers(1, 99), coordinate),
 )
 unusual = st.one_of(
-    st.builds(lambda shot: {**shot, "seed": 7.0}, aimed),
-    st.builds(lambda shot: {**shot, "exclude": [3.0]}, aimed),
+    st.builds(lambda shot: {**shot, "seed": 7.0}, aimed), st.builds(lambda shot: {**shot, "exclude": [3.0]}, aimed)
 )
 
 

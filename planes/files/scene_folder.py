@@ -66,12 +66,7 @@ PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
 ID = Whole(0, ITEMS_MAX - 1)
-FRAMES = Keys(
-    {
-        "grid_wh": Wholes((2,), 1, MASK_SIDE_MAX),
-        "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX),
-    }
-)
+FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
 SOURCES: dict[str, dict[str, Value]] = {
     "image": {
         "image": Text(),

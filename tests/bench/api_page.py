@@ -244,12 +244,7 @@ def summary(thing: Any) -> str:
 
 def page() -> str:
     """The whole page."""
-    lines = [
-        "# The public API",
-        "",
-        f"`{COMMAND}` writes this page from signatures and docstrings; edit those.",
-        "",
-    ]
+    lines = ["# The public API", "", f"`{COMMAND}` writes this page from signatures and docstrings; edit those.", ""]
     names = dict.fromkeys(name for group in GROUPS.values() for name in group)
     left = [name for name in MODULES["hitplanes"] if name not in names]
     for heading, group in {**GROUPS, **({"Others": tuple(left)} if left else {})}.items():

@@ -17,11 +17,7 @@ from pathlib import Path
 from hitplanes import Disc, load_scene
 
 ROOT = Path(__file__).parents[2]
-MIXES = {
-    "point": ["point"],
-    "disc r=8": ["disc"],
-    "mixed": ["point"] * 14 + ["disc"] * 3 + ["shotgun"] * 2 + ["blast"],
-}
+MIXES = {"point": ["point"], "disc r=8": ["disc"], "mixed": ["point"] * 14 + ["disc"] * 3 + ["shotgun"] * 2 + ["blast"]}
 
 
 def write_log(path: Path, weapons: list[str], shots: int) -> None:

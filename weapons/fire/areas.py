@@ -209,12 +209,7 @@ def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
             place, tile = tiles.of(rank)
             near = placement[place], tile
         found = kernels_of(front_to_back).front_to_back(
-            placed_of(placements),
-            placements.pellets,
-            windows,
-            ordered,
-            rule,
-            near,
+            placed_of(placements), placements.pellets, windows, ordered, rule, near
         )
         tests = f"{'' if request.filtered else 'boxes, '}{'strips, ' * bool(len(windows.strips))}filters and occluders"
         parts.append(_rows_of(placements, found, stack.ids).later(begin))

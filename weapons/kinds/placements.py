@@ -340,14 +340,7 @@ class Placements:
 
 
 def checked_shots(
-    weapon: Weapon,
-    at: object,
-    aim: object,
-    toward: object,
-    accept: object,
-    exclude: object,
-    seed: object,
-    shot: object,
+    weapon: Weapon, at: object, aim: object, toward: object, accept: object, exclude: object, seed: object, shot: object
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
     at_256, single = _places(at)

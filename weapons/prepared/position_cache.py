@@ -14,15 +14,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from hitplanes.planes.bits.tiles import (
-    BigPattern,
-    BigTiles,
-    Ground,
-    Hit,
-    big_pattern,
-    hit_by_one,
-    integers_ns,
-)
+from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, big_pattern, hit_by_one, integers_ns
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
 from hitplanes.planes.common.limits import POSITION_MAX, WEIGHT_FULL

@@ -481,11 +481,7 @@ def _rates(met: Contacts, cost: Ints) -> tuple[Ints, Ints, Ints]:
     ray = np.concatenate([met.ray[pair]] * 2)
     time, change = np.concatenate([first, last]), np.concatenate([rate, -rate])
     order = np.lexsort((time, ray))
-    return (
-        ray[order],
-        time[order],
-        np.cumsum(change[order]),
-    )  # a ray leaves all that it enters: the next starts at 0
+    return (ray[order], time[order], np.cumsum(change[order]))  # a ray leaves all that it enters: the next starts at 0
 
 
 def _spent(ray: Ints, time: Ints, slope: Ints, scale: Ints) -> npt.NDArray[Any]:

@@ -273,10 +273,7 @@ def _curves(alone: Scene, at: Ints, radius: int, whole: int, seed: int) -> tuple
 
     every = fired_method(None, alone, Disc(radius, pierce=True), lambda hits: _parts(hits, whole), at=at)
     note = "a share is a part of the pellets; it does not tell where it hit"
-    return (
-        Curve("pellets", "pellets", tuple(map(by_pellets, PELLETS)), note),
-        Curve("every pixel", "", (every,)),
-    )
+    return (Curve("pellets", "pellets", tuple(map(by_pellets, PELLETS)), note), Curve("every pixel", "", (every,)))
 
 
 def _shares(hits: Hits, pellets: int) -> Decisions:
