@@ -709,3 +709,9 @@ def test_a_sprite_of_another_process_is_hit_where_it_is() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 def test_sprites_of_two_forked_processes_are_two() -> None:
     assert ran(FORKED).split() == ["29", "2821"]
+
+
+@pytest.mark.parametrize("frames", [np.ones((3, 3), np.bool_), [], (np.ones((3, 3), np.bool_),), "disc.png", None])
+def test_a_sprite_is_not_made_of_an_array_by_its_own_name(frames: Any) -> None:
+    with pytest.raises(InputError, match=r"^frames: expected a tuple of frames, got .*: Sprite.from_mask and"):
+        Sprite(frames)

@@ -281,6 +281,12 @@ class Sprite(Known):
     source: dict[str, Any] | None = None
     uid: int = field(default_factory=_uids.__next__, init=False)
 
+    def __post_init__(self) -> None:
+        """Refuse what is no frames, such as the array of a mask."""
+        if not (isinstance(self.frames, tuple) and all(isinstance(frame, Frame) for frame in self.frames)):
+            how = "Sprite.from_mask and Sprite.from_image make sprites of arrays"
+            raise InputError(f"frames: expected a tuple of frames, got {shown(self.frames)}: {how}")
+
     @classmethod
     def from_image(
         cls,
