@@ -40,7 +40,7 @@ from hitplanes import (
     fire,
     weapon_from_json,
 )
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.grid.fixed_point import ONE, unit
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.fire import prefilter as narrow

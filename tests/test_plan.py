@@ -499,7 +499,7 @@ START = "from hitplanes import Disc, Pistol, Scene, fire; scene = Scene((99, 99)
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
     "bits.bit_rows bits.cells bits.front_to_back bits.label_plane bits.span_walk bits.tiles bits.visible"
-    " common.backend common.caches common.checks common.costs common.limits common.tables grid.fixed_point"
+    " common.backend common.checks common.costs common.limits common.tables grid.fixed_point"
     " grid.rasterize grid.spans late scene.items scene.render scene.scene scene.sprite"
 )
 OF_FIRE = (

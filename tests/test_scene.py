@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hitplanes import Disc, Laser, Point, fire
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.files.scene_folder import load_scene

@@ -21,7 +21,7 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import VARIANT_BYTES
 from hitplanes.planes.scene import sprite as module

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.backend import kernels_of
-from ..common.caches import LruCache, cached_attribute
+from ..common.backend import LruCache, cached_attribute, kernels_of
 from ..common.checks import Bools, Ints
 from ..common.limits import ALL
 from ..grid.spans import Box

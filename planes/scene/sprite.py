@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..common.backend import kernels_of
-from ..common.caches import LruCache
+from ..common.backend import LruCache, kernels_of
 from ..common.checks import (
     Bools,
     Image,

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.caches import LruCache
+from ..common.backend import LruCache
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, bools, integer, real, reals
 from ..common.limits import (
     BOUNDING_BYTES,

@@ -18,7 +18,7 @@ from typing import Any
 
 import hitplanes
 from hitplanes.planes.broadphase import __all__ as broad_phases
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute
 
 PAGE = Path(__file__).parents[2] / "weapons" / "API.md"
 COMMAND = "python tests/bench/api_page.py"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hitplanes.planes.bits.span_walk import Verdict
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans, merged_runs

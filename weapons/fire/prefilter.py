@@ -20,8 +20,7 @@ import numpy as np
 from hitplanes.planes import late
 from hitplanes.planes.bits import cells
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, Kinds, Pairs
-from hitplanes.planes.common.backend import kernels_of
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import Bools, Ints, choice
 from hitplanes.planes.common.limits import (
     BOUNDING_BYTES,

@@ -11,7 +11,7 @@ from weakref import ref
 
 import numpy as np
 
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed

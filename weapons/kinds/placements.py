@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.common.backend import kernels_of
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from hitplanes.planes.grid import fixed_point

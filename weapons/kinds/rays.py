@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import PELLETS_MAX, REACH_MAX, STEPS_MAX
 from hitplanes.planes.common.tables import Number, Optional, Value, Whole, Word

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, big_pattern
-from hitplanes.planes.common.caches import LruCache
+from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value

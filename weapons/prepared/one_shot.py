@@ -10,7 +10,7 @@ import numpy as np
 
 from hitplanes.planes.bits.span_walk import OF_PATTERNS
 from hitplanes.planes.bits.visible import View
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
 from hitplanes.planes.grid.fixed_point import snap, unit_toward

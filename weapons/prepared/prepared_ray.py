@@ -17,7 +17,7 @@ import numpy as np
 
 from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
 from hitplanes.planes.bits.raycast import Cast, Touched
-from hitplanes.planes.common.caches import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
