@@ -345,7 +345,7 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     """Of a square on a square all is known by hand: 9 samples in 3 runs, on one item."""
     scene = Scene((99, 99))
     scene.add(np.ones((5, 5), np.bool_), (20, 20))
-    word, runs, hits = 8, 3 * 5 * 8, 3 * 5 * 8
+    word, runs = 8, 3 * 5 * 8
     told = {
         "shots": 2 * word,
         "stack": 8 * word + 1,
@@ -357,7 +357,7 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
         "pre-filter": 3 * word,
         "samples": runs,
         "walk": 9 + 3 * (1 + 4 * word),
-        "rows": hits + runs + 10 * word,
+        "rows": runs + 10 * word,
     }
     weapon = Box(3, 3, falloff="linear")
     for now in (told, {**told, "stack": 0}):

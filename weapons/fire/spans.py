@@ -178,7 +178,8 @@ def _laid(volley: Placements, placements: Ints, boxes: Ints) -> Runs:
 def _met(volley: Placements, runs: Runs, events: list[Events], counts: Ints, plan: Plan) -> SpanHits:
     hit = Events.joined(events)
     under = runs.take(hit.run)
-    plan.run("rows", "hit pixels, gathered by object", hit.nbytes + under.nbytes)
+    joined = hit.nbytes if len(events) > 1 else 0  # of one part nothing is copied
+    plan.run("rows", "hit pixels, gathered by object", joined + under.nbytes)
     weight = volley.table.weight(under.ordinal, hit.x_first, hit.x_last)
     if volley.table.prefix is not None:
         plan.run("weights", "", weight.nbytes)
