@@ -27,11 +27,11 @@ from hitplanes.planes.files.png import write_text
 from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
+from ..peers import PEERS, installed, of_peer
 from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike
 from ..study.study import markdown_table
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
-from .rivals import PEERS, installed, of_peer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,16 +1,18 @@
-"""The study's methods for discs (pixel planes at several scales, volumes of every kind), and kinds of shapes."""
+"""The study's question about discs, its methods (pixel planes at several scales, volumes), and kinds of shapes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from hitplanes.planes.common.checks import Bools, Floats, Ints
-from hitplanes.planes.common.limits import SUB, TRIG_BITS
+from hitplanes.planes.common.limits import SCALE_BITS, SUB, TRIG_BITS
 from hitplanes.planes.files.png import cv2
+from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, variant_of
 from hitplanes.planes.volumes import fit
@@ -22,8 +24,107 @@ from hitplanes.planes.volumes.volumes import Aabbs, Circles, ConcavePolygons, Pa
 from ...fire.call import fire
 from ...fire.hits import Hits
 from ...kinds.areas import Disc, Stencil
-from .methods import Curve, Decisions, Method, copied, enlarged, fired_method, scaled, unscaled
-from .peers import Discs
+from .methods import (
+    Curve,
+    Decisions,
+    Method,
+    Question,
+    copied,
+    drawn_places,
+    enlarged,
+    fired_method,
+    scaled,
+    size_of,
+    targets_of,
+    unscaled,
+)
+from .truth import Round, Straight, discs_on_shapes, parts_of_discs, placed_rings
+
+REACH = 8
+"""Median size of the objects, in radii of the disc."""
+
+RADIUS_MAX = 32
+"""Largest radius of a disc, px; at scale 4 it becomes 128 px, with 51,000 samples per shot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Shots with discs of one radius, and the objects that they are fired at.
+
+    Parameters
+    ----------
+    scene : the objects, numbered from 0
+    exact : (M,) whether the exact shape of an object is known
+    at : (N, 2) px; whole numbers if no shape is exact
+    aimed : (N,) the object near which a shot is
+    radius : px
+    """
+
+    scene: Scene
+    exact: Bools
+    at: Floats
+    aimed: Ints
+    radius: float
+
+
+def discs_at(alone: Scene, shots: int, seed: int) -> Discs:
+    """Draw discs, each uniformly in the box of an object grown by twice the radius.
+
+    Parameters
+    ----------
+    alone : the objects, numbered from 0, each with a pixel
+    shots : number of discs
+    seed : random seed of the places
+    """
+    targets, count = targets_of(alone), len(alone)
+    exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
+    radius = min(max(1, round(size_of(targets) / REACH)), RADIUS_MAX)
+    place, _, near = drawn_places(targets, shots, seed, 2 * SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
+    at = place / SUB if exact.any() else pixel(place).astype(np.float64)
+    items = np.array([item for item, _, _ in targets] or [0])
+    return Discs(alone, exact, at, items[near], float(radius))
+
+
+def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
+    """Return the question which objects discs touch, with its true answers."""
+    exact, masks = int(discs.exact.sum()), int((~discs.exact).sum())
+    texts = [f"exact shapes of {exact} objects"] * bool(exact) + [f"masks at full scale of {masks}"] * bool(masks)
+    asks = f"Which objects does a disc of radius {discs.radius:g} px touch?"
+    truth = " and ".join(texts) or "nothing can be hit"
+    return Question("areas", asks, len(discs.at), _truth(discs), truth, tuple(curves), aimed=discs.aimed)
+
+
+def _truth(discs: Discs) -> Decisions:
+    """Return the exact shapes and the masks that discs touch, with places and shares."""
+    exact = np.flatnonzero(discs.exact)
+    of = discs_on_shapes(discs.at, discs.radius, [_shape(discs.scene, item) for item in exact.tolist()])
+    masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
+    on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
+    return Decisions.joined(
+        [
+            Decisions(of.shot, exact[of.object], of.xy, of.share),
+            Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole),
+        ]
+    )
+
+
+def _is_exact(scene: Scene, item: int) -> bool:
+    """Whether the exact shape of an object is known, which holds for polygons and circles, but not for ellipses."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    return outline is not None and (outline.radius is None or form.scale_x == form.scale_y)
+
+
+def _shape(scene: Scene, item: int) -> Round | Straight:
+    """Return the exact shape of an object in the world."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    assert outline is not None  # it is exact
+    position = scene.items.position_256[item] / SUB
+    scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
+    if outline.radius is not None:
+        return Round(position, outline.radius / SUB * scale[0])
+    rings = [ring / SUB for ring in outline.rings]
+    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[item], position))
+
 
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
 PREFILTERS = ("none", "box", "circle", "oriented box", "4 boxes", "polygon")

@@ -18,6 +18,7 @@ from ...fire.hits import Hits
 from ...kinds.areas import Disc, Point, Spread
 from ...kinds.rays import Pistol, Projectile
 from ...rays.ray_hits import RayHits
+from ..peers import Segments, mover_curve, ray_curves
 from .methods import (
     Curve,
     Decisions,
@@ -32,7 +33,6 @@ from .methods import (
     targets_of,
     velocities_of,
 )
-from .peers import Segments, mover_peer_curve, peer_curves
 from .truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
 STEPS = tuple(2.0**k for k in range(4, -5, -1))
@@ -71,7 +71,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
         (
             _stepping(alone, start, step, length),
             *_supercover(alone, start, step),
-            *peer_curves(targets, Segments(start / SUB, (start + step) / SUB)),
+            *ray_curves(targets, Segments(start / SUB, (start + step) / SUB)),
         ),
     )
 
@@ -194,7 +194,7 @@ def _peer(alone: Scene, flights: Flights) -> Curve:
     targets = targets_of(alone)
     start, step = flights.start_256 / SUB, flights.step_256 / SUB
     moving = bool(velocities_of(alone, targets).any())
-    return mover_peer_curve(targets, Segments(start, start + step), flights.radius_256 / SUB, moving)
+    return mover_curve(targets, Segments(start, start + step), flights.radius_256 / SUB, moving)
 
 
 def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:

@@ -24,9 +24,9 @@ from ...fire.call import fire
 from ...fire.plan import plan_lines
 from ...kinds.areas import Disc
 from ...replay.stream import Progress
-from .area_questions import kind_of, plane_curves, volume_curves
-from .methods import Cost, Curve, Errors, Method, Question, copied, errors_of, measured
-from .peers import Discs, area_peer_curves, areas_question, discs_at
+from ..peers import disc_curves
+from .area_questions import Discs, areas_question, discs_at, kind_of, plane_curves, volume_curves
+from .methods import Cost, Curve, Errors, Method, Question, copied, errors_of, measured, targets_of
 from .ray_questions import movers_question, rays_question, spread_question
 
 FORMAT = "hitplanes-study/1"
@@ -129,8 +129,9 @@ def _leave_out(row: dict[str, Any], method: Method, error: InputError) -> None:
 
 
 def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
+    peers = disc_curves(targets_of(alone), discs.at, discs.radius)
     return [
-        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *area_peer_curves(discs)]),
+        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *peers]),
         rays_question(alone, shots, seed),
         movers_question(alone, shots, seed),
         spread_question(alone, max(1, shots // SPREAD_PART), seed),
