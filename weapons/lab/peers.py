@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -74,16 +75,14 @@ def squares_in_shapely(shapely: Any, targets: Sequence[Target]) -> Array:
     return np.array(shapes, object)
 
 
-def pygame_mask(mask: Bools) -> Any:
-    """Convert a mask to one of pygame."""
-    pygame = library("pygame")
-    rgba = np.repeat(np.where(mask, 255, 0).astype(np.uint8)[..., None], 4, axis=2)
-    return pygame.mask.from_surface(pygame.image.frombuffer(rgba.tobytes(), mask.shape[::-1], "RGBA"))
-
-
 def masks_in_pygame(pygame: Any, targets: Sequence[Target]) -> list[tuple[Any, Any]]:
     """Return a rectangle and a mask for each target."""
-    return [(pygame.Rect(x, y, mask.shape[1], mask.shape[0]), pygame_mask(mask)) for _, mask, (x, y) in targets]
+    world = []
+    for _, mask, corner in targets:
+        rgba, size = np.repeat(np.where(mask, 255, 0).astype(np.uint8)[..., None], 4, axis=2), mask.shape[::-1]
+        surface = pygame.image.frombuffer(rgba.tobytes(), size, "RGBA")
+        world.append((pygame.Rect(corner, size), pygame.mask.from_surface(surface)))
+    return world
 
 
 # Curves of a study
@@ -335,14 +334,18 @@ PEERS = {"shapely": "shapely", "pymunk": "pymunk", "pygame-ce": "pygame.geometry
 """Packages that provide the libraries, and the module that each is asked through."""
 
 
+def versions(*packages: str) -> dict[str, str]:
+    """Return the versions of the packages that are installed."""
+    found = {}
+    for name in packages:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
 def installed(peer: str) -> bool:
-    """Whether the package of a library is installed."""
-    if peer == "pymunk" and not __debug__:
-        return False  # without assertions it cannot report a missing contact
-    try:
-        return bool(version(peer))
-    except PackageNotFoundError:
-        return False
+    """Whether the package of a library is installed; pymunk without assertions cannot report a missing contact."""
+    return bool(versions(peer)) and (peer != "pymunk" or __debug__)
 
 
 def of_peer(peer: str, predicate: str) -> Callable[..., Bools] | None:

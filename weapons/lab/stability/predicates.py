@@ -28,11 +28,22 @@ from ...kinds.areas import Beam, Disc, Polygon
 from ...kinds.rays import Laser, Projectile
 from ...kinds.weapon import Weapon
 from . import textbook, truth
-from .families import MAKERS, POINT_FAMILIES, TRIANGLE_FAMILIES, TRIPLES, Columns, Rng, across, either, shape_pairs
+from .families import (
+    MAKERS,
+    POINT_FAMILIES,
+    TRIANGLE_FAMILIES,
+    TRIPLES,
+    Columns,
+    Make,
+    Rng,
+    across,
+    either,
+    random_sides,
+    shape_pairs,
+)
 from .truth import is_simple
 
 Whole = npt.NDArray[np.int64]
-Make = Callable[[Rng, int], Columns]
 
 PX, HALF = 256, 128
 
@@ -253,8 +264,7 @@ def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin
         if is_simple(ring.tolist()):
             rings.append(np.concatenate([ring, np.repeat(ring[-1:], 5 - len(ring), axis=0)]))
     every = _held(np.array(rings), n)
-    rows, side = np.arange(n), rng.integers(0, 5, n)
-    p, q = every[rows, side], every[rows, (side + 1) % 5]
+    p, q = random_sides(rng, every)
     share = np.where(rng.random(n) < 0.5, rng.choice([0.0, 0.5], n), rng.random(n))[:, None]
     near = np.rint((p + share * (q - p)) / PX).astype(np.int64)
     return every, near + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.3), _places(rng, n, *places)
@@ -273,7 +283,7 @@ PATTERN_FAMILIES: dict[str, Make] = {
 
 Array = npt.NDArray[Any]
 Method = Callable[..., Bools]
-Families = Mapping[str, Callable[[Rng, int], Columns]]
+Families = Mapping[str, Make]
 
 APART = 2**22
 """Distance between the areas of two rows, px; more than twice the reach of any shot."""

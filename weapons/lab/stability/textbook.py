@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from hitplanes.planes.common.checks import Bools, Floats
 
+from .families import cross3
+
 Array = npt.NDArray[Any]
 
 
@@ -95,7 +97,7 @@ def triangles(a: Floats, b: Floats) -> Bools:
     side_a = (a * normal_b[:, None]).sum(axis=2) + at_b[:, None]
     side_b = (b * normal_a[:, None]).sum(axis=2) + at_a[:, None]
     apart = [(side > 0).all(axis=1) | (side < 0).all(axis=1) for side in (side_a, side_b)]
-    along = np.abs(_cross3(normal_a, normal_b)).argmax(axis=1)
+    along = np.abs(cross3(normal_a, normal_b)).argmax(axis=1)
     rows = np.arange(len(a))
     (low_a, high_a), (low_b, high_b) = _interval(a[rows, :, along], side_a), _interval(b[rows, :, along], side_b)
     meet = (low_a <= high_b) & (low_b <= high_a) & ~apart[0] & ~apart[1]
@@ -104,12 +106,8 @@ def triangles(a: Floats, b: Floats) -> Bools:
     return np.asarray(meet)
 
 
-def _cross3(p: Floats, q: Floats) -> Floats:
-    return np.stack([p[:, k - 2] * q[:, k - 1] - p[:, k - 1] * q[:, k - 2] for k in range(3)], axis=1)
-
-
 def _plane(t: Floats) -> tuple[Floats, Floats]:
-    normal = _cross3(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    normal = cross3(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
     return normal, -(normal * t[:, 0]).sum(axis=1)
 
 

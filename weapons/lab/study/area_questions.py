@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -100,12 +100,8 @@ def _truth(discs: Discs) -> Decisions:
     of = discs_on_shapes(discs.at, discs.radius, [_shape(discs.scene, item) for item in exact.tolist()])
     masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
     on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
-    return Decisions.joined(
-        [
-            Decisions(of.shot, exact[of.object], of.xy, of.share),
-            Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole),
-        ]
-    )
+    on_masks = Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole)
+    return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), on_masks])
 
 
 def _is_exact(scene: Scene, item: int) -> bool:
@@ -179,17 +175,11 @@ def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
 
 def _decided_by_planes(fired: Fired, scale: float) -> Decisions:
     """Convert hits to decisions with the first pixel and the part of the disc's pixels that hit."""
-    return Decisions.joined(
-        [
-            Decisions(
-                hits.shot,
-                ids[hits.object],
-                unscaled(hits.first_xy.astype(np.float64), scale),
-                hits.samples / hits.verdicts.sum(axis=1)[hits.shot],
-            )
-            for hits, ids in fired
-        ]
-    )
+    found = []
+    for hits, ids in fired:
+        xy, share = hits.first_xy.astype(np.float64), hits.samples / hits.verdicts.sum(axis=1)[hits.shot]
+        found.append(Decisions(hits.shot, ids[hits.object], unscaled(xy, scale), share))
+    return Decisions.joined(found)
 
 
 BOXES = (1, 2, 4, 8, 16, 32, 64)
@@ -255,25 +245,24 @@ def _triangles(mask: Bools, tolerance: float) -> Volumes:
 
 def _pivot_circles(scene: Scene) -> list[Volumes]:
     """Fit circles around the pivots before rotation, which they do not need to follow."""
-    unturned = [_unturned(scene, item) for item in range(len(scene))]
-    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in unturned]
+    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in _unturned(scene)]
 
 
 def _reboxed(scene: Scene) -> list[Volumes]:
     """Rotate boxes of the unrotated masks, and return the bounds of their corners."""
-    boxes: list[Volumes] = []
-    for item in range(len(scene)):
-        mask, pivot_xy, corner_xy = _unturned(scene, item)
-        boxes.append(fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy))
-    return boxes
+    return [
+        fit.box(mask).rotated(scene.items.angles[item], pivot).bounds().translated(corner)
+        for item, (mask, pivot, corner) in enumerate(_unturned(scene))
+    ]
 
 
-def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
-    """Return the mask of an object before rotation, its pivot in the mask, and the position of the mask, px."""
+def _unturned(scene: Scene) -> Iterator[tuple[Bools, Floats, Floats]]:
+    """Yield the masks of objects before rotation, their pivots in the masks, and the positions of the masks, px."""
     items = scene.items
-    variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
-    pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
-    return variant.mask, pivot, items.position_256[item] / SUB - pivot
+    for item in range(len(scene)):
+        variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
+        pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
+        yield variant.mask, pivot, items.position_256[item] / SUB - pivot
 
 
 def _method(discs: Discs, setting: float | None, make: Make) -> Method:
@@ -354,8 +343,10 @@ TURNED_DEG = 15.0
 def kind_of(scene: Scene, item: int) -> str:
     """Classify the shape of an object that has pixels; the first kind that applies is returned."""
     mask, _ = scene.mask(item)
-    off = abs((scene.items.angles[item] + 45) % 90 - 45)
-    sides, radius = _oriented_sides(mask), float(fit.least_circle(mask).radius[0])
+    off, radius = abs((scene.items.angles[item] + 45) % 90 - 45), float(fit.least_circle(mask).radius[0])
+    corners, (x, y) = fit.oriented_box(mask).points, fit.hull(mask).points.T
+    sides = [math.sqrt(float((side**2).sum())) for side in np.diff(corners[:3], axis=0)]
+    hull_area = abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
     if _regions(mask, diagonal=True) > 1:
         return PARTS
     if _regions(~np.pad(mask, 1), diagonal=False) > 1:
@@ -366,7 +357,7 @@ def kind_of(scene: Scene, item: int) -> str:
         return TURNED
     if max(sides) >= LONG_LEAST * min(sides):
         return LONG
-    return CONCAVE if mask.sum() < CONCAVE_MOST * _hull_area(mask) else COMPACT
+    return CONCAVE if mask.sum() < CONCAVE_MOST * hull_area else COMPACT
 
 
 def kinds_scene() -> Scene:
@@ -393,14 +384,3 @@ def kinds_scene() -> Scene:
 def _regions(mask: Bools, diagonal: bool) -> int:
     """Number of connected regions of set pixels."""
     return int(cv2.connectedComponents(mask.astype(np.uint8), connectivity=8 if diagonal else 4)[0]) - 1
-
-
-def _oriented_sides(mask: Bools) -> tuple[float, float]:
-    corners = fit.oriented_box(mask).points
-    first, second = corners[1] - corners[0], corners[2] - corners[1]
-    return math.sqrt(float((first**2).sum())), math.sqrt(float((second**2).sum()))
-
-
-def _hull_area(mask: Bools) -> float:
-    x, y = fit.hull(mask).points.T
-    return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2

@@ -166,35 +166,25 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     )
     way = ahead(speed, angle)
     flights = Flights(start, flown(SUB * speed, way), SUB * radius)
-    first = impacts(flights, targets, velocities_of(alone, targets))
+    velocities = velocities_of(alone, targets)
+    first = impacts(flights, targets, velocities)
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
+    once, *substeps = (_overlapping(alone, flights, None if n == 1 else n, n) for n in (1, *SUBSTEPS))
+    swept = fired_method(None, alone, Projectile(speed, radius), _impacts, at=start / SUB, toward=(start + way) / SUB)
+    ends = Segments(start / SUB, (start + flights.step_256) / SUB)
     return Question(
         "movers",
         f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
         shots,
         Decisions.of(first.flight, first.object, point),
         "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
-        (*_mover_curves(alone, flights, start + way, speed), _peer(alone, flights)),
+        (
+            Curve("one test a frame", "", (once,), "a disc at the end of the frame, as many games have it"),
+            Curve("substeps", "tests a frame", tuple(substeps), "a disc at each of them"),
+            Curve("swept", "", (swept,)),
+            mover_curve(targets, ends, float(radius), bool(velocities.any())),
+        ),
     )
-
-
-def _mover_curves(alone: Scene, flights: Flights, toward: Ints, speed: int) -> tuple[Curve, ...]:
-    once = _overlapping(alone, flights, None, 1)
-    substeps = tuple(_overlapping(alone, flights, n, n) for n in SUBSTEPS)
-    weapon = Projectile(speed, flights.radius_256 / SUB)
-    swept = fired_method(None, alone, weapon, _impacts, at=flights.start_256 / SUB, toward=toward / SUB)
-    return (
-        Curve("one test a frame", "", (once,), "a disc at the end of the frame, as many games have it"),
-        Curve("substeps", "tests a frame", substeps, "a disc at each of them"),
-        Curve("swept", "", (swept,)),
-    )
-
-
-def _peer(alone: Scene, flights: Flights) -> Curve:
-    targets = targets_of(alone)
-    start, step = flights.start_256 / SUB, flights.step_256 / SUB
-    moving = bool(velocities_of(alone, targets).any())
-    return mover_curve(targets, Segments(start, start + step), flights.radius_256 / SUB, moving)
 
 
 def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:
