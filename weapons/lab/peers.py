@@ -43,14 +43,6 @@ def library(name: str) -> Any:
     return import_module(name)
 
 
-def library_or_none(name: str) -> Any:
-    """Import a library; None if it is not installed."""
-    try:
-        return library(name)
-    except ImportError:
-        return None
-
-
 # Objects, as each library holds them
 
 
@@ -94,10 +86,6 @@ class Segments(NamedTuple):
     start_xy: Floats
     end_xy: Floats
 
-    def at(self, shot: Ints, part: Floats) -> Floats:
-        """Return the points at these fractions of segments."""
-        return self.start_xy[shot] + part[:, None] * (self.end_xy - self.start_xy)[shot]
-
 
 def disc_curves(targets: list[Target], at: Floats, radius: float) -> list[Curve]:
     """Return a curve of each library for discs around points (N, 2) against all targets."""
@@ -124,11 +112,6 @@ def ray_curves(targets: list[Target], rays: Segments) -> tuple[Curve, ...]:
     """Return a curve of each library for the first hits of rays on targets, given front to back."""
     ids, far = _ids(targets), max(float(np.abs(xy).max(initial=0)) for xy in rays)
 
-    def on_hulls(found: FirstHits) -> Decisions:
-        """Convert first hits on hulls."""
-        shot, item, part = _along(found)
-        return _entered(rays, shot, item, rays.at(shot, part))
-
     def on_masks(found: list[tuple[int, int, int, int]]) -> Decisions:
         """Convert shots, ranks and pixels."""
         rows = _rows(found, 4)
@@ -137,7 +120,8 @@ def ray_curves(targets: list[Target], rays: Segments) -> tuple[Curve, ...]:
     easier = "an easier question: convex hulls of the masks; in floats"
     walked = "from whole pixel to whole pixel: the line is clipped to each rectangle, then its mask is read each px"
     return (
-        _curve("pymunk", easier, lambda m: _first_hulls(m, targets, rays, 0.0), on_hulls),
+        _curve("pymunk", easier, lambda m: _first_hulls(m, targets, rays, 0.0),
+               lambda found: _entered(rays, *_along(rays, found))),
         _curve("shapely", "outlines of the masks; in floats", lambda m: _first_outlines(m, targets, rays),
                lambda found: _entered(rays, found[0], ids[found[1]], found[2])),
         _curve("pygame", walked, lambda m: _first_masks(m, targets, rays), on_masks, far),
@@ -151,14 +135,9 @@ def mover_curve(targets: list[Target], flights: Segments, radius: float, moving:
     ----------
     moving : whether objects move; the curve is then left out, as objects stand still in a query of pymunk
     """
-
-    def on_hulls(found: FirstHits) -> Decisions:
-        """Convert first hits on hulls."""
-        shot, item, part = _along(found)
-        return Decisions.of(shot, item, flights.at(shot, part))
-
     note = "a thick segment, swept, against convex hulls of the masks; in floats"
-    curve = _curve("pymunk", note, lambda m: _first_hulls(m, targets, flights, radius), on_hulls)
+    run, read = partial(_first_hulls, targets=targets, rays=flights, radius=radius), partial(_along, flights)
+    curve = _curve("pymunk", note, run, lambda found: Decisions.of(*read(found)))
     if curve.methods and moving:
         return Curve("pymunk", left_out="objects move, and stand still during its queries")
     return curve
@@ -168,8 +147,9 @@ def _curve(
     name: str, note: str, prepare: Callable[[Any], Run], read: Callable[[Any], Decisions], far: float = 0.0
 ) -> Curve:
     """Return a curve of one point; `prepare` takes the library, and `far` is pygame's largest coordinate."""
-    module = library_or_none(name)
-    if module is None:
+    try:
+        module = library(name)
+    except ImportError:
         return Curve(name, left_out=f"{name} is not installed")
     if far > PYGAME_MOST:
         return Curve(name, left_out=f"places beyond {PYGAME_MOST} px do not fit its rectangles")
@@ -252,15 +232,16 @@ def _first_hulls(pymunk: Any, targets: list[Target], rays: Segments, radius: flo
     return lambda: ([ask(start, end, radius, every) for start, end in shots], item_of)
 
 
-def _along(answer: FirstHits) -> tuple[Ints, Ints, Floats]:
-    """Return the segments that hit, their objects, and the fraction of the segment at which each hits.
+def _along(rays: Segments, answer: FirstHits) -> tuple[Ints, Ints, Floats]:
+    """Return the segments that hit, their objects, and the points, at a fraction of the segment.
 
     The fraction is used as it is right (0) for a segment that begins in a hull; pymunk's point is then the end.
     """
     found, item_of = answer
     hit = [(shot, item_of[info.shape], info.alpha) for shot, info in enumerate(found) if info is not None]
     rows = np.array(hit, np.float64).reshape(-1, 3)
-    return rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2]
+    shot, item = rows[:, :2].T.astype(np.int64)
+    return shot, item, rays.start_xy[shot] + rows[:, 2:] * (rays.end_xy - rays.start_xy)[shot]
 
 
 def _entered(rays: Segments, shot: Ints, item: Ints, point: Floats) -> Decisions:

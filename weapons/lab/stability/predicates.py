@@ -432,7 +432,7 @@ PREDICATES = (
     ),
     Predicate(
         "oriented boxes", truth.polygons_meet, lambda a, b: overlap(Obbs.from_corners(a), Obbs.from_corners(b)),
-        textbook.oriented_boxes, _pairs("oriented box", "oriented box", without=("walls",)), *HULLS,
+        partial(textbook.polygons, sides=2), _pairs("oriented box", "oriented box", without=("walls",)), *HULLS,
     ),
     Predicate(
         "triangles in space", truth.triangles_meet, triangles_meet, textbook.triangles, TRIANGLE_FAMILIES, *HULLS,

@@ -68,23 +68,15 @@ def circle_polygon(rings: Floats, center: Floats, radius: Floats) -> Bools:
     return found
 
 
-def polygons(a: Floats, b: Floats) -> Bools:
-    """Project both on the normal of each side (separating axes)."""
-    return _projected(a, b, range(a.shape[1])) & _projected(b, a, range(b.shape[1]))
-
-
-def oriented_boxes(a: Floats, b: Floats) -> Bools:
-    """Project both on the two axes of each box (separating axes)."""
-    return _projected(a, b, range(2)) & _projected(b, a, range(2))
-
-
-def _projected(a: Floats, b: Floats, sides: range) -> Bools:
+def polygons(a: Floats, b: Floats, sides: int | None = None) -> Bools:
+    """Project both on the normals of sides (separating axes): of all sides, or of the first few of each."""
     found = np.ones(len(a), np.bool_)
-    for k in sides:
-        side = a[:, (k + 1) % a.shape[1]] - a[:, k]
-        normal = np.stack([-side[:, 1], side[:, 0]], axis=1)[:, None]
-        on_a, on_b = (a * normal).sum(axis=2), (b * normal).sum(axis=2)
-        found &= (on_a.max(axis=1) >= on_b.min(axis=1)) & (on_b.max(axis=1) >= on_a.min(axis=1))
+    for one in (a, b):
+        for k in range(sides or one.shape[1]):
+            side = one[:, (k + 1) % one.shape[1]] - one[:, k]
+            normal = np.stack([-side[:, 1], side[:, 0]], axis=1)[:, None]
+            on_a, on_b = (a * normal).sum(axis=2), (b * normal).sum(axis=2)
+            found &= (on_a.max(axis=1) >= on_b.min(axis=1)) & (on_b.max(axis=1) >= on_a.min(axis=1))
     return found
 
 

@@ -286,9 +286,11 @@ def size_of(targets: list[Target]) -> float:
     return float(np.median([sum(mask.shape) / 2 for _, mask, _ in targets])) if targets else 1.0
 
 
-def checked_draw(shots: object, seed: object) -> tuple[int, int]:
-    """Check the number of shots and the seed."""
-    return integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
+def drawn_for(scene: Scene, shots: object, seed: object) -> tuple[int, int, Scene, list[Target]]:
+    """Check the number of shots and the seed; return them, a copy of the hittable objects, and these as targets."""
+    shots, seed = integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
+    alone = only_hittable(scene)
+    return shots, seed, alone, targets_of(alone)
 
 
 def drawn_places(

@@ -25,12 +25,11 @@ from .methods import (
     Method,
     Question,
     ahead,
-    checked_draw,
+    drawn_for,
     drawn_places,
     fired_method,
     only_hittable,
     size_of,
-    targets_of,
     velocities_of,
 )
 from .truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
@@ -55,9 +54,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of rays
     seed : random seed of the rays
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
     start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, 0, targets))
     step = ahead(length, angle)
@@ -156,9 +153,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of discs
     seed : random seed of the flights
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     size = size_of(targets)
     radius, speed = min(max(1, round(size / 6)), MOVER_RADIUS_MAX), min(max(1, round(8 * size)), REACH_MAX)
     start, angle, _ = drawn_places(
@@ -237,9 +232,7 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of blasts
     seed : random seed of the places and of the pellets
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     radius = min(max(1, round(size_of(targets) / 2)), RADIUS_MAX)
     place, _, _ = drawn_places(targets, shots, seed, SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = pixel(place)
