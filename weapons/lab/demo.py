@@ -269,14 +269,15 @@ def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
         If the structure is unknown, or the output has another ending or cannot be written.
     """
     output = path_of("output", output)
-    if output.suffix.lower() not in ("", ".gif") and not output.is_dir():
+    gif = output.suffix.lower() == ".gif"
+    if not gif and output.suffix and not output.is_dir():
         wanted = "a name that ends in .gif, or of a folder, without an ending"
         raise InputError(f"--output: expected {wanted}, got {output.name!r}")
     pictures = demo_frames(kind, frames)
-    if output.suffix.lower() == ".gif" and can_write_gif():
+    if gif and can_write_gif():
         write_gif(output, pictures, MILLISECONDS)
         return output
-    folder = output.with_suffix("") if output.suffix.lower() == ".gif" else output
+    folder = output.with_suffix("") if gif else output
     write_frames(folder, pictures)
     return folder
 

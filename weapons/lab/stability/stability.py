@@ -202,8 +202,11 @@ def heat_figure(study: Study) -> Figure:
             wide, high = 1 - (LEFT + RIGHT) / WIDTH, ROW * len(names) / height
             axes = figure.add_axes((LEFT / WIDTH, top / height, wide, high))
             _block(axes, study, method, names)
-            if k == 0:
-                _name_families(axes)
+            if k == 0:  # the names of the families, slanted; all blocks have the same columns
+                axes.set_xticks(range(len(FAMILIES)), [re.sub(r"\^(-?\d+)", r"$^{\1}$", f) for f in FAMILIES.values()])
+                axes.tick_params(axis="x", labeltop=True, labelbottom=False, rotation=38, pad=19)
+                for label in axes.get_xticklabels():
+                    label.set(ha="left", va="bottom", rotation_mode="anchor")
         _scale(figure, height)
     return figure
 
@@ -255,14 +258,6 @@ def rate(per_million: float) -> str:
     """Return a rate as short text: per cent, or ppm below a thousandth."""
     value, unit = (per_million / 10_000, "%") if per_million >= 1000 else (per_million, "ppm")
     return f"{value:.0f} {unit}" if value >= 10 else f"{value:.2g} {unit}"
-
-
-def _name_families(axes: Axes) -> None:
-    """Write the names of the families above the first block, slanted; all blocks have the same columns."""
-    axes.set_xticks(range(len(FAMILIES)), [re.sub(r"\^(-?\d+)", r"$^{\1}$", name) for name in FAMILIES.values()])
-    axes.tick_params(axis="x", labeltop=True, labelbottom=False, rotation=38, pad=19)
-    for label in axes.get_xticklabels():
-        label.set(ha="left", va="bottom", rotation_mode="anchor")
 
 
 def _scale(figure: Figure, height: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -101,21 +102,18 @@ def _stepping(alone: Scene, start: Ints, step: Ints, length: int) -> Curve:
         return Curve("fixed step", left_out=f"a plane of {width} x {height} px is more than {PLANE_MOST} px")
     own_start, own_step = start / SUB - np.array(box[:2]) + 1, step / SUB
 
-    def prepare_by(spacing: float) -> Callable[[], Callable[[], tuple[Ints, Ints]]]:
-        def prepare() -> Callable[[], tuple[Ints, Ints]]:
-            labels = np.pad(label_plane(alone.items.stack(), box), 1)
-            parts = np.arange(0, length + spacing, spacing)
-            parts = parts[parts <= length] / length
-            return lambda: _looked_up(labels, own_start, own_step, parts)
-
-        return prepare
+    def prepare(spacing: float) -> Callable[[], tuple[Ints, Ints]]:
+        labels = np.pad(label_plane(alone.items.stack(), box), 1)
+        parts = np.arange(0, length + spacing, spacing)
+        parts = parts[parts <= length] / length
+        return lambda: _looked_up(labels, own_start, own_step, parts)
 
     def read(found: tuple[Ints, Ints]) -> Decisions:
         label, xy = found
         hit = np.flatnonzero(label)
         return Decisions.of(hit, label[hit] - 1, (xy[hit] + box[:2] - 1).astype(np.float64))
 
-    methods = tuple(Method(spacing, prepare_by(spacing), read) for spacing in STEPS)
+    methods = tuple(Method(spacing, partial(prepare, spacing), read) for spacing in STEPS)
     return Curve("fixed step", "px", methods, "one plane of the front-most objects, read at points along the ray")
 
 
@@ -238,33 +236,23 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     at = pixel(place)
     parts = parts_of_discs(at, radius, targets)
 
+    def pellets(n: int) -> Method:
+        weapon = Spread(Point(pierce=True), n, radius)
+        return fired_method(
+            n, alone, weapon, lambda h: Decisions.of(h.shot, h.object, share=h.samples / n), at=at, seed=seed
+        )
+
+    def shares(hits: Hits) -> Decisions:
+        return Decisions(hits.shot, hits.object, hits.first_xy.astype(np.float64), hits.samples / parts.whole)
+
+    note = "a share is a part of the pellets; it does not tell where it hit"
+    every = fired_method(None, alone, Disc(radius, pierce=True), shares, at=at)
     return Question(
         "spread",
         f"How much of a blast of {radius} px lies on each object?",
         shots,
         Decisions(parts.disc, parts.object, parts.nearest_xy.astype(np.float64), parts.pixels / parts.whole),
         "every pixel of the blast is looked up in the mask of every object, at full scale",
-        _curves(alone, at, radius, parts.whole, seed),
+        (Curve("pellets", "pellets", tuple(map(pellets, PELLETS)), note), Curve("every pixel", "", (every,))),
         by_share=True,
     )
-
-
-def _curves(alone: Scene, at: Ints, radius: int, whole: int, seed: int) -> tuple[Curve, ...]:
-    def by_pellets(n: int) -> Method:
-        weapon = Spread(Point(pierce=True), n, radius)
-        return fired_method(n, alone, weapon, lambda hits: _shares(hits, n), at=at, seed=seed)
-
-    every = fired_method(None, alone, Disc(radius, pierce=True), lambda hits: _parts(hits, whole), at=at)
-    note = "a share is a part of the pellets; it does not tell where it hit"
-    return (
-        Curve("pellets", "pellets", tuple(map(by_pellets, PELLETS)), note),
-        Curve("every pixel", "", (every,)),
-    )
-
-
-def _shares(hits: Hits, pellets: int) -> Decisions:
-    return Decisions.of(hits.shot, hits.object, share=hits.samples / pellets)
-
-
-def _parts(hits: Hits, whole: int) -> Decisions:
-    return Decisions(hits.shot, hits.object, hits.first_xy.astype(np.float64), hits.samples / whole)
