@@ -109,7 +109,7 @@ def test_what_is_compared_and_what_is_found_look_different(kind: str) -> None:
 def test_opened_leaves_are_filled_and_outlined(kind: str) -> None:
     for moment in moments(kind, 6):
         pane = demo._first_step(moment)
-        plain = demo._pane()[0, 0]
+        plain = np.array(demo.CARD, np.uint8)
         inside = np.zeros(pane.shape[:2], np.bool_)
         for box in np.rint(np.clip(moment.cells.box[moment.entered], 0, 300)).astype(int):
             inside[box[1] : box[3] + 1, box[0] : box[2] + 1] = True

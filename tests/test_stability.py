@@ -16,7 +16,8 @@ import pytest
 
 from hitplanes import InputError
 from hitplanes.weapons.cli.command import main
-from hitplanes.weapons.lab.stability import families, rivals, stability
+from hitplanes.weapons.lab import peers
+from hitplanes.weapons.lab.stability import families, stability, textbook
 from hitplanes.weapons.lab.stability import stability as heatfigure
 from hitplanes.weapons.lab.stability import stability as tally
 from hitplanes.weapons.lab.stability.families import FAMILIES
@@ -127,14 +128,14 @@ EASY: dict[str, tuple[list[Any], list[Any]]] = {
 }
 
 
-@pytest.mark.parametrize("method", [OURS, NAIVE, *rivals.PEERS])
+@pytest.mark.parametrize("method", [OURS, NAIVE, *peers.PEERS])
 def test_every_method_is_asked_fairly(method: str) -> None:
     """What is plainly so, or not, each of them tells: their errors are their own, not those of how they are asked."""
-    if method in rivals.PEERS and not rivals.installed(method):
+    if method in peers.PEERS and not peers.installed(method):
         pytest.skip("not installed")
     asked = 0
     for predicate in PREDICATES:
-        answers = {OURS: predicate.ours, NAIVE: predicate.naive}.get(method) or rivals.of_peer(method, predicate.name)
+        answers = {OURS: predicate.ours, NAIVE: predicate.naive}.get(method) or peers.of_peer(method, predicate.name)
         if answers is None:
             continue
         columns = tuple(np.array(column) for column in zip(*EASY[predicate.name], strict=True))
@@ -154,13 +155,13 @@ MOVED = {
 """Columns of the second shape's points."""
 
 
-@pytest.mark.parametrize("method", [NAIVE, *rivals.PEERS])
+@pytest.mark.parametrize("method", [NAIVE, *peers.PEERS])
 @pytest.mark.parametrize("name", MOVED)
 def test_ordinary_input_is_no_trouble(name: str, method: str) -> None:
     """Shapes of about the same size that do not touch but overlap or are apart: every method is right."""
     predicate = named(name)
-    answers = predicate.naive if method == NAIVE else rivals.of_peer(method, name)
-    if answers is None or (method in rivals.PEERS and not rivals.installed(method)):
+    answers = predicate.naive if method == NAIVE else peers.of_peer(method, name)
+    if answers is None or (method in peers.PEERS and not peers.installed(method)):
         pytest.skip("not asked")
     rng = np.random.default_rng(6)
     columns = list(predicate.families["near"](rng, 240))
@@ -177,7 +178,7 @@ def test_the_textbook_is_wrong_where_it_is_known_to_be() -> None:
     assert not PREDICATES[0].true((np.array([[0.0, 0.0]]), *row[1:2], np.array([[0.30000000000000004, 0.0]]), row[3]))[
         0
     ]
-    assert rivals.circles(row[0], row[1], np.array([[0.30000000000000004, 0.0]]), row[3])[0]
+    assert textbook.circles(row[0], row[1], np.array([[0.30000000000000004, 0.0]]), row[3])[0]
 
 
 def test_the_textbook_is_asked_as_it_is_best() -> None:
@@ -185,7 +186,7 @@ def test_the_textbook_is_asked_as_it_is_best() -> None:
     boxes = named("boxes")
     for family, make in boxes.families.items():
         columns = make(np.random.default_rng(7), 200)
-        assert np.array_equal(rivals.boxes(*columns), boxes.true(columns)), family
+        assert np.array_equal(textbook.boxes(*columns), boxes.true(columns)), family
 
 
 # A run
@@ -400,7 +401,7 @@ def test_a_library_that_fails_is_left_out_of_a_cell(few: None, tmp_path: Path, m
     def answers(a: np.ndarray, b: np.ndarray) -> Any:
         if np.abs(a).max() > 1e100:
             raise OverflowError("too far")
-        return rivals.polygons(a, b)
+        return textbook.polygons(a, b)
 
     with_predicates(monkeypatch, named("polygons"))
     monkeypatch.setattr(stability, "of_peer", lambda peer, name: answers if (peer, name) == SHAPELY else None)

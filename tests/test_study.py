@@ -23,9 +23,16 @@ from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.lab.stability.stability import load_study, summary
 from hitplanes.weapons.lab.study import area_questions
 from hitplanes.weapons.lab.study import study as study_module
-from hitplanes.weapons.lab.study.area_questions import kind_of, kinds_scene, plane_curves, volume_curves
+from hitplanes.weapons.lab.study.area_questions import (
+    Discs,
+    areas_question,
+    discs_at,
+    kind_of,
+    kinds_scene,
+    plane_curves,
+    volume_curves,
+)
 from hitplanes.weapons.lab.study.methods import Cost, Decisions, Method, Question, copied, enlarged, errors_of, measured
-from hitplanes.weapons.lab.study.peers import Discs, areas_question, discs_at
 from hitplanes.weapons.lab.study.study import (
     FILES,
     Effort,

@@ -13,6 +13,7 @@ from oracle_projectile import impacts as oracle_impacts
 from oracle_rays import thin_cells
 
 from hitplanes import InputError, Pistol, Projectile, Scene, Sprite, fire, load_scene
+from hitplanes.weapons.lab.peers import Segments, ray_curves
 from hitplanes.weapons.lab.study.methods import (
     Curve,
     Decisions,
@@ -27,7 +28,6 @@ from hitplanes.weapons.lab.study.methods import (
     targets_of,
     velocities_of,
 )
-from hitplanes.weapons.lab.study.peers import Segments, peer_curves
 from hitplanes.weapons.lab.study.ray_questions import movers_question, rays_question, spread_question
 from hitplanes.weapons.lab.study.truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
@@ -445,7 +445,7 @@ def test_a_peer_finds_the_nearest_of_what_lies_in_the_box_of_another(peer: str) 
     ell[0, :-1] = False
     targets = [(4, ell, (0, 0)), (7, np.ones((1, 1), np.bool_), (10, 0)), (8, ell, (2, 0))]
     for order in (targets, targets[::-1]):
-        curves = peer_curves(order, Segments(np.array([[-5.0, 0], [12, 0]]), np.array([[30.0, 0], [30, 0]])))
+        curves = ray_curves(order, Segments(np.array([[-5.0, 0], [12, 0]]), np.array([[30.0, 0], [30, 0]])))
         found = decided(next(curve for curve in curves if curve.name == peer).methods[0])
         assert (found.object.tolist(), found.xy.tolist()) == ([7, 4], [[10, 0], [19, 0]])
 

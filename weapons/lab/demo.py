@@ -223,37 +223,29 @@ def _around(centre: Floats, half: Floats) -> Floats:
 
 def _moment(structure: BroadPhase, boxes: Floats, query: Floats) -> Moment:
     work, cells = structure.work(query[None]), structure.cell_boxes()
-    tested, found = np.zeros((2, len(boxes)), np.bool_)
-    tested[work.tested[1]] = True
-    found[structure.query(query[None])[1]] = True
+    tested, found = (np.isin(np.arange(len(boxes)), met) for met in (work.tested[1], structure.query(query[None])[1]))
     visited = np.isin(cells.number, work.visited[1])
     return Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _orbits(frames: int) -> tuple[Floats, Floats]:
-    """Return the centres (frames, N, 2) of the boxes on closed orbits, and half their sides (N, 1), px."""
+    """Return the centres (frames, N, 2) of the boxes on closed orbits, and half their sides (N, 1), px.
+
+    Boxes of a flock circle its centre, which circles the middle of the world; others circle their own centres.
+    """
     rng = np.random.default_rng(SEED)
-    places = np.concatenate((_flocks(frames, rng), _wanderers(frames, rng)), axis=1)
-    half = rng.choice([1.5, 2.0, 2.5, 3.5], (places.shape[1], 1))
-    return np.clip(places, WALL, MIDDLE * 2 - WALL), half
-
-
-def _flocks(frames: int, rng: np.random.Generator) -> Floats:
-    """Return positions of boxes that circle the centre of their flock, which circles the middle of the world."""
     n, reach = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]])
     turns = np.array([[1, 1], [-1, 1], [1, -1]])
     leaders = _on_ellipse(frames, np.tile(MIDDLE, (FLOCKS, 1)), reach, turns, rng)
     reach = np.abs(rng.normal(0, 22, (n, 2))) + 3
     own = _on_ellipse(frames, np.zeros((n, 2)), reach, rng.choice([-2, -1, 1, 2], (n, 2)), rng)
-    return np.asarray(np.repeat(leaders, FLOCK, axis=1) + own)
-
-
-def _wanderers(frames: int, rng: np.random.Generator) -> Floats:
-    """Return positions of boxes that circle their own centres, within the world."""
     reach = rng.uniform(5, (70, 60), (WANDERERS, 2))
     least = reach + WALL
     about = least + rng.uniform(0, 1, (WANDERERS, 2)) * 2 * (MIDDLE - least)
-    return _on_ellipse(frames, about, reach, rng.choice([-2, -1, 1, 2], (WANDERERS, 2)), rng)
+    wanderers = _on_ellipse(frames, about, reach, rng.choice([-2, -1, 1, 2], (WANDERERS, 2)), rng)
+    places = np.concatenate((np.repeat(leaders, FLOCK, axis=1) + own, wanderers), axis=1)
+    half = rng.choice([1.5, 2.0, 2.5, 3.5], (places.shape[1], 1))
+    return np.clip(places, WALL, MIDDLE * 2 - WALL), half
 
 
 def _on_ellipse(frames: int, middle: Floats, reach: Floats, turns: Ints, rng: np.random.Generator) -> Floats:
@@ -277,14 +269,15 @@ def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
         If the structure is unknown, or the output has another ending or cannot be written.
     """
     output = path_of("output", output)
-    if output.suffix.lower() not in ("", ".gif") and not output.is_dir():
+    gif = output.suffix.lower() == ".gif"
+    if not gif and output.suffix and not output.is_dir():
         wanted = "a name that ends in .gif, or of a folder, without an ending"
         raise InputError(f"--output: expected {wanted}, got {output.name!r}")
     pictures = demo_frames(kind, frames)
-    if output.suffix.lower() == ".gif" and can_write_gif():
+    if gif and can_write_gif():
         write_gif(output, pictures, MILLISECONDS)
         return output
-    folder = output.with_suffix("") if output.suffix.lower() == ".gif" else output
+    folder = output.with_suffix("") if gif else output
     write_frames(folder, pictures)
     return folder
 
@@ -324,9 +317,7 @@ def _distinct(boxes: Floats) -> Floats:
 
 def _first_step(now: Moment) -> Image:
     """Draw the cells, with those that the query visits highlighted, and the leaves that it opens filled."""
-    pane = _pane()
-    for box in _distinct(now.cells.box[now.entered]):
-        _fill(pane, box, VISITED, TINT)
+    pane = _pane(now, TINT)
     _discs(pane, now, np.ones(len(now.boxes), np.bool_), REST)
     for which, color in ((~now.visited, CELL), (now.visited & ~now.entered, ON_THE_WAY), (now.entered, VISITED)):
         for box in now.cells.box[which]:
@@ -337,9 +328,7 @@ def _first_step(now: Moment) -> Image:
 
 def _second_step(now: Moment) -> Image:
     """Draw the boxes: compared ones as rings, and those that overlap the query filled, with a rim."""
-    pane = _pane()
-    for box in _distinct(now.cells.box[now.entered]):
-        _fill(pane, box, VISITED, TINT // 2)
+    pane = _pane(now, TINT // 2)
     _discs(pane, now, ~now.tested, REST)
     _frame(pane, now.query, INK, 2)
     _discs(pane, now, now.tested & ~now.found, TESTED, 1, hollow=True)
@@ -348,9 +337,14 @@ def _second_step(now: Moment) -> Image:
     return pane
 
 
-def _pane() -> Image:
+def _pane(now: Moment, tint: int) -> Image:
+    """Return a pane in which the opened leaves are tinted."""
     pane = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     pane[:] = CARD
+    for box in _distinct(now.cells.box[now.entered]):
+        x0, y0, x1, y1 = _corners(box)
+        if x0 < x1 and y0 < y1:
+            blend(pane, VISITED, np.full((y1 - y0, x1 - x0), tint, np.uint8), x0, y0)
     return pane
 
 
@@ -377,12 +371,6 @@ def _round(picture: Image, centre: Floats, radius: Floats, color: Color, hollow:
 def _corners(box: Floats) -> tuple[int, int, int, int]:
     x0, y0, x1, y1 = np.rint(np.clip(box, -2, 2 * WIDTH)).astype(int).tolist()
     return x0, y0, x1, y1
-
-
-def _fill(pane: Image, box: Floats, color: Color, alpha: int) -> None:
-    x0, y0, x1, y1 = _corners(box)
-    if x0 < x1 and y0 < y1:
-        blend(pane, color, np.full((y1 - y0, x1 - x0), alpha, np.uint8), x0, y0)
 
 
 def _frame(pane: Image, box: Floats, color: Color, thick: int = 1) -> None:

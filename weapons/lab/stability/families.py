@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ from .truth import has_area, is_convex, is_simple
 Rng = np.random.Generator
 Columns = tuple[npt.NDArray[Any], ...]
 """Arguments of a predicate, row by row."""
+
+Make = Callable[[Rng, int], Columns]
+"""Function that makes n rows."""
 
 FAMILIES = {
     "near": "near touching, 1 to 3 ulp",
@@ -44,6 +48,8 @@ FAMILIES = {
 
 TRIPLES = np.array([(1, 0, 1), (0, 1, 1), (3, 4, 5), (4, 3, 5), (5, 12, 13), (12, 5, 13), (8, 15, 17), (20, 21, 29)])
 """Integer vectors of integer length, and the length; integer shapes along them touch exactly."""
+
+SQUARE = np.array([(-1.0, -1), (1, -1), (1, 1), (-1, 1)])
 
 POWERS = np.array([float(f"1e{k}") for k in range(-20, 21)])
 
@@ -86,7 +92,8 @@ def directions(rng: Rng, n: int) -> Floats:
     """Return random vectors of length 1 (rounded)."""
     s = rng.uniform(0, 1, n)
     x, y = (1 - s * s) / (1 + s * s), 2 * s / (1 + s * s)
-    return np.asarray(np.stack([x, y], axis=1)[np.arange(n)[:, None], _turns(rng, n)] * either(rng, (n, 2)))
+    swap = rng.integers(0, 2, n) == 1
+    return np.stack([np.where(swap, y, x), np.where(swap, x, y)], axis=1) * either(rng, (n, 2))
 
 
 def decades(rng: Rng, n: int, low: int, high: int) -> Floats:
@@ -97,10 +104,6 @@ def decades(rng: Rng, n: int, low: int, high: int) -> Floats:
 def across(v: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Rotate vectors by a quarter turn."""
     return np.stack([-v[:, 1], v[:, 0]], axis=1)
-
-
-def _turns(rng: Rng, n: int) -> npt.NDArray[np.int64]:
-    return np.array([(0, 1), (1, 0)])[rng.integers(0, 2, n)]
 
 
 def either(rng: Rng, shape: Any) -> npt.NDArray[np.int64]:
@@ -139,17 +142,23 @@ def _shapes(rng: Rng, kind: str, along: Floats, size: Floats, thin: Floats) -> S
         return Shapes(np.zeros((n, 1, 2)), length)
     if kind == "box":
         along = np.tile([1.0, 0.0], (n, 1))
-    frame = np.stack([along * length[:, None], across(along) * width[:, None]], axis=1)
+    x, y = along * length[:, None], across(along) * width[:, None]
     if kind == "capsule":
-        return Shapes(np.stack([-frame[:, 0], frame[:, 0]], axis=1), width)
-    corners = np.array([(-1.0, -1), (1, -1), (1, 1), (-1, 1)])
-    unit = np.broadcast_to(corners, (n, 4, 2)) if kind != "polygon" else _round(rng, n, CORNERS[kind])
-    return Shapes(unit[:, :, :1] * frame[:, None, 0] + unit[:, :, 1:] * frame[:, None, 1], np.zeros(n))
+        return Shapes(np.stack([-x, x], axis=1), width)
+    around = unit_circle(np.sort(rng.uniform(0, 4, (n, CORNERS[kind])), axis=1)) if kind == "polygon" else SQUARE
+    return Shapes(_in_frame(around, x, y), np.zeros(n))
 
 
-def _round(rng: Rng, n: int, k: int) -> Floats:
-    """Return random points (n, k, 2) on the unit circle, in order."""
-    return unit_circle(np.sort(rng.uniform(0, 4, (n, k)), axis=1))
+def _in_frame(points: Floats, x: Floats, y: Floats) -> Floats:
+    """Return points (n, k, ...) whose coordinates (k, 2) or (n, k, 2) are along two vectors for each row."""
+    return np.asarray(points[..., :1] * x[:, None] + points[..., 1:] * y[:, None])
+
+
+def random_sides(rng: Rng, rings: npt.NDArray[Any], *many: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return both ends (n, 2) of a random side of each ring (n, k, 2), or of so many."""
+    n, k = rings.shape[:2]
+    rows, side = np.arange(n).reshape(n, *(1 for _ in many)), rng.integers(0, k, (n, *many))
+    return rings[rows, side], rings[rows, (side + 1) % k]
 
 
 def unit_circle(quarters: Floats) -> Floats:
@@ -171,8 +180,7 @@ def _whole_shapes(rng: Rng, kind: str, normal: Floats, length: Floats) -> Shapes
         step = np.where(rng.random((n, 1)) < 0.6, across(normal), rng.integers(-5, 6, (n, 2))) * some[:, :1]
         return Shapes(np.stack([-step, step], axis=1), radius)
     if kind == "box":
-        corners = np.array([(-1.0, -1), (1, -1), (1, 1), (-1, 1)])
-        return Shapes(corners * some[:, None], np.zeros(n))
+        return Shapes(SQUARE * some[:, None], np.zeros(n))
     if kind == "oriented box":
         u, v = normal * some[:, :1], across(normal) * some[:, 1:]
         return Shapes(np.stack([0 * u, u, u + v, v], axis=1), np.zeros(n))
@@ -195,9 +203,8 @@ def _whole_rings(rng: Rng, n: int) -> Floats:
 
 def _touching(rng: Rng, a: Shapes, b: Shapes) -> Pair:
     """Move the second shape so that it touches a side or the outermost point of the first."""
-    n, k = a.points.shape[:2]
-    rows, side = np.arange(n), rng.integers(0, k, n)
-    p, q = a.points[rows, side], a.points[rows, (side + 1) % k]
+    n = len(a.points)
+    p, q = random_sides(rng, a.points)
     by_side = (rng.random((n, 1)) < 0.6) & np.any(p != q, axis=1)[:, None]
     normal = np.where(by_side, -across(q - p), directions(rng, n))
     size = np.sqrt((normal * normal).sum(axis=1))[:, None]
@@ -226,11 +233,10 @@ def _whole_contact(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
     triple = TRIPLES[rng.integers(0, len(TRIPLES), n)].astype(np.float64)
     normal, length = triple[:, :2] * either(rng, (n, 2)), triple[:, 2]
     a, b = (_whole_shapes(rng, kind, normal, length) for kind in kinds)
-    rows, side = np.arange(n), rng.integers(0, a.points.shape[1], n)
-    ends = a.points[rows, side], a.points[rows, (side + 1) % a.points.shape[1]]
-    outward: Floats = np.where((a.radius + b.radius > 0)[:, None], normal, -across(ends[1] - ends[0]))
+    p, q = random_sides(rng, a.points)
+    outward: Floats = np.where((a.radius + b.radius > 0)[:, None], normal, -across(q - p))
     halfway = (rng.random(n) < 0.5) & (a.radius + b.radius == 0)
-    place = np.where(halfway[:, None], (ends[0] + ends[1]) / 2, a.farthest(outward))
+    place = np.where(halfway[:, None], (p + q) / 2, a.farthest(outward))
     b = b.moved(place - b.farthest(-outward) + np.rint(normal * ((a.radius + b.radius) / length)[:, None]))
     step = rng.integers(-1, 2, (n, 2)) * (rng.random((n, 1)) < 0.5)
     return a, b.moved(step.astype(np.float64))
@@ -273,9 +279,8 @@ def _parallel(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
 def _shared(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
     """Make shapes that share a corner or a side to the last bit; half of the rows are then nudged."""
     a, b = (_shapes(rng, kind, directions(rng, n), np.ones(n), rng.uniform(0.1, 1, n)) for kind in kinds)
-    rows, side = np.arange(n), rng.integers(0, a.points.shape[1], n)
-    p, q = a.points[rows, side], a.points[rows, (side + 1) % a.points.shape[1]]
-    corner = rng.integers(0, b.points.shape[1], n)
+    p, q = random_sides(rng, a.points)
+    rows, corner = np.arange(n), rng.integers(0, b.points.shape[1], n)
     points = b.points + (p - b.points[rows, corner])[:, None]
     points[rows, corner] = p
     if kinds[1] == "oriented box":
@@ -314,26 +319,30 @@ MAKERS: dict[str, Callable[[Rng, tuple[str, str], int], Pair]] = {
 }
 
 
-def shape_pairs(kinds: tuple[str, str], family: str) -> Callable[[Rng, int], Columns]:
+def shape_pairs(kinds: tuple[str, str], family: str) -> Make:
     """Return a maker of pairs of two kinds, as arguments of `truth`; polygons are exactly convex as stored."""
+    sided = sum(kind in ("polygon", "oriented box") for kind in kinds)  # they come first
 
     def make(rng: Rng, n: int) -> Columns:
         pair = MAKERS[family](rng, kinds, n)
-        kept = np.ones(n, np.bool_)
-        for kind, shapes in zip(kinds, pair, strict=True):
-            if kind in ("polygon", "oriented box"):
-                kept &= [is_convex(ring) for ring in shapes.points.tolist()]
-        return tuple(column[kept] for kind, s in zip(kinds, pair, strict=True) for column in _stored(kind, s))
+        return tuple(column for kind, shapes in zip(kinds, pair, strict=True) for column in _stored(kind, shapes))
 
-    return lambda rng, n: filled(rng, n, make)
+    return _filled(make, lambda *row: all(map(is_convex, row[:sided])))
 
 
-def filled(rng: Rng, n: int, make: Callable[[Rng, int], Columns]) -> Columns:
-    """Make rows until there are enough, as makers drop rows that rounding made invalid."""
-    parts = [make(rng, n)]
-    while sum(len(part[0]) for part in parts) < n:
-        parts.append(make(rng, n))
-    return tuple(np.concatenate(column)[:n] for column in zip(*parts, strict=True))
+def _filled(make: Make, valid: Callable[..., bool]) -> Make:
+    """Make rows until enough are valid, as rounding makes some invalid."""
+
+    def filled(rng: Rng, n: int) -> Columns:
+        parts: list[Columns] = []
+        while not parts or sum(len(part[0]) for part in parts) < n:
+            columns = make(rng, n)
+            rows = zip(*(column.tolist() for column in columns), strict=True)
+            kept = np.array([valid(*row) for row in rows], np.bool_)
+            parts.append(tuple(column[kept] for column in columns))
+        return tuple(np.concatenate(column)[:n] for column in zip(*parts, strict=True))
+
+    return filled
 
 
 def _stored(kind: str, shapes: Shapes) -> Columns:
@@ -363,50 +372,42 @@ def stars(rng: Rng, n: int, low: float = 0.4) -> Floats:
 
 def _on_sides(rng: Rng, rings: Floats) -> Floats:
     """Return points (n, m, 2) on sides: corners, midpoints, and random ones."""
-    n = len(rings)
-    rows, side = np.arange(n)[:, None], rng.integers(0, TRIANGLE_CORNERS, (n, POINTS))
-    p, q = rings[rows, side], rings[rows, (side + 1) % TRIANGLE_CORNERS]
-    share = np.where(rng.random((n, POINTS)) < 0.4, rng.choice([0.0, 0.5], (n, POINTS)), rng.random((n, POINTS)))
+    p, q = random_sides(rng, rings, POINTS)
+    many = p.shape[:2]
+    share = np.where(rng.random(many) < 0.4, rng.choice([0.0, 0.5], many), rng.random(many))
     return np.asarray(p + share[..., None] * (q - p))
 
 
-def _whole_stars(rng: Rng, n: int) -> tuple[Floats, Floats]:
+def _whole_stars(rng: Rng, n: int) -> Columns:
     """Make polygons of even integers, and integer points in and around them, many on sides."""
-    rings = 2 * np.rint(
-        unit_circle(4 * (np.arange(TRIANGLE_CORNERS) + 0.3) / TRIANGLE_CORNERS)
-        * rng.integers(3, 7, (n, TRIANGLE_CORNERS, 1))
-    )
+    around = unit_circle(4 * (np.arange(TRIANGLE_CORNERS) + 0.3) / TRIANGLE_CORNERS)
+    rings = 2 * np.rint(around * rng.integers(3, 7, (n, TRIANGLE_CORNERS, 1)))
     on_sides = _on_sides(rng, rings)
     near = np.where(rng.random((n, POINTS, 1)) < 0.5, on_sides, rng.integers(-13, 14, (n, POINTS, 2)))
     return rings, np.rint(near)
 
 
-def _near(rng: Rng, n: int, by: float = 0.0, thin: bool = False) -> Columns:
+def _near(rng: Rng, n: int, far: bool = False, thin: bool = False) -> Columns:
     rings = stars(rng, n)
     if thin:
         rings = rings * np.array([1.0, 0.0]) + rings * np.array([0.0, 1.0]) * decades(rng, n, -12, -2)[:, None, None]
-        slope = directions(rng, n)[:, None]
-        rings = rings[..., :1] * slope + rings[..., 1:] * across(slope[:, 0])[:, None]
-    if by:
+        slope = directions(rng, n)
+        rings = _in_frame(rings, slope, across(slope))
+    if far:
         rings = rings + (directions(rng, n) * decades(rng, n, 0, 12)[:, None])[:, None]
-    points = _on_sides(rng, rings)
-    return rings, _pushed(rng, points, rings)
+    return rings, _pushed(rng, _on_sides(rng, rings))
 
 
-def _pushed(rng: Rng, points: Floats, rings: Floats) -> Floats:
-    """Move points by up to 3 ulp."""
-    n = len(points)
-    flat = points.reshape(-1, 2)
-    (moved,) = nudged(rng, flat)
-    return np.asarray(moved.reshape(n, POINTS, 2))
+def _pushed(rng: Rng, points: Floats) -> Floats:
+    """Move each point (n, m, 2) by up to 3 ulp."""
+    return nudged(rng, points.reshape(-1, 2))[0].reshape(points.shape)
 
 
 def _level(rng: Rng, n: int) -> Columns:
     """Make points (rounded) at the height of a corner, or on the line of a side beyond its ends."""
     rings = stars(rng, n)
-    rows, side = np.arange(n)[:, None], rng.integers(0, TRIANGLE_CORNERS, (n, POINTS))
-    p, q = rings[rows, side], rings[rows, (side + 1) % TRIANGLE_CORNERS]
-    beyond = _pushed(rng, p + (q - p) * rng.uniform(-1, 2, (n, POINTS, 1)), rings)
+    p, q = random_sides(rng, rings, POINTS)
+    beyond = _pushed(rng, p + (q - p) * rng.uniform(-1, 2, (n, POINTS, 1)))
     level = np.stack([rng.uniform(-1, 1, (n, POINTS)), p[..., 1]], axis=2)
     return rings, np.where(rng.random((n, POINTS, 1)) < 0.5, beyond, level)
 
@@ -414,8 +415,7 @@ def _level(rng: Rng, n: int) -> Columns:
 def _shared_edges(rng: Rng, n: int) -> Columns:
     """Make points that are corners, or rounded midpoints of sides."""
     rings = stars(rng, n)
-    rows, side = np.arange(n)[:, None], rng.integers(0, TRIANGLE_CORNERS, (n, POINTS))
-    p, q = rings[rows, side], rings[rows, (side + 1) % TRIANGLE_CORNERS]
+    p, q = random_sides(rng, rings, POINTS)
     return rings, np.where(rng.random((n, POINTS, 1)) < 0.5, p, p / 2 + q / 2)
 
 
@@ -425,25 +425,25 @@ def _scaled(rng: Rng, n: int, low: int, high: int) -> Columns:
     return tuple(np.ldexp(column, power) for column in _whole_stars(rng, n))
 
 
-def _repeated(make: Callable[[Rng, int], Columns]) -> Callable[[Rng, int], Columns]:
-    """Repeat the polygon for each of its points."""
+def _repeated(make: Make) -> Make:
+    """Keep simple polygons, and repeat each for each of its points."""
+    filled = _filled(make, lambda ring, _: is_simple(ring))
 
     def rows(rng: Rng, n: int) -> Columns:
-        rings, points = make(rng, -(-n // POINTS))
-        kept = np.array([is_simple(ring) for ring in rings.tolist()], np.bool_)
-        return np.repeat(rings[kept], POINTS, axis=0), points[kept].reshape(-1, 2)
+        rings, points = filled(rng, -(-n // POINTS))
+        return np.repeat(rings, POINTS, axis=0)[:n], points.reshape(-1, 2)[:n]
 
-    return lambda rng, n: filled(rng, n, rows)
+    return rows
 
 
-POINT_FAMILIES: dict[str, Callable[[Rng, int], Columns]] = {
+POINT_FAMILIES = {
     "near": _repeated(_near),
-    "far": _repeated(lambda rng, n: _near(rng, n, by=1.0)),
-    "needles": _repeated(lambda rng, n: _near(rng, n, thin=True)),
+    "far": _repeated(partial(_near, far=True)),
+    "needles": _repeated(partial(_near, thin=True)),
     "parallel": _repeated(_level),
     "shared": _repeated(_shared_edges),
-    "subnormal": _repeated(lambda rng, n: _scaled(rng, n, -1073, -1015)),
-    "huge": _repeated(lambda rng, n: _scaled(rng, n, 400, 496)),
+    "subnormal": _repeated(partial(_scaled, low=-1073, high=-1015)),
+    "huge": _repeated(partial(_scaled, low=400, high=496)),
     "lattice": _repeated(_whole_stars),
 }
 
@@ -457,15 +457,16 @@ def _space_directions(rng: Rng, n: int) -> Floats:
     return np.asarray(v / np.sqrt((v * v).sum(axis=1))[:, None])
 
 
-def _cross3(a: Floats, b: Floats) -> Floats:
-    (ax, ay, az), (bx, by, bz) = a.T, b.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+def cross3(p: Floats, q: Floats) -> Floats:
+    """Return the cross products of rows (n, 3)."""
+    return np.stack([p[:, k - 2] * q[:, k - 1] - p[:, k - 1] * q[:, k - 2] for k in range(3)], axis=1)
 
 
-def _touching_triangles(rng: Rng, n: int, size: Floats, thin: Floats) -> Columns:
+def _touching3(rng: Rng, n: int, size: Any = 1.0, thin: Any = 1.0) -> Columns:
     """Make triangles that touch with a corner on a face, or with two crossing edges, on different sides of a plane."""
+    thin, size = (np.broadcast_to(v, n)[:, None] for v in (thin, size))
     x, y = _space_directions(rng, n), _space_directions(rng, n)
-    up, thin, size = _cross3(x, y), thin[:, None], size[:, None]
+    up = cross3(x, y)
     face = np.stack([-0.4 * x, 0.6 * x, y * thin + x * rng.uniform(-0.4, 0.6, (n, 1))], axis=1)
     share = rng.dirichlet(np.ones(3), n)
     place = (face * share[:, :, None]).sum(axis=1)
@@ -482,12 +483,12 @@ def _touching_triangles(rng: Rng, n: int, size: Floats, thin: Floats) -> Columns
 
 
 def _near3(rng: Rng, n: int) -> Columns:
-    return nudged(rng, *_touching_triangles(rng, n, np.ones(n), np.ones(n)))
+    return nudged(rng, *_touching3(rng, n))
 
 
 def _far3(rng: Rng, n: int) -> Columns:
     by = (_space_directions(rng, n) * decades(rng, n, 0, 12)[:, None])[:, None]
-    return nudged(rng, *(t + by for t in _touching_triangles(rng, n, np.ones(n), np.ones(n))))
+    return nudged(rng, *(t + by for t in _touching3(rng, n)))
 
 
 def _lattice3(rng: Rng, n: int) -> Columns:
@@ -505,7 +506,7 @@ def _coplanar3(rng: Rng, n: int) -> Columns:
     frame = np.where(whole, rng.integers(-3, 4, (n, 2, 3)), frame)
     flat_a = np.where(whole, rng.integers(-4, 5, (n, 3, 2)), flat_a)
     flat_b = np.where(whole, rng.integers(-4, 5, (n, 3, 2)), flat_b)
-    pair = tuple(f[:, :, :1] * frame[:, None, 0] + f[:, :, 1:] * frame[:, None, 1] for f in (flat_a, flat_b))
+    pair = tuple(_in_frame(flat, frame[:, 0], frame[:, 1]) for flat in (flat_a, flat_b))
     return tuple(np.where(whole, exact, moved) for exact, moved in zip(pair, nudged(rng, *pair), strict=True))
 
 
@@ -528,33 +529,15 @@ def _scaled3(rng: Rng, n: int, low: int, high: int) -> Columns:
     return tuple(np.ldexp(np.where(some, whole, a), power) for a, whole in pairs)
 
 
-def _thin3(rng: Rng, n: int) -> Columns:
-    return nudged(rng, *_touching_triangles(rng, n, np.ones(n), decades(rng, n, -16, -2)))
-
-
-def _ratio3(rng: Rng, n: int) -> Columns:
-    return nudged(rng, *_touching_triangles(rng, n, decades(rng, n, -12, 0), np.ones(n)))
-
-
-def _with_areas(make: Callable[[Rng, int], Columns]) -> Callable[[Rng, int], Columns]:
-    """Keep the rows in which both triangles have an area."""
-
-    def rows(rng: Rng, n: int) -> Columns:
-        a, b = make(rng, n)
-        kept = np.array([has_area(p) and has_area(q) for p, q in zip(a.tolist(), b.tolist(), strict=True)], np.bool_)
-        return a[kept], b[kept]
-
-    return lambda rng, n: filled(rng, n, rows)
-
-
-TRIANGLE_FAMILIES: dict[str, Callable[[Rng, int], Columns]] = {
-    "near": _with_areas(_near3),
-    "far": _with_areas(_far3),
-    "ratio": _with_areas(_ratio3),
-    "needles": _with_areas(_thin3),
-    "shared": _with_areas(_shared3),
-    "coplanar": _with_areas(_coplanar3),
-    "subnormal": _with_areas(lambda rng, n: _scaled3(rng, n, -1073, -1015)),
-    "huge": _with_areas(lambda rng, n: _scaled3(rng, n, 250, 498)),
-    "lattice": _with_areas(_lattice3),
+_TRIANGLES: dict[str, Make] = {
+    "near": _near3,
+    "far": _far3,
+    "ratio": lambda rng, n: nudged(rng, *_touching3(rng, n, size=decades(rng, n, -12, 0))),
+    "needles": lambda rng, n: nudged(rng, *_touching3(rng, n, thin=decades(rng, n, -16, -2))),
+    "shared": _shared3,
+    "coplanar": _coplanar3,
+    "subnormal": partial(_scaled3, low=-1073, high=-1015),
+    "huge": partial(_scaled3, low=250, high=498),
+    "lattice": _lattice3,
 }
+TRIANGLE_FAMILIES = {name: _filled(make, lambda a, b: has_area(a) and has_area(b)) for name, make in _TRIANGLES.items()}

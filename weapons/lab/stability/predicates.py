@@ -24,16 +24,26 @@ from hitplanes.planes.volumes.overlap import contains_point, overlap
 from hitplanes.planes.volumes.volumes import Aabbs, Capsules, Circles, ConcavePolygons, Obbs, Polygons, Volumes
 
 from ...fire.call import fire
-from ...fire.hits import Hits
 from ...kinds.areas import Beam, Disc, Polygon
 from ...kinds.rays import Laser, Projectile
 from ...kinds.weapon import Weapon
-from . import rivals, truth
-from .families import MAKERS, POINT_FAMILIES, TRIANGLE_FAMILIES, TRIPLES, Columns, Rng, across, either, shape_pairs
+from . import textbook, truth
+from .families import (
+    MAKERS,
+    POINT_FAMILIES,
+    TRIANGLE_FAMILIES,
+    TRIPLES,
+    Columns,
+    Make,
+    Rng,
+    across,
+    either,
+    random_sides,
+    shape_pairs,
+)
 from .truth import is_simple
 
 Whole = npt.NDArray[np.int64]
-Make = Callable[[Rng, int], Columns]
 
 PX, HALF = 256, 128
 
@@ -46,9 +56,15 @@ SHARED = 32
 TENS = 10 ** np.arange(13)
 
 
-def _powers(rng: Rng, n: int, low: int, high: int) -> Whole:
-    """Return random integers from 10^low to 10^high."""
-    return np.asarray(rng.integers(1, 10, n) * TENS[rng.integers(low, high, n)])
+def _places(rng: Rng, n: int, low: int = 0, high: int = 2) -> Whole:
+    """Return random places (n, 2) whose coordinates are from 10^low to 10^high."""
+    powers = rng.integers(1, 10, 2 * n) * TENS[rng.integers(low, high, 2 * n)]
+    return np.asarray(powers.reshape(n, 2) * either(rng, (n, 2)))
+
+
+def _held(values: Whole, n: int) -> Whole:
+    """Repeat rows, so that SHARED consecutive ones of n are equal."""
+    return np.repeat(values, SHARED, axis=0)[:n]
 
 
 def _wide(rng: Rng, n: int, size: Any) -> Whole:
@@ -73,9 +89,10 @@ def _through(rng: Rng, places: Whole, step: Whole, before: Whole, after: Whole, 
 # Rays: start, end, pixel
 
 
-def _near_ray(rng: Rng, n: int) -> Columns:
+def _passing_ray(rng: Rng, n: int, size: int, least: int) -> Columns:
+    """Make rays that pass corners, or begin or end there, of a few steps of a size."""
     cells, corner = _corner(rng, n)
-    start, end = _through(rng, corner, _wide(rng, n, 1500), rng.integers(0, 4, n), rng.integers(0, 4, n))
+    start, end = _through(rng, corner, _wide(rng, n, size), rng.integers(least, 4, n), rng.integers(least, 4, n))
     return start, end, cells
 
 
@@ -86,11 +103,6 @@ def _corner_ray(rng: Rng, n: int) -> Columns:
     start, end = _through(rng, corner, step, rng.integers(0, 4, n), rng.integers(0, 4, n), 0)
     centre = rng.random((n, 1)) < 0.3
     return np.where(centre, PX * (start // PX), start), np.where(centre, PX * (end // PX), end), cells
-
-
-def _lattice_ray(rng: Rng, n: int) -> Columns:
-    """Make rays of small multiples of half pixels."""
-    return HALF * _wide(rng, n, 8), HALF * _wide(rng, n, 8), _wide(rng, n, 3)
 
 
 def _level_ray(rng: Rng, n: int, length: int) -> Columns:
@@ -105,57 +117,41 @@ def _level_ray(rng: Rng, n: int, length: int) -> Columns:
     return start, end, cells
 
 
-def _fast_ray(rng: Rng, n: int) -> Columns:
-    """Make rays about 10^6 px long."""
-    cells, corner = _corner(rng, n)
-    start, end = _through(rng, corner, _wide(rng, n, 3 * 10**7), rng.integers(1, 4, n), rng.integers(1, 4, n))
-    return start, end, cells
+def _then(make: Make, change: Callable[..., Columns]) -> Make:
+    """Change rows after they are made."""
+    return lambda rng, n: change(rng, *make(rng, n))
 
 
-def _shifted(make: Make, low: int, high: int) -> Make:
-    """Move rays far away, by whole pixels."""
+def _shifted(rng: Rng, *columns: Whole, units: Mapping[int, int], low: int, high: int) -> Columns:
+    """Move shots and targets far away by whole pixels; `units` are the lengths of a pixel in columns of places."""
+    by = _places(rng, len(columns[0]), low, high)
+    return tuple(column + units[k] * by if k in units else column for k, column in enumerate(columns))
 
-    def made(rng: Rng, n: int) -> Columns:
-        *points, cells = make(rng, n)
-        by = _powers(rng, 2 * n, low, high).reshape(n, 2) * either(rng, (n, 2))
-        return *(p + PX * by for p in points), cells + by
 
-    return made
+def _beside(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
+    """Replace pixels by others near the ones aimed at."""
+    return start, end, cells + _wide(rng, len(cells), 1) * (rng.random((len(cells), 1)) < 0.6)
 
+
+def _with_length(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
+    """Give shots without length a length of 1/256 px."""
+    return start, end + (start == end).all(axis=1)[:, None], cells
+
+
+_near_ray = partial(_passing_ray, size=1500, least=0)
+_far_ray = partial(_shifted, units={0: PX, 1: PX, 2: 1})
 
 RAYS: dict[str, Make] = {
     "near": _near_ray,
-    "far": _shifted(_near_ray, 0, 12),
+    "far": _then(_near_ray, partial(_far_ray, low=0, high=12)),
     "parallel": partial(_level_ray, length=10**4),
-    "lattice": _lattice_ray,
+    "lattice": lambda rng, n: (HALF * _wide(rng, n, 8), HALF * _wide(rng, n, 8), _wide(rng, n, 3)),
     "corners": _corner_ray,
-    "fast": _fast_ray,
-    "scene": _shifted(_corner_ray, 9, 10),
+    "fast": partial(_passing_ray, size=3 * 10**7, least=1),  # about 10^6 px long
+    "scene": _then(_corner_ray, partial(_far_ray, low=9, high=10)),
 }
-
-
-def _around(make: Make) -> Make:
-    """Replace pixels by others near the ones aimed at."""
-
-    def made(rng: Rng, n: int) -> Columns:
-        start, end, cells = make(rng, n)
-        return start, end, cells + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.6)
-
-    return made
-
-
-def _aimed(make: Make) -> Make:
-    """Give shots without length a length of 1/256 px."""
-
-    def made(rng: Rng, n: int) -> Columns:
-        start, end, cells = make(rng, n)
-        return start, end + (start == end).all(axis=1)[:, None], cells
-
-    return made
-
-
-CELL_FAMILIES = {name: _around(make) for name, make in RAYS.items() if name != "fast"}
-RAY_FAMILIES = {name: _aimed(make) for name, make in RAYS.items()}
+CELL_FAMILIES = {name: _then(make, _beside) for name, make in RAYS.items() if name != "fast"}
+RAY_FAMILIES = {name: _then(make, _with_length) for name, make in RAYS.items()}
 
 
 # Flights: start, unit vector and how often it is flown, radius, pixel, where that moves
@@ -164,10 +160,10 @@ RAY_FAMILIES = {name: _aimed(make) for name, make in RAYS.items()}
 def _flight(rng: Rng, n: int, most: int) -> Columns:
     """Make discs that just touch a pixel's centre or square; consecutive rows share speed and radius."""
     groups = -(-n // SHARED)
-    triple = np.repeat(TRIPLES[rng.integers(0, len(TRIPLES), groups)], SHARED, axis=0)[:n]
+    triple = _held(TRIPLES[rng.integers(0, len(TRIPLES), groups)], n)
     unit, length = triple[:, :2] * either(rng, (n, 2)), triple[:, 2]
-    times = np.repeat(rng.integers(most // 2, most, groups), SHARED)[:n] // length + 1
-    share = np.repeat(np.where(rng.random(groups) < 0.3, 0, rng.integers(0, 1500, groups)), SHARED)[:n] // length
+    times = _held(rng.integers(most // 2, most, groups), n) // length + 1
+    share = _held(np.where(rng.random(groups) < 0.3, 0, rng.integers(0, 1500, groups)), n) // length
     cells, corner = _corner(rng, n)
     by_corner = (rng.random((n, 1)) < 0.3) | (share == 0)[:, None]
     place = np.where(by_corner, corner, PX * cells + across(unit) * (share * either(rng, n))[:, None])
@@ -178,28 +174,18 @@ def _flight(rng: Rng, n: int, most: int) -> Columns:
     return start, unit, times, length * share, cells, velocity
 
 
-def _far_flight(make: Make, low: int, high: int) -> Make:
-    def made(rng: Rng, n: int) -> Columns:
-        start, unit, times, radius, cells, velocity = make(rng, n)
-        by = _powers(rng, 2 * n, low, high).reshape(n, 2) * either(rng, (n, 2))
-        return start + PX * by, unit, times, radius, cells + by, velocity
-
-    return made
-
+_near_flight = partial(_flight, most=20_000)
+_far_flight = partial(_shifted, units={0: PX, 4: 1})
 
 FLIGHT_FAMILIES: dict[str, Make] = {
-    "near": partial(_flight, most=20_000),
-    "far": _far_flight(partial(_flight, most=20_000), 0, 12),
+    "near": _near_flight,
+    "far": _then(_near_flight, partial(_far_flight, low=0, high=12)),
     "fast": partial(_flight, most=PX * 10**6),
-    "scene": _far_flight(partial(_flight, most=20_000), 9, 10),
+    "scene": _then(_near_flight, partial(_far_flight, low=9, high=10)),
 }
 
 
 # Patterns: what they are, the pixel that is asked for from the shot's own, and where that is
-
-
-def _places(rng: Rng, n: int, low: int = 0, high: int = 2) -> Whole:
-    return np.asarray(_powers(rng, 2 * n, low, high).reshape(n, 2) * either(rng, (n, 2)))
 
 
 def _disc(rng: Rng, n: int, least: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
@@ -208,7 +194,7 @@ def _disc(rng: Rng, n: int, least: int, most: int, places: tuple[int, int] = (0,
     triple = TRIPLES[rng.integers(0, len(TRIPLES), groups)]
     times = rng.integers(least, most + 1, groups) // triple[:, 2] + (least > 0)
     radius = PX * triple[:, 2] * times + rng.integers(-MOST, MOST + 1, groups) * (rng.random(groups) < 0.6)
-    radius, rim = (np.repeat(v, SHARED, axis=0)[:n] for v in (np.maximum(radius, 0), triple[:, :2] * times[:, None]))
+    radius, rim = (_held(v, n) for v in (np.maximum(radius, 0), triple[:, :2] * times[:, None]))
     reach = radius // PX
     x = rng.integers(-reach, reach + 1)
     y = np.rint(np.sqrt(reach * reach - x * x)).astype(np.int64) + rng.integers(-1, 2, n)
@@ -219,8 +205,9 @@ def _disc(rng: Rng, n: int, least: int, most: int, places: tuple[int, int] = (0,
 
 def _one_px_disc(rng: Rng, n: int) -> Columns:
     """Make discs with radii up to a pixel and a half."""
-    radius = np.repeat(rng.integers(0, 6, -(-n // SHARED)) * HALF // 2, SHARED)[:n]
-    radius = np.maximum(radius + np.repeat(rng.integers(-1, 2, -(-n // SHARED)), SHARED)[:n], 0)
+    groups = -(-n // SHARED)
+    radius = HALF * rng.integers(0, 6, groups) // 2
+    radius = _held(np.maximum(radius + rng.integers(-1, 2, groups), 0), n)
     return radius, _wide(rng, n, 1), _places(rng, n)
 
 
@@ -237,11 +224,11 @@ DISC_FAMILIES: dict[str, Make] = {
 def _beam(rng: Rng, n: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
     """Make beams along integer vectors (unit, times, radius, pixel, place), with pixels on or near a side or an end."""
     groups = -(-n // SHARED)
-    triple = np.repeat(TRIPLES[rng.integers(0, len(TRIPLES), groups)], SHARED, axis=0)[:n]
+    triple = _held(TRIPLES[rng.integers(0, len(TRIPLES), groups)], n)
     unit, length = triple[:, :2] * either(rng, (n, 2)), triple[:, 2]
-    long = np.repeat(rng.integers(most // 2, most + 1, groups), SHARED)[:n] // length + 1
-    wide = np.repeat(rng.integers(0, most // 2 + 1, groups), SHARED)[:n] // length
-    off = np.repeat(rng.integers(-MOST, MOST + 1, groups) * (rng.random(groups) < 0.6), SHARED)[:n]
+    long = _held(rng.integers(most // 2, most + 1, groups), n) // length + 1
+    wide = _held(rng.integers(0, most // 2 + 1, groups), n) // length
+    off = _held(rng.integers(-MOST, MOST + 1, groups) * (rng.random(groups) < 0.6), n)
     beside = unit * rng.integers(0, long + 1)[:, None] + across(unit) * (wide * either(rng, n))[:, None]
     ends = unit * np.where(rng.random(n) < 0.5, -wide, long + wide)[:, None]
     cells = np.where(rng.random((n, 1)) < 0.8, beside, ends) + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.3)
@@ -252,7 +239,7 @@ def _thin_beam(rng: Rng, n: int) -> Columns:
     """Make beams of 10^4 px at most 3/256 px wide, whose pixels are those of the axis."""
     unit, times, _, _, places = _beam(rng, n, 10_000)
     along = unit * rng.integers(0, times // PX + 1)[:, None]
-    radius = np.repeat(rng.integers(0, MOST + 1, -(-n // SHARED)), SHARED)[:n]
+    radius = _held(rng.integers(0, MOST + 1, -(-n // SHARED)), n)
     return unit, times, radius, along + _wide(rng, n, 1), places
 
 
@@ -271,15 +258,13 @@ def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin
     rings: list[Whole] = []
     groups = -(-n // SHARED)
     while len(rings) < groups:
-        ring = np.rint(rng.uniform(-1, 1, (int(rng.integers(3, 6)), 2)) * size * np.array([1, 1 / thin])).astype(
-            np.int64
-        )
+        corners = rng.uniform(-1, 1, (int(rng.integers(3, 6)), 2)) * size * np.array([1, 1 / thin])
+        ring = np.rint(corners).astype(np.int64)
         ring = PX * ring if rng.random() < 0.6 else PX * ring + _wide(rng, len(ring), HALF)
         if is_simple(ring.tolist()):
             rings.append(np.concatenate([ring, np.repeat(ring[-1:], 5 - len(ring), axis=0)]))
-    every = np.repeat(np.array(rings), SHARED, axis=0)[:n]
-    rows, side = np.arange(n), rng.integers(0, 5, n)
-    p, q = every[rows, side], every[rows, (side + 1) % 5]
+    every = _held(np.array(rings), n)
+    p, q = random_sides(rng, every)
     share = np.where(rng.random(n) < 0.5, rng.choice([0.0, 0.5], n), rng.random(n))[:, None]
     near = np.rint((p + share * (q - p)) / PX).astype(np.int64)
     return every, near + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.3), _places(rng, n, *places)
@@ -298,7 +283,7 @@ PATTERN_FAMILIES: dict[str, Make] = {
 
 Array = npt.NDArray[Any]
 Method = Callable[..., Bools]
-Families = Mapping[str, Callable[[Rng, int], Columns]]
+Families = Mapping[str, Make]
 
 APART = 2**22
 """Distance between the areas of two rows, px; more than twice the reach of any shot."""
@@ -345,150 +330,74 @@ def _pairs(*kinds: str, without: tuple[str, ...] = ()) -> Families:
 # Ours: volumes
 
 
-def _circles(center_a: Array, radius_a: Array, center_b: Array, radius_b: Array) -> Bools:
-    return overlap(Circles(center_a, radius_a), Circles(center_b, radius_b))
-
-
-def _boxes(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> Bools:
-    return overlap(Aabbs(low_a, high_a), Aabbs(low_b, high_b))
-
-
-def _capsule_circle(a: Array, b: Array, radius: Array, center: Array, radius_c: Array) -> Bools:
-    return overlap(Capsules(a, b, radius), Circles(center, radius_c))
+def _polygons(rings: Array, kind: type[Polygons | ConcavePolygons] = Polygons) -> Volumes:
+    return kind(rings.reshape(-1, 2), np.arange(0, rings.shape[0] * rings.shape[1], rings.shape[1]))
 
 
 def _point_polygon(rings: Array, points: Array) -> Bools:
     """Test points; consecutive rows with equal polygons share one."""
     new = np.concatenate([[True], (rings[1:] != rings[:-1]).any(axis=(1, 2))])
-    distinct = rings[new]
-    made = ConcavePolygons(distinct.reshape(-1, 2), _starts(distinct))
-    return contains_point(made.take(np.cumsum(new) - 1), points)
+    return contains_point(_polygons(rings[new], ConcavePolygons).take(np.cumsum(new) - 1), points)
 
 
-def _circle_polygon(rings: Array, center: Array, radius: Array) -> Bools:
-    return overlap(_polygons(rings), Circles(center, radius))
-
-
-def _starts(rings: Array) -> Array:
-    return np.arange(0, rings.shape[0] * rings.shape[1], rings.shape[1])
-
-
-def _polygons(rings: Array) -> Volumes:
-    return Polygons(rings.reshape(-1, 2), _starts(rings))
-
-
-def _polygon_pair(a: Array, b: Array) -> Bools:
-    return overlap(_polygons(a), _polygons(b))
-
-
-def _oriented_boxes(a: Array, b: Array) -> Bools:
-    return overlap(Obbs.from_corners(a), Obbs.from_corners(b))
-
-
-# Ours: rays, projectiles and patterns, each with its target in a separate area
+# Ours: shots, each with its target
 
 
 def _ray_cells(start: Array, end: Array, cells: Array) -> Bools:
     ray, met, *_ = cells_of_rays(start, end)
     found = np.zeros(len(cells), np.bool_)
-    near = (met == cells[ray]).all(axis=1)
-    found[ray[near]] = True
+    found[ray[(met == cells[ray]).all(axis=1)]] = True
     return found
 
 
-def _grounds(n: int) -> Array:
-    """Return offsets (n, 2), px, that separate the rows so that no shot reaches the target of another."""
-    row = np.arange(n)
-    return APART * np.stack([row % ABREAST, row // ABREAST], axis=1)
-
-
-def _scene(cells: Array, velocity: Array | None = None) -> Scene:
-    """Make a scene with a target of one pixel for each row."""
+def _hit(weapon: Weapon, cells: Array, at: Array, toward: Array | None = None, velocity: Array | None = None) -> Bools:
+    """Fire a shot for each row, and return which hit the target of their own row, which is one pixel."""
     scene, target = Scene(), Sprite.from_mask(np.ones((1, 1), np.bool_))
     moves = np.zeros_like(cells) if velocity is None else velocity / SUB
     for cell, move in zip(cells.tolist(), moves.tolist(), strict=True):
         scene.add(target, cell, velocity_xy=move)
-    return scene
-
-
-def _own(hits: Hits, rows: Array) -> Bools:
-    """Return which shots hit the target of their own row."""
-    found = np.zeros(len(rows), np.bool_)
-    found[hits.shot[hits.object == rows[hits.shot]]] = True
-    return found
-
-
-def _ray_targets(start: Array, end: Array, cells: Array) -> Bools:
-    hits = fire(_scene(cells), Laser(None), start / SUB, toward=end / SUB)  # passes through other rows' targets
-    return _own(hits, np.arange(len(cells)))
-
-
-def _flights(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
-    length = np.rint(np.sqrt((unit * unit).sum(axis=1))).astype(np.int64)
-    keys = np.stack([length * times, radius], axis=1)
-    by = _grounds(len(cells))
-    scene = _scene(cells + by, velocity)
+    aim: Any = {} if toward is None else {"toward": toward}
+    hits = fire(scene, weapon, at, **aim)
     found = np.zeros(len(cells), np.bool_)
-    for speed, reach in np.unique(keys, axis=0).tolist():
-        rows = np.flatnonzero((keys == (speed, reach)).all(axis=1))
-        at = start[rows] / SUB + by[rows]
-        hits = fire(scene, Projectile(speed / SUB, reach / SUB), at, toward=at + unit[rows])
-        found[rows] = _own(hits, rows)
+    found[hits.shot[hits.object == hits.shot]] = True
     return found
 
 
-# Ours: patterns, rows of one weapon together
-
-
-def _by_weapon(keys: Array, weapon: Callable[[list[Any]], Weapon], columns: Columns) -> Bools:
-    """Fire all rows of a weapon in one call, each in a separate area; a third column is a direction."""
-    cells, places, *toward = columns
+def _by_weapon(
+    keys: Array, weapon: Callable[[Any], Weapon], cells: Array, at: Array,
+    along: Array | None = None, velocity: Array | None = None,
+) -> Bools:  # fmt: skip
+    """Fire all rows of a weapon in one call, each in a separate area, so that no shot reaches another row's target."""
     found = np.zeros(len(cells), np.bool_)
     _, which = np.unique(keys.reshape(len(keys), -1), axis=0, return_inverse=True)
     for k in range(which.max(initial=-1) + 1):
         rows = np.flatnonzero(which == k)
-        at = places[rows] + _grounds(len(rows))
-        aim: Any = {"toward": at + toward[0][rows]} if toward else {}
-        hits = fire(_scene(at + cells[rows]), weapon(keys[rows[0]].tolist()), at.astype(np.float64), **aim)
-        found[rows] = _own(hits, np.arange(len(rows)))
+        area = np.arange(len(rows))
+        by = APART * np.stack([area % ABREAST, area // ABREAST], axis=1)
+        start = (at[rows] + by).astype(np.float64)
+        toward = None if along is None else start + along[rows]
+        own = None if velocity is None else velocity[rows]
+        found[rows] = _hit(weapon(keys[rows[0]].tolist()), cells[rows] + by, start, toward, own)
     return found
 
 
-def _disc_pixels(radius: Array, cells: Array, places: Array) -> Bools:
-    return _by_weapon(radius, lambda r: Disc(r / SUB), (cells, places))  # type: ignore[operator]
+def _long(unit: Array, times: Array, radius: Array) -> Array:
+    """Return lengths and radii as keys (n, 2)."""
+    return np.stack([np.rint(np.sqrt((unit * unit).sum(axis=1))).astype(np.int64) * times, radius], axis=1)
+
+
+def _flights(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
+    keys = _long(unit, times, radius)
+    return _by_weapon(keys, lambda k: Projectile(k[0] / SUB, k[1] / SUB), cells, start / SUB, unit, velocity)
 
 
 def _beam_pixels(unit: Array, times: Array, radius: Array, cells: Array, places: Array) -> Bools:
-    length = np.rint(np.sqrt((unit * unit).sum(axis=1))).astype(np.int64) * times
-    keys = np.stack([length, radius], axis=1)
-    return _by_weapon(keys, lambda k: Beam(k[0] / SUB, 2 * k[1] / SUB), (cells, places, unit))
+    keys = _long(unit, times, radius)
+    return _by_weapon(keys, lambda k: Beam(k[0] / SUB, 2 * k[1] / SUB), cells + places, places, unit)
 
 
-def _pattern_pixels(rings: Array, cells: Array, places: Array) -> Bools:
-    def weapon(ring: list[Any]) -> Weapon:
-        points = [p for k, p in enumerate(ring) if p != ring[k - 1]]
-        return Polygon([(x / SUB, y / SUB) for x, y in points])
-
-    return _by_weapon(rings, weapon, (cells, places))
-
-
-# Exact answers of rows
-
-
-def _flies_into(start: Any, unit: Any, times: int, radius: int, cell: Any, velocity: Any) -> bool:
-    return truth.disc_flies_into(start, [times * v for v in unit], radius, cell, velocity)
-
-
-def _in_disc(radius: int, cell: Any, place: Any) -> bool:
-    return truth.in_disc(radius, cell)
-
-
-def _in_beam(unit: Any, times: int, radius: int, cell: Any, place: Any) -> bool:
-    return truth.in_beam([times * v for v in unit], radius, cell)
-
-
-def _in_pattern(ring: Any, cell: Any, place: Any) -> bool:
-    return truth.polygon_holds(ring, [SUB * v for v in cell])
+def _polygon(ring: list[Any]) -> Weapon:
+    return Polygon([(x / SUB, y / SUB) for k, (x, y) in enumerate(ring) if [x, y] != ring[k - 1]])
 
 
 ROUND = ("needles", "parallel", "shared")
@@ -499,32 +408,59 @@ CLOSED, HULLS, FIRED = (10**6, 1000, 25_000, 1), (5 * 10**4, 300, 5000, 5), (10*
 
 PREDICATES = (
     Predicate(
-        "circles", truth.circles_meet, _circles, rivals.circles, _pairs("circle", "circle", without=ROUND), *CLOSED,
+        "circles", truth.circles_meet, lambda a, r, b, s: overlap(Circles(a, r), Circles(b, s)), textbook.circles,
+        _pairs("circle", "circle", without=ROUND), *CLOSED,
     ),
-    Predicate("boxes", truth.boxes_meet, _boxes, rivals.boxes, _pairs("box", "box", without=("walls",)), *CLOSED),
     Predicate(
-        "capsule, circle", truth.capsule_meets_circle, _capsule_circle, rivals.capsule_circle,
+        "boxes", truth.boxes_meet, lambda a, a_max, b, b_max: overlap(Aabbs(a, a_max), Aabbs(b, b_max)), textbook.boxes,
+        _pairs("box", "box", without=("walls",)), *CLOSED,
+    ),
+    Predicate(
+        "capsule, circle", truth.capsule_meets_circle,
+        lambda a, b, r, center, s: overlap(Capsules(a, b, r), Circles(center, s)), textbook.capsule_circle,
         _pairs("capsule", "circle", without=("parallel", "shared")), *CLOSED,
     ),
-    Predicate("point in polygon", truth.polygon_holds, _point_polygon, rivals.point_polygon, POINT_FAMILIES, *HULLS),
+    Predicate("point in polygon", truth.polygon_holds, _point_polygon, textbook.point_polygon, POINT_FAMILIES, *HULLS),
     Predicate(
-        "circle, polygon", truth.circle_meets_polygon, _circle_polygon, rivals.circle_polygon,
+        "circle, polygon", truth.circle_meets_polygon,
+        lambda rings, center, r: overlap(_polygons(rings), Circles(center, r)), textbook.circle_polygon,
         _pairs("polygon", "circle", without=("parallel", "shared")), *HULLS,
     ),
     Predicate(
-        "polygons", truth.polygons_meet, _polygon_pair, rivals.polygons,
+        "polygons", truth.polygons_meet, lambda a, b: overlap(_polygons(a), _polygons(b)), textbook.polygons,
         _pairs("polygon", "polygon", without=("walls",)), *HULLS,
     ),
     Predicate(
-        "oriented boxes", truth.polygons_meet, _oriented_boxes, rivals.oriented_boxes,
-        _pairs("oriented box", "oriented box", without=("walls",)), *HULLS,
+        "oriented boxes", truth.polygons_meet, lambda a, b: overlap(Obbs.from_corners(a), Obbs.from_corners(b)),
+        partial(textbook.polygons, sides=2), _pairs("oriented box", "oriented box", without=("walls",)), *HULLS,
     ),
-    Predicate("triangles in space", truth.triangles_meet, triangles_meet, rivals.triangles, TRIANGLE_FAMILIES, *HULLS),
-    Predicate("ray's pixels", truth.segment_meets_cell, _ray_cells, rivals.ray_cells, CELL_FAMILIES, *HULLS),
-    Predicate("ray, 1-px target", truth.segment_meets_cell, _ray_targets, rivals.ray_targets, RAY_FAMILIES, *FIRED),
-    Predicate("projectile, 1-px target", _flies_into, _flights, rivals.flights, FLIGHT_FAMILIES, *FIRED),
-    Predicate("disc's pixels", _in_disc, _disc_pixels, rivals.disc_pixels, DISC_FAMILIES, *FIRED),
-    Predicate("beam's pixels", _in_beam, _beam_pixels, rivals.beam_pixels, BEAM_FAMILIES, *FIRED),
-    Predicate("polygon's pixels", _in_pattern, _pattern_pixels, rivals.pattern_pixels, PATTERN_FAMILIES, *FIRED),
+    Predicate(
+        "triangles in space", truth.triangles_meet, triangles_meet, textbook.triangles, TRIANGLE_FAMILIES, *HULLS,
+    ),
+    Predicate("ray's pixels", truth.segment_meets_cell, _ray_cells, textbook.ray_cells, CELL_FAMILIES, *HULLS),
+    Predicate(
+        "ray, 1-px target", truth.segment_meets_cell,
+        lambda start, end, cells: _hit(Laser(None), cells, start / SUB, end / SUB),  # through other rows' targets
+        textbook.ray_targets, RAY_FAMILIES, *FIRED,
+    ),
+    Predicate(
+        "projectile, 1-px target",
+        lambda a, unit, times, r, cell, v: truth.disc_flies_into(a, [times * u for u in unit], r, cell, v),
+        _flights, textbook.flights, FLIGHT_FAMILIES, *FIRED,
+    ),
+    Predicate(
+        "disc's pixels", lambda r, cell, _: truth.in_disc(r, cell),
+        lambda r, cells, places: _by_weapon(r, lambda key: Disc(key / SUB), cells + places, places),
+        textbook.disc_pixels, DISC_FAMILIES, *FIRED,
+    ),
+    Predicate(
+        "beam's pixels", lambda unit, times, r, cell, _: truth.in_beam([times * u for u in unit], r, cell),
+        _beam_pixels, textbook.beam_pixels, BEAM_FAMILIES, *FIRED,
+    ),
+    Predicate(
+        "polygon's pixels", lambda ring, cell, _: truth.polygon_holds(ring, [SUB * v for v in cell]),
+        lambda rings, cells, places: _by_weapon(rings, _polygon, cells + places, places),
+        textbook.pattern_pixels, PATTERN_FAMILIES, *FIRED,
+    ),
 )  # fmt: skip
 """All predicates, in the order of the table."""

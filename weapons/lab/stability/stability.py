@@ -13,7 +13,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,11 +27,11 @@ from hitplanes.planes.files.png import write_text
 from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
+from ..peers import PEERS, installed, of_peer
 from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike
 from ..study.study import markdown_table
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
-from .rivals import PEERS, installed, of_peer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,6 +116,11 @@ class Study:
         """Whether hitplanes answered every question, and made no wrong decision."""
         return not self.total(OURS).wrong and not any(OURS in cell.failed for cell in self.cells)
 
+    def asked(self, method: str) -> list[str]:
+        """Return the names of the predicates that a method has answered."""
+        answered = {c.predicate for c in self.cells if method in c.methods}
+        return [p.name for p in PREDICATES if p.name in answered]
+
     def total(self, method: str) -> Count:
         """Return the sum of the counts of a method."""
         found = [c.methods[method] for c in self.cells if method in c.methods]
@@ -130,18 +135,8 @@ class Study:
             "complete": self.complete,
             "versions": self.versions,
             "families": FAMILIES,
-            "cells": [
-                {
-                    "predicate": cell.predicate,
-                    "family": cell.family,
-                    "asked": cell.asked,
-                    "methods": {name: {"cases": c.cases, "missed": c.missed, "false": c.false}
-                                for name, c in cell.methods.items()},
-                    "failed": cell.failed,
-                }
-                for cell in self.cells
-            ],
-        }  # fmt: skip
+            "cells": [asdict(cell) for cell in self.cells],
+        }
 
 
 def load_study(path: Path) -> Study:
@@ -158,12 +153,8 @@ def load_study(path: Path) -> Study:
         if data["format"] != FORMAT:
             raise InputError(f"format: expected {FORMAT!r}, got {data['format']!r}")
         cells = [
-            Cell(
-                c["predicate"], c["family"], c["asked"],
-                {name: Count(**n) for name, n in c["methods"].items()}, c["failed"],
-            )
-            for c in data["cells"]
-        ]  # fmt: skip
+            Cell(**{**c, "methods": {name: Count(**n) for name, n in c["methods"].items()}}) for c in data["cells"]
+        ]
         return Study(data["seed"], data["quick"], data["versions"], cells)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: expected what `hitplanes stability` writes, got {error}") from error
@@ -187,11 +178,6 @@ FULL = 7
 """Length of a text that fills a cell, characters."""
 
 
-def powers(text: str) -> str:
-    """Convert powers such as 10^-6 to raised exponents."""
-    return re.sub(r"\^(-?\d+)", r"$^{\1}$", text)
-
-
 def heat_figure(study: Study) -> Figure:
     """Draw the wrong decisions of a run, with a block of predicates by families for each method.
 
@@ -200,8 +186,7 @@ def heat_figure(study: Study) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    blocks = {m: [p.name for p in PREDICATES if _is_asked(study, m, p.name)] for m in study.methods}
-    blocks = {m: names for m, names in blocks.items() if names}
+    blocks = {method: names for method in study.methods if (names := study.asked(method))}
     height = HEADING + NAMES + sum(GAP + ROW * len(names) for names in blocks.values()) + SCALE
     with looking_alike():
         figure = Figure(figsize=(WIDTH, height))
@@ -214,17 +199,16 @@ def heat_figure(study: Study) -> Figure:
         top = height - HEADING - NAMES
         for k, (method, names) in enumerate(blocks.items()):
             top -= GAP + ROW * len(names)
-            box = (LEFT / WIDTH, top / height, 1 - (LEFT + RIGHT) / WIDTH, ROW * len(names) / height)
-            axes = figure.add_axes(box)
+            wide, high = 1 - (LEFT + RIGHT) / WIDTH, ROW * len(names) / height
+            axes = figure.add_axes((LEFT / WIDTH, top / height, wide, high))
             _block(axes, study, method, names)
-            if k == 0:
-                _name_families(axes)
+            if k == 0:  # the names of the families, slanted; all blocks have the same columns
+                axes.set_xticks(range(len(FAMILIES)), [re.sub(r"\^(-?\d+)", r"$^{\1}$", f) for f in FAMILIES.values()])
+                axes.tick_params(axis="x", labeltop=True, labelbottom=False, rotation=38, pad=19)
+                for label in axes.get_xticklabels():
+                    label.set(ha="left", va="bottom", rotation_mode="anchor")
         _scale(figure, height)
     return figure
-
-
-def _is_asked(study: Study, method: str, predicate: str) -> bool:
-    return any(method in cell.methods for cell in study.cells if cell.predicate == predicate)
 
 
 def _block(axes: Axes, study: Study, method: str, predicates: list[str]) -> None:
@@ -252,13 +236,9 @@ def _square(axes: Axes, x: int, y: int, per_million: float) -> None:
     """Draw a cell, with its colour and text."""
     from matplotlib.patches import Rectangle
 
-    color = _color(per_million) if per_million else (1.0, 1.0, 1.0)
+    color, rim = (_color(per_million), 0.0) if per_million else ((1.0, 1.0, 1.0), 0.8)
     axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=PAPER, linewidth=0))
-    axes.add_patch(
-        Rectangle(
-            (x - 0.47, y - 0.45), 0.94, 0.9, facecolor=color, edgecolor=HATCH, linewidth=0 if per_million else 0.8
-        )
-    )
+    axes.add_patch(Rectangle((x - 0.47, y - 0.45), 0.94, 0.9, facecolor=color, edgecolor=HATCH, linewidth=rim))
     dark = color[0] * 0.3 + color[1] * 0.59 + color[2] * 0.11 < DARK
     text = rate(per_million) if per_million else "0"
     size = 8 if len(text) < FULL else 7
@@ -278,14 +258,6 @@ def rate(per_million: float) -> str:
     """Return a rate as short text: per cent, or ppm below a thousandth."""
     value, unit = (per_million / 10_000, "%") if per_million >= 1000 else (per_million, "ppm")
     return f"{value:.0f} {unit}" if value >= 10 else f"{value:.2g} {unit}"
-
-
-def _name_families(axes: Axes) -> None:
-    """Write the names of the families above the first block, slanted; all blocks have the same columns."""
-    axes.set_xticks(range(len(FAMILIES)), [powers(name) for name in FAMILIES.values()])
-    axes.tick_params(axis="x", labeltop=True, labelbottom=False, rotation=38, pad=19)
-    for label in axes.get_xticklabels():
-        label.set(ha="left", va="bottom", rotation_mode="anchor")
 
 
 def _scale(figure: Figure, height: float) -> None:
@@ -331,7 +303,8 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     seed = integer("seed", seed, 0, SEED_MAX)
     folder = path_of("output", folder)
     own_folder(folder, FILES)
-    study = Study(seed, quick, _versions())
+    names = ["hitplanes", "numpy", *(peer for peer in PEERS if installed(peer))]
+    study = Study(seed, quick, {name: version(name) for name in names})
     progress = Progress(stream, "decisions")
     try:
         _ask(study, progress, lambda: _keep(study, folder))
@@ -344,11 +317,6 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
     progress.clear()
     _write(study, folder)
     return study
-
-
-def _versions() -> dict[str, str]:
-    names = ["hitplanes", "numpy", *(peer for peer in PEERS if installed(peer))]
-    return {name: version(name) for name in names}
 
 
 def _ask(study: Study, progress: Progress, keep: Callable[[], None]) -> None:
@@ -368,7 +336,8 @@ def _ask(study: Study, progress: Progress, keep: Callable[[], None]) -> None:
 
 def _blocks(predicate: Predicate, family: str, cell: Cell, study: Study) -> Iterator[int]:
     """Ask the questions of a cell block by block; yield the number of rows done."""
-    methods = _methods(predicate, study)
+    methods: dict[str, Method | None] = {OURS: predicate.ours, NAIVE: predicate.naive}
+    methods |= {peer: of_peer(peer, predicate.name) for peer in PEERS if peer in study.versions}
     place = [PREDICATES.index(predicate), list(FAMILIES).index(family)]
     done = 0
     while done < cell.asked:
@@ -377,7 +346,9 @@ def _blocks(predicate: Predicate, family: str, cell: Cell, study: Study) -> Iter
         true = predicate.true(columns)
         counts, failed = {}, dict(cell.failed)
         for name, method in methods.items():
-            counts[name] = Count(**vars(cell.methods.get(name, Count())))
+            if method is None or name in failed:
+                continue
+            counts[name] = replace(cell.methods.get(name, Count()))
             if name in ONE_BY_ONE and done >= ONE_BY_ONE_MOST:
                 continue
             try:
@@ -385,20 +356,10 @@ def _blocks(predicate: Predicate, family: str, cell: Cell, study: Study) -> Iter
                     counts[name].add(true, method(*columns))
             except Exception as error:  # whatever a library raises
                 failed[name] = f"{type(error).__name__}: {error}"
-        methods = {name: method for name, method in methods.items() if name not in failed}
-        cell.methods = {name: counts[name] for name in methods}  # complete blocks only
+        cell.methods = {name: count for name, count in counts.items() if name not in failed}  # complete blocks only
         cell.failed = failed
         done += len(true)
         yield done
-
-
-def _methods(predicate: Predicate, study: Study) -> dict[str, Method]:
-    methods: dict[str, Method] = {OURS: predicate.ours, NAIVE: predicate.naive}
-    for peer in PEERS:
-        method = of_peer(peer, predicate.name) if peer in study.versions else None
-        if method is not None:
-            methods[peer] = method
-    return methods
 
 
 def _keep(study: Study, folder: Path) -> None:
@@ -428,8 +389,7 @@ def markdown(study: Study) -> str:
     predicates = [p.name for p in PREDICATES if any(c.predicate == p.name for c in study.cells)]
     lines = ["# Wrong decisions on hard input", "", *_head(study), ""]
     for method in study.methods:
-        asked = [p for p in predicates if any(method in c.methods for c in study.cells if c.predicate == p)]
-        if asked:
+        if asked := study.asked(method):
             lines += [f"## {method} {study.versions.get(method, '')}".rstrip(), ""]
             lines += _table(study, asked, families, functools.partial(_entry, method))
     lines += ["## Rows asked", ""]
@@ -439,14 +399,12 @@ def markdown(study: Study) -> str:
 
 def _head(study: Study) -> list[str]:
     text = "Wrong decisions of those asked, against exact rational truth: missed + false. Touching counts as meeting."
-    if not study.complete:
-        text += " **This run is not complete.**"
+    late = "" if study.complete else " **This run is not complete.**"
     names = ", ".join(f"{name} {number}" for name, number in study.versions.items())
-    out = [name for name in PEERS if name not in study.versions]
+    out = ", ".join(name for name in PEERS if name not in study.versions)
     asked = f"Seed {study.seed}{', quick' if study.quick else ''}; {names}."
-    if out:
-        asked += f" Not installed, so not asked: {', '.join(out)}."
-    return [text, "", asked, "", *(f"- {line}" for line in summary(study))]
+    absent = f" Not installed, so not asked: {out}." if out else ""
+    return [text + late, "", asked + absent, "", *(f"- {line}" for line in summary(study))]
 
 
 def _table(
@@ -481,8 +439,7 @@ def summary(study: Study) -> list[str]:
             answered = [cell for cell in study.cells if method in cell.methods]
             worst = max(answered, key=lambda cell: cell.methods[method].per_million)
             count = worst.methods[method]
-            family = FAMILIES[worst.family]
-            line += f"; most in {worst.predicate}, {family}: {100 * count.wrong / count.cases:.1f} %"
+            line += f"; most in {worst.predicate}, {FAMILIES[worst.family]}: {100 * count.wrong / count.cases:.1f} %"
         if failed:
             line += f"; it failed in {len(failed)} cells, first by {failed[0].failed[method]}"
         lines.append(line)

@@ -130,24 +130,16 @@ def _touch(a: Point, b: Point, c: Point, d: Point) -> bool:
 def polygon_holds(ring: Row, p: Row) -> bool:
     """Whether a point lies in a simple polygon or on its edge, by the crossings of a ray to +x."""
     ring, (p,) = _rows(ring, [p])
-    return _on_outline(ring, p) or _crossings(ring, p) % 2 == 1
-
-
-def _on_outline(ring: Ring, p: Point) -> bool:
-    return any(_on_side(p, a, b) for a, b in _sides(ring))
+    if any(_on_side(p, *side) for side in _sides(ring)):
+        return True
+    crossed = [
+        sorted(side, key=lambda end: end[1]) for side in _sides(ring) if (side[0][1] > p[1]) != (side[1][1] > p[1])
+    ]
+    return sum(_turn(low, high, p) > 0 for low, high in crossed) % 2 == 1
 
 
 def _on_side(p: Point, a: Point, b: Point) -> bool:
     return _turn(a, b, p) == 0 and all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in (0, 1))
-
-
-def _crossings(ring: Ring, p: Point) -> int:
-    count = 0
-    for a, b in _sides(ring):
-        if (a[1] > p[1]) != (b[1] > p[1]):
-            low, high = (a, b) if a[1] < b[1] else (b, a)
-            count += _turn(low, high, p) > 0
-    return count
 
 
 def circle_meets_polygon(ring: Row, center: Row, radius: float) -> bool:

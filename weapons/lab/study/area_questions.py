@@ -1,16 +1,18 @@
-"""The study's methods for discs (pixel planes at several scales, volumes of every kind), and kinds of shapes."""
+"""The study's question about discs, its methods (pixel planes at several scales, volumes), and kinds of shapes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from hitplanes.planes.common.checks import Bools, Floats, Ints
-from hitplanes.planes.common.limits import SUB, TRIG_BITS
+from hitplanes.planes.common.limits import SCALE_BITS, SUB, TRIG_BITS
 from hitplanes.planes.files.png import cv2
+from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, variant_of
 from hitplanes.planes.volumes import fit
@@ -22,8 +24,103 @@ from hitplanes.planes.volumes.volumes import Aabbs, Circles, ConcavePolygons, Pa
 from ...fire.call import fire
 from ...fire.hits import Hits
 from ...kinds.areas import Disc, Stencil
-from .methods import Curve, Decisions, Method, copied, enlarged, fired_method, scaled, unscaled
-from .peers import Discs
+from .methods import (
+    Curve,
+    Decisions,
+    Method,
+    Question,
+    copied,
+    drawn_places,
+    enlarged,
+    fired_method,
+    scaled,
+    size_of,
+    targets_of,
+    unscaled,
+)
+from .truth import Round, Straight, discs_on_shapes, parts_of_discs, placed_rings
+
+REACH = 8
+"""Median size of the objects, in radii of the disc."""
+
+RADIUS_MAX = 32
+"""Largest radius of a disc, px; at scale 4 it becomes 128 px, with 51,000 samples per shot."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Shots with discs of one radius, and the objects that they are fired at.
+
+    Parameters
+    ----------
+    scene : the objects, numbered from 0
+    exact : (M,) whether the exact shape of an object is known
+    at : (N, 2) px; whole numbers if no shape is exact
+    aimed : (N,) the object near which a shot is
+    radius : px
+    """
+
+    scene: Scene
+    exact: Bools
+    at: Floats
+    aimed: Ints
+    radius: float
+
+
+def discs_at(alone: Scene, shots: int, seed: int) -> Discs:
+    """Draw discs, each uniformly in the box of an object grown by twice the radius.
+
+    Parameters
+    ----------
+    alone : the objects, numbered from 0, each with a pixel
+    shots : number of discs
+    seed : random seed of the places
+    """
+    targets, count = targets_of(alone), len(alone)
+    exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
+    radius = min(max(1, round(size_of(targets) / REACH)), RADIUS_MAX)
+    place, _, near = drawn_places(targets, shots, seed, 2 * SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
+    at = place / SUB if exact.any() else pixel(place).astype(np.float64)
+    items = np.array([item for item, _, _ in targets] or [0])
+    return Discs(alone, exact, at, items[near], float(radius))
+
+
+def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
+    """Return the question which objects discs touch, with its true answers."""
+    exact, masks = int(discs.exact.sum()), int((~discs.exact).sum())
+    texts = [f"exact shapes of {exact} objects"] * bool(exact) + [f"masks at full scale of {masks}"] * bool(masks)
+    asks = f"Which objects does a disc of radius {discs.radius:g} px touch?"
+    truth = " and ".join(texts) or "nothing can be hit"
+    return Question("areas", asks, len(discs.at), _truth(discs), truth, tuple(curves), aimed=discs.aimed)
+
+
+def _truth(discs: Discs) -> Decisions:
+    """Return the exact shapes and the masks that discs touch, with places and shares."""
+    exact = np.flatnonzero(discs.exact)
+    of = discs_on_shapes(discs.at, discs.radius, [_shape(discs.scene, item) for item in exact.tolist()])
+    masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
+    on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
+    on_masks = Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole)
+    return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), on_masks])
+
+
+def _is_exact(scene: Scene, item: int) -> bool:
+    """Whether the exact shape of an object is known, which holds for polygons and circles, but not for ellipses."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    return outline is not None and (outline.radius is None or form.scale_x == form.scale_y)
+
+
+def _shape(scene: Scene, item: int) -> Round | Straight:
+    """Return the exact shape of an object in the world."""
+    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    assert outline is not None  # it is exact
+    position = scene.items.position_256[item] / SUB
+    scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
+    if outline.radius is not None:
+        return Round(position, outline.radius / SUB * scale[0])
+    rings = [ring / SUB for ring in outline.rings]
+    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[item], position))
+
 
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
 PREFILTERS = ("none", "box", "circle", "oriented box", "4 boxes", "polygon")
@@ -78,17 +175,11 @@ def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
 
 def _decided_by_planes(fired: Fired, scale: float) -> Decisions:
     """Convert hits to decisions with the first pixel and the part of the disc's pixels that hit."""
-    return Decisions.joined(
-        [
-            Decisions(
-                hits.shot,
-                ids[hits.object],
-                unscaled(hits.first_xy.astype(np.float64), scale),
-                hits.samples / hits.verdicts.sum(axis=1)[hits.shot],
-            )
-            for hits, ids in fired
-        ]
-    )
+    found = []
+    for hits, ids in fired:
+        xy, share = hits.first_xy.astype(np.float64), hits.samples / hits.verdicts.sum(axis=1)[hits.shot]
+        found.append(Decisions(hits.shot, ids[hits.object], unscaled(xy, scale), share))
+    return Decisions.joined(found)
 
 
 BOXES = (1, 2, 4, 8, 16, 32, 64)
@@ -154,25 +245,24 @@ def _triangles(mask: Bools, tolerance: float) -> Volumes:
 
 def _pivot_circles(scene: Scene) -> list[Volumes]:
     """Fit circles around the pivots before rotation, which they do not need to follow."""
-    unturned = [_unturned(scene, item) for item in range(len(scene))]
-    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in unturned]
+    return [fit.pivot_circle(mask, pivot.tolist()).translated(corner) for mask, pivot, corner in _unturned(scene)]
 
 
 def _reboxed(scene: Scene) -> list[Volumes]:
     """Rotate boxes of the unrotated masks, and return the bounds of their corners."""
-    boxes: list[Volumes] = []
-    for item in range(len(scene)):
-        mask, pivot_xy, corner_xy = _unturned(scene, item)
-        boxes.append(fit.box(mask).rotated(scene.items.angles[item], pivot_xy).bounds().translated(corner_xy))
-    return boxes
+    return [
+        fit.box(mask).rotated(scene.items.angles[item], pivot).bounds().translated(corner)
+        for item, (mask, pivot, corner) in enumerate(_unturned(scene))
+    ]
 
 
-def _unturned(scene: Scene, item: int) -> tuple[Bools, Floats, Floats]:
-    """Return the mask of an object before rotation, its pivot in the mask, and the position of the mask, px."""
+def _unturned(scene: Scene) -> Iterator[tuple[Bools, Floats, Floats]]:
+    """Yield the masks of objects before rotation, their pivots in the masks, and the positions of the masks, px."""
     items = scene.items
-    variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
-    pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
-    return variant.mask, pivot, items.position_256[item] / SUB - pivot
+    for item in range(len(scene)):
+        variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
+        pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
+        yield variant.mask, pivot, items.position_256[item] / SUB - pivot
 
 
 def _method(discs: Discs, setting: float | None, make: Make) -> Method:
@@ -253,8 +343,10 @@ TURNED_DEG = 15.0
 def kind_of(scene: Scene, item: int) -> str:
     """Classify the shape of an object that has pixels; the first kind that applies is returned."""
     mask, _ = scene.mask(item)
-    off = abs((scene.items.angles[item] + 45) % 90 - 45)
-    sides, radius = _oriented_sides(mask), float(fit.least_circle(mask).radius[0])
+    off, radius = abs((scene.items.angles[item] + 45) % 90 - 45), float(fit.least_circle(mask).radius[0])
+    corners, (x, y) = fit.oriented_box(mask).points, fit.hull(mask).points.T
+    sides = [math.sqrt(float((side**2).sum())) for side in np.diff(corners[:3], axis=0)]
+    hull_area = abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
     if _regions(mask, diagonal=True) > 1:
         return PARTS
     if _regions(~np.pad(mask, 1), diagonal=False) > 1:
@@ -265,7 +357,7 @@ def kind_of(scene: Scene, item: int) -> str:
         return TURNED
     if max(sides) >= LONG_LEAST * min(sides):
         return LONG
-    return CONCAVE if mask.sum() < CONCAVE_MOST * _hull_area(mask) else COMPACT
+    return CONCAVE if mask.sum() < CONCAVE_MOST * hull_area else COMPACT
 
 
 def kinds_scene() -> Scene:
@@ -292,14 +384,3 @@ def kinds_scene() -> Scene:
 def _regions(mask: Bools, diagonal: bool) -> int:
     """Number of connected regions of set pixels."""
     return int(cv2.connectedComponents(mask.astype(np.uint8), connectivity=8 if diagonal else 4)[0]) - 1
-
-
-def _oriented_sides(mask: Bools) -> tuple[float, float]:
-    corners = fit.oriented_box(mask).points
-    first, second = corners[1] - corners[0], corners[2] - corners[1]
-    return math.sqrt(float((first**2).sum())), math.sqrt(float((second**2).sum()))
-
-
-def _hull_area(mask: Bools) -> float:
-    x, y = fit.hull(mask).points.T
-    return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2

@@ -6,7 +6,7 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from hitplanes.planes.files.png import write_bytes
 
@@ -78,34 +78,28 @@ CLOSE = 1.12
 """Points whose times are within this ratio share a label."""
 
 
-class Style(NamedTuple):
-    """Colour and mark of a curve."""
+Style = tuple[str, str]
+"""Colour and mark of a curve."""
 
-    color: str
-    mark: str
-
-
-STYLES = {
-    "pixel planes": Style(BLUE, "o"),
-    "pixels, pre-filter": Style(SKY, "D"),
-    "pixels, broad phase": Style(SKY, "s"),
-    "circle": Style(PURPLE, "o"),
-    "circle about the pivot": Style(PURPLE, "P"),
-    "box, re-boxed": Style(ORANGE, "X"),
-    "box, refitted": Style(ORANGE, "s"),
-    "oriented box": Style(RED, "D"),
-    "boxes": Style(ORANGE, "v"),
-    "convex polygon": Style(GREEN, "^"),
-    "hull": Style(GREEN, "*"),
-    "polygon": Style(GREEN, "p"),
-    "triangles": Style(RED, "<"),
-    "pymunk": Style(BLACK, "P"),
-    "shapely": Style(BLACK, "X"),
-    "pygame": Style(BLACK, "*"),
+STYLES: dict[str, Style] = {
+    "pixel planes": (BLUE, "o"),
+    "pixels, pre-filter": (SKY, "D"),
+    "pixels, broad phase": (SKY, "s"),
+    "circle": (PURPLE, "o"),
+    "circle about the pivot": (PURPLE, "P"),
+    "box, re-boxed": (ORANGE, "X"),
+    "box, refitted": (ORANGE, "s"),
+    "oriented box": (RED, "D"),
+    "boxes": (ORANGE, "v"),
+    "convex polygon": (GREEN, "^"),
+    "hull": (GREEN, "*"),
+    "polygon": (GREEN, "p"),
+    "triangles": (RED, "<"),
+    "pymunk": (BLACK, "P"),
+    "shapely": (BLACK, "X"),
+    "pygame": (BLACK, "*"),
 }
-OTHERS = (
-    Style(BLUE, "o"), Style(ORANGE, "s"), Style(GREEN, "^"), Style(RED, "D"), Style(PURPLE, "v"), Style(SKY, "<"),
-)  # fmt: skip
+OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (SKY, "<"))
 """Styles for all other methods, in turn."""
 
 
@@ -141,24 +135,15 @@ def work_precision(question: Mapping[str, Any], title: str) -> Figure:
 
 def _draw_axes(plot: Axes, question: Mapping[str, Any]) -> None:
     """Set the scales, the labels with their units, and the grid."""
-    plot.set(
-        xscale="log",
-        yscale="log",
-        xlabel="time a shot, microseconds (least of all runs); better is lower, and farther left",
-        ylabel=_asked(question),
-    )
+    shares, wrong = "error of the share hit, mean", "wrong decisions a shot (missed and false hits)"
+    time = "time a shot, microseconds (least of all runs); better is lower, and farther left"
+    plot.set(xscale="log", yscale="log", xlabel=time, ylabel=shares if question["error"] == "share" else wrong)
     plot.grid(which="major", color="#dde2e7", linewidth=0.8)
     plot.set_axisbelow(True)
     plot.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     plot.xaxis.set_minor_formatter("")
     least, most = plot.get_xlim()
     plot.set_xlim(min(least, most / DECADES), max(most, least * DECADES))
-
-
-def _asked(question: Mapping[str, Any]) -> str:
-    if question["error"] == "share":
-        return "error of the share hit, mean"
-    return "wrong decisions a shot (missed and false hits)"
 
 
 def _floor(question: Mapping[str, Any], found: Sequence[Place]) -> float:
@@ -172,16 +157,17 @@ def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, fl
     """Draw a curve with its settings beside the points; points whose settings are words are not joined."""
     x, y = [place.us for place in own], [place.error or floor for place in own]
     joined = all(isinstance(place.setting, int | float) for place in own)
+    color, mark = style
     label = own[0].curve + (f" ({setting})" if joined and setting not in ("", own[0].curve) else "")
     plot.plot(
-        x, y, linestyle="-" if joined else "", color=style.color, marker=style.mark, label=label,
-        markersize=10 if style.mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4,
+        x, y, linestyle="-" if joined else "", color=color, marker=mark, label=label,
+        markersize=10 if mark in "PX*" else 7.5, markeredgecolor="white", markeredgewidth=0.7, linewidth=1.4,
         clip_on=False, zorder=3,
     )  # fmt: skip
     for place, left, low in zip(own, x, y, strict=True):
         if joined and place.setting is not None:
             plot.annotate(setting_text(place.setting), (left, low), (5, 3), textcoords="offset points",
-                          fontsize=7.5, color=style.color, path_effects=_halo(), zorder=4)  # fmt: skip
+                          fontsize=7.5, color=color, path_effects=_halo(), zorder=4)  # fmt: skip
 
 
 def _halo() -> list[AbstractPathEffect]:

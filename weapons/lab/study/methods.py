@@ -6,8 +6,7 @@ import gc
 import statistics
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -22,7 +21,7 @@ from hitplanes.planes.scene.sprite import Sprite
 
 from ...fire.call import fire
 from ...fire.hits import Hits
-from ...kinds.placements import ShotColumns, Words, mix64
+from ...kinds.placements import ShotColumns, mix64
 from ...kinds.weapon import Weapon
 
 
@@ -93,13 +92,9 @@ def errors_of(found: Decisions, truth: Decisions) -> Errors:
         int(missed.sum()),
         int(false.sum()),
         None if len(found) and np.isnan(found.share).all() else _mean(np.abs(share[0] - share[1])),
-        _mean(_lengths(apart)),
+        _mean(np.sqrt((apart**2).sum(axis=1))),
         pairs[missed | false] % objects,
     )
-
-
-def _lengths(xy: Floats) -> Floats:
-    return np.asarray(np.sqrt((xy**2).sum(axis=1)))
 
 
 def _mean(values: Floats) -> float | None:
@@ -208,12 +203,25 @@ def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     answer = run()
     setup = time.perf_counter() - begin
     times: list[float] = []
-    with _undisturbed():
+    collects = gc.isenabled()
+    gc.disable()
+    try:
         while not times or _goes_on(times, runs, seconds):
             begin = time.perf_counter()
             run()
             times.append(time.perf_counter() - begin)
-    kept, needed = _traced(method, run) if method.kept_bytes is None else (method.kept_bytes(answer), _peak(run))
+    finally:
+        if collects:
+            gc.enable()
+
+    def again() -> Any:
+        """Set up once more, with the first run."""
+        own = method.prepare()
+        own()
+        return own
+
+    kept = _traced(again)[0] if method.kept_bytes is None else method.kept_bytes(answer)
+    needed = _traced(run)[1]
     return answer, Cost(
         max(setup - min(times), 0.0), min(times), statistics.median(times), max(times), len(times), kept, needed
     )
@@ -226,36 +234,12 @@ def _goes_on(times: list[float], runs: int, seconds: float) -> bool:
     return sum(times) < seconds and len(times) < RUNS_MAX
 
 
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Disable the garbage collector during the timing."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-def _traced(method: Method, run: Callable[[], Any]) -> tuple[int, int]:
-    """Return the bytes that another set-up and its first run keep, and the most that a run needs beside them."""
+def _traced(call: Callable[[], Any]) -> tuple[int, int]:
+    """Return the bytes that the result of a call keeps, and the most that the call needs at once."""
     tracemalloc.start()
     try:
-        again = method.prepare()
-        again()
-        kept, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return kept, _peak(run)
-
-
-def _peak(run: Callable[[], Any]) -> int:
-    """Return the most bytes that a run needs at once."""
-    tracemalloc.start()
-    try:
-        run()
-        return tracemalloc.get_traced_memory()[1]
+        _kept = call()
+        return tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
 
@@ -302,9 +286,11 @@ def size_of(targets: list[Target]) -> float:
     return float(np.median([sum(mask.shape) / 2 for _, mask, _ in targets])) if targets else 1.0
 
 
-def checked_draw(shots: object, seed: object) -> tuple[int, int]:
-    """Check the number of shots and the seed."""
-    return integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
+def drawn_for(scene: Scene, shots: object, seed: object) -> tuple[int, int, Scene, list[Target]]:
+    """Check the number of shots and the seed; return them, a copy of the hittable objects, and these as targets."""
+    shots, seed = integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
+    alone = only_hittable(scene)
+    return shots, seed, alone, targets_of(alone)
 
 
 def drawn_places(
@@ -335,7 +321,8 @@ def drawn_places(
     while free < shots:
         if begin > TRIES * shots:
             raise InputError(f"scene: expected room between its objects, got {free} free places of {begin} drawn")
-        words = _words(seed, begin, shots).astype(object)
+        number = np.arange(4 * begin, 4 * (begin + shots), dtype=np.uint64) + np.uint64(1)
+        words = mix64(mix64(np.array([seed], np.uint64)) + number * GOLDEN).reshape(shots, 4).astype(object)
         which = (words[:, 0] % len(boxes)).astype(np.int64)
         xy = low[which] + (words[:, 1:3] % (high - low + 1)[which]).astype(np.int64)
         good = np.flatnonzero(~taken(xy))
@@ -348,12 +335,6 @@ def drawn_places(
 
 TRIES = 1000
 """Most tries per shot, before the scene is an error for lack of room."""
-
-
-def _words(seed: int, begin: int, count: int) -> Words:
-    """Return the random words (count, 4) of a seed, from try `begin` on."""
-    number = np.arange(4 * begin, 4 * (begin + count), dtype=np.uint64) + np.uint64(1)
-    return mix64(mix64(np.array([seed], np.uint64)) + number * GOLDEN).reshape(count, 4)
 
 
 def ahead(length: float, degrees: Floats) -> Ints:
@@ -410,7 +391,7 @@ def enlarged(scene: Scene, ids: Ints, factor: int) -> Scene:
     """Copy objects like `copied`, with each pixel of their masks as a square of `factor` by `factor` pixels."""
     alone, square = Scene(), np.ones((factor, factor), np.bool_)
     for item in ids.tolist():
-        mask, corner_xy = scene.mask(item)
+        mask, (x, y) = scene.mask(item)
         big = Sprite.from_mask(np.kron(mask, square), pivot_xy=(0, 0))
-        alone.add(big, tuple(factor * v for v in corner_xy), layer=int(scene.items.layer[item]))
+        alone.add(big, (factor * x, factor * y), layer=int(scene.items.layer[item]))
     return alone

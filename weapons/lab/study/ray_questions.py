@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -18,21 +19,20 @@ from ...fire.hits import Hits
 from ...kinds.areas import Disc, Point, Spread
 from ...kinds.rays import Pistol, Projectile
 from ...rays.ray_hits import RayHits
+from ..peers import Segments, mover_curve, ray_curves
 from .methods import (
     Curve,
     Decisions,
     Method,
     Question,
     ahead,
-    checked_draw,
+    drawn_for,
     drawn_places,
     fired_method,
     only_hittable,
     size_of,
-    targets_of,
     velocities_of,
 )
-from .peers import Segments, mover_peer_curve, peer_curves
 from .truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
 STEPS = tuple(2.0**k for k in range(4, -5, -1))
@@ -55,9 +55,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of rays
     seed : random seed of the rays
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
     start, angle, _ = drawn_places(targets, shots, seed, SUB * length // 2, lambda xy: touching(xy, 0, targets))
     step = ahead(length, angle)
@@ -71,7 +69,7 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
         (
             _stepping(alone, start, step, length),
             *_supercover(alone, start, step),
-            *peer_curves(targets, Segments(start / SUB, (start + step) / SUB)),
+            *ray_curves(targets, Segments(start / SUB, (start + step) / SUB)),
         ),
     )
 
@@ -104,21 +102,18 @@ def _stepping(alone: Scene, start: Ints, step: Ints, length: int) -> Curve:
         return Curve("fixed step", left_out=f"a plane of {width} x {height} px is more than {PLANE_MOST} px")
     own_start, own_step = start / SUB - np.array(box[:2]) + 1, step / SUB
 
-    def prepare_by(spacing: float) -> Callable[[], Callable[[], tuple[Ints, Ints]]]:
-        def prepare() -> Callable[[], tuple[Ints, Ints]]:
-            labels = np.pad(label_plane(alone.items.stack(), box), 1)
-            parts = np.arange(0, length + spacing, spacing)
-            parts = parts[parts <= length] / length
-            return lambda: _looked_up(labels, own_start, own_step, parts)
-
-        return prepare
+    def prepare(spacing: float) -> Callable[[], tuple[Ints, Ints]]:
+        labels = np.pad(label_plane(alone.items.stack(), box), 1)
+        parts = np.arange(0, length + spacing, spacing)
+        parts = parts[parts <= length] / length
+        return lambda: _looked_up(labels, own_start, own_step, parts)
 
     def read(found: tuple[Ints, Ints]) -> Decisions:
         label, xy = found
         hit = np.flatnonzero(label)
         return Decisions.of(hit, label[hit] - 1, (xy[hit] + box[:2] - 1).astype(np.float64))
 
-    methods = tuple(Method(spacing, prepare_by(spacing), read) for spacing in STEPS)
+    methods = tuple(Method(spacing, partial(prepare, spacing), read) for spacing in STEPS)
     return Curve("fixed step", "px", methods, "one plane of the front-most objects, read at points along the ray")
 
 
@@ -156,9 +151,7 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of discs
     seed : random seed of the flights
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     size = size_of(targets)
     radius, speed = min(max(1, round(size / 6)), MOVER_RADIUS_MAX), min(max(1, round(8 * size)), REACH_MAX)
     start, angle, _ = drawn_places(
@@ -166,35 +159,25 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     )
     way = ahead(speed, angle)
     flights = Flights(start, flown(SUB * speed, way), SUB * radius)
-    first = impacts(flights, targets, velocities_of(alone, targets))
+    velocities = velocities_of(alone, targets)
+    first = impacts(flights, targets, velocities)
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
+    once, *substeps = (_overlapping(alone, flights, None if n == 1 else n, n) for n in (1, *SUBSTEPS))
+    swept = fired_method(None, alone, Projectile(speed, radius), _impacts, at=start / SUB, toward=(start + way) / SUB)
+    ends = Segments(start / SUB, (start + flights.step_256) / SUB)
     return Question(
         "movers",
         f"What does a disc of {radius} px that flies {speed} px in a frame hit first?",
         shots,
         Decisions.of(first.flight, first.object, point),
         "for every pixel of every object the moment at which the disc touches it, exactly; objects move",
-        (*_mover_curves(alone, flights, start + way, speed), _peer(alone, flights)),
+        (
+            Curve("one test a frame", "", (once,), "a disc at the end of the frame, as many games have it"),
+            Curve("substeps", "tests a frame", tuple(substeps), "a disc at each of them"),
+            Curve("swept", "", (swept,)),
+            mover_curve(targets, ends, float(radius), bool(velocities.any())),
+        ),
     )
-
-
-def _mover_curves(alone: Scene, flights: Flights, toward: Ints, speed: int) -> tuple[Curve, ...]:
-    once = _overlapping(alone, flights, None, 1)
-    substeps = tuple(_overlapping(alone, flights, n, n) for n in SUBSTEPS)
-    weapon = Projectile(speed, flights.radius_256 / SUB)
-    swept = fired_method(None, alone, weapon, _impacts, at=flights.start_256 / SUB, toward=toward / SUB)
-    return (
-        Curve("one test a frame", "", (once,), "a disc at the end of the frame, as many games have it"),
-        Curve("substeps", "tests a frame", substeps, "a disc at each of them"),
-        Curve("swept", "", (swept,)),
-    )
-
-
-def _peer(alone: Scene, flights: Flights) -> Curve:
-    targets = targets_of(alone)
-    start, step = flights.start_256 / SUB, flights.step_256 / SUB
-    moving = bool(velocities_of(alone, targets).any())
-    return mover_peer_curve(targets, Segments(start, start + step), flights.radius_256 / SUB, moving)
 
 
 def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int) -> Method:
@@ -247,38 +230,29 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     shots : number of blasts
     seed : random seed of the places and of the pellets
     """
-    shots, seed = checked_draw(shots, seed)
-    alone = only_hittable(scene)
-    targets = targets_of(alone)
+    shots, seed, alone, targets = drawn_for(scene, shots, seed)
     radius = min(max(1, round(size_of(targets) / 2)), RADIUS_MAX)
     place, _, _ = drawn_places(targets, shots, seed, SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = pixel(place)
     parts = parts_of_discs(at, radius, targets)
 
+    def pellets(n: int) -> Method:
+        weapon = Spread(Point(pierce=True), n, radius)
+        return fired_method(
+            n, alone, weapon, lambda h: Decisions.of(h.shot, h.object, share=h.samples / n), at=at, seed=seed
+        )
+
+    def shares(hits: Hits) -> Decisions:
+        return Decisions(hits.shot, hits.object, hits.first_xy.astype(np.float64), hits.samples / parts.whole)
+
+    note = "a share is a part of the pellets; it does not tell where it hit"
+    every = fired_method(None, alone, Disc(radius, pierce=True), shares, at=at)
     return Question(
         "spread",
         f"How much of a blast of {radius} px lies on each object?",
         shots,
         Decisions(parts.disc, parts.object, parts.nearest_xy.astype(np.float64), parts.pixels / parts.whole),
         "every pixel of the blast is looked up in the mask of every object, at full scale",
-        _curves(alone, at, radius, parts.whole, seed),
+        (Curve("pellets", "pellets", tuple(map(pellets, PELLETS)), note), Curve("every pixel", "", (every,))),
         by_share=True,
     )
-
-
-def _curves(alone: Scene, at: Ints, radius: int, whole: int, seed: int) -> tuple[Curve, ...]:
-    def by_pellets(n: int) -> Method:
-        weapon = Spread(Point(pierce=True), n, radius)
-        return fired_method(n, alone, weapon, lambda hits: _shares(hits, n), at=at, seed=seed)
-
-    every = fired_method(None, alone, Disc(radius, pierce=True), lambda hits: _parts(hits, whole), at=at)
-    note = "a share is a part of the pellets; it does not tell where it hit"
-    return (Curve("pellets", "pellets", tuple(map(by_pellets, PELLETS)), note), Curve("every pixel", "", (every,)))
-
-
-def _shares(hits: Hits, pellets: int) -> Decisions:
-    return Decisions.of(hits.shot, hits.object, share=hits.samples / pellets)
-
-
-def _parts(hits: Hits, whole: int) -> Decisions:
-    return Decisions(hits.shot, hits.object, hits.first_xy.astype(np.float64), hits.samples / whole)

@@ -8,7 +8,6 @@ import json
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,12 +23,13 @@ from ...fire.call import fire
 from ...fire.plan import plan_lines
 from ...kinds.areas import Disc
 from ...replay.stream import Progress
-from .area_questions import kind_of, plane_curves, volume_curves
-from .methods import Cost, Curve, Errors, Method, Question, copied, errors_of, measured
-from .peers import Discs, area_peer_curves, areas_question, discs_at
+from ..peers import disc_curves, versions
+from .area_questions import Discs, areas_question, discs_at, kind_of, plane_curves, volume_curves
+from .methods import Cost, Errors, Method, Question, copied, errors_of, measured, targets_of
 from .ray_questions import movers_question, rays_question, spread_question
 
 FORMAT = "hitplanes-study/1"
+PACKAGES = ("hitplanes", "numpy", "opencv-python-headless", "pymunk", "shapely", "pygame-ce")
 
 SPREAD_PART = 5
 """Factor by which blasts are fewer than other shots, as thousands of pellets take long."""
@@ -71,30 +71,30 @@ def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -
     """
     ids = scene.ids("hittable")
     ids = ids[scene.items.size_wh[ids, 0] > 0]
-    chosen = _spread_over(ids, effort.objects)
+    chosen = ids  # at most so many, evenly from the first to the last
+    if len(ids) > effort.objects:
+        chosen = ids[np.linspace(0, len(ids) - 1, effort.objects).astype(np.int64)]
     alone = copied(scene, chosen)
     discs = discs_at(alone, effort.shots, seed)
     questions = _questions(alone, discs, effort.shots, seed)
+    weapon = Disc(discs.radius)
+    fire(scene, weapon, discs.at)  # warms up
+    plan = fire(scene, weapon, discs.at).plan.timed()
     kinds = [kind_of(alone, item) for item in range(len(alone))]
     study: dict[str, Any] = {
         "format": FORMAT,
         "complete": False,
         "scene": {"name": scene.name, "hash": scene.content_hash(), "objects": len(chosen), "of": len(ids)},
         "seed": seed,
-        "versions": _versions(),
+        "versions": {"python": platform.python_version(), **versions(*PACKAGES)},
         "kinds": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
-        "plan": {"shots": effort.shots, **_plan(scene, discs)},
+        "plan": {"shots": effort.shots, **plan},
         "questions": [_progress_text(question) for question in questions],
     }
     _measure(study, questions, kinds, effort, show, keep)
     study["complete"] = True
     keep(study)
     return study
-
-
-def _spread_over(ids: Ints, most: int) -> Ints:
-    """Choose at most `most` ids, evenly from the first to the last."""
-    return ids[np.linspace(0, len(ids) - 1, most).astype(np.int64)] if len(ids) > most else ids
 
 
 def _measure(
@@ -105,7 +105,8 @@ def _measure(
     done = 0
     for question, record in zip(questions, study["questions"], strict=True):
         for curve in question.curves:
-            row = _curve(curve)
+            row: dict[str, Any] = {name: getattr(curve, name) for name in ("name", "setting", "note", "left_out")}
+            row["points"] = []
             record["curves"].append(row)
             for method in curve.methods:
                 show(f"{question.name}: {curve.name}", done, points)
@@ -113,7 +114,8 @@ def _measure(
                 try:
                     answer, cost = measured(method, effort.runs, effort.seconds)
                 except InputError as error:
-                    _leave_out(row, method, error)
+                    setting = "" if method.setting is None else f"{row['setting']} {method.setting} is left out: "
+                    row["note"] = "; ".join([*filter(None, [row["note"]]), f"{setting}{error}"])
                 else:
                     errors = errors_of(method.read(answer), question.truth)
                     row["points"].append(_point(method, question, errors, cost, kinds))
@@ -122,26 +124,14 @@ def _measure(
                 row["left_out"], row["note"] = row["note"], ""
 
 
-def _leave_out(row: dict[str, Any], method: Method, error: InputError) -> None:
-    """Add the setting that met a limit to the note of its curve."""
-    setting = "" if method.setting is None else f"{row['setting']} {method.setting} is left out: "
-    row["note"] = "; ".join([*filter(None, [row["note"]]), f"{setting}{error}"])
-
-
 def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
+    peers = disc_curves(targets_of(alone), discs.at, discs.radius)
     return [
-        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *area_peer_curves(discs)]),
+        areas_question(discs, [*plane_curves(discs), *volume_curves(discs), *peers]),
         rays_question(alone, shots, seed),
         movers_question(alone, shots, seed),
         spread_question(alone, max(1, shots // SPREAD_PART), seed),
     ]
-
-
-def _plan(scene: Scene, discs: Discs) -> dict[str, Any]:
-    """Return the plan of the discs in the original scene: the cost of each stage; measured after a warm-up call."""
-    weapon = Disc(discs.radius)
-    fire(scene, weapon, discs.at)
-    return fire(scene, weapon, discs.at).plan.timed()
 
 
 def _progress_text(question: Question) -> dict[str, Any]:
@@ -154,10 +144,6 @@ def _progress_text(question: Question) -> dict[str, Any]:
         "error": "share" if question.by_share else "wrong",
         "curves": [],
     }
-
-
-def _curve(curve: Curve) -> dict[str, Any]:
-    return {"name": curve.name, "setting": curve.setting, "note": curve.note, "left_out": curve.left_out, "points": []}
 
 
 def _point(method: Method, question: Question, errors: Errors, cost: Cost, kinds: Sequence[str]) -> dict[str, Any]:
@@ -187,17 +173,6 @@ def _by_kind(wrong: Ints, aimed: Ints | None, kinds: Sequence[str]) -> dict[str,
     of, count = np.bincount(wrong, minlength=len(kinds)), np.bincount(aimed, minlength=len(kinds))
     rows = {kind: np.array([k == kind for k in kinds]) for kind in dict.fromkeys(kinds)}
     return {kind: float(of[mask].sum() / count[mask].sum()) for kind, mask in rows.items() if count[mask].any()}
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions of all libraries that take part and are installed."""
-    found = {"python": platform.python_version()}
-    for name in ("hitplanes", "numpy", "opencv-python-headless", "pymunk", "shapely", "pygame-ce"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 Json = Mapping[str, Any]
@@ -330,55 +305,50 @@ def markdown(study: Json, error: float, pictures: Sequence[str] = ()) -> str:
 
 
 def _lines(study: Json, error: float, pictures: Sequence[str]) -> Iterator[str]:
-    scene, versions = study["scene"], study["versions"]
-    yield f"# Error against run time: {printable(scene['name']) or 'a scene'}"
-    yield ""
-    if not study["complete"]:
-        yield "**Not complete: it was interrupted.** What was measured is here."
-        yield ""
+    scene = study["scene"]
     part = "" if scene["objects"] == scene["of"] else f" of {scene['of']}"
     kinds = ", ".join(f"{count} {kind}" for kind, count in study["kinds"].items())
-    yield f"{scene['objects']}{part} objects ({kinds}), seed {study['seed']}."
-    yield f"Versions: {', '.join(f'{name} {number}' for name, number in versions.items())}."
-    yield ""
-    yield f"## The verdict, for an error of {error:g}"
-    yield ""
+    late = "" if study["complete"] else "**Not complete: it was interrupted.** What was measured is here.\n\n"
+    yield f"""# Error against run time: {printable(scene["name"]) or "a scene"}
+
+{late}{scene["objects"]}{part} objects ({kinds}), seed {study["seed"]}.
+Versions: {", ".join(f"{name} {number}" for name, number in study["versions"].items())}.
+
+## The verdict, for an error of {error:g}
+"""
     yield from (f"- {line}" for line in verdict(study, error))
-    yield ""
-    yield "Pixels, supercover, swept, every pixel and pellets are what `fire` does; volumes are tested by `overlap`."
-    yield ""
-    table = ranks(study, error)
-    if table:
-        yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:"
-        yield ""
+    yield """
+Pixels, supercover, swept, every pixel and pellets are what `fire` does; volumes are tested by `overlap`.
+"""
+    if table := ranks(study, error):
+        yield f"As the books rank them, but measured; good enough means {error:g} wrong decisions a shot or less:\n"
         yield from markdown_table(["", "fast", "accurate", "good enough for"], table)
     for question in study["questions"]:
         yield from _question(question, question["name"] in pictures)
     for question in study["questions"]:
         yield from _kinds(question)
-    yield "## What this scene pays for"
-    yield ""
-    yield f"{study['plan']['shots']} discs in one call at the scene as it is: what each stage cost, what was left out."
-    yield ""
-    yield "```text"
+    yield f"""## What this scene pays for
+
+{study["plan"]["shots"]} discs in one call at the scene as it is: what each stage cost, what was left out.
+
+```text"""
     yield from plan_lines(study["plan"])
     yield "```"
 
 
 def _question(question: Json, picture: bool) -> Iterator[str]:
-    yield f"## {question['name'].capitalize()}: {question['asks']}"
-    yield ""
-    yield f"{question['shots']} shots, {question['hits']} hits in truth. Truth: {question['truth']}."
-    yield ""
+    yield f"""## {question["name"].capitalize()}: {question["asks"]}
+
+{question["shots"]} shots, {question["hits"]} hits in truth. Truth: {question["truth"]}.
+"""
     if picture:
-        yield f"![Error against time: {question['name']}]({question['name']}.png)"
-        yield ""
+        yield f"![Error against time: {question['name']}]({question['name']}.png)\n"
     head = ["method", "setting", "wrong a shot", "missed", "false", "error of share", "of place, px", "us a shot"]
     rows = [_row(curve, point, question) for curve in question["curves"] for point in curve["points"]]
     yield from markdown_table([*head, "median, most", "set-up, ms", "kept", "a run needs"], rows, numbers=True)
-    yield "Of place: mean distance from where it truly hit. Us a shot: the least of all runs of a batch, then the"
-    yield "median and the most. Kept: what stays between runs; a run needs: the most at once."
-    yield ""
+    yield """Of place: mean distance from where it truly hit. Us a shot: the least of all runs of a batch, then the
+median and the most. Kept: what stays between runs; a run needs: the most at once.
+"""
     for curve in question["curves"]:
         if curve["left_out"] or curve["note"]:
             yield f"- {curve['name']}: {'left out: ' + curve['left_out'] if curve['left_out'] else curve['note']}"
@@ -391,7 +361,8 @@ def _row(curve: Json, point: Json, question: Json) -> list[str]:
     unit = f" {curve['setting']}" if isinstance(point["setting"], int | float) else ""
     return [
         curve["name"], setting_text(point["setting"]) + unit, wrong, str(point["missed"]), str(point["false"]),
-        _number(point["share_error"], ".4f"), _number(point["position_error_px"], ".3f"), f"{us['least']:.2f}",
+        *("" if point[name] is None else format(point[name], form)
+          for name, form in (("share_error", ".4f"), ("position_error_px", ".3f"))), f"{us['least']:.2f}",
         f"{us['median']:.2f}, {us['most']:.2f}", f"{point['setup_ms']:.1f}", _bytes(point["kept_bytes"]),
         _bytes(point["run_bytes"]),
     ]  # fmt: skip
@@ -404,8 +375,7 @@ def _kinds(question: Json) -> Iterator[str]:
     kinds = list(dict.fromkeys(kind for _, by_kind in shown for kind in by_kind))
     if not kinds:
         return
-    yield "## Shapes by kind: wrong decisions for each shot near one"
-    yield ""
+    yield "## Shapes by kind: wrong decisions for each shot near one\n"
     rows = [
         [f"{name} {setting_text(setting)}".strip(), *(f"{by_kind[kind]:.3f}" for kind in kinds)]
         for (name, setting), by_kind in shown
@@ -419,10 +389,6 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: 
     yield "| --- |" + (" ---: |" if numbers else " --- |") * (len(head) - 1)
     yield from (f"| {' | '.join(row)} |" for row in rows)
     yield ""
-
-
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
 
 
 def _bytes(count: int) -> str:

@@ -244,10 +244,10 @@ def _nearby(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> 
         relative = step - velocity_256.reshape(-1, 2)
         low, high = start + np.minimum(relative, 0) - reach, start + np.maximum(relative, 0) + reach
         near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
-        pixels = [
-            np.concatenate([_between(targets[k], start - reach, start + reach), _within(rims[k], low[k], high[k])])
-            for k in near.tolist()
-        ]
+        pixels = []
+        for k in near.tolist():
+            rim = rims[k][((PX * rims[k] >= low[k]) & (PX * rims[k] <= high[k])).all(axis=1)]
+            pixels.append(np.concatenate([_between(targets[k], start - reach, start + reach), rim]))
         if any(map(len, pixels)):
             xy, rank = np.concatenate(pixels), np.repeat(near, [len(rows) for rows in pixels])
             yield number, _Near(PX * xy - start, relative[rank], xy, rank)
@@ -260,11 +260,6 @@ def _rim(target: Target) -> Ints:
     wide = np.pad(mask, 1)
     inner = np.all([wide[y : y + h, x : x + w] for y in range(3) for x in range(3)], axis=0)
     return np.asarray(np.argwhere(mask & ~inner)[:, ::-1] + corner)
-
-
-def _within(xy: Ints, low: Ints, high: Ints) -> Ints:
-    """Return the pixels whose centres lie between two corners."""
-    return xy[((PX * xy >= low) & (PX * xy <= high)).all(axis=1)]
 
 
 def _first(near: _Near, radius: int) -> tuple[float, int] | None:
@@ -348,9 +343,6 @@ def _square_time(away: list[int], step: list[int]) -> Fraction | None:
     return entry if entry <= leave else None
 
 
-Reals = npt.NDArray[np.float64]
-Whole = npt.NDArray[np.int64]
-
 STRIPS = 1024
 """Strips into which a disc is cut; the error of a share is about STRIPS**-1.5, or 1 in 30,000."""
 
@@ -359,36 +351,35 @@ STRIPS = 1024
 class Touched:
     """Hits as columns: shot and object (K,), point nearest to the shot (K, 2), share of the disc (K,)."""
 
-    shot: Whole
-    object: Whole
-    xy: Reals
-    share: Reals
+    shot: Ints
+    object: Ints
+    xy: Floats
+    share: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Round:
     """A circle in the world, px."""
 
-    center_xy: Reals
+    center_xy: Floats
     radius: float
 
     @property
-    def box(self) -> tuple[Reals, Reals]:
+    def box(self) -> tuple[Floats, Floats]:
         """Corners of the box around it."""
         return self.center_xy - self.radius, self.center_xy + self.radius
 
-    def meets(self, at: Reals, radius: float) -> bool:
+    def meets(self, at: Floats, radius: float) -> bool:
         """Whether a disc touches it, by the distance of the centres, as the nearest point is rounded."""
         return bool(((at - self.center_xy) ** 2).sum() <= (self.radius + radius) ** 2)
 
-    def nearest(self, at: Reals) -> Reals:
+    def nearest(self, at: Floats) -> Floats:
         """Return its point nearest to `at`."""
         away = at - self.center_xy
         far = math.sqrt(float((away**2).sum()))
-        nearest: Reals = at if far <= self.radius else self.center_xy + away * (self.radius / far)
-        return nearest
+        return at if far <= self.radius else np.asarray(self.center_xy + away * (self.radius / far))
 
-    def chords(self, y: Reals, low: Reals, high: Reals) -> Reals:
+    def chords(self, y: Floats, low: Floats, high: Floats) -> Floats:
         """Return the lengths that it covers of horizontal lines at `y`, from `low` to `high`."""
         half = np.sqrt(np.maximum(self.radius**2 - (y - self.center_xy[1]) ** 2, 0))
         x = self.center_xy[0]
@@ -399,24 +390,24 @@ class Round:
 class Straight:
     """A polygon of one or more rings in the world, px, filled by the even-odd rule."""
 
-    rings: tuple[Reals, ...]
+    rings: tuple[Floats, ...]
 
     @property
-    def box(self) -> tuple[Reals, Reals]:
+    def box(self) -> tuple[Floats, Floats]:
         """Corners of the box around it."""
         points = np.concatenate(self.rings)
         return points.min(axis=0), points.max(axis=0)
 
     @property
-    def edges(self) -> tuple[Reals, Reals]:
+    def edges(self) -> tuple[Floats, Floats]:
         """Begins and ends of all edges."""
         return np.concatenate(self.rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in self.rings])
 
-    def meets(self, at: Reals, radius: float) -> bool:
+    def meets(self, at: Floats, radius: float) -> bool:
         """Whether a disc touches it."""
         return bool(((self.nearest(at) - at) ** 2).sum() <= radius * radius)
 
-    def nearest(self, at: Reals) -> Reals:
+    def nearest(self, at: Floats) -> Floats:
         """Return its point nearest to `at`, which is `at` itself if that lies inside."""
         begin, end = self.edges
         straddles = (begin[:, 1] > at[1]) != (end[:, 1] > at[1])
@@ -428,10 +419,9 @@ class Straight:
         square = (along**2).sum(axis=1)
         part = ((at - begin) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
         foot = begin + along * np.clip(part, 0, 1)[:, None]
-        nearest: Reals = foot[((foot - at) ** 2).sum(axis=1).argmin()]
-        return nearest
+        return np.asarray(foot[((foot - at) ** 2).sum(axis=1).argmin()])
 
-    def chords(self, y: Reals, low: Reals, high: Reals) -> Reals:
+    def chords(self, y: Floats, low: Floats, high: Floats) -> Floats:
         """Return the lengths that it covers of horizontal lines at `y`, from `low` to `high`."""
         begin, end = self.edges
         straddles = (begin[:, 1] > y[:, None]) != (end[:, 1] > y[:, None])
@@ -446,8 +436,8 @@ class Straight:
 
 
 def placed_rings(
-    rings: Sequence[Reals], flip: str, scale_xy: tuple[float, float], degrees: float, position_xy: Reals
-) -> tuple[Reals, ...]:
+    rings: Sequence[Floats], flip: str, scale_xy: tuple[float, float], degrees: float, position_xy: Floats
+) -> tuple[Floats, ...]:
     """Flip, scale, rotate (clockwise on the screen) and move rings around the origin."""
     signs = np.array([-1.0 if "x" in flip else 1.0, -1.0 if flip in ("y", "xy") else 1.0])
     turn = math.radians(degrees)
@@ -456,7 +446,7 @@ def placed_rings(
     return tuple(np.stack([p[:, 0] * c - p[:, 1] * s, p[:, 0] * s + p[:, 1] * c], axis=1) + position_xy for p in flat)
 
 
-def discs_on_shapes(at: Reals, radius: float, shapes: Sequence[Round | Straight]) -> Touched:
+def discs_on_shapes(at: Floats, radius: float, shapes: Sequence[Round | Straight]) -> Touched:
     """Find the closed discs around points (N, 2) that touch closed shapes."""
     found = []
     for k, shape in enumerate(shapes):
@@ -468,7 +458,7 @@ def discs_on_shapes(at: Reals, radius: float, shapes: Sequence[Round | Straight]
     return Touched(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4])
 
 
-def _share(at: Reals, radius: float, shape: Round | Straight) -> float:
+def _share(at: Floats, radius: float, shape: Round | Straight) -> float:
     """Return the part of a disc's area that a shape covers."""
     step = 2 * radius / STRIPS
     off = (np.arange(STRIPS) + 0.5) * step - radius
