@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from hitplanes import Beam, Disc, Scene, fire
-from hitplanes.planes.bits import cells as cells_module
 from hitplanes.planes.bits import visible
 from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
-from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.limits import ALL
 
 CORNERS = [(0, 0), (-(10**9), 10**9), (10**12, -(10**12))]
@@ -79,8 +77,7 @@ def test_many_placements_are_worth_lists_and_those_that_are_there_cost_nothing()
     cells, made = visible_set.cells_for(small, WITHOUT_MOST + 1)
     assert made == cells.nbytes > 0 and visible_set.cells_for(small, 1) == (cells, 0)
     for _ in range(2):
-        everything, made = visible_set.cells_for(large, WITHOUT_MOST)
-        assert made == 0 and everything.listed.tolist() == list(range(len(visible_set.seen.rank)))
+        assert visible_set.cells_for(large, WITHOUT_MOST) == (None, 0)
     assert visible_set.cells_for(large, WITHOUT_MOST + 1)[1] > 0
 
 
@@ -95,27 +92,21 @@ def what(scene: Scene) -> Any:
     return scene.items.stack(), scene.items.tiles(), scene.bounds, View(False, ALL, ())
 
 
-def test_nothing_can_be_seen_of_no_objects() -> None:
+def test_nothing_can_be_seen_of_no_objects(jit: bool) -> None:
     visible_set = VisibleSet(*what(Scene()))
-    cells, made = visible_set.cells_for(np.array([-3, -3, 3, 3]), 1)
-    assert made == 0 and not len(cells.listed)
+    assert visible_set.cells_for(np.array([-3, -3, 3, 3]), 1) == (None, 0) and not len(visible_set.seen.rank)
+    assert not fire(Scene(), Disc(3), (0, 0), strategy="visible")
 
 
 @pytest.mark.parametrize("size", [(1, 1), (250, 1), (1, 250), (70, 250)])
 @pytest.mark.parametrize("corner", CORNERS)
-def test_one_cell_with_all_is_wherever_a_pattern_meets_anything(
-    jit: bool, size: tuple[int, int], corner: tuple[int, int]
-) -> None:
+def test_a_few_shots_find_all_that_is_visible(jit: bool, size: tuple[int, int], corner: tuple[int, int]) -> None:
     scene = Scene()
     for x in (0, size[0] - 1):
         for y in (0, size[1] - 1):
             scene.add([[True]], (corner[0] + x, corner[1] + y))
-    visible_set = VisibleSet(*what(scene))
-    left, top = visible_set.seen.box_xyxy.T[:2]
-    reach = np.array([-2, -30, 40, 5])
-    cells, _ = visible_set.cells_for(reach, 1)
-    x, y = np.meshgrid(
-        [left.min() - reach[2], left.max() - reach[0]], [top.min() - reach[3], top.max() - reach[1]], indexing="ij"
-    )
-    place, _ = kernels_of(cells_module).listed_at(cells, x.reshape(-1), y.reshape(-1))
-    assert np.bincount(place, minlength=4).tolist() == [len(left)] * 4
+    left, top = scene.items.stack().box_xyxy.T[:2]
+    at = [(x, y) for x in (left.min() - 40, left.max() + 2) for y in (top.min() - 5, top.max() + 30)]
+    for place in at:
+        hits = fire(scene, Disc(400), place, strategy="visible")
+        assert hits == fire(scene, Disc(400), place, strategy="spans") and hits

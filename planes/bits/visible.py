@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.backend import LruCache, cached_attribute, kernels_of
+from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Ints
 from ..common.limits import ALL
 from ..grid.spans import Box
@@ -116,34 +116,15 @@ class VisibleSet:
         make = kernels_of(cells).cells_of
         return self._cells.get(tuple(reach_xyxy.tolist()), lambda: make(self.seen.box_xyxy, reach_xyxy, SHOT_BITS))
 
-    def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells, int]:
-        """Cells for a number of placements, and the bytes newly made; for a few, one cell with all tiles."""
+    def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells | None, int]:
+        """Cells for a number of placements, and the bytes newly made; None for a few, which look at all tiles."""
         reach = tuple(reach_xyxy.tolist())
         if reach in self._cells.values:
             return self.cells(reach_xyxy), 0
         if placements <= WITHOUT_MOST and placements * len(self.seen.rank) <= PAIRS_MOST:
-            return self._everything(*reach), 0
+            return None, 0
         made = self.cells(reach_xyxy)
         return made, made.nbytes
-
-    def _everything(self, left: int, top: int, right: int, low: int) -> Cells:
-        """One cell that lists all tiles, over all positions at which a pattern with this box may meet any."""
-        x, y, x_max, y_max = self._around
-        size = max(x_max - left - (x - right), y_max - top - (y - low))
-        return Cells(x - right, y - low, size.bit_length(), 1, 1, *self._listed)
-
-    @cached_attribute
-    def _listed(self) -> tuple[Ints, Ints]:
-        """Begin and end of the list of that cell, and the list."""
-        count = len(self.seen.rank)
-        return np.array([0, count]), np.arange(count)
-
-    @cached_attribute
-    def _around(self) -> Box:
-        """Box around all tiles."""
-        low = self.seen.box_xyxy[:, :2].min(axis=0, initial=0)
-        high = self.seen.box_xyxy[:, 2:].max(axis=0, initial=0)
-        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     @property
     def nbytes(self) -> int:

@@ -413,10 +413,6 @@ class Items:
         changes = self.changes(version)
         return None if changes is None else np.unique(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
 
-    def knows(self, version: int) -> bool:
-        """Whether the journal still has all changes after a version."""
-        return version >= self._forgotten
-
     def changes(self, version: int) -> list[Change] | None:
         """Changes after a version, the last first; None if that is forgotten."""
         if version < self._forgotten:

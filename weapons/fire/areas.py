@@ -236,7 +236,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     for begin, _, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
         windows = _windows(placements, plan)
         listed, made = visible_set.cells_for(_reach(windows.box_xyxy), len(placements))
-        text = "all tiles" if listed.wide * listed.high == 1 else f"cells of {1 << listed.bits} px"
+        text = "all tiles" if listed is None else f"cells of {1 << listed.bits} px"
         plan.run("pre-filter", text + ", strips" * bool(len(windows.strips)), made)
         found = kernels_of(front_to_back).front_to_back(
             placed_of(placements), placements.pellets, windows, visible_set.seen, Rule(True), listed

@@ -176,36 +176,16 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
     return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
 
 
-class Sizes(NamedTuple):
-    """What costs depend on: how many rays a call has, or that it is of one prepared ray; and the items."""
-
-    rays: int
-    prepared: bool
-    stack: Stack
-
-
-def _walk_ns(sizes: Sizes) -> float:
-    """Cost of the walk, ns, among items that are spread evenly over the box around all; a prepared ray never walks."""
-    if sizes.prepared:
-        return inf
-    item_wh, world_wh = sizes.stack.sizes
-    items, now = len(sizes.stack), costs()
+def _ray_costs(rays: int, stack: Stack, prepared: bool = False) -> dict[str, float]:
+    """Time that each way takes for so many rays, ns, among items that are spread evenly; a prepared ray never walks."""
+    now, items = costs(), len(stack)
+    cast = rays * (now.cast_ray + items * now.cast_pair)
+    if prepared:
+        return {"walk": inf, "cast": cast, "march": now.march_prepared}
+    item_wh, world_wh = stack.sizes
     met = min(items * float((item_wh / world_wh).prod()), items)
-    return now.walk_call + items * now.walk_item + sizes.rays * (now.walk_ray + met * now.walk_met)
-
-
-def _cast_ns(sizes: Sizes) -> float:
-    now = costs()
-    return now.cast_call * (not sizes.prepared) + sizes.rays * (now.cast_ray + len(sizes.stack) * now.cast_pair)
-
-
-def _march_ns(sizes: Sizes) -> float:
-    now = costs()
-    return now.march_prepared if sizes.prepared else now.march_call + sizes.rays * now.march_ray
-
-
-def _never(_: RayWeapon, __: Scene) -> str:
-    return ""
+    walk = now.walk_call + items * now.walk_item + rays * (now.walk_ray + met * now.walk_met)
+    return {"walk": walk, "cast": now.cast_call + cast, "march": now.march_call + rays * now.march_ray}
 
 
 def _not_cast(ray: RayWeapon, _: Scene) -> str:
@@ -216,22 +196,13 @@ def _not_marched(ray: RayWeapon, scene: Scene) -> str:
     return _not_cast(ray, scene) or ("" if scene.distance_field() else "no bounds that fit one plane")
 
 
-class RayWay(NamedTuple):
-    """A way of rays: why it cannot serve a weapon at a scene, or ""; and what it costs, ns.
+RAY_WAYS: dict[str, Callable[[RayWeapon, Scene], str]] = {
+    "walk": lambda _, __: "", "cast": _not_cast, "march": _not_marched
+}  # fmt: skip
+"""Why each way of rays cannot serve a weapon at a scene, or "". The walk is the reference, and follows any ray.
 
-    Its engine is of the same name in `first_hit.ENGINES`; the walk's is `ray_walk.trace`.
-    """
-
-    why_not: Callable[[RayWeapon, Scene], str]
-    cost: Callable[[Sizes], float]
-
-
-RAY_WAYS = {
-    "walk": RayWay(_never, _walk_ns),
-    "cast": RayWay(_not_cast, _cast_ns),
-    "march": RayWay(_not_marched, _march_ns),
-}
-"""All ways of rays. The walk is the reference, and follows any ray; the others serve thin rays that end at a hit."""
+Engines of the same names stand in `first_hit.ENGINES`; the walk's is `ray_walk.trace`.
+"""
 
 RAYS_ASKED = {"direct": "walk", "built": "march"}
 """Ways that are meant by the strategies which areas and rays share."""
@@ -266,14 +237,13 @@ def chosen_ray_way(
     choice("strategy", strategy, STRATEGIES)
     name = RAYS_ASKED.get(strategy, strategy)
     forced = RAY_WAYS.get(name)
-    passed_over = forced.why_not(ray, scene) if forced else ""
+    passed_over = forced(ray, scene) if forced else ""
     if forced and not passed_over:
         return RayChoice(name, "asked for")
     why = f"{name} is passed over: {passed_over}; " if passed_over else ""
     if asked or not len(stack) or not is_thin_first(ray):
         return RayChoice("walk", f"{why}every ray walks")
-    sizes = Sizes(rays, prepared, stack)
-    walk, cast, march = (way.cost(sizes) for way in RAY_WAYS.values())
+    walk, cast, march = _ray_costs(rays, stack, prepared).values()
     why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
     field, saved_ns = scene.distance_field(), min(cast, walk) - march
     if field is not None:
@@ -284,9 +254,8 @@ def chosen_ray_way(
 
 def way_of_rest(way: str, stack: Stack, rays: int) -> str:
     """Way of the rays that another way left over."""
-    sizes = Sizes(rays, False, stack)
-    casts = way == "march" and len(stack) and _cast_ns(sizes) < _walk_ns(sizes)
-    return "cast" if casts else "walk"
+    ns = _ray_costs(rays, stack) if way == "march" and len(stack) else {"walk": 0.0, "cast": 0.0}
+    return "cast" if ns["cast"] < ns["walk"] else "walk"
 
 
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:
