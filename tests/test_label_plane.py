@@ -21,6 +21,16 @@ MASKS = [np.random.default_rng(n).random((1 + n % 6, 1 + n % 7)) < 0.75 for n in
 MASKS += [np.ones((9, 9), np.bool_), np.pad(np.zeros((4, 4), np.bool_), 2, constant_values=True)]
 
 
+def changed_boxes(scene: Scene, version: int) -> Any:
+    """Boxes (n, 4), old and new, of deciding items that changed after a version; None if that is forgotten."""
+    changes = scene.items.changes(version)
+    if changes is None:
+        return None
+    none = np.zeros((0, 4), np.int64)
+    every = np.concatenate([none, *(np.reshape(box, (-1, 4)) for _, _, *both in changes for box in both)])
+    return every[every[:, 0] <= every[:, 2]]
+
+
 BOX = (-9, 4, 40, 33)
 NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.scene"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_label_plane import MASKS, add_one, change, front_to_back, random_scene
+from test_label_plane import MASKS, add_one, change, changed_boxes, front_to_back, random_scene
 
 from hitplanes import History, InputError, Scene, Sprite
 from hitplanes.planes.bits.tiles import Tiles
@@ -232,7 +232,7 @@ def test_many_are_placed_as_each_is_alone(jit: bool, rows: list[tuple[int, float
         scenes[1].move(item, (x, y))
     assert scenes[0].items.position_256.tolist() == scenes[1].items.position_256.tolist()
     assert told(scenes[0].items.stack()) == told(scenes[1].items.stack()) == said_of(scenes[0])
-    boxes = [sorted(scene.items.changed_boxes(12).tolist()) for scene in scenes]  # type: ignore[union-attr]
+    boxes = [sorted(changed_boxes(scene, 12).tolist()) for scene in scenes]  # type: ignore[union-attr]
     assert boxes[0] == boxes[1]
 
 
@@ -254,7 +254,7 @@ def test_what_decides_nothing_is_moved_without_a_box() -> None:
     start = scene.version
     scene.move(ids, [[5, 5]] * 4)
     scene.move(ids[0], (7, 7))
-    boxes = scene.items.changed_boxes(start)
+    boxes = changed_boxes(scene, start)
     assert boxes is not None and boxes.tolist() == [[0, 0, 1, 1], [5, 5, 6, 6]]
     assert scene.items.position_256[ids[0]].tolist() == [7 * 256, 7 * 256]
     assert len(scene.items.stack()) == 1
@@ -283,9 +283,9 @@ def test_the_journal_forgets_no_more_than_it_must(monkeypatch: pytest.MonkeyPatc
         scene.move(ids, (x, 0))
         scene.move(int(ids[0]), (x, 1))
     for lag, rows in ((0, 0), (1, 2), (2, 8), (3, 10)):
-        boxes = scene.items.changed_boxes(scene.version - lag)
+        boxes = changed_boxes(scene, scene.version - lag)
         assert boxes is not None and len(boxes) == rows
-    assert scene.items.changed_boxes(scene.version - 4) is None
+    assert changed_boxes(scene, scene.version - 4) is None
 
 
 def test_the_stacks_of_the_past_are_those_of_their_time() -> None:

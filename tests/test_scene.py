@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_label_plane import changed_boxes
 
 from hitplanes import Disc, Laser, Point, fire
 from hitplanes.planes.common.backend import LruCache
@@ -159,11 +160,11 @@ def test_a_journal_is_no_longer_than_what_it_is_worth(monkeypatch: pytest.Monkey
     start = scene.version
     for x in range(17):
         scene.move(0, (x, 0))
-    assert len(scene.items.changed_boxes(start)) == 34  # 5 changes, and 4 for each of 3
+    assert len(changed_boxes(scene, start)) == 34  # 5 changes, and 4 for each of 3
     scene.move(0, (7, 0))
-    assert scene.items.changed_boxes(start) is None
+    assert changed_boxes(scene, start) is None
     scene.remove([0, 1])
-    assert scene.items.changed_boxes(scene.version - 1) is not None
+    assert changed_boxes(scene, scene.version - 1) is not None
     assert len(scene.items._journal) == 8
 
 
@@ -650,13 +651,13 @@ def test_the_journal_tells_where_deciding_items_were_and_are() -> None:
     start = scene.version
     scene.move(0, (5, 3))
     hud = scene.add(DOT, (1, 1), role="hud")
-    assert scene.items.changed_boxes(start).tolist() == [[0, 1, 0, 1], [5, 3, 5, 3]]
+    assert changed_boxes(scene, start).tolist() == [[0, 1, 0, 1], [5, 3, 5, 3]]
     scene.move(hud, (2, 2))
     scene.set(hud, role="occluder")
-    assert scene.items.changed_boxes(start + 2).tolist() == [[2, 2, 2, 2]]
+    assert changed_boxes(scene, start + 2).tolist() == [[2, 2, 2, 2]]
     scene.remove([1])
-    assert scene.items.changed_boxes(start + 4).tolist() == [[1, 1, 1, 1]]
-    assert scene.items.changed_boxes(scene.version).tolist() == []
+    assert changed_boxes(scene, start + 4).tolist() == [[1, 1, 1, 1]]
+    assert changed_boxes(scene, scene.version).tolist() == []
 
 
 def test_a_journal_that_is_too_long_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -665,13 +666,13 @@ def test_a_journal_that_is_too_long_is_forgotten(monkeypatch: pytest.MonkeyPatch
     start = scene.version
     for x in range(4):
         scene.move(0, (x, 0))
-    assert len(scene.items.changed_boxes(start)) == 8
+    assert len(changed_boxes(scene, start)) == 8
     scene.move(0, (7, 0))
-    assert scene.items.changed_boxes(start) is None
-    assert len(scene.items.changed_boxes(start + 1)) == 8
+    assert changed_boxes(scene, start) is None
+    assert len(changed_boxes(scene, start + 1)) == 8
     scene.move([0, 1, 2], (7, 0))
-    assert scene.items.changed_boxes(start + 4) is not None
-    assert scene.items.changed_boxes(start + 3) is None
+    assert changed_boxes(scene, start + 4) is not None
+    assert changed_boxes(scene, start + 3) is None
 
 
 def scene_of_all() -> Scene:

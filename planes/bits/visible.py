@@ -7,7 +7,6 @@ on their positions: they are computed once for a version of a scene, or only for
 
 from __future__ import annotations
 
-import sys
 import threading
 from typing import NamedTuple
 
@@ -113,8 +112,8 @@ class VisibleSet:
 
     def cells(self, reach_xyxy: Ints) -> Cells:
         """Tiles that a pattern with this box may meet, by cells of its position; kept for the last few boxes."""
-        make = kernels_of(cells).cells_of
-        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: make(self.seen.box_xyxy, reach_xyxy, SHOT_BITS))
+        boxes = self.seen.box_xyxy
+        return self._cells.get(tuple(reach_xyxy.tolist()), lambda: cells.cells_of(boxes, reach_xyxy, SHOT_BITS))
 
     def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells | None, int]:
         """Cells for a number of placements, and the bytes newly made; None for a few, which look at all tiles."""
@@ -223,15 +222,12 @@ def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:
     boxes_xyxy : (V, 4) boxes of the tiles
     rows : (V, height) their visible pixels
     """
-    kernels = kernels_of(sys.modules[__name__])
-    sides = kernels.sides_of(rows)
+    sides = sides_of(rows)
     kept = np.flatnonzero(sides[:, 2] >= 0)
     sides = sides[kept]
     height = -(-int((sides[:, 3] - sides[:, 1]).max(initial=0) + 1) // 8) * 8
     corner = boxes_xyxy[kept, :2]
-    return _laid_out(
-        rank[kept], sides + np.concatenate([corner, corner], axis=1), kernels.moved(rows, kept, sides, height)
-    )
+    return _laid_out(rank[kept], sides + np.concatenate([corner, corner], axis=1), moved(rows, kept, sides, height))
 
 
 def _laid_out(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:

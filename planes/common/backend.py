@@ -55,7 +55,6 @@ COMPILED = {
     "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.cells": "hitplanes.planes.jit.bit_rows",
-    "hitplanes.planes.bits.visible": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
     "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.rays",
     "hitplanes.planes.bits.raycast": "hitplanes.planes.jit.rays",

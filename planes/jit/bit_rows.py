@@ -1,4 +1,4 @@
-"""Compiled kernels of bit rows, cells and visible tiles; they work pair by pair and row by row."""
+"""Compiled kernels of bit rows, and of boxes that meet; they work pair by pair and row by row."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-from ..bits import bit_rows
+from ..bits import bit_rows, cells
 from ..bits.bit_rows import Words
-from ..bits.cells import Cells, coarse_enough
 from ..common.backend import in_parts
 from ..common.checks import Ints
 from .cache import compiled
@@ -209,43 +208,8 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     return seen
 
 
-BRUTE_PAIRS = 2**14
-"""Most pairs of boxes that are compared one by one; with more, listing boxes in cells is faster."""
-
-
-@compiled(OUT(BOXES, types.int64, types.int64, OUT))
-def _listed(spans, wide, cells, begin):
-    for box in range(len(spans)):
-        for row in range(spans[box, 1], spans[box, 3] + 1):
-            for column in range(spans[box, 0], spans[box, 2] + 1):
-                begin[row * wide + column + 1] += 1
-    for cell in range(cells):
-        begin[cell + 1] += begin[cell]
-    listed = np.empty(begin[cells], np.int64)
-    for box in range(len(spans)):
-        for row in range(spans[box, 1], spans[box, 3] + 1):
-            for column in range(spans[box, 0], spans[box, 2] + 1):
-                cell = row * wide + column
-                listed[begin[cell]] = box
-                begin[cell] += 1
-    for cell in range(cells, 0, -1):
-        begin[cell] = begin[cell - 1]
-    begin[0] = 0
-    return listed
-
-
-def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:
-    """See `bits.cells.cells_of`."""
-    if not len(boxes_xyxy):
-        return Cells(0, 0, bits, 0, 0, np.zeros(1, np.int64), np.zeros(0, np.int64))
-    spans = boxes_xyxy - np.concatenate([reach_xyxy[2:], reach_xyxy[:2]])
-    x, y = spans[:, :2].min(axis=0).tolist()
-    spans -= (x, y, x, y)
-    bits = coarse_enough(spans[:, :2], spans[:, 2:], bits)
-    spans >>= bits
-    wide, high = (spans[:, 2:].max(axis=0) + 1).tolist()
-    begin = np.zeros(wide * high + 1, np.int64)
-    return Cells(x, y, bits, wide, high, begin, _listed(spans, wide, wide * high, begin))
+BRUTE_PAIRS = 2**21
+"""Most pairs of boxes that are compared one by one; with more, numpy lists them in cells."""
 
 
 @njit(inline="always")
@@ -254,31 +218,6 @@ def cell_at(at_x, at_y, x, y, bits, wide, high):
     column, row = np.uint64((at_x - x) >> bits), np.uint64((at_y - y) >> bits)  # negative numbers become very large
     inside = (column < np.uint64(wide)) & (row < np.uint64(high))
     return np.int64(row * np.uint64(wide) + column) if inside else -1
-
-
-@compiled(types.int64(types.int64, types.int64, types.int64, types.int64, types.int64, *[INTS] * 4, OUT, OUT))
-def _at(x, y, bits, wide, high, begin, listed, at_x, at_y, place, box):
-    count, room = 0, len(place)
-    for i in range(len(at_x)):
-        cell = cell_at(at_x[i], at_y[i], x, y, bits, wide, high)
-        if cell < 0:
-            continue
-        for entry in range(begin[cell], begin[cell + 1]):
-            if count < room:
-                place[count], box[count] = i, listed[entry]
-            count += 1
-    return count
-
-
-def listed_at(cells: Cells, x: Ints, y: Ints) -> tuple[Ints, Ints]:
-    """See `bits.cells.listed_at`."""
-    room = 2 * len(x) + 64
-    while True:
-        place, box = np.empty(room, np.int64), np.empty(room, np.int64)
-        count = _at(*cells, x, y, place, box)
-        if count <= room:
-            return place[:count], box[:count]
-        room = count
 
 
 @compiled(types.int64(BOXES, BOXES, OUT, OUT))
@@ -294,29 +233,11 @@ def _met(asked, boxes, rows, others):
     return count
 
 
-@compiled(types.int64(BOXES, BOXES, INTS, INTS, OUT, OUT))
-def _met_of(asked, boxes, row, box, rows, others):
-    count = 0
-    for pair in range(len(row)):
-        a, b = row[pair], box[pair]
-        across = (asked[a, 0] <= boxes[b, 2]) & (asked[a, 2] >= boxes[b, 0])
-        if across & (asked[a, 1] <= boxes[b, 3]) & (asked[a, 3] >= boxes[b, 1]):
-            rows[count], others[count] = a, b
-            count += 1
-    return count
-
-
 def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
     """See `bits.cells.met_boxes`."""
+    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS:
+        return cells.met_boxes(asked_xyxy, boxes_xyxy)
     asked_xyxy, boxes_xyxy = np.ascontiguousarray(asked_xyxy), np.ascontiguousarray(boxes_xyxy)
-    if len(asked_xyxy) * len(boxes_xyxy) > BRUTE_PAIRS and (asked_xyxy[:, :2] <= asked_xyxy[:, 2:]).all():
-        reach = np.zeros(4, np.int64)
-        reach[2:] = (asked_xyxy[:, 2:] - asked_xyxy[:, :2]).max(axis=0)
-        listed = cells_of(boxes_xyxy, reach, int(reach.max()).bit_length())
-        row, box = listed_at(listed, asked_xyxy[:, 0], asked_xyxy[:, 1])
-        rows, others = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
-        count = _met_of(asked_xyxy, boxes_xyxy, row, box, rows, others)
-        return rows[:count], others[:count]
     room = 4 * len(asked_xyxy) + 64
     while True:
         rows, others = np.empty(room, np.int64), np.empty(room, np.int64)
@@ -324,41 +245,3 @@ def met_boxes(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         if count <= room:
             return rows[:count], others[:count]
         room = count
-
-
-ROWS = types.Array(types.uint64, 2, "C", readonly=True)
-ANY_INTS = types.Array(types.int64, 1, "C", readonly=True)
-
-
-@compiled(types.int64[:, ::1](ROWS))
-def sides_of(rows: Words) -> Ints:
-    """Inclusive boxes (V, 4) of the pixels of tiles; see `bits.visible.sides_of`."""
-    zero, one = np.uint64(0), np.uint64(1)
-    sides = np.empty((len(rows), 4), np.int64)
-    for tile in range(len(rows)):
-        columns, top, bottom = zero, 0, -1
-        for row in range(rows.shape[1]):
-            word = rows[tile, row]
-            if word != zero:
-                if columns == zero:
-                    top = row
-                bottom = row
-                columns |= word
-        left, right = 0, 63 if columns != zero else -1
-        while columns != zero and (columns >> np.uint64(left)) & one == zero:
-            left += 1
-        while columns != zero and (columns >> np.uint64(right)) & one == zero:
-            right -= 1
-        sides[tile, 0], sides[tile, 1], sides[tile, 2], sides[tile, 3] = left, top, right, bottom
-    return sides
-
-
-@compiled(types.uint64[:, ::1](ROWS, ANY_INTS, BOXES, types.int64))
-def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
-    """Rows of some tiles with the first pixel of each in row 0 and in column 0; see `bits.visible.moved`."""
-    found = np.zeros((len(kept), height), np.uint64)
-    for i in range(len(kept)):
-        left, top = np.uint64(sides[i, 0]), sides[i, 1]
-        for row in range(sides[i, 3] - top + 1):
-            found[i, row] = rows[kept[i], top + row] >> left
-    return found

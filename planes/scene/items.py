@@ -400,14 +400,6 @@ class Items:
             self._journal_rows -= np.size(old)
             self._forgotten = version
 
-    def changed_boxes(self, version: int) -> Ints | None:
-        """Boxes (n, 4), old and new, of deciding items that changed after a version; None if that is forgotten."""
-        changes = self.changes(version)
-        if changes is None:
-            return None
-        every = np.concatenate([NO_BOXES, *(np.reshape(box, (-1, 4)) for _, _, *both in changes for box in both)])
-        return every[every[:, 0] <= every[:, 2]]
-
     def changed_ids(self, version: int) -> Ints | None:
         """Sorted ids of the items that changed after a version; None if that is forgotten."""
         changes = self.changes(version)

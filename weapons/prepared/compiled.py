@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 import threading
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import carray, types
@@ -115,12 +115,8 @@ shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
-class Buffer(NamedTuple):
-    """Memory to which a kernel writes rows: its address, bytes, and the array that owns them."""
-
-    address: int
-    view: memoryview
-    numbers: Ints
+Buffer = tuple[int, memoryview, Ints]
+"""Memory to which a kernel writes rows: its address, bytes, and the array that owns them."""
 
 
 class PositionCache:
@@ -216,7 +212,7 @@ class PositionCache:
     def _buffer(self, pixels: Ints) -> Buffer:
         numbers = np.zeros(FOUND + ROW * FEW_ROWS + len(pixels), np.int64)
         numbers[:FOUND] = address(self._here), address(pixels)
-        return Buffer(address(numbers), memoryview(numbers).cast("B"), numbers)
+        return address(numbers), memoryview(numbers).cast("B"), numbers
 
 
 def _numbers(one: Round) -> Ints:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +26,6 @@ from ..fire.areas import accepted
 from ..fire.hits import HitRow
 from ..kinds.weapon import Weapon
 from .one_shot import Answer, Filter, Round, answer_of
-
-Kind = TypeVar("Kind")
 
 CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
@@ -76,7 +74,7 @@ ZERO = np.zeros(1, np.int64)
 """Number of the only shot, as a column."""
 
 
-class Made(dict[int, "Column[Kind]"], Generic[Kind]):
+class Made(dict[int, "Column"]):
     """Squares as [i][j], each made when it is first asked for; those beyond EDGE raise KeyError.
 
     Parameters
@@ -84,24 +82,24 @@ class Made(dict[int, "Column[Kind]"], Generic[Kind]):
     make : function of i and j that returns a square, and may store it here
     """
 
-    def __init__(self, make: Callable[[int, int], Kind]) -> None:
+    def __init__(self, make: Callable[[int, int], Square]) -> None:
         super().__init__()
         self.make = make
 
-    def __missing__(self, i: int) -> Column[Kind]:
+    def __missing__(self, i: int) -> Column:
         if not -EDGE < i < EDGE:
             raise KeyError(i)
         return self.setdefault(i, Column(self, i))
 
 
-class Column(dict[int, Kind]):
+class Column(dict[int, Square]):
     """Squares of one column i."""
 
-    def __init__(self, made: Made[Kind], i: int) -> None:
+    def __init__(self, made: Made, i: int) -> None:
         super().__init__()
         self.made, self.i = made, i
 
-    def __missing__(self, j: int) -> Kind:
+    def __missing__(self, j: int) -> Square:
         if not -EDGE < j < EDGE:
             raise KeyError(j)
         return self.made.make(self.i, j)
@@ -117,7 +115,7 @@ class PositionCache:
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, reach: int) -> None:
-        self.made: Made[Square] = Made(self._asked)
+        self.made = Made(self._asked)
         self.quick: Any = self.made
         self.nbytes = 0
         self._tell = answer_of(weapon)[1]
