@@ -349,13 +349,13 @@ def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch
     for _ in range(120):
         for _ in range(int(rng.integers(0, 5))):
             change(scene, rng)
-        owed = index.owed(scene.items)
+        owed = index.build_cost(scene.items)
         corner = rng.integers(-5, 60, (4, 2))
         boxes = np.concatenate([corner, corner + rng.integers(0, 20, (4, 2))], axis=1)
         row, item = index.query(scene.items, boxes)
         assert sorted(zip(row.tolist(), item.tolist(), strict=True)) == expected(scene, boxes)
         assert index.followed == owed
-        assert index.owed(scene.items) == 0
+        assert index.build_cost(scene.items) == 0
         index.read(scene.items).check()
         followed += owed
     assert followed > 100
@@ -364,13 +364,13 @@ def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch
 def test_a_change_owes_what_it_changes() -> None:
     scene = crowd(2, 200)
     index = scene.index("grid")
-    assert index.owed(scene.items) == len(scene.items.stack())
+    assert index.build_cost(scene.items) == len(scene.items.stack())
     index.read(scene.items)
     scene.move([3, 7], (5, 5))
     scene.move([3], (6, 5))
-    assert index.owed(scene.items) == index.owed(scene.items) == 2
+    assert index.build_cost(scene.items) == index.owed(scene.items) == 2
     index.read(scene.items)
-    assert index.owed(scene.items) == 0
+    assert index.build_cost(scene.items) == 0
 
 
 def test_changes_that_no_answer_follows_do_not_pile_up() -> None:
@@ -379,7 +379,7 @@ def test_changes_that_no_answer_follows_do_not_pile_up() -> None:
     index.read(scene.items)
     for i in range(500):
         scene.move(scene.ids()[i % 7 :], (i % 60, i % 50))
-        assert index.owed(scene.items) <= 33 * 30
+        assert index.build_cost(scene.items) <= 33 * 30
     boxes = np.array([[0, 0, 60, 60], [20, 20, 25, 25]])
     assert [v.tolist() for v in index.query(scene.items, boxes)] == [
         v.tolist() for v in fresh.query(scene.items, boxes)
@@ -428,9 +428,9 @@ def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch
 def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
     scene = crowd(2, 10)
     index = scene.index("grid")
-    index.missed = 5.0
+    index.regret = 5.0
     index.read(scene.items)
-    assert index.missed == 0
+    assert index.regret == 0
 
 
 def test_an_index_forgets_boxes_that_came_and_went() -> None:

@@ -46,7 +46,7 @@ def test_more_views_in_turn_than_are_kept_lose_anew_before_each_is_composed_agai
     lost, cost, rounds = 1.0, 10.0, 200
     for _ in range(rounds):
         for view in views:
-            if known.kept(view, scene.version) is None and known.pays(view, scene.version, lost, cost):
+            if known.kept(view, scene.version) is None and known.worth_building(view, scene.version, lost, cost):
                 known.read(view, scene.items, scene.bounds)
     assert len(views) <= len(composed) <= rounds * len(views) * lost / cost
 

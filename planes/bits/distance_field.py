@@ -330,12 +330,12 @@ class DistanceField:
     Parameters
     ----------
     labels : the label plane
-    lost_ns : time that calls lost without the field since the scene changed last
+    regret_ns : time that calls lost without the field since the scene changed last
     """
 
     def __init__(self, labels: LabelPlane) -> None:
         self.labels = labels
-        self.lost_ns = 0.0
+        self.regret_ns = 0.0
         self._distance_field: Clearance | None = None
         self._seen = -1
         self._lock = threading.Lock()
@@ -354,7 +354,7 @@ class DistanceField:
         if self._seen != items.version:
             changes = items.changes(self._seen)
             if changes is None or any(self._holds(box) for _, _, *both in changes for box in both):
-                self._distance_field, self.lost_ns = None, 0.0
+                self._distance_field, self.regret_ns = None, 0.0
             self._seen = items.version
         return self._distance_field is not None
 

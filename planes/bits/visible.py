@@ -141,14 +141,14 @@ class VisibleSets:
     def __init__(self) -> None:
         self._version = -1
         self._kept: dict[View, VisibleSet] = {}
-        self._missed: dict[View, float] = {}
+        self._regret: dict[View, float] = {}
         self._lock = threading.Lock()
 
     def kept(self, view: View, version: int) -> VisibleSet | None:
         """The visible set of a view and version, if it is made."""
         return self._kept.get(view) if self._version == version else None
 
-    def pays(self, view: View, version: int, lost: float, cost: float) -> bool:
+    def worth_building(self, view: View, version: int, lost: float, cost: float) -> bool:
         """Whether a view's calls, including this one, have lost as much time as the visible set costs.
 
         So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
@@ -156,12 +156,12 @@ class VisibleSets:
         """
         with self._lock:
             self._forget(version)
-            self._missed[view] = self._missed.get(view, 0.0) + max(lost, 0.0)
-            return self._missed[view] > cost
+            self._regret[view] = self._regret.get(view, 0.0) + max(lost, 0.0)
+            return self._regret[view] > cost
 
-    def lost(self, view: View, version: int) -> float:
+    def regret(self, view: View, version: int) -> float:
         """The time that a view's calls have lost for want of its visible set, ns."""
-        return self._missed.get(view, 0.0) if self._version == version else 0.0
+        return self._regret.get(view, 0.0) if self._version == version else 0.0
 
     def read(self, view: View, items: Items, bounds: Box | None) -> VisibleSet:
         """The visible set of the items as they are now, within the bounds of the scene."""
@@ -170,13 +170,13 @@ class VisibleSets:
             found = VisibleSet(items.stack(), items.tiles(), bounds, view)
             with self._lock:
                 self._forget(items.version)
-                self._missed[view] = 0.0
+                self._regret[view] = 0.0
                 self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
         return found
 
     def _forget(self, version: int) -> None:
         if self._version != version:
-            self._kept, self._missed, self._version = {}, {}, version  # in this order: `kept` holds no lock
+            self._kept, self._regret, self._version = {}, {}, version  # in this order: `kept` holds no lock
 
 
 def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:

@@ -301,14 +301,14 @@ class Index:
     ----------
     boxes : the structure, None before the first query
     followed : number of boxes that were updated for the last query
-    missed : cost that callers have paid so far for not using the index, in their own unit
+    regret : cost that callers have paid so far for not using the index, in their own unit
     """
 
     def __init__(self, structure: str) -> None:
         self.structure = choice("structure", structure, tuple(STRUCTURES))
         self.boxes: BroadPhase | None = None
         self.followed = 0
-        self.missed = 0.0
+        self.regret = 0.0
         self._pending = np.zeros(0, np.int64)
         self._seen = -1
         self._made_of = 0
@@ -316,7 +316,7 @@ class Index:
         self._item_of = np.zeros(0, np.int64)
         self._lock = threading.RLock()
 
-    def owed(self, items: Items) -> int:
+    def build_cost(self, items: Items) -> int:
         """Number of boxes that must be updated before the next query; each change is read once."""
         with self._lock:
             if self.boxes is not None and self._seen != items.version:
@@ -336,11 +336,11 @@ class Index:
     def read(self, items: Items) -> BroadPhase:
         """Update the structure to the present version, and return it."""
         with self._lock:
-            self.followed = self.owed(items)
+            self.followed = self.build_cost(items)
             if self.boxes is None:
                 from .. import broadphase
 
-                self.missed = 0.0
+                self.regret = 0.0
                 ids = np.sort(items.stack().ids)
                 self.boxes = getattr(broadphase, STRUCTURES[self.structure])(items.boxes(ids))
                 self._item_of, self._place_of = ids, np.full(items.count, -1)

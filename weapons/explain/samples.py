@@ -95,7 +95,7 @@ class Detail:
 
     Parameters
     ----------
-    stack, shots, volley : the items, the shots and their placements
+    stack, shots, placements : the items, the shots and their placements
     runs : runs of pixels
     run, x : run and column of each sample
     hit : runs that hit an object; all of them if the weapon pierces
@@ -105,7 +105,7 @@ class Detail:
 
     stack: Stack
     shots: Shots
-    volley: Placements
+    placements: Placements
     runs: Runs
     run: Ints
     x: Ints
@@ -132,18 +132,18 @@ class Detail:
 
 def samples_of(detail: Detail) -> Samples:
     """All samples of one shot."""
-    volley = detail.volley
+    placements = detail.placements
     placement = detail.runs.placement[detail.run]
     ids = np.append(detail.stack.ids, -1)
     xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
-    return Samples(xy, volley.round[placement], volley.pellet[placement], detail.verdict, ids[detail.rank])
+    return Samples(xy, placements.round[placement], placements.pellet[placement], detail.verdict, ids[detail.rank])
 
 
 def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
     """Distinct pixels that each round hit of each object, as {(round, object): pixels}."""
     under = detail.runs.take(detail.hit.run)
     found: dict[tuple[int, int], Spans] = {}
-    keys = np.stack([detail.volley.round[under.placement], detail.stack.ids[detail.hit.rank]], axis=1)
+    keys = np.stack([detail.placements.round[under.placement], detail.stack.ids[detail.hit.rank]], axis=1)
     order = np.lexsort(keys.T[::-1])
     begins = np.flatnonzero((np.diff(keys[order], axis=0, prepend=-1) != 0).any(axis=1)).tolist()
     for first, last in pairwise([*begins, len(order)]):
@@ -161,7 +161,7 @@ def blockers_of(detail: Detail) -> list[Blocked]:
     if not len(ranks):
         return []
     behind: dict[int, list[Behind]] = {rank: [] for rank in ranks.tolist()}
-    every = np.unique(pairs_of(detail.volley.boxes, detail.volley.shot, detail.shots, stack).rank)
+    every = np.unique(pairs_of(detail.placements.boxes, detail.placements.shot, detail.shots, stack).rank)
     refuses = refused(stack, every, detail.shots, np.zeros(len(every), np.int64))
     for rank in every[~refuses & ~stack.occluder[every]].tolist():
         on = detail.on(rank)
@@ -194,8 +194,8 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
         if key not in visible:
             visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
         if row.shot not in in_round:
-            volley = placements_for(weapon, shots.take(row.shot, row.shot + 1))
-            in_round[row.shot] = np.bincount(volley.round, volley.count).astype(np.int64)
+            placements = placements_for(weapon, shots.take(row.shot, row.shot + 1))
+            in_round[row.shot] = np.bincount(placements.round, placements.count).astype(np.int64)
         fired = int(in_round[row.shot][row.round])
         shares.append(
             Share(row.samples / fired, row.pixels / visible[key], row.pixels / scene.items.variants[row.object].area)
@@ -205,9 +205,9 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
 
 def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     """Objects within NEAR_PX of the pattern of one shot that were not hit, nearest first, then by id."""
-    stack, volley = detail.stack, detail.volley
-    boxes = volley.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
-    near = np.unique(pairs_of(boxes, volley.shot, detail.shots, stack).rank)
+    stack, placements = detail.stack, detail.placements
+    boxes = placements.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
+    near = np.unique(pairs_of(boxes, placements.shot, detail.shots, stack).rank)
     found = []
     for rank in near.tolist():
         if stack.occluder[rank] or int(stack.ids[rank]) in hit:
@@ -222,13 +222,13 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
 def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
     stack, bounds = scene.items.stack(), scene.bounds
-    volley = placements_for(weapon, shots)
-    if int(volley.count.sum()) > DETAIL_SAMPLES_MAX:
-        got = int(volley.count.sum())
+    placements = placements_for(weapon, shots)
+    if int(placements.count.sum()) > DETAIL_SAMPLES_MAX:
+        got = int(placements.count.sum())
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
-    runs = volley.table.laid(volley.pattern, volley.xy[:, 0], volley.xy[:, 1], volley.boxes)
+    runs = placements.table.laid(placements.pattern, placements.xy[:, 0], placements.xy[:, 1], placements.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
-    pairs = pairs_of(volley.boxes, volley.shot, shots, stack)
+    pairs = pairs_of(placements.boxes, placements.shot, shots, stack)
     events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
@@ -246,7 +246,7 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)
         rank[outside] = ended[outside] = -1
     hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
-    return Detail(stack, shots, volley, runs, run, x, hit, verdict, rank, ended)
+    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended)
 
 
 def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
@@ -364,16 +364,16 @@ def _shifts() -> Ints:
 SHIFTS = _shifts()
 
 
-def _flips(volley: Placements, shot: Shots, context: QueryContext) -> tuple[Bools, Ints]:
+def _flips(placements: Placements, shot: Shots, context: QueryContext) -> tuple[Bools, Ints]:
     """Whether a shot hits each item of the stack, and the number of the first shift that changes this, -1 for none."""
-    n, placements = len(context.stack), len(volley)
+    n, each = len(context.stack), len(placements)
     still, flips = np.zeros(n, np.bool_), np.full(n, -1)
-    step = max(1, CHUNK_SAMPLES // max(int(volley.count.sum()), 1))
+    step = max(1, CHUNK_SAMPLES // max(int(placements.count.sum()), 1))
     edges = [0, 1, *range(1 + step, len(SHIFTS), step), len(SHIFTS)]
     for first, last in pairwise(edges):
-        met = direct(_shifted(volley, SHIFTS[first:last]), shot, context)
+        met = direct(_shifted(placements, SHIFTS[first:last]), shot, context)
         hit = np.zeros((last - first, n), np.bool_)
-        hit[met.placement // placements, met.rank] = True
+        hit[met.placement // each, met.rank] = True
         if not first:
             still = hit[0]
         turned = hit != still
@@ -381,9 +381,9 @@ def _flips(volley: Placements, shot: Shots, context: QueryContext) -> tuple[Bool
     return still, flips
 
 
-def _shifted(volley: Placements, shift: Ints) -> Placements:
+def _shifted(placements: Placements, shift: Ints) -> Placements:
     """Placements repeated for each shift, all as placements of shot 0."""
-    n = len(shift)
-    xy = np.tile(volley.xy, (n, 1)) + np.repeat(shift, len(volley), axis=0)
-    turn_xy = np.tile(volley.turn_xy, (n, 1))
-    return Placements(volley.table, np.tile(volley.pattern, n), xy, turn_xy, volley.rounds, volley.pellets, shot=0)
+    n, table = len(shift), placements.table
+    xy = np.tile(placements.xy, (n, 1)) + np.repeat(shift, len(placements), axis=0)
+    pattern, turn_xy = np.tile(placements.pattern, n), np.tile(placements.turn_xy, (n, 1))
+    return Placements(table, pattern, xy, turn_xy, placements.rounds, placements.pellets, shot=0)

@@ -395,11 +395,12 @@ def _named(row: tuple[Any, ...]) -> HitRow:
 
 
 # house: row order
-def rows_of_span_hits(met: SpanHits, volley: Placements, ids: Ints, first_shot: int) -> Rows:
+def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_shot: int) -> Rows:
     """Add runs of hit pixels up to rows; a pixel hit by several pellets counts once in `pixels`."""
-    rounds = int(volley.round.max(initial=0)) + 1
-    group = (volley.shot[met.placement] * rounds + volley.round[met.placement]) * max(len(ids), 1) + met.rank
-    origin = volley.origin_xy[met.placement]
+    rounds = int(placements.round.max(initial=0)) + 1
+    shot, round_ = placements.shot[met.placement], placements.round[met.placement]
+    group = (shot * rounds + round_) * max(len(ids), 1) + met.rank
+    origin = placements.origin_xy[met.placement]
     x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
     distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
     order = np.lexsort((x, met.y, distance2, group))
@@ -410,15 +411,13 @@ def rows_of_span_hits(met: SpanHits, volley: Placements, ids: Ints, first_shot: 
     samples = np.add.reduceat(lengths, first) if len(first) else lengths
     weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
     pellets, pixels = np.ones_like(samples), samples
-    if int(volley.pellet.max(initial=0)):
+    if int(placements.pellet.max(initial=0)):
         pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
-    placement, rank = met.placement[best], met.rank[best]
-    columns = (volley.shot[placement], volley.round[placement], distance2[first], met.y[best], x[best], rank)
-    sort = np.lexsort(columns[::-1])
-    first_xy = np.stack([x[best], met.y[best]], axis=1)
+    sort = np.lexsort((met.rank[best], x[best], met.y[best], distance2[first], round_[best], shot[best]))
+    best = best[sort]
     return Rows(
-        volley.shot[placement][sort] + first_shot, volley.round[placement][sort], ids[rank][sort], samples[sort],
-        pixels[sort], weight[sort], pellets[sort], first_xy[sort], distance2[first][sort],
+        shot[best] + first_shot, round_[best], ids[met.rank[best]], samples[sort], pixels[sort], weight[sort],
+        pellets[sort], np.stack([x[best], met.y[best]], axis=1), distance2[first][sort],
     )  # fmt: skip
 
 

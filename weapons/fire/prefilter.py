@@ -169,11 +169,12 @@ class Candidates:
         row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_of[item]), m)
         return row, rank
 
-    def near(self, volley: Placements, placement: Ints, rank: Ints) -> Bools:
+    def near(self, placements: Placements, placement: Ints, rank: Ints) -> Bools:
         """Whether the volumes of pattern and item may meet, for pairs whose boxes do."""
         kind = late.fit.Kind(self.prefilter.volume, self.prefilter.k)
-        found = volley.count[placement] > 0  # the box of an empty pattern lies within others
-        found[found] = near(self.prefilter.name, kind, self.items, self.stack, volley, placement[found], rank[found])
+        found = placements.count[placement] > 0  # the box of an empty pattern lies within others
+        placement, rank, name = placement[found], rank[found], self.prefilter.name
+        found[found] = near(name, kind, self.items, self.stack, placements, placement, rank)
         return found
 
 
@@ -183,7 +184,7 @@ _kept: LruCache[tuple[ref[Pattern], str], Volumes] = LruCache(
 """Volumes of patterns; the key is a weak reference, so the patterns are not kept alive."""
 
 
-def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Placements, placement: Ints, rank: Ints) -> Bools:
+def near(name: str, kind: Kind, items: Items, stack: Stack, placed: Placements, placement: Ints, rank: Ints) -> Bools:
     """Which pairs of placements and items may touch: their volumes meet, or floats cannot decide.
 
     Parameters
@@ -194,9 +195,9 @@ def near(name: str, kind: Kind, items: Items, stack: Stack, volley: Placements, 
     """
     if not len(rank):
         return np.zeros(0, np.bool_)
-    fired, of_pattern = np.unique(volley.pattern[placement], return_inverse=True)
-    patterns = pattern_volumes(name, [volley.table.patterns[i] for i in fired.tolist()])
-    shift = stack.box_xyxy[rank, :2] - volley.xy[placement]
+    fired, of_pattern = np.unique(placed.pattern[placement], return_inverse=True)
+    patterns = pattern_volumes(name, [placed.table.patterns[i] for i in fired.tolist()])
+    shift = stack.box_xyxy[rank, :2] - placed.xy[placement]
     return _meet(kind, items, stack.ids[rank], shift, patterns, of_pattern)
 
 

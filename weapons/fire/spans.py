@@ -62,20 +62,20 @@ class SpanHits:
     counts: Ints
 
 
-def direct(volley: Placements, shots: Shots, context: QueryContext) -> SpanHits:
+def direct(placements: Placements, shots: Shots, context: QueryContext) -> SpanHits:
     """Walk the stack under every placement, but only where an item may be."""
-    boxes = volley.boxes
-    counts = inside(volley, boxes, context)
+    boxes = placements.boxes
+    counts = inside(placements, boxes, context)
     if not len(context.stack):
-        return _met(volley, Runs.joined([]), [], counts, context.plan)
-    placement, rank = near_pairs(volley, np.arange(len(boxes)), boxes, context)
-    pairs = Pairs(placement, rank, _kinds(rank, volley.shot[placement], shots, context))
-    runs = _under_items(volley, pairs, context)
+        return _met(placements, Runs.joined([]), [], counts, context.plan)
+    placement, rank = near_pairs(placements, np.arange(len(boxes)), boxes, context)
+    pairs = Pairs(placement, rank, _kinds(rank, placements.shot[placement], shots, context))
+    runs = _under_items(placements, pairs, context)
     context.plan.run("samples", "runs where items may be", runs.nbytes)
-    return _met(volley, runs, _walked(runs, pairs, context, counts), counts, context.plan)
+    return _met(placements, runs, _walked(runs, pairs, context, counts), counts, context.plan)
 
 
-def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Runs:
+def _under_items(placements: Placements, pairs: Pairs, context: QueryContext) -> Runs:
     """Runs of placements, clipped to the items that they are paired with."""
     busy, first = np.unique(pairs.placement, return_index=True)
     if not len(busy):
@@ -84,8 +84,8 @@ def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Run
     low = np.minimum.reduceat(items[:, :2], first, axis=0)
     hull = np.concatenate([low, np.maximum.reduceat(items[:, 2:], first, axis=0)], axis=1)
     if area(hull) <= SPARSE * area(items):
-        return _laid(volley, busy, hull if context.bounds is None else clipped(hull, context.bounds))
-    runs = _laid(volley, pairs.placement, items if context.bounds is None else clipped(items, context.bounds))
+        return _laid(placements, busy, hull if context.bounds is None else clipped(hull, context.bounds))
+    runs = _laid(placements, pairs.placement, items if context.bounds is None else clipped(items, context.bounds))
     y = runs.y - runs.y.min(initial=0)
     rows = int(y.max(initial=0)) + 1
     which, x_first, x_last = merged_runs(runs.placement * rows + y, runs.x_first, runs.x_last)
@@ -93,22 +93,22 @@ def _under_items(volley: Placements, pairs: Pairs, context: QueryContext) -> Run
     return Runs(runs.placement, runs.y, x_first, x_last, runs.ordinal)
 
 
-def near_pairs(volley: Placements, placements: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
+def near_pairs(placements: Placements, which: Ints, boxes: Ints, context: QueryContext) -> tuple[Ints, Ints]:
     """Pairs of placements and ranks of the items that they may touch, sorted; the plan records how they were found."""
     candidates, plan = context.candidates, context.plan
     row, rank = candidates.meeting(boxes)
-    placement = placements[row]
+    placement = which[row]
     made = row.nbytes + rank.nbytes + placement.nbytes
     if index := candidates.index:
         plan.run("broad phase", f"{index.structure}: {index.followed} boxes placed anew", made)
         made = 0
     if candidates.prefilter.volume:
         plan.run("pre-filter", candidates.why, made)
-        near, met = candidates.near(volley, placement, rank), len(rank)
+        near, met = candidates.near(placements, placement, rank), len(rank)
         placement, rank = placement[near], rank[near]
         plan.run("volumes", str(candidates.prefilter), near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
         made = 0
-    plan.run("pre-filter", candidates.why, made, (len(rank), len(placements) * len(context.stack)))
+    plan.run("pre-filter", candidates.why, made, (len(rank), len(which) * len(context.stack)))
     return placement, rank
 
 
@@ -148,10 +148,10 @@ def _count(counts: Ints, placement: Ints, state: Ints, samples: Ints | None) -> 
     counts[:, Verdict.EMPTY] -= added.sum(axis=1)
 
 
-def inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
+def inside(placements: Placements, boxes: Ints, context: QueryContext) -> Ints:
     """Counts (P, 5) before the walk: samples inside the bounds are EMPTY, the others OUTSIDE."""
     counts = np.zeros((len(boxes), len(OF_PATTERNS)), np.int64)
-    counts[:, Verdict.EMPTY] = volley.count
+    counts[:, Verdict.EMPTY] = placements.count
     context.plan.run("verdicts", "counted for each placement", counts.nbytes)
     if context.bounds is None:
         return counts
@@ -160,7 +160,7 @@ def inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
     if not len(over):
         context.plan.run("outside", "no placement reaches over the bounds")
         return counts
-    runs = _laid(volley, over, np.broadcast_to(np.array(bounds), (len(over), 4)))
+    runs = _laid(placements, over, np.broadcast_to(np.array(bounds), (len(over), 4)))
     inside = np.bincount(runs.placement, runs.lengths, len(boxes)).astype(np.int64)[over]
     counts[over, Verdict.OUTSIDE] = counts[over, Verdict.EMPTY] - inside
     counts[over, Verdict.EMPTY] = inside
@@ -168,19 +168,19 @@ def inside(volley: Placements, boxes: Ints, context: QueryContext) -> Ints:
     return counts
 
 
-def _laid(volley: Placements, placements: Ints, boxes: Ints) -> Runs:
+def _laid(placements: Placements, which: Ints, boxes: Ints) -> Runs:
     """Runs of some of the placements, each clipped to a box."""
-    x, y = volley.xy[placements].T
-    runs = volley.table.laid(volley.pattern[placements], x, y, boxes)
-    return Runs(placements[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
+    x, y = placements.xy[which].T
+    runs = placements.table.laid(placements.pattern[which], x, y, boxes)
+    return Runs(which[runs.placement], runs.y, runs.x_first, runs.x_last, runs.ordinal)
 
 
-def _met(volley: Placements, runs: Runs, events: list[Events], counts: Ints, plan: Plan) -> SpanHits:
+def _met(placements: Placements, runs: Runs, events: list[Events], counts: Ints, plan: Plan) -> SpanHits:
     hit = Events.joined(events)
     under = runs.take(hit.run)
     joined = hit.nbytes if len(events) > 1 else 0  # of one part nothing is copied
     plan.run("rows", "hit pixels, gathered by object", joined + under.nbytes)
-    weight = volley.table.weight(under.ordinal, hit.x_first, hit.x_last)
-    if volley.table.prefix is not None:
+    weight = placements.table.weight(under.ordinal, hit.x_first, hit.x_last)
+    if placements.table.prefix is not None:
         plan.run("weights", "", weight.nbytes)
     return SpanHits(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)

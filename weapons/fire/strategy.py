@@ -169,9 +169,9 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
             ready, least = way, cost
     if wanted is not None and wanted[1] < least and request.view is not None:
         (way, cost, made), known, version = wanted, request.scene.visible_sets(), request.scene.version
-        if known.pays(request.view, version, least - cost, made):
+        if known.worth_building(request.view, version, least - cost, made):
             return way, f"{passed_over}calls have lost the {made / 1e3:.0f} us that it takes to make what it needs"
-        lost = known.lost(request.view, version)
+        lost = known.regret(request.view, version)
         passed_over += f"{way.name} would take {made / 1e3:.0f} us to make, {lost / 1e3:.0f} us lost so far; "
     return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
 
@@ -265,10 +265,10 @@ def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, save
     """
     if field.is_made(scene.items):
         return other._replace(way="march")
-    field.lost_ns += saved_ns
+    field.regret_ns += saved_ns
     build = field.labels.cost(scene.items) * costs().labels_pixel + field.labels.size * costs().field_pixel
-    why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.lost_ns / 1e3:.0f} us lost so far"
-    return other._replace(way="march", why=why) if field.lost_ns > build else RayChoice(other.way, why, pending=True)
+    why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.regret_ns / 1e3:.0f} us lost so far"
+    return other._replace(way="march", why=why) if field.regret_ns > build else RayChoice(other.way, why, pending=True)
 
 
 def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack: Stack, asked: int) -> Candidates:
@@ -311,6 +311,6 @@ def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
         return False
     index = scene.index("bvh")
     if index.boxes is not None:
-        return one_by_one > answer + index.owed(scene.items) * now.bvh_moved
-    index.missed += one_by_one - answer
-    return index.missed > items * now.bvh_item
+        return one_by_one > answer + index.build_cost(scene.items) * now.bvh_moved
+    index.regret += one_by_one - answer
+    return index.regret > items * now.bvh_item

@@ -59,13 +59,13 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
     """Rounds that have pixels, of a shot at the origin that is aimed toward an offset, if one is given."""
     if offset_256 is not None:
         shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
-    volley = placements_for(weapon, shots)
+    placements = placements_for(weapon, shots)
     found: list[Round] = []
-    for number in np.unique(volley.round).tolist():
-        pellets = np.flatnonzero(volley.round == number)
-        x, y = volley.origin_xy[pellets[0]].tolist()
-        placed = zip(volley.pattern[pellets].tolist(), volley.xy[pellets].tolist(), strict=True)
-        sets = [volley.table.patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed]
+    for number in np.unique(placements.round).tolist():
+        pellets = np.flatnonzero(placements.round == number)
+        x, y = placements.origin_xy[pellets[0]].tolist()
+        placed = zip(placements.pattern[pellets].tolist(), placements.xy[pellets].tolist(), strict=True)
+        sets = [placements.table.patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed]
         runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
         spans = Spans.from_runs(*runs)
         if len(spans):
@@ -141,10 +141,10 @@ class Answer(Hits):
     def _met(self) -> tuple[Placements, SpanHits]:
         """Placements and span hits of the shot in the snapshot."""
         present = self._present
-        volley = placements_for(present.weapon, self.shots)
+        placements = placements_for(present.weapon, self.shots)
         candidates = Candidates(present.scene.items, present.stack)
         context = QueryContext(present.stack, present.bounds, pierces(present.weapon), candidates, self.plan)
-        return volley, direct(volley, self.shots, context)
+        return placements, direct(placements, self.shots, context)
 
     def _counted(self) -> Ints:
         return np.asarray(self._met[1].counts.reshape(1, -1, len(OF_PATTERNS)).sum(axis=1))
@@ -199,8 +199,8 @@ class Uneven(Answer):
     def _columns(self) -> Rows:
         if not self._count:
             return Rows.none()
-        volley, met = self._met
-        return rows_of_span_hits(met, volley, self._present.stack.ids, 0)
+        placements, met = self._met
+        return rows_of_span_hits(met, placements, self._present.stack.ids, 0)
 
 
 def answer_of(weapon: Weapon) -> tuple[Callable[[], Answer], Callable[[Any, HitRow], None]]:

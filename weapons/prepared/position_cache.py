@@ -205,7 +205,7 @@ class PositionCache:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""
         known, scene, now = self._scene.visible_sets(), self._scene, costs.NUMPY
         made = now.visible_made + len(scene.items.stack()) * now.visible_item
-        if known.pays(self._view, scene.version, now.integers_placement + ns, made):
+        if known.worth_building(self._view, scene.version, now.integers_placement + ns, made):
             self._visible = known.read(self._view, scene.items, scene.bounds)
         if ns > now.tiles_call:
             raise KeyError

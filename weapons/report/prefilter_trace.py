@@ -76,13 +76,13 @@ class PrefilterTrace:
             boxes, ranks, lines = self._rays(hits, shot)
             patterns = self._capsules(boxes, lines)
         else:
-            volley = placements_for(hits.weapon, shot)
-            boxes = _boxes_of(volley)
+            placements = placements_for(hits.weapon, shot)
+            boxes = _boxes_of(placements)
             candidates = self._candidates()
-            placement, ranks = candidates.meeting(volley.boxes)
+            placement, ranks = candidates.meeting(placements.boxes)
             if candidates.prefilter.volume:
-                ranks = ranks[candidates.near(volley, placement, ranks)]
-            patterns = self._patterns(volley)
+                ranks = ranks[candidates.near(placements, placement, ranks)]
+            patterns = self._patterns(placements)
         return {
             "objects": np.unique(stack.ids[ranks]).tolist(),
             "of": len(stack),
@@ -134,16 +134,16 @@ class PrefilterTrace:
         low, high = np.maximum(cells.box[seen, :2], view[:2] - 1), np.minimum(cells.box[seen, 2:], view[2:] + 1)
         return cells.number[seen], np.concatenate([low, high], axis=1)
 
-    def _patterns(self, volley: Placements) -> list[Floats]:
+    def _patterns(self, placements: Placements) -> list[Floats]:
         """Outlines of the volumes of the first placements, in the world."""
-        some = np.flatnonzero(volley.count > 0)[:PATTERNS_MAX]
+        some = np.flatnonzero(placements.count > 0)[:PATTERNS_MAX]
         if not len(some) or self.prefilter.name == "none":
             return []
         if not self.prefilter.volume:
-            return [rectangle(box) for box in volley.boxes[some]]
-        fired = [volley.table.patterns[i] for i in volley.pattern[some].tolist()]
+            return [rectangle(box) for box in placements.boxes[some]]
+        fired = [placements.table.patterns[i] for i in placements.pattern[some].tolist()]
         volumes = pattern_volumes(self.prefilter.name, fired)
-        return [outline_of(volumes, i)[0] + volley.xy[p] for i, p in enumerate(some.tolist())]
+        return [outline_of(volumes, i)[0] + placements.xy[p] for i, p in enumerate(some.tolist())]
 
     def _capsules(self, boxes_xyxy: Ints, lines: Lines) -> list[Floats]:
         """Outlines of the first boxes that rays asked for, or of the capsules around the first rays."""
@@ -156,9 +156,9 @@ class PrefilterTrace:
         return [outline_of(capsules, i)[0] for i in range(len(some))]
 
 
-def _boxes_of(volley: Placements) -> Ints:
+def _boxes_of(placements: Placements) -> Ints:
     """Boxes (n, 4) of the placements that have pixels."""
-    return volley.boxes[volley.count > 0]
+    return placements.boxes[placements.count > 0]
 
 
 def prefilter_trace(

@@ -362,15 +362,15 @@ def _boxes(hits: Hits) -> Ints:
         around = ray_boxes(hits)
         return np.array([] if around is None else [around], np.int64).reshape(-1, 4)
     found = []
-    for volley in _volleys(hits):
-        boxes = volley.boxes
+    for placements in _placements_of(hits):
+        boxes = placements.boxes
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
         if len(boxes):
             found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
     return np.array(found, np.int64).reshape(-1, 4)
 
 
-def _volleys(hits: Hits) -> Iterator[Placements]:
+def _placements_of(hits: Hits) -> Iterator[Placements]:
     """Placements of a batch, in chunks of about PLACEMENTS_AT_A_TIME."""
     burst, spread, _ = parts_of(hits.weapon)
     step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
