@@ -16,7 +16,7 @@ from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from .canvas import INK, OUTLINES_MAX, Text, World, enlarged, fill_runs
+from .canvas import INK, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
 from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
 
@@ -51,22 +51,12 @@ class Overlay:
     def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Reserve the samples, the objects that were hit, and the occluders that blocked, against labels."""
         runs = [of for shot in shots for of in shot["samples"].values()]
-        hit = {row["object"] for shot in shots for row in shot["rows"]}
-        blocking = {by["object"] for shot in shots for by in shot["blockers"]}
-        self.taken |= self._plane(
-            [*runs, *(Spans.from_mask(*scene.mask(item)).runs() for item in sorted(hit | blocking))]
-        )
-        self.targets |= self._plane(
-            [Spans.from_mask(*scene.mask(item)).runs() for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]]
-        )
-
-    def _plane(self, runs: Sequence[Any]) -> Bools:
-        """Mask of the pixels of the picture that runs of the world cover."""
-        x, y, x_max, y_max = self.view
-        at = np.zeros((y_max - y + 1, x_max - x + 1), np.bool_)
-        for some in runs:
-            fill_runs(at, self.view, some)
-        return enlarged(at, self.factor)
+        items = {told["object"] for shot in shots for told in (*shot["rows"], *shot["blockers"])}
+        runs += [Spans.from_mask(*scene.mask(item)).runs() for item in items]
+        targets = scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]
+        self.taken |= enlarged(covered(self.view, runs), self.factor)
+        every = (Spans.from_mask(*scene.mask(item)).runs() for item in targets)
+        self.targets |= enlarged(covered(self.view, every), self.factor)
 
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Draw a cross on the pixel of a shot and its number in a disc with a line to it; an arrow if out of view."""

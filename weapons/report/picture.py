@@ -29,11 +29,11 @@ from .canvas import (
     Text,
     World,
     clipped,
+    covered,
     draw_present,
     draw_texts,
     factor_of,
     fill,
-    fill_runs,
     heat_boxes,
     page_of,
     sign_entries,
@@ -79,13 +79,13 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
 
         draw_cells(world, report)
     if report["batch"]:
-        texts, cards = _heat(world, report, scene), batch_cards(report)
+        for verdict in MARKS:
+            world.mark_heat(report["batch"]["heat"], verdict)
+        world.outline_seen(scene.ids(Role.HITTABLE).tolist())
+        texts, cards = [], batch_cards(report)
     else:
         texts = _shots(world, report, scene)
-        again = [hit_now(report, number) for number in range(len(report["shots"]))]
-        cards = [
-            shot_card(shot, n, scene, now) for n, (shot, now) in enumerate(zip(report["shots"], again, strict=True))
-        ]
+        cards = [shot_card(shot, n, scene, hit_now(report, n)) for n, shot in enumerate(report["shots"])]
     page, texts = page_of(report, world, texts, cards)
     if text:
         draw_texts(page, texts)
@@ -118,14 +118,6 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     overlay.names(shots, scene)
     overlay.links(shots, hit)
     return [*told, *overlay.texts]
-
-
-def _heat(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
-    """Colour each pixel by its number of samples, and outline the objects."""
-    for verdict in MARKS:
-        world.mark_heat(report["batch"]["heat"], verdict)
-    world.outline_seen(scene.ids(Role.HITTABLE).tolist())
-    return []
 
 
 WIDTH, HEIGHT, GAP = 640, 720, 12
@@ -206,12 +198,9 @@ def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: B
 
 def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
     """Mask (h, w) for each verdict of the pixels that have it in any shot."""
-    shape = view[3] - view[1] + 1, view[2] - view[0] + 1
-    planes = {verdict: np.zeros(shape, np.bool_) for verdict in MARKS}
-    for verdict, plane in planes.items():
-        for shot in report["shots"]:
-            fill_runs(plane, view, shot["samples"].get(verdict, ()))
-        if report["batch"]:
+    planes = {v: covered(view, [shot["samples"].get(v, ()) for shot in report["shots"]]) for v in MARKS}
+    if report["batch"]:
+        for verdict, plane in planes.items():
             for _, box in heat_boxes(report["batch"]["heat"], verdict):
                 fill(plane, view, box)
     return planes
@@ -281,8 +270,7 @@ def _page(
     told = list(words[:LINES_MAX]) or ["no difference"]
     if len(words) > LINES_MAX:
         told.append(f"and {len(words) - LINES_MAX} more")
-    page = np.empty((below + LINE * len(told) + 12, width, 3), np.uint8)
-    page[:] = PAGE_GROUND
+    page = np.full((below + LINE * len(told) + 12, width, 3), PAGE_GROUND, np.uint8)
     texts = []
     for i, ((world, labels), title) in enumerate(zip(sides, ("expected", "got", "difference"), strict=True)):
         left = EDGE + i * (wide + GAP)

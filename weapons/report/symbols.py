@@ -37,6 +37,9 @@ SKETCH = {
 }
 """Colours of what may be drawn of a pre-filter: volumes of items, volumes of shots, cells."""
 
+MARK_GROUND = (70, 74, 82)
+"""Colour of the ground of a mark in a legend."""
+
 TINT = 40
 """Opacity of a mark's ground, which shows all samples, even those too small for a shape each."""
 
@@ -364,8 +367,7 @@ def sign_mark(name: str) -> Image:
         signs.sweep(left + 4, right - 4, 5.0)
     else:
         signs.of(name).around(middle, middle, RING, FINE)
-    mark = np.empty((14, wide, 3), np.uint8)
-    mark[:] = (70, 74, 82)
+    mark = np.full((14, wide, 3), MARK_GROUND, np.uint8)
     signs.lay(mark)
     return mark
 
