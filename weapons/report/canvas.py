@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,10 @@ from .symbols import (
     glyph,
     sign_mark,
     tiled_glyph,
-)  # fmt: skip
+)
+
+if TYPE_CHECKING:
+    from .cards import Card
 
 WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 """Largest size of an enlarged view, px, and largest factor."""
@@ -308,19 +311,8 @@ class Text(NamedTuple):
     middle: bool = False
 
 
-class Drawn(Protocol):
-    """Protocol of a card: its height, and how it draws itself."""
-
-    @property
-    def height(self) -> int:
-        """Height, px."""
-
-    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
-        """Draw it with its top left at (x, y), and return its texts."""
-
-
 def page_of(
-    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Drawn]
+    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Card]
 ) -> tuple[Image, list[Text]]:
     """Page around the enlarged world, and all texts, which are drawn later."""
     image = world.image

@@ -190,9 +190,7 @@ def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: B
     """Masks (h, w) of the pixels of a view that were hit in both reports or in one, or had another verdict change."""
     mine, other = (_verdict_planes(report, view) for report in (expected, got))
     a, b = mine["hit"], other["hit"]
-    changed = np.zeros_like(a)
-    for verdict in MARKS:
-        changed |= mine[verdict] != other[verdict]
+    changed = np.logical_or.reduce([mine[verdict] != other[verdict] for verdict in MARKS])
     return {"both": a & b, "other verdict": changed & ~(a | b), "only expected": a & ~b, "only got": b & ~a}
 
 
@@ -209,13 +207,11 @@ def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
 def _focus(kinds: Mapping[str, Bools], whole: Box) -> Box:
     """Box around the pixels that differ, else around those that were hit, else the whole box."""
     for names in (("only expected", "only got"), ("other verdict",), ("both",)):
-        rows, columns = np.nonzero(np.logical_or.reduce([kinds[name] for name in names]))
-        if len(rows):
-            low = (int(columns.min()) - AROUND, int(rows.min()) - AROUND)
-            high = (int(columns.max()) + AROUND, int(rows.max()) + AROUND)
-            x, y = (max(v, 0) + origin for v, origin in zip(low, whole[:2], strict=True))
-            x_max, y_max = (min(v + origin, most) for v, origin, most in zip(high, whole[:2], whole[2:], strict=True))
-            return _cut(x, y, x_max, y_max)
+        at = np.argwhere(np.logical_or.reduce([kinds[name] for name in names]))[:, ::-1]
+        if len(at):
+            low = np.maximum(at.min(axis=0) - AROUND, 0) + whole[:2]
+            high = np.minimum(at.max(axis=0) + AROUND + whole[:2], whole[2:])
+            return _cut(*low.tolist(), *high.tolist())
     return _cut(*whole)
 
 

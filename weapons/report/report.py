@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +27,6 @@ from ..kinds.areas import parts_of, ray_parts_of
 from ..kinds.placements import placements_for
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
-
-if TYPE_CHECKING:
-    from .prefilter_trace import PrefilterTrace
-
 
 CELLS_MAX = 2**18
 """Most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels."""
@@ -220,6 +216,8 @@ SHOTS_MAX = 24
 
 PLACEMENTS_AT_A_TIME = 2**16
 
+NO_BOXES: Ints = np.zeros((0, 4), np.int64)
+
 NEAR_OUTSIDE = 48
 """Width of the strip beyond the bounds in which samples are shown, px."""
 
@@ -258,11 +256,15 @@ def report_of(
     each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
     told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
     view = view_of(scene, fired)
-    sieve = None
+    sieve = {}
     if prefilter is not None or broadphase is not None:
         from .prefilter_trace import prefilter_trace  # few reports need it
 
-        sieve = prefilter_trace(scene, view, prefilter, broadphase)
+        trace = prefilter_trace(scene, view, prefilter, broadphase)
+        for (hits, _, row), shot in zip(each[: len(told)], told, strict=True):
+            shot["tested"] = trace.told(hits, row)
+        opened = [np.zeros(0, np.int64), *(trace.opened(hits) for hits in fired)]
+        sieve = {"filter": trace.to_dict(np.unique(np.concatenate(opened)))}
     return {
         "format": FORMAT,
         "version": version("hitplanes"),
@@ -278,25 +280,15 @@ def report_of(
         "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
         "shots": told,
         "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
-        **({} if sieve is None else {"filter": _sifted(sieve, fired, each if told else [], told)}),
+        **sieve,
         **({} if now is None else {"now": present_of(scene, now, fired, view)}),
     }
-
-
-def _sifted(
-    sieve: PrefilterTrace, fired: Sequence[Hits], each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]
-) -> dict[str, Any]:
-    """Add the tested objects to each shot, and return the pre-filter's part of the report."""
-    for (hits, _, row), shot in zip(each, told, strict=True):
-        shot["tested"] = sieve.told(hits, row)
-    opened = [np.zeros(0, np.int64), *(sieve.opened(hits) for hits in fired)]
-    return sieve.to_dict(np.unique(np.concatenate(opened)))
 
 
 def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
     """Box of the world that a picture shows: the scene, and samples near it."""
     x, y, x_max, y_max = scene.extent()
-    reach = np.concatenate([np.zeros((0, 4), np.int64), *(_boxes(hits) for hits in fired)])
+    reach = np.concatenate([NO_BOXES, *(_boxes(hits) for hits in fired)])
     if not len(reach):
         return x, y, min(x_max, x + VIEW_MAX), min(y_max, y + VIEW_MAX)
     low, high = reach[:, :2].min(axis=0).tolist(), reach[:, 2:].max(axis=0).tolist()
@@ -328,12 +320,10 @@ def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int
 
 def _boxes(hits: Hits) -> Ints:
     """Boxes (n, 4) around the samples of each part of a batch that has samples."""
-    found = []
     if isinstance(hits, RayHits):
-        if len(hits.stop):
-            ends = np.concatenate([pixel(hits.shots.at_256), hits.stop.cell_xy])  # rays, from starts to stops
-            found.append(np.concatenate([ends.min(axis=0), ends.max(axis=0)]))
-        return np.array(found, np.int64).reshape(-1, 4)
+        ends = np.concatenate([pixel(hits.shots.at_256), hits.stop.cell_xy])  # rays, from starts to stops
+        return np.concatenate([ends.min(axis=0), ends.max(axis=0)])[None] if len(hits.stop) else NO_BOXES
+    found = []
     burst, spread, _ = parts_of(hits.weapon)
     step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
     for first in range(0, len(hits.shots), step):
@@ -467,12 +457,8 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
 def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
     """Runs of the pixels of each verdict that occurs; the verdict of a pixel is the same for every pellet."""
     samples = hits.samples_at(row)
-    runs = {}
-    for verdict in Verdict:
-        xy = samples.xy[samples.verdict == verdict]
-        if len(xy):
-            runs[verdict.name.lower()] = Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]).runs().tolist()
-    return runs
+    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict].T for verdict in Verdict}
+    return {name: Spans.from_runs(y, x, x).runs().tolist() for name, (x, y) in of.items() if len(x)}
 
 
 def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
