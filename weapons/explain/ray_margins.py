@@ -27,7 +27,7 @@ from ..fire.prefilter import refused
 from ..kinds.rays import Laser, Projectile, RayWeapon
 from ..rays.contacts import Reason, Terminations, terminations_of
 from .ray_samples import RayDetail, gap, squares
-from .samples import Margin
+from .samples import Margin, spans_of
 
 RAYS_MAX = 1024
 """Most rays of a shot that has margins; all rays are handled at once, and so many take some seconds."""
@@ -205,8 +205,7 @@ def _near(
         if not meets(np.concatenate([low, high]), box):
             continue
         if spans is None:
-            x, y = box[:2].tolist()
-            spans = Spans.from_mask(stack.mask(rank), (x, y))
+            spans = spans_of(stack, rank)
         x_first, x_last, y = spans.x_first, spans.x_last, spans.y
         if bounds is not None:
             low, high = np.maximum(low, bounds[:2]), np.minimum(high, bounds[2:])
@@ -266,17 +265,13 @@ def _to_squares(way: Way, runs: Runs) -> Floats:
     corners = [(x, y) for x in (low[:, 0], high[:, 0]) for y in (low[:, 1], high[:, 1])]
     cross = np.stack([way.cross(x, y) for x, y in corners])
     for (x, y), aside in zip(corners, cross, strict=True):
-        ends.append(_sideways(way, way.along(x, y), aside / (way.ray or 1.0)))
+        along = way.along(x, y)
+        beside = (along > 0) & (along < way.length)  # these may be shifted at right angles to the segment
+        ends.append((aside / (way.ray or 1.0))[beside, None] * way.across)
     least, most = (np.minimum(way.begin, way.end), np.maximum(way.begin, way.end + way.part))
     crossed = ((least <= high) & (most >= low)).all(axis=1) & (cross.min(axis=0) <= 0) & (cross.max(axis=0) >= 0)
     ends.append(np.zeros((int(crossed.sum()), 2)))
     return np.concatenate(ends)
-
-
-def _sideways(way: Way, along: Floats, aside: Floats) -> Floats:
-    """Shifts at right angles to the segment, to the points that lie beside it."""
-    beside = (along > 0) & (along < way.length)
-    return np.asarray(aside[beside, None] * way.across)
 
 
 def _to_centres(way: Way, runs: Runs) -> Floats:
@@ -401,13 +396,7 @@ def _capsules(way: Way, runs: Runs) -> tuple[tuple[Floats, Floats], Floats]:
         return _polygons([(way.across, np.zeros(0))]), begin.astype(np.float64)
     cross, along = way.cross(x, y), way.along(x, y)
     ahead = way.step / way.ray
-    bodies = _polygons(
-        [
-            (way.across, way.wide(cross, 1)),
-            (-way.across, way.wide(cross, -1)),
-            (ahead, along),
-            (-ahead, way.length - along),
-        ]
-    )
+    sides = [(way.across, way.wide(cross, 1)), (-way.across, way.wide(cross, -1))]
+    bodies = _polygons([*sides, (ahead, along), (-ahead, way.length - along)])
     end = np.stack([way.from_end(x, 0), way.from_end(y, 1)], axis=1)
     return bodies, np.concatenate([begin.astype(np.float64), end])

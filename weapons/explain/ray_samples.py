@@ -23,7 +23,7 @@ from ..fire.prefilter import Candidates, refused
 from ..kinds.placements import Shots
 from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, rays_of, steps_of
 from ..rays.ray_walk import Range, touching, trace
-from .samples import Behind, Blocked, Samples, WhyNot
+from .samples import Behind, Blocked, Samples, WhyNot, unmet
 
 REACH_BITS = 23
 """Bits of a coordinate of a cell; cells lie within 2**22 px of their ray's origin, so x, y and the ray fit int64."""
@@ -133,7 +133,10 @@ class RayDetail:
         at = xy - rays.origin_xy[ray]
         every = _Keyed(ray, at[:, 0], at[:, 1])
         verdict, rank = self._met(every)
-        beyond = self._beyond(ray, at, entry, scale)
+        if (scale != self.lines.scale).any():  # times of a projectile are fractions of the frame
+            beyond = np.asarray(entry / scale[ray] > self.ends.fraction[ray])
+        else:
+            beyond = ~self.ends.reaches(ray, entry, at[:, 1], at[:, 0])
         verdict[beyond], rank[beyond] = Verdict.BEYOND, -1
         if self.bounds is not None:
             outside = ((xy < self.bounds[:2]) | (xy > self.bounds[2:])).any(axis=1)
@@ -158,12 +161,6 @@ class RayDetail:
             cell, found = every.places(ray, x, y)
             verdict[cell], rank[cell] = told, item[found]
         return verdict, rank
-
-    def _beyond(self, ray: Ints, at: Ints, entry: Ints, scale: Ints) -> Bools:
-        """Mask of the cells that come after the end of their ray."""
-        if (scale != self.lines.scale).any():  # times of a projectile are fractions of the frame
-            return np.asarray(entry / scale[ray] > self.ends.fraction[ray])
-        return ~self.ends.reaches(ray, entry, at[:, 1], at[:, 0])
 
     def samples(self) -> Samples:
         """Cells as samples."""
@@ -247,13 +244,11 @@ def ray_why_not(detail: RayDetail, hit: Set[int]) -> list[WhyNot]:
 
 
 def _why(detail: RayDetail, rank: int, samples: int, distance: float) -> WhyNot:
-    stack, shot, ends = detail.stack, detail.shots, detail.ends
+    stack, ends = detail.stack, detail.ends
     item = int(stack.ids[rank])
-    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
-        foreign = not int(stack.categories[rank]) & int(shot.accept[0])
-        return WhyNot(item, "category" if foreign else "excluded", samples, {}, distance)
-    if not samples:
-        return WhyNot(item, "missed", 0, {}, distance)
+    reason = unmet(stack, detail.shots, rank, samples)
+    if reason is not None:
+        return WhyNot(item, reason, samples, {}, distance)
     pairs = np.flatnonzero(detail.every.rank == rank)
     rays = detail.every.ray[pairs]
     passed = detail.entered[pairs] < ends.fraction[rays]

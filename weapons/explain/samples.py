@@ -208,13 +208,9 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
     stack, placements = detail.stack, detail.placements
     boxes = placements.boxes + np.array([-NEAR_PX, -NEAR_PX, NEAR_PX, NEAR_PX])
     near = np.unique(pairs_of(boxes, placements.shot, detail.shots, stack).rank)
-    found = []
-    for rank in near.tolist():
-        if stack.occluder[rank] or int(stack.ids[rank]) in hit:
-            continue
-        distance = math.sqrt(_distance2(detail.runs, stack, rank))
-        if distance <= NEAR_PX:
-            found.append(_why(detail, rank, distance))
+    near = near[~stack.occluder[near] & ~np.isin(stack.ids[near], list(hit))]
+    apart = {rank: math.sqrt(_distance2(detail.runs, stack, rank)) for rank in near.tolist()}
+    found = [_why(detail, rank, distance) for rank, distance in apart.items() if distance <= NEAR_PX]
     return sorted(found, key=lambda w: (w.distance, w.object))
 
 
@@ -262,23 +258,26 @@ def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
 def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
     """Why one object was not hit."""
     stack, shot = detail.stack, detail.shots
-    item, on = int(stack.ids[rank]), detail.on(rank)
+    on = detail.on(rank)
     ended = detail.ended[on]
-    by_rank = np.unique(ended[ended >= 0], return_counts=True)
-    by = {int(stack.ids[p]): int(n) for p, n in zip(*by_rank, strict=True)}
-    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
-        foreign = not int(stack.categories[rank]) & int(shot.accept[0])
-        return WhyNot(item, "category" if foreign else "excluded", len(on), by, distance)
-    if not len(on):
-        return WhyNot(item, "missed", 0, {}, distance)
+    ranks, counts = np.unique(ended[ended >= 0], return_counts=True)
+    by = dict(zip(stack.ids[ranks].tolist(), counts.tolist(), strict=True))
     outside = (detail.verdict[on] == Verdict.OUTSIDE).all()
-    return WhyNot(item, "outside" if outside else "behind", len(on), by, distance)
+    reason = unmet(stack, shot, rank, len(on)) or ("outside" if outside else "behind")
+    return WhyNot(int(stack.ids[rank]), reason, len(on), by, distance)
+
+
+def unmet(stack: Stack, shot: Shots, rank: int, samples: int) -> str | None:
+    """Reason why an item was not hit that does not depend on what lies before it, as in `WhyNot`."""
+    if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
+        return "excluded" if int(stack.categories[rank]) & int(shot.accept[0]) else "category"
+    return None if samples else "missed"
 
 
 def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     """Least squared distance between the pixels of a pattern and an item, px^2; not exact beyond NEAR_PX."""
     x, y, x_max, y_max = stack.box_xyxy[rank].tolist()
-    spans = Spans.from_mask(stack.mask(rank), (x, y))
+    spans = spans_of(stack, rank)
     near = (runs.y >= y - NEAR_PX) & (runs.y <= y_max + NEAR_PX)
     near &= (runs.x_last >= x - NEAR_PX) & (runs.x_first <= x_max + NEAR_PX)
     runs = runs.take(near)
@@ -294,20 +293,20 @@ def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
 
 def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
     """Number of pixels of an object that a pattern covering everything would hit."""
-    stack, bounds = scene.items.stack(), scene.bounds
-    x, y = stack.box_xyxy[rank, :2].tolist()
-    spans = Spans.from_mask(stack.mask(rank), (x, y))
+    stack = scene.items.stack()
+    spans = spans_of(stack, rank)
     zero = np.zeros(len(spans), np.int64)
     runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
-    if bounds is not None:
-        first, last = np.maximum(spans.x_first, bounds[0]), np.minimum(spans.x_last, bounds[2])
-        some = (first <= last) & (spans.y >= bounds[1]) & (spans.y <= bounds[3])
-        runs = Runs(zero, spans.y, first, last, zero).take(some)
-    box = stack.box_xyxy[rank][None]
-    pairs = pairs_of(box, np.zeros(1, np.int64), shot, stack)
+    pairs = pairs_of(stack.box_xyxy[rank][None], zero[:1], shot, stack)
     events, _ = walk(runs, pairs, stack, pierce, HIT)
-    own = events.rank == rank
-    return int((events.x_last - events.x_first + 1)[own].sum())
+    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, scene.bounds)
+    return int((own.x_last - own.x_first + 1).sum())
+
+
+def spans_of(stack: Stack, rank: int) -> Spans:
+    """Pixels of an item of the stack."""
+    x, y = stack.box_xyxy[rank, :2].tolist()
+    return Spans.from_mask(stack.mask(rank), (x, y))
 
 
 class Margin(NamedTuple):
@@ -354,11 +353,10 @@ def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) 
 
 def _shifts() -> Ints:
     """Whole-pixel shifts (n, 2) of at most MARGIN_PX, sorted by (length, y, x); the first is (0, 0)."""
-    side = np.arange(-MARGIN_PX, MARGIN_PX + 1)
-    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
+    y, x = np.mgrid[-MARGIN_PX : MARGIN_PX + 1, -MARGIN_PX : MARGIN_PX + 1].reshape(2, -1)
     length2 = x * x + y * y
     order = np.lexsort((x, y, length2))
-    return np.stack([x, y], axis=1)[order[length2[order] <= MARGIN_PX**2]]
+    return np.asarray(np.stack([x, y], axis=1)[order[length2[order] <= MARGIN_PX**2]])
 
 
 SHIFTS = _shifts()

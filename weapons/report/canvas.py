@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence, Set
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,10 @@ from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.render import GROUND, blend, draw_view
 from hitplanes.planes.scene.scene import Scene
 
-from .symbols import HEAT, LET_THROUGH, MARKS, SIGNS, SKETCH, TINT, Strokes, glyph, sign_mark, tiled_glyph
+from .symbols import HEAT, LET_THROUGH, MARK_GROUND, MARKS, SIGNS, SKETCH, TINT, Strokes, glyph, sign_mark, tiled_glyph
+
+if TYPE_CHECKING:
+    from .cards import Card
 
 WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 """Largest size of an enlarged view, px, and largest factor."""
@@ -25,7 +28,7 @@ WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
 DIM = 125
 """Brightness of the scene, of 255."""
 
-HATCH = (200, 212, 230)
+OUTSIDE, HATCH = (18, 19, 22), (200, 212, 230)
 OUTLINES = {
     "hit": ((255, 200, 40), 255),
     "blocked": ((86, 180, 233), 255),
@@ -75,12 +78,17 @@ class World:
         shape = view[3] - view[1] + 1, view[2] - view[0] + 1
         ground = np.full((*shape, 3), GROUND, np.uint8) if scene is None else _dimmed(scene, view, light)
         if bounds is not None:
-            _shade_outside(ground, view, bounds)
+            inside = np.zeros(shape, np.bool_)
+            fill(inside, view, bounds)
+            ground[~inside] = OUTSIDE
         self.image: Image = enlarged(ground, factor)
         if bounds is not None and view != tuple(bounds):
             _frame(self.image, view, bounds, factor)
         if scene is not None and len(scene.ids(Role.OCCLUDER)):
-            self._hatch(np.isin(label_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1))
+            occluding = np.isin(label_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1)
+            if occluding.any():
+                self.painted.add("occluder")
+                _lay(self.image, enlarged(occluding, factor) & _stripes(self.image.shape, 12, 2), HATCH, 80)
 
     def placed(self, points: Floats) -> Floats:
         """Points (n, 2) of the world in coordinates of the picture."""
@@ -88,10 +96,7 @@ class World:
 
     def mark_samples(self, shots: Sequence[Mapping[str, Any]], verdict: str) -> None:
         """Mark the samples of one verdict, each with the verdict's shape."""
-        at = np.zeros((self.view[3] - self.view[1] + 1, self.view[2] - self.view[0] + 1), np.bool_)
-        for shot in shots:
-            fill_runs(at, self.view, shot["samples"].get(verdict, ()))
-        self.lay(at, verdict)
+        self.lay(covered(self.view, [shot["samples"].get(verdict, ()) for shot in shots]), verdict)
 
     def lay(self, at: Bools, verdict: str) -> None:
         """Mark the set pixels of a plane (h, w) of the view with the shape of a verdict."""
@@ -129,11 +134,7 @@ class World:
     def outline(self, item: int, kind: str) -> None:
         """Draw the border of an object's mask inside its pixels: thick for "hit", thick and dashed for "blocked"."""
         if self.scene is not None:
-            self._border(*self.scene.mask(item), kind)
-
-    def outline_pixels(self, spans: Spans, kind: str) -> None:
-        """Draw the border of a set of pixels."""
-        self._border(*spans.to_mask(), kind)
+            self.border(*self.scene.mask(item), kind)
 
     def outline_seen(self, items: Sequence[int]) -> None:
         """Draw the borders of the visible parts of at most OUTLINES_MAX objects."""
@@ -148,16 +149,13 @@ class World:
             end = min(left + mask.shape[1], around[2] + 1), min(top + mask.shape[0], around[3] + 1)
             if box[0] < end[0] and box[1] < end[1]:
                 rows, columns = slice(box[1] - y + 1, end[1] - y + 1), slice(box[0] - x + 1, end[0] - x + 1)
-                self._border(front[rows, columns] == item + 1, box, "other")
+                self.border(front[rows, columns] == item + 1, box, "other")
 
-    def _border(self, mask: Bools, corner: tuple[int, int], kind: str) -> None:
+    def border(self, mask: Bools, corner: tuple[int, int], kind: str) -> None:
+        """Draw the border of a mask (h, w) whose pixel [0, 0] lies at a corner, inside its pixels."""
         (x, y), (height, width), view, factor = corner, mask.shape, self.view, self.factor
-        left, top, right, low = (
-            max(x, view[0]),
-            max(y, view[1]),
-            min(x + width, view[2] + 1),
-            min(y + height, view[3] + 1),
-        )
+        left, top = max(x, view[0]), max(y, view[1])
+        right, low = min(x + width, view[2] + 1), min(y + height, view[3] + 1)
         if left >= right or top >= low:
             return
         inside = enlarged(np.pad(mask, 1)[top - y : low - y + 2, left - x : right - x + 2], factor)
@@ -169,18 +167,9 @@ class World:
             return
         self.painted.add(f"object {kind}")
         if kind in DASHED:
-            rows, columns = np.ogrid[: border.shape[0], : border.shape[1]]
-            border &= (rows + columns) // DASH % 2 == 0
+            border &= _stripes(border.shape, 2 * DASH, DASH)
         window = self.image[(top - view[1]) * factor : (low - view[1]) * factor]
         _lay(window[:, (left - view[0]) * factor : (right - view[0]) * factor], border, *OUTLINES[kind])
-
-    def _hatch(self, occluding: Bools) -> None:
-        """Hatch the visible parts of the occluders."""
-        if not occluding.any():
-            return
-        self.painted.add("occluder")
-        y, x = np.ogrid[: self.image.shape[0], : self.image.shape[1]]
-        _lay(self.image, enlarged(occluding, self.factor) & ((x + y) % 12 < 2), HATCH, 80)
 
 
 def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box]]:
@@ -190,19 +179,22 @@ def heat_boxes(heat: Mapping[str, Any], verdict: str) -> Iterator[tuple[int, Box
         yield count, (x + first * cell, y + row * cell, x + (last + 1) * cell - 1, y + (row + 1) * cell - 1)
 
 
-def fill(plane: npt.NDArray[Any], view: Box, box: Box, value: int = 1) -> None:
+def fill(plane: npt.NDArray[Any], view: Box, box: Sequence[int], value: int = 1) -> None:
     """Set the part of a box of the world that lies in a plane (h, w) of a view."""
     x0, y0, x1, y1 = (max(v - low, -1) for v, low in zip(box, (view[0], view[1]) * 2, strict=True))
     plane[max(y0, 0) : y1 + 1, max(x0, 0) : x1 + 1] = value
 
 
-def fill_runs(plane: Bools, view: Box, runs: Sequence[Sequence[int]] | Ints) -> None:
-    """Set the parts of runs [y, x_first, x_last] of the world that lie in a plane (h, w) of a view."""
-    y, first, last = np.array(runs, np.int64).reshape(-1, 3).T
-    seen = (y >= view[1]) & (y <= view[3])
-    first, last = np.maximum(first[seen], view[0]), np.minimum(last[seen], view[2])
-    run, x = each_pixel(first, np.maximum(last, first - 1))
-    plane[y[seen][run] - view[1], x - view[0]] = True
+def covered(view: Box, lists: Iterable[Sequence[Sequence[int]] | Ints]) -> Bools:
+    """Mask (h, w) of the pixels of a view that lists of runs [y, x_first, x_last] of the world cover."""
+    plane = np.zeros((view[3] - view[1] + 1, view[2] - view[0] + 1), np.bool_)
+    for runs in lists:
+        y, first, last = np.array(runs, np.int64).reshape(-1, 3).T
+        seen = (y >= view[1]) & (y <= view[3])
+        first, last = np.maximum(first[seen], view[0]), np.minimum(last[seen], view[2])
+        run, x = each_pixel(first, np.maximum(last, first - 1))
+        plane[y[seen][run] - view[1], x - view[0]] = True
+    return plane
 
 
 def heat_step(count: int, most: int) -> int:
@@ -215,13 +207,6 @@ def _dimmed(scene: Scene, view: Box, light: int) -> Image:
     plain = draw_view(scene.items, view, scene.extent()[:2]).astype(np.uint32)
     grey = (plain * (54, 183, 19)).sum(axis=2, keepdims=True) // 256
     return np.asarray((plain * 3 + grey * 2) // 5 * light // 255, np.uint8)
-
-
-def _shade_outside(picture: Image, view: Box, bounds: Sequence[int]) -> None:
-    """Darken the pixels out of bounds."""
-    y, x = np.ogrid[view[1] : view[3] + 1, view[0] : view[2] + 1]
-    outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
-    picture[outside] = (18, 19, 22)
 
 
 def _frame(world: Image, view: Box, bounds: Sequence[int], factor: int) -> None:
@@ -240,6 +225,12 @@ def _core(inside: Bools) -> Bools:
 def enlarged(plane: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
     """Enlarge a plane (h, w) or a picture (h, w, 3) by a whole factor."""
     return np.repeat(np.repeat(plane, factor, axis=0), factor, axis=1)
+
+
+def _stripes(shape: tuple[int, ...], period: int, wide: int) -> Bools:
+    """Slanted stripes over a picture (h, w, ...): in each row `wide` pixels of every `period`."""
+    rows, columns = np.ogrid[: shape[0], : shape[1]]
+    return np.asarray((rows + columns) % period < wide)
 
 
 def _lay(world: Image, where: Bools, color: tuple[int, int, int], alpha: int) -> None:
@@ -264,8 +255,8 @@ def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
     strokes = Strokes(world.image.shape[:2])
     for entry in report["now"]["moved"]:
         runs = np.array(entry["runs"], np.int64).reshape(-1, 3)
-        world.outline_pixels(Spans(*runs.T), "now")
-        begin, end = ((np.array(entry[key]) - world.view[:2] + 0.5) * world.factor for key in ("from_xy", "to_xy"))
+        world.border(*Spans(*runs.T).to_mask(), "now")
+        begin, end = world.placed(np.array([entry["from_xy"], entry["to_xy"]]))
         way = end - begin
         length = float(np.sqrt((way**2).sum()))
         if length > FAR:
@@ -308,19 +299,8 @@ class Text(NamedTuple):
     middle: bool = False
 
 
-class Drawn(Protocol):
-    """Protocol of a card: its height, and how it draws itself."""
-
-    @property
-    def height(self) -> int:
-        """Height, px."""
-
-    def draw(self, page: Image, x: int, y: int, wide: int) -> list[Text]:
-        """Draw it with its top left at (x, y), and return its texts."""
-
-
 def page_of(
-    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Drawn]
+    report: Mapping[str, Any], world: World, texts: Sequence[Text], cards: Sequence[Card]
 ) -> tuple[Image, list[Text]]:
     """Page around the enlarged world, and all texts, which are drawn later."""
     image = world.image
@@ -334,8 +314,7 @@ def page_of(
         column = bottoms.index(min(bottoms))
         places.append((EDGE + column * (wide + GAP), bottoms[column]))
         bottoms[column] += card.height + GAP
-    page = np.empty((max(bottoms) + 46, width, 3), np.uint8)
-    page[:] = PAGE_GROUND
+    page = np.full((max(bottoms) + 46, width, 3), PAGE_GROUND, np.uint8)
     left = (width - image.shape[1]) // 2
     page[TOP : TOP + image.shape[0], left : left + image.shape[1]] = image
     every = [text._replace(x=text.x + left, y=text.y + TOP) for text in texts]
@@ -414,25 +393,16 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     entries = [Entry(v, verdict_mark(v)) for v in reversed(MARKS) if v in painted and not (heat and v == "hit")]
     if heat and "hit" in painted:
         scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
-        entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{_per(report)}", np.repeat(scale, 5, axis=1)))
+        cell = report["batch"]["heat"]["cell"]
+        per = f" in {cell} x {cell} px" if cell > 1 else ""
+        entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{per}", np.repeat(scale, 5, axis=1)))
     told = "other target" if painted & {"object hit", "object blocked"} else "target"
-    for kind, word in (
-        ("hit", "object hit"),
-        ("blocked", "object blocked"),
-        ("other", told),
-        ("now", "where it is now"),
-    ):
-        if f"object {kind}" in painted:
-            entries.append(Entry(word, _outlined(kind)))
-    for name, color in SKETCH.items():
-        if name in painted:
-            entries.append(Entry(name, _sketched(color, name)))
+    words = {"hit": "object hit", "blocked": "object blocked", "other": told, "now": "where it is now"}
+    entries += [Entry(word, _outlined(kind)) for kind, word in words.items() if f"object {kind}" in painted]
+    entries += [Entry(name, _sketched(color, name)) for name, color in SKETCH.items() if name in painted]
     entries += sign_entries(painted)
     if "occluder" in painted:
-        rows, columns = np.mgrid[:14, :14]
-        mark = _blank(14)
-        mark[(rows + columns) % 6 < 2] = HATCH
-        entries.append(Entry("occluder", mark))
+        entries.append(Entry("occluder", mark_of(_stripes((14, 14), 6, 2), HATCH)))
     return Legend(entries, width)
 
 
@@ -441,56 +411,38 @@ def sign_entries(painted: Set[str]) -> list[Entry]:
     return [Entry(name, sign_mark(name)) for name in NAMED_SIGNS if f"ray: {name}" in painted]
 
 
-def _per(report: Mapping[str, Any]) -> str:
-    """Size of a cell of the heat map in words; empty for one pixel."""
-    cell = report["batch"]["heat"]["cell"]
-    return f" in {cell} x {cell} px" if cell > 1 else ""
+def mark_of(where: Bools, color: Color, ground: Color = MARK_GROUND) -> Image:
+    """Mark (h, w, 3) of a legend, in one colour on a ground."""
+    return np.where(where[:, :, None], np.array(color, np.uint8), np.array(ground, np.uint8))
 
 
 def verdict_mark(verdict: str, size: int = 14) -> Image:
     """Mark (size, size, 3) of a verdict, for a legend."""
-    mark = _blank(size)
-    mark[glyph(verdict, size)] = MARKS[verdict][0]
-    return mark
-
-
-def _blank(size: int) -> Image:
-    mark = np.empty((size, size, 3), np.uint8)
-    mark[:] = (70, 74, 82)
-    return mark
+    return mark_of(glyph(verdict, size), MARKS[verdict][0])
 
 
 def _outlined(kind: str) -> Image:
-    mark, thick = _blank(14), 1 if kind == "other" else 2
-    border = np.ones((14, 14), np.bool_)
+    thick = 1 if kind == "other" else 2
+    border = _stripes((14, 14), 6, 3 if kind in DASHED else 6)
     border[thick:-thick, thick:-thick] = False
-    rows, columns = np.ogrid[:14, :14]
-    mark[border & ((kind not in DASHED) | ((rows + columns) // 3 % 2 == 0))] = OUTLINES[kind][0]
-    return mark
+    return mark_of(border, OUTLINES[kind][0])
 
 
 def _sketched(color: Color, name: str) -> Image:
     """Mark of a volume, a rhombus unlike the outline of an object; or of a cell, filled if it was opened."""
-    mark = _blank(14)
+    columns = np.abs(2 * np.arange(14) - 13)
+    rows = columns[:, None]
     if name.startswith("cell"):
-        if name == "cell opened":
-            mark[:] = (np.array(color) + 2 * mark.astype(np.int64)) // 3
-        mark[[0, -1]] = mark[:, [0, -1]] = color
-        return mark
-    rows, columns = np.mgrid[:14, :14]
-    away = abs(2 * rows - 13) + abs(2 * columns - 13)
-    mark[(away <= 13) & (away > (7 if name == LET_THROUGH else 9))] = color
-    return mark
-
-
-def _of(batch: Mapping[str, Any] | None, key: str) -> Sequence[Any]:
-    found: Sequence[Any] = batch[key] if batch else ()
-    return found
+        ground = (np.array(color) + 2 * np.array(MARK_GROUND)) // 3 if name == "cell opened" else MARK_GROUND
+        return mark_of(np.maximum(rows, columns) == 13, color, ground)
+    away = rows + columns
+    return mark_of((away <= 13) & (away > (7 if name == LET_THROUGH else 9)), color)
 
 
 def _summary(report: Mapping[str, Any], width: int) -> Text:
     shots, batch = report["shots"], report["batch"]
-    objects = {row["object"] for shot in shots for row in shot["rows"]} | {o["object"] for o in _of(batch, "objects")}
+    objects = {entry["object"] for shot in shots for entry in shot["rows"]}
+    objects |= {entry["object"] for entry in (batch["objects"] if batch else ())}
     told = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
     if report.get("now", {}).get("tick") is not None:
         told = f"tick {report['now']['tick']:g}: {told}"
@@ -500,7 +452,7 @@ def _summary(report: Mapping[str, Any], width: int) -> Text:
 def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
     """Footer with scene, version and plan; the cards have weapons and seeds."""
     scene = report["scene"]
-    plans = [shot["plan"] for shot in report["shots"]] + list(_of(report["batch"], "plan"))
+    plans = [shot["plan"] for shot in report["shots"]] + (report["batch"]["plan"] if report["batch"] else [])
     ran = dict.fromkeys(stage["stage"] for plan in plans for stage in plan["ran"])
     left = [s["stage"] for s in plans[0]["left_out"]] if plans else []
     left = [name for name in left if all(name in [s["stage"] for s in plan["left_out"]] for plan in plans)]

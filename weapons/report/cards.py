@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -125,10 +126,7 @@ class Card:
             left = x + 38
         texts.append(Text(left, y + 22, clipped(self.title, wide // 3), INK, bold=True))
         texts.append(Text(x + wide - 10, y + 22, clipped(self.told, wide * 2 // 3 - 50), FAINT, right=True))
-        if self.ray is None:
-            _bar(page, self.verdicts, x + 10, y + 36, wide - 20)
-        else:
-            _strip(page, self.ray, x + 10, y + 36, wide - 20)
+        _bar(page[y + 36 : y + 36 + BAR, x + 10 : x + wide - 10], self.verdicts, self.ray)
         top = y + 52
         counts_x = x + 10
         if self.inset:
@@ -160,11 +158,12 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
     hit = _hits(shot) if rays is None else phrases.table(shot)
     lines: list[Sequence[str]] = [*hit[: HIT_LINES + 1], *_rest(hit, HIT_LINES + 1, "")]
     lines += _at_risk(shot["rows"])
-    near = None if rays is None else phrases.missed(shot)
+    near = None
     if rays is not None:
+        near = phrases.missed(shot)
         ends = phrases.ended(rays)
         lines += [[line] for line in ends[:NOT_LINES]] + _rest(ends, NOT_LINES, " ends")
-    blockers = [_blocks(entry) for entry in shot["blockers"]] if rays is None else phrases.blocked(shot)
+    blockers = phrases.blocked(shot)
     lines += [*blockers[:NOT_LINES], *_rest(blockers, NOT_LINES, " block")]
     others = shot["why_not"]
     if near is not None:
@@ -208,11 +207,6 @@ def _hits(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return lines
 
 
-def _blocks(entry: Mapping[str, Any]) -> tuple[str, str]:
-    behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
-    return f"{short(entry['name'])} blocks {entry['samples']}", behind or "nothing behind it"
-
-
 def hit_now(report: Mapping[str, Any], number: int) -> str | None:
     """What a shot at the past would hit now, in words; None if the report does not say."""
     if "now" not in report:
@@ -233,9 +227,8 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     lines: list[Sequence[str]] = [BATCH_HEADER] if batch["objects"] else []
     for entry in batch["objects"][:HIT_LINES]:
         share = percent(entry["shots"] / shots)
-        lines.append(
-            (entry["name"], str(entry["shots"]), share, str(entry["pixels"]), f"{entry['weight'] / WEIGHT_FULL:.1f}")
-        )
+        weight = f"{entry['weight'] / WEIGHT_FULL:.1f}"
+        lines.append((entry["name"], str(entry["shots"]), share, str(entry["pixels"]), weight))
     lines += _rest(batch["objects"], HIT_LINES, " hit")
     lines.append([f"{never} of {report['scene']['hittable']} objects never hit" if never else "every object was hit"])
     if "filter" in report:
@@ -269,31 +262,28 @@ def _fired(shot: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _bar(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> None:
-    """Draw the verdicts of a shot as parts of one bar, in the texture of their marks."""
-    total = sum(verdicts.values())
-    page[y : y + BAR, x : x + wide] = (58, 62, 70)
-    begun = 0
-    for verdict in ("hit", "occluded", "filtered", "outside", "beyond"):
-        done = begun + verdicts.get(verdict, 0)
-        if total:
-            part = page[y : y + BAR, x + begun * wide // total : x + done * wide // total]
-            part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]
-        begun = done
+def _bar(bar: Image, verdicts: Mapping[str, int], ray: Mapping[str, Any] | None) -> None:
+    """Draw the verdicts of a shot as parts of one bar, in the texture of their marks.
 
-
-def _strip(page: Image, ray: Mapping[str, Any], x: int, y: int, wide: int) -> None:
-    """Draw a ray from end to end, with its parts in objects, its stop, and dashes beyond."""
-    strip = page[y : y + BAR, x : x + wide]
-    strip[:] = (58, 62, 70)
-    stop = int(ray["stop"]["fraction"] * (wide - 2))
-    for verdict, first, last in (
-        ("beyond", stop, wide),
-        *(("hit", int(told["entry"] * (wide - 2)), int(told["exit"] * (wide - 2)) + 1) for told in ray["passes"]),
-    ):
-        part = strip[:, first:last]
+    A ray is drawn from end to end instead, with its parts in objects, its stop, and dashes beyond.
+    """
+    bar[:] = (58, 62, 70)
+    wide = bar.shape[1]
+    if ray is None:
+        names = ("hit", "occluded", "filtered", "outside", "beyond")
+        ends = [0, *itertools.accumulate(verdicts.get(name, 0) for name in names)]
+        places = [end * wide // max(sum(verdicts.values()), 1) for end in ends]
+        parts = list(zip(names, places[:-1], places[1:], strict=True))
+    else:
+        stop = int(ray["stop"]["fraction"] * (wide - 2))
+        parts = [("beyond", stop, wide)]
+        for told in ray["passes"]:
+            parts.append(("hit", int(told["entry"] * (wide - 2)), int(told["exit"] * (wide - 2)) + 1))
+    for verdict, first, last in parts:
+        part = bar[:, first:last]
         part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]
-    strip[:, stop : stop + 2] = MARKS["occluded"][0] if ray["stop"]["reason"] == "occluder" else (255, 255, 255)
+    if ray is not None:
+        bar[:, stop : stop + 2] = MARKS["occluded"][0] if ray["stop"]["reason"] == "occluder" else (255, 255, 255)
 
 
 def _counts(page: Image, verdicts: Mapping[str, int], x: int, y: int, wide: int) -> list[Text]:

@@ -79,7 +79,7 @@ def _passes(was: Any, now: Any) -> list[str] | None:
     lines = []
     for before, after in pairs(was, now, "object"):
         told = after or before or {}
-        name = f"object {shown(told.get('object'))} {shown(told.get('name'))}"
+        name = _name(told)
         if before is None or after is None:
             lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(told)}")
         elif _way(before) != _way(after):
@@ -136,14 +136,12 @@ def differences(expected: Entry, got: Entry) -> list[str]:
     lines, empty if and only if all that decides is equal: plans, versions, the scene's hash and times do not count
     """
     was, now = decisive(expected), decisive(got)
-    return [] if same(was, now) else list(map(printable, _differences(was, now)))
-
-
-def _differences(was: Entry, now: Entry) -> list[str]:
-    words: dict[str, Words] = {"scene": _scene, "weapons": _weapons, "batch": _batch, "shots": _shots}
+    if same(was, now):
+        return []
     if _told_as(was) != _told_as(now):
         return [f"{_told_as(now)}, was {_told_as(was)}"]
-    return _told(was, now, words) or list(by_path("", was, now))
+    words: dict[str, Words] = {"scene": _scene, "weapons": _weapons, "batch": _batch, "shots": _shots}
+    return list(map(printable, _told(was, now, words) or by_path("", was, now)))
 
 
 def decisive(report: Entry) -> dict[str, Any]:
@@ -168,23 +166,25 @@ def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
         before, after = was.get(key, ABSENT), now.get(key, ABSENT)
         if same(before, after):
             continue
-        told = words[key](was, now) if key in words and ABSENT not in (before, after) else None
+        known = ABSENT not in (before, after)
+        known &= key not in OBJECTS or (isinstance(before, dict) and isinstance(after, dict))
+        told = words[key](was, now) if key in words and known else None
         lines += first_of(by_path(key, before, after)) if told is None else told
     return lines
 
 
+OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")
+"""Keys whose words are only for objects."""
+
+
 def _scene(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["scene"], now["scene"]
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        return None
     return [f"scene: {line}" for line in _fields(before, after, dict.fromkeys([*before, *after]))]
 
 
 def _weapons(was: Entry, now: Entry) -> list[str] | None:
     lines = []
     before, after = was["weapons"], now["weapons"]
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        return None
     for name in dict.fromkeys([*before, *after]):
         if name not in before or name not in after:
             lines.append(f"weapon {shown(name)} is {'new' if name in after else 'gone'}")
@@ -197,7 +197,8 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
     groups = []
     numbers = {id(shot): number for side in (was, now) for number, shot in enumerate(entries(side["shots"]))}
     for before, after in _paired_shots(entries(was["shots"]), entries(now["shots"])):
-        title = _title(after or before or {}, numbers)
+        shot = after or before or {}
+        title = f"shot {numbers.get(id(shot), 0)} ({unquoted(shot.get('weapon'))} at {_place(shot.get('at'))})"
         if before is None or after is None:
             groups.append([f"{title} is {'missing' if after is None else 'new'}"])
         elif not same(before, after):
@@ -232,8 +233,6 @@ def _at(was: Entry, now: Entry) -> list[str]:
 
 def _verdicts(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["verdicts"], now["verdicts"]
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        return None
     told = []
     for key in dict.fromkeys([*after, *before]):
         had, has = before.get(key, ABSENT), after.get(key, ABSENT)
@@ -322,8 +321,6 @@ def _why_changed(was: Entry, now: Entry) -> list[str]:
 
 def _samples(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["samples"], now["samples"]
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        return None
     lines = []
     for verdict in dict.fromkeys([*after, *before]):
         told = _gained_and_lost(before.get(verdict, []), after.get(verdict, []))
@@ -334,8 +331,6 @@ def _samples(was: Entry, now: Entry) -> list[str] | None:
 def _batch(was: Entry, now: Entry) -> list[str] | None:
     """Lines about a batch; totals and heat only if nothing else has changed."""
     before, after = was["batch"], now["batch"]
-    if not (isinstance(before, dict) and isinstance(after, dict)):
-        return None
     words: dict[str, Words] = {"rows": lambda *_: _batch_rows(before, after), "verdicts": _verdicts}
     rest = [{key: v for key, v in batch.items() if key not in BATCH_DERIVED} for batch in (before, after)]
     return [f"batch: {line}" for line in _told(rest[0], rest[1], words) or _told(before, after, {})]
@@ -346,20 +341,16 @@ def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
     if not all(isinstance(row, list | tuple) and len(row) == len(BATCH_COLUMNS) for side in rows for row in side):
         return None
     known = [{text_of_json(row) for row in side} for side in rows]
-    before, after = (
-        [_as_row(row, names) for row in batch["rows"] if text_of_json(row) not in known[1 - side]]
-        for side, (batch, names) in enumerate((batch, _names_of(batch)) for batch in (was, now))
-    )
+    sides: list[list[Entry]] = []
+    for batch, others in zip((was, now), reversed(known), strict=True):
+        names = {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
+        sides.append([_as_row(row, names) for row in batch["rows"] if text_of_json(row) not in others])
     lines = []
-    for old, new in pairs(before, after, "shot", "object", "round"):
+    for old, new in pairs(sides[0], sides[1], "shot", "object", "round"):
         row = new or old or {}
         name = f"shot {shown(row['shot'])}: {_name(row)}"
         lines += _row(name + (f", round {shown(row['round'])}" if row["round"] else ""), old, new, "")
     return first_of(lines) or None
-
-
-def _names_of(batch: Entry) -> dict[str, Any]:
-    return {text_of_json(entry.get("object")): entry.get("name") for entry in entries(batch.get("objects"))}
 
 
 def _as_row(row: Any, names: Mapping[str, Any]) -> dict[str, Any]:
@@ -436,15 +427,7 @@ def _without(part: Entry, kind: str) -> dict[str, Any]:
 
 def _told_as(report: Entry) -> str:
     """Whether a report lists its shots one by one or as a batch, in words."""
-    batch = report.get("batch")
-    if isinstance(batch, dict):
-        return "shots told as a batch"
-    return "shots told one by one"
-
-
-def _title(shot: Entry, numbers: Mapping[int, int]) -> str:
-    """Title of a shot, with its number in the picture."""
-    return f"shot {numbers.get(id(shot), 0)} ({unquoted(shot.get('weapon'))} at {_place(shot.get('at'))})"
+    return f"shots told {'as a batch' if isinstance(report.get('batch'), dict) else 'one by one'}"
 
 
 def _name(entry: Entry) -> str:

@@ -5,18 +5,19 @@ A label is placed where it covers no sample, no object that it could seem to nam
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
+from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.files.png import cv2
 from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from .canvas import INK, OUTLINES_MAX, Text, World, enlarged, fill_runs
+from .canvas import INK, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
 from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
 
@@ -51,22 +52,12 @@ class Overlay:
     def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Reserve the samples, the objects that were hit, and the occluders that blocked, against labels."""
         runs = [of for shot in shots for of in shot["samples"].values()]
-        hit = {row["object"] for shot in shots for row in shot["rows"]}
-        blocking = {by["object"] for shot in shots for by in shot["blockers"]}
-        self.taken |= self._plane(
-            [*runs, *(Spans.from_mask(*scene.mask(item)).runs() for item in sorted(hit | blocking))]
-        )
-        self.targets |= self._plane(
-            [Spans.from_mask(*scene.mask(item)).runs() for item in scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]]
-        )
-
-    def _plane(self, runs: Sequence[Any]) -> Bools:
-        """Mask of the pixels of the picture that runs of the world cover."""
-        x, y, x_max, y_max = self.view
-        at = np.zeros((y_max - y + 1, x_max - x + 1), np.bool_)
-        for some in runs:
-            fill_runs(at, self.view, some)
-        return enlarged(at, self.factor)
+        items = {told["object"] for shot in shots for told in (*shot["rows"], *shot["blockers"])}
+        runs += [Spans.from_mask(*scene.mask(item)).runs() for item in items]
+        targets = scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]
+        self.taken |= enlarged(covered(self.view, runs), self.factor)
+        every = (Spans.from_mask(*scene.mask(item)).runs() for item in targets)
+        self.targets |= enlarged(covered(self.view, every), self.factor)
 
     def shot(self, shot: Mapping[str, Any], number: int) -> None:
         """Draw a cross on the pixel of a shot and its number in a disc with a line to it; an arrow if out of view."""
@@ -74,12 +65,14 @@ class Overlay:
         x, y = self._start(shot)
         inside = 0 <= x < width and 0 <= y < height
         if not inside:
-            edge = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
-            x, y = edge
+            x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
         bx, by = self._free(x, y, SHOT_BADGE + 1, SHOT_BADGE + 1)
         if inside:
             cv2.line(self.image, (x, y), (bx, by), WHITE, 1)
-            _cross(self.image, x, y, max(3, self.factor))
+            size = max(3, self.factor)
+            for color, thick in ((DARK, 3), (WHITE, 1)):
+                cv2.line(self.image, (x - size, y), (x + size, y), color, thick)
+                cv2.line(self.image, (x, y - size), (x, y + size), color, thick)
         else:
             cv2.arrowedLine(self.image, (bx, by), (x, y), WHITE, 1, tipLength=0.4)
         cv2.circle(self.image, (bx, by), SHOT_BADGE - 1, DARK, -1)
@@ -166,15 +159,11 @@ class Overlay:
 
     def _free(self, x: int, y: int, half_w: int, half_h: int) -> tuple[int, int]:
         """Free place for a rectangle around a point, else the nearest free place, else a place that is not free."""
-        for bx, by in _around((x - 6, y - 6, x + 6, y + 6), half_w, half_h, FAR):
-            if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
-                return bx, by
         height, width = self.image.shape[:2]
-        rows, columns = np.mgrid[half_h : height - half_h : SHOT_BADGE, half_w : width - half_w : SHOT_BADGE].reshape(
-            2, -1
-        )
-        for i in np.argsort((columns - x) ** 2 + (rows - y) ** 2, kind="stable").tolist():
-            bx, by = int(columns[i]), int(rows[i])
+        grid = np.mgrid[half_h : height - half_h : SHOT_BADGE, half_w : width - half_w : SHOT_BADGE].reshape(2, -1).T
+        order = np.argsort(((grid - (y, x)) ** 2).sum(axis=1), kind="stable")
+        others = ((column, row) for row, column in grid[order].tolist())
+        for bx, by in itertools.chain(_around((x - 6, y - 6, x + 6, y + 6), half_w, half_h, FAR), others):
             if self._is_free(bx - half_w, by - half_h, bx + half_w, by + half_h):
                 return bx, by
         return min(max(x, half_w), max(width - half_w, 0)), min(max(y - 22, half_h), max(height - half_h, 0))
@@ -199,13 +188,6 @@ def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple
         left, right, up, down = x0 - gap - half_w, x1 + gap + half_w, y0 - gap - half_h, y1 + gap + half_h
         yield from ((x, up), (x, down), (right, y), (left, y))
         yield from ((right, up), (left, up), (right, down), (left, down))
-
-
-def _cross(world: Image, x: int, y: int, size: int) -> None:
-    """Draw a cross on the pixel of a shot."""
-    for color, thickness in ((DARK, 3), (WHITE, 1)):
-        cv2.line(world, (x - size, y), (x + size, y), color, thickness)
-        cv2.line(world, (x, y - size), (x, y + size), color, thickness)
 
 
 NUMBERED_MAX = 3
@@ -240,13 +222,13 @@ def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bool
     for shot in shots:
         _sweeps(signs, world, shot, _steps_of(report["weapons"][shot["weapon"]]))
         _arrows(signs, world, shot)
-        _miss(signs, world, shot)
+        miss = shot["nearest_miss"]
+        if miss is not None and 0 < miss["distance"] <= NEAR_MISS:
+            signs.miss(*world.placed(np.array([miss["ray_xy"], miss["object_xy"]])))
     texts = [text for shot in shots for text in _numbers(signs, world, shot)]
     world.painted |= {f"ray: {name}" for name in signs.lay(world.image)}
-    taken = np.zeros(world.image.shape[:2], np.bool_)
-    for strokes in signs.strokes.values():
-        taken |= strokes.ground > 0
-    return texts, taken
+    blank = np.zeros(world.image.shape[:2], np.bool_)
+    return texts, np.logical_or.reduce([blank, *(strokes.ground > 0 for strokes in signs.strokes.values())])
 
 
 def draw_arrows(world: World, shot: Mapping[str, Any]) -> None:
@@ -275,7 +257,8 @@ def _sweeps(signs: Signs, world: World, shot: Mapping[str, Any], steps: int | No
         if steps:
             for k in range(1, min(steps, STEPS_SHOWN) + 1):
                 if k <= stop["fraction"] * steps:
-                    signs.tested(begin + (end - begin) * (k / steps), radius)
+                    spot = begin + (end - begin) * (k / steps)
+                    signs.sweep(spot, spot, radius, "tested only here")
         elif radius:
             signs.sweep(begin, at, radius)
         if steps is not None and stop["item"] is not None:
@@ -307,7 +290,7 @@ def _numbers(signs: Signs, world: World, shot: Mapping[str, Any]) -> Iterator[Te
             into = world.placed(np.array([told["point"]]))[0]
             spot = next(_spots(signs, into, end - begin, np.array(told["normal"]), radius), None)
             if spot is not None:
-                signs.badge(spot)
+                signs.of("number").line(spot, spot, 2 * BADGE)
                 label = str(told["order"] + 1)
                 x, y = np.rint(spot).astype(np.int64).tolist()
                 yield Text(x - 4 * len(label), y + 4, label, BADGE_INK, bold=True)
@@ -332,10 +315,3 @@ def _spots(signs: Signs, at: Floats, ahead: Floats, normal: Floats, radius: floa
                 strokes.ink[box].any() for name, strokes in signs.strokes.items() if name in CLEAR_OF
             ):
                 yield spot
-
-
-def _miss(signs: Signs, world: World, shot: Mapping[str, Any]) -> None:
-    """Draw the nearest miss, if it is within NEAR_MISS."""
-    miss = shot["nearest_miss"]
-    if miss is not None and 0 < miss["distance"] <= NEAR_MISS:
-        signs.miss(*world.placed(np.array([miss["ray_xy"], miss["object_xy"]])))

@@ -178,14 +178,9 @@ def table(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
         name = row["name"] if several else f"{passes[0]['order'] + 1}. {row['name']}"
         ends = min(told["entry_px"] for told in passes), max(told["exit_px"] for told in passes)
         material = sum(told["material"] for told in passes)
-        lines.append(
-            (
-                f"{name}, round {row['round']}" if rounds else name,
-                *([str(row["pellets"])] * several),
-                *(f"{value:.1f} px" for value in (*ends, material)),
-                *([f"{row['weight'] / WEIGHT_FULL:.2f}"] * faded),
-            )
-        )
+        cells = [f"{name}, round {row['round']}" if rounds else name, *([str(row["pellets"])] * several)]
+        cells += [f"{value:.1f} px" for value in (*ends, material)]
+        lines.append((*cells, *([f"{row['weight'] / WEIGHT_FULL:.2f}"] * faded)))
     return lines
 
 
@@ -214,12 +209,17 @@ def missed(shot: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def blocked(shot: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Number of rays that each occluder ended, and the objects behind it; for one ray only if there are any."""
+    """Number of samples or rays that each occluder ended, and the objects behind it; for one ray only if it has any."""
     lines = []
     for entry in shot["blockers"]:
+        name = short(entry["name"])
+        if "rays" not in shot:
+            behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
+            lines.append((f"{name} blocks {entry['samples']}", behind or "nothing behind it"))
+            continue
         behind = ", ".join(short(told["name"]) for told in entry["blocked"])
         if behind or len(shot["rays"]) > 1:
-            told = f"{short(entry['name'])} ends {_rays(entry['samples'])}"
+            told = f"{name} ends {_rays(entry['samples'])}"
             lines.append((told, f"in front of {behind}" if behind else "nothing behind it"))
     return lines
 

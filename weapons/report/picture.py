@@ -29,11 +29,11 @@ from .canvas import (
     Text,
     World,
     clipped,
+    covered,
     draw_present,
     draw_texts,
     factor_of,
     fill,
-    fill_runs,
     heat_boxes,
     page_of,
     sign_entries,
@@ -79,13 +79,13 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
 
         draw_cells(world, report)
     if report["batch"]:
-        texts, cards = _heat(world, report, scene), batch_cards(report)
+        for verdict in MARKS:
+            world.mark_heat(report["batch"]["heat"], verdict)
+        world.outline_seen(scene.ids(Role.HITTABLE).tolist())
+        texts, cards = [], batch_cards(report)
     else:
         texts = _shots(world, report, scene)
-        again = [hit_now(report, number) for number in range(len(report["shots"]))]
-        cards = [
-            shot_card(shot, n, scene, now) for n, (shot, now) in enumerate(zip(report["shots"], again, strict=True))
-        ]
+        cards = [shot_card(shot, n, scene, hit_now(report, n)) for n, shot in enumerate(report["shots"])]
     page, texts = page_of(report, world, texts, cards)
     if text:
         draw_texts(page, texts)
@@ -118,14 +118,6 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     overlay.names(shots, scene)
     overlay.links(shots, hit)
     return [*told, *overlay.texts]
-
-
-def _heat(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
-    """Colour each pixel by its number of samples, and outline the objects."""
-    for verdict in MARKS:
-        world.mark_heat(report["batch"]["heat"], verdict)
-    world.outline_seen(scene.ids(Role.HITTABLE).tolist())
-    return []
 
 
 WIDTH, HEIGHT, GAP = 640, 720, 12
@@ -198,20 +190,15 @@ def compared_pixels(expected: Mapping[str, Any], got: Mapping[str, Any], view: B
     """Masks (h, w) of the pixels of a view that were hit in both reports or in one, or had another verdict change."""
     mine, other = (_verdict_planes(report, view) for report in (expected, got))
     a, b = mine["hit"], other["hit"]
-    changed = np.zeros_like(a)
-    for verdict in MARKS:
-        changed |= mine[verdict] != other[verdict]
+    changed = np.logical_or.reduce([mine[verdict] != other[verdict] for verdict in MARKS])
     return {"both": a & b, "other verdict": changed & ~(a | b), "only expected": a & ~b, "only got": b & ~a}
 
 
 def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
     """Mask (h, w) for each verdict of the pixels that have it in any shot."""
-    shape = view[3] - view[1] + 1, view[2] - view[0] + 1
-    planes = {verdict: np.zeros(shape, np.bool_) for verdict in MARKS}
-    for verdict, plane in planes.items():
-        for shot in report["shots"]:
-            fill_runs(plane, view, shot["samples"].get(verdict, ()))
-        if report["batch"]:
+    planes = {v: covered(view, [shot["samples"].get(v, ()) for shot in report["shots"]]) for v in MARKS}
+    if report["batch"]:
+        for verdict, plane in planes.items():
             for _, box in heat_boxes(report["batch"]["heat"], verdict):
                 fill(plane, view, box)
     return planes
@@ -220,13 +207,11 @@ def _verdict_planes(report: Mapping[str, Any], view: Box) -> dict[str, Bools]:
 def _focus(kinds: Mapping[str, Bools], whole: Box) -> Box:
     """Box around the pixels that differ, else around those that were hit, else the whole box."""
     for names in (("only expected", "only got"), ("other verdict",), ("both",)):
-        rows, columns = np.nonzero(np.logical_or.reduce([kinds[name] for name in names]))
-        if len(rows):
-            low = (int(columns.min()) - AROUND, int(rows.min()) - AROUND)
-            high = (int(columns.max()) + AROUND, int(rows.max()) + AROUND)
-            x, y = (max(v, 0) + origin for v, origin in zip(low, whole[:2], strict=True))
-            x_max, y_max = (min(v + origin, most) for v, origin, most in zip(high, whole[:2], whole[2:], strict=True))
-            return _cut(x, y, x_max, y_max)
+        at = np.argwhere(np.logical_or.reduce([kinds[name] for name in names]))[:, ::-1]
+        if len(at):
+            low = np.maximum(at.min(axis=0) - AROUND, 0) + whole[:2]
+            high = np.minimum(at.max(axis=0) + AROUND + whole[:2], whole[2:])
+            return _cut(*low.tolist(), *high.tolist())
     return _cut(*whole)
 
 
@@ -281,8 +266,7 @@ def _page(
     told = list(words[:LINES_MAX]) or ["no difference"]
     if len(words) > LINES_MAX:
         told.append(f"and {len(words) - LINES_MAX} more")
-    page = np.empty((below + LINE * len(told) + 12, width, 3), np.uint8)
-    page[:] = PAGE_GROUND
+    page = np.full((below + LINE * len(told) + 12, width, 3), PAGE_GROUND, np.uint8)
     texts = []
     for i, ((world, labels), title) in enumerate(zip(sides, ("expected", "got", "difference"), strict=True)):
         left = EDGE + i * (wide + GAP)

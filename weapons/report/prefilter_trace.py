@@ -72,35 +72,34 @@ class PrefilterTrace:
     def told(self, hits: Hits, row: int) -> dict[str, Any]:
         """Objects whose pixels a shot was tested against, number of all items, and number of opened cells, as JSON."""
         shot, stack = hits.shots.take(row, row + 1), self.scene.items.stack()
+        fired: Lines | Placements
         if isinstance(hits, RayHits):
-            boxes, ranks, lines = self._rays(hits, shot)
-            patterns = self._capsules(boxes, lines)
+            boxes, ranks, fired = self._rays(hits, shot)
         else:
-            placements = placements_for(hits.weapon, shot)
-            boxes = _boxes_of(placements)
+            fired = placements_for(hits.weapon, shot)
+            boxes = fired.boxes[fired.count > 0]
             candidates = self._candidates()
-            placement, ranks = candidates.meeting(placements.boxes)
-            if candidates.prefilter.volume:
-                ranks = ranks[candidates.near(placements, placement, ranks)]
-            patterns = self._patterns(placements)
+            placement, ranks = candidates.meeting(fired.boxes)
+            if self.prefilter.volume:
+                ranks = ranks[candidates.near(fired, placement, ranks)]
         return {
             "objects": np.unique(stack.ids[ranks]).tolist(),
             "of": len(stack),
             "opened": len(self._visited(boxes)),
-            "patterns": [{"points": points.tolist()} for points in patterns],
+            "patterns": [{"points": points.tolist()} for points in self._patterns(boxes, fired)],
         }
 
     def opened(self, hits: Hits) -> Ints:
         """Numbers of the cells or nodes that were opened for all shots."""
-        if self.index is None:
-            return np.zeros(0, np.int64)
-        each = (
-            self._rays(hits, hits.shots.take(i, i + SHOTS_AT_A_TIME))[0]
-            if isinstance(hits, RayHits)
-            else _boxes_of(placements_for(hits.weapon, hits.shots.take(i, i + SHOTS_AT_A_TIME)))
-            for i in range(0, len(hits.shots), SHOTS_AT_A_TIME)
-        )
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *(self._visited(boxes) for boxes in each)]))
+        found = [np.zeros(0, np.int64)]
+        for first in range(0, len(hits.shots) if self.index else 0, SHOTS_AT_A_TIME):
+            shots = hits.shots.take(first, first + SHOTS_AT_A_TIME)
+            if isinstance(hits, RayHits):
+                found.append(self._visited(self._rays(hits, shots)[0]))
+            else:
+                placements = placements_for(hits.weapon, shots)
+                found.append(self._visited(placements.boxes[placements.count > 0]))
+        return np.unique(np.concatenate(found))
 
     def _visited(self, boxes_xyxy: Ints) -> Ints:
         """Numbers of the cells or nodes that are opened for boxes (n, 4)."""
@@ -134,37 +133,23 @@ class PrefilterTrace:
         low, high = np.maximum(cells.box[seen, :2], view[:2] - 1), np.minimum(cells.box[seen, 2:], view[2:] + 1)
         return cells.number[seen], np.concatenate([low, high], axis=1)
 
-    def _patterns(self, placements: Placements) -> list[Floats]:
-        """Outlines of the volumes of the first placements, in the world."""
-        some = np.flatnonzero(placements.count > 0)[:PATTERNS_MAX]
-        if not len(some) or self.prefilter.name == "none":
-            return []
-        if not self.prefilter.volume:
-            return [rectangle(box) for box in placements.boxes[some]]
-        fired = [placements.table.patterns[i] for i in placements.pattern[some].tolist()]
-        volumes = pattern_volumes(self.prefilter.name, fired)
-        return [outline_of(volumes, i)[0] + placements.xy[p] for i, p in enumerate(some.tolist())]
-
-    def _capsules(self, boxes_xyxy: Ints, lines: Lines) -> list[Floats]:
-        """Outlines of the first boxes that rays asked for, or of the capsules around the first rays."""
-        if self.prefilter.name == "none":
+    def _patterns(self, boxes_xyxy: Ints, fired: Placements | Lines) -> list[Floats]:
+        """Outlines, in the world, of the first boxes that were asked for, or of the volumes of what was fired first."""
+        if self.prefilter.name == "none" or (not len(boxes_xyxy) and isinstance(fired, Placements)):
             return []
         if not self.prefilter.volume:
             return [rectangle(box) for box in boxes_xyxy[:PATTERNS_MAX]]
-        some = lines.take(np.arange(min(len(lines), PATTERNS_MAX)))
-        capsules = Capsules(some.start / SUB, (some.start + some.step) / SUB, some.radius / SUB)
-        return [outline_of(capsules, i)[0] for i in range(len(some))]
+        if isinstance(fired, Lines):
+            lines = fired.take(np.arange(min(len(fired), PATTERNS_MAX)))
+            capsules = Capsules(lines.start / SUB, (lines.start + lines.step) / SUB, lines.radius / SUB)
+            return [outline_of(capsules, i)[0] for i in range(len(lines))]
+        some = np.flatnonzero(fired.count > 0)[:PATTERNS_MAX]
+        volumes = pattern_volumes(self.prefilter.name, [fired.table.patterns[i] for i in fired.pattern[some].tolist()])
+        return [outline_of(volumes, i)[0] + fired.xy[p] for i, p in enumerate(some.tolist())]
 
 
-def _boxes_of(placements: Placements) -> Ints:
-    """Boxes (n, 4) of the placements that have pixels."""
-    return placements.boxes[placements.count > 0]
-
-
-def prefilter_trace(
-    scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: str | None
-) -> PrefilterTrace | None:
-    """Make the trace of a pre-filter and a broad phase; None if neither is named.
+def prefilter_trace(scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: str | None) -> PrefilterTrace:
+    """Make the trace of a pre-filter and a broad phase.
 
     Parameters
     ----------
@@ -176,8 +161,6 @@ def prefilter_trace(
     InputError
         If one is not known, or is "auto", or a broad phase is named without a pre-filter.
     """
-    if prefilter is None and broadphase is None:
-        return None
     wanted = prefilter_of("box" if prefilter is None else prefilter)
     if wanted.name == "auto":
         raise InputError(f"prefilter: expected one to be shown, of {', '.join(PREFILTERS[1:])}, got 'auto'")
@@ -224,20 +207,16 @@ OPENED = 26
 
 def draw_cells(world: World, report: Mapping[str, Any]) -> None:
     """Draw the cells of the broad phase; those that were opened are filled, too."""
-    cells = report["filter"]["cells"]
-    for opened, name in ((False, "cell"), (True, "cell opened")):
-        for cell in cells:
-            if cell["opened"] is not opened:
-                continue
-            x, y, x_max, y_max = cell["box_xyxy"]
-            ring = world.placed(np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)]))
-            if opened:
-                (left, top), (right, low) = (
-                    np.rint(np.clip(v, -1, max(world.image.shape))) for v in (ring[0], ring[2])
-                )
-                ground = np.full((max(int(low - top), 0), max(int(right - left), 0)), OPENED, np.uint8)
-                blend(world.image, SKETCH[name], ground, int(left), int(top))
-            _trace(world, ring, name)
+    for cell in sorted(report["filter"]["cells"], key=lambda cell: bool(cell["opened"])):
+        x, y, x_max, y_max = cell["box_xyxy"]
+        ring = np.array([(x, y), (x_max, y), (x_max, y_max), (x, y_max)])
+        name = "cell opened" if cell["opened"] else "cell"
+        if cell["opened"]:
+            ends = np.rint(np.clip(world.placed(ring[::2]), -1, max(world.image.shape)))
+            (left, top), (right, low) = ends.astype(np.int64).tolist()
+            ground = np.full((max(low - top, 0), max(right - left, 0)), OPENED, np.uint8)
+            blend(world.image, SKETCH[name], ground, left, top)
+        _draw(world, [ring], name)
 
 
 def draw_volumes(world: World, report: Mapping[str, Any], scene: Scene) -> None:
@@ -272,24 +251,21 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
 
 
 def _draw(world: World, rings: list[Floats], name: str) -> None:
-    for ring in rings:
-        _trace(world, world.placed(ring), name)
-
-
-def _trace(world: World, ring: Floats, name: str) -> None:
-    """Draw a closed line through points of the picture, twice as thick around items that were let through.
+    """Draw closed lines through points of the world, twice as thick around items that were let through.
 
     OpenCV is not used, because the pixels of a line that leaves the picture depend on its version.
     """
     height, width = world.image.shape[:2]
-    begin, end = (np.rint(v) for v in within(ring, np.roll(ring, -1, axis=0), np.array([width, height]), BEYOND))
-    step = (end - begin).astype(np.int64)
-    edge, place = ragged(np.maximum(np.abs(step).max(axis=1, initial=0), 1))
-    count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True, initial=0), 1)
-    at = begin[edge].astype(np.int64) + (2 * step[edge] * place[:, None] + count) // (2 * count)
-    if name == LET_THROUGH:
-        at = (at[:, None] + BRUSH).reshape(-1, 2)
-    x, y = at[((at >= 0) & (at < (width, height))).all(axis=1)].T
-    world.image[y, x] = SKETCH[name]
-    if len(x):
-        world.painted.add(name)
+    for ring in map(world.placed, rings):
+        ends = within(ring, np.roll(ring, -1, axis=0), np.array([width, height]), BEYOND)
+        begin, end = (np.rint(v).astype(np.int64) for v in ends)
+        step = end - begin
+        edge, place = ragged(np.maximum(np.abs(step).max(axis=1, initial=0), 1))
+        count = np.maximum(np.abs(step[edge]).max(axis=1, keepdims=True, initial=0), 1)
+        at = begin[edge] + (2 * step[edge] * place[:, None] + count) // (2 * count)
+        if name == LET_THROUGH:
+            at = (at[:, None] + BRUSH).reshape(-1, 2)
+        x, y = at[((at >= 0) & (at < (width, height))).all(axis=1)].T
+        world.image[y, x] = SKETCH[name]
+        if len(x):
+            world.painted.add(name)

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,18 +20,13 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.ray_samples import Miss
 from ..explain.samples import detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import HitRow, Hits
 from ..kinds.areas import parts_of, ray_parts_of
-from ..kinds.placements import Placements, placements_for
+from ..kinds.placements import placements_for
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
-
-if TYPE_CHECKING:
-    from .prefilter_trace import PrefilterTrace
-
 
 CELLS_MAX = 2**18
 """Most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels."""
@@ -95,42 +90,41 @@ def _runs(counts: Ints) -> list[list[int]]:
     return runs
 
 
+PASS_COLUMNS = (
+    "order", "entry_xy", "exit_xy", "entry_px", "exit_px", "entry", "exit", "point_xy", "material", "normal_xy",
+    "weight",
+)  # fmt: skip
+"""Columns of a pass through an object that a report tells."""
+
+
 def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
     """Rays of one shot as JSON, with its nearest miss."""
     parts = ray_parts_of(hits.weapon)
     assert parts is not None  # its hits are those of rays
     rays = rays_of(parts, hits.shots.take(row, row + 1))
     stops, passes = hits.stops_at(row), hits.passes_at(row)
-    of = np.searchsorted(_ray_numbers(passes, parts[1].count if parts[1] else 1), np.arange(len(rays) + 1)).tolist()
-    ends = (rays.start_256 + rays.step_256) / SUB
+    numbers = passes.round * (parts[1].count if parts[1] else 1) + passes.pellet
+    of = np.searchsorted(numbers, np.arange(len(rays) + 1)).tolist()
     told = [
         {
             "round": int(rays.round[i]),
             "pellet": int(rays.pellet[i]),
             "start": (rays.start_256[i] / SUB).tolist(),
-            "end": ends[i].tolist(),
+            "end": ((rays.start_256[i] + rays.step_256[i]) / SUB).tolist(),
             "stop": _stop(scene, stops, i),
-            "passes": [_pass(scene, passes, k) for k in range(of[i], of[i + 1])],
+            "passes": [
+                {**item_told(scene, int(passes.object[k])), **_columns(passes, PASS_COLUMNS, k)}
+                for k in range(of[i], of[i + 1])
+            ],
         }
         for i in range(len(rays))
     ]
     miss = hits.nearest_miss(row)
-    near = None if miss is None else {**item_told(scene, miss.object), **_near(miss)}
+    near = None
+    if miss is not None:
+        ends = {"ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy)}
+        near = {**item_told(scene, miss.object), "distance": miss.distance, **ends}
     return {"radius": parts[2].radius_256 / SUB, "rays": told, "nearest_miss": near}
-
-
-def ray_boxes(hits: RayHits) -> Box | None:
-    """Box around all rays, from their starts to their stops."""
-    if not len(hits.stop):
-        return None
-    begin, end = pixel(hits.shots.at_256), hits.stop.cell_xy
-    x, y = np.minimum(begin.min(axis=0), end.min(axis=0)).tolist()
-    x_max, y_max = np.maximum(begin.max(axis=0), end.max(axis=0)).tolist()
-    return x, y, x_max, y_max
-
-
-def _ray_numbers(passes: Passes, pellets: int) -> Any:
-    return passes.round * pellets + passes.pellet
 
 
 def item_told(scene: Scene, item: int) -> dict[str, Any]:
@@ -143,33 +137,14 @@ def _stop(scene: Scene, stops: Stops, i: int) -> dict[str, Any]:
     return {
         "reason": Reason(int(stops.reason[i])).name.lower(),
         "item": None if item < 0 else item_told(scene, item),
-        "cell_xy": stops.cell_xy[i].tolist(),
-        "point": stops.point_xy[i].tolist(),
-        "distance": float(stops.distance[i]),
-        "fraction": float(stops.fraction[i]),
-        "normal": stops.normal_xy[i].tolist(),
+        **_columns(stops, ("cell_xy", "point_xy", "distance", "fraction", "normal_xy"), i),
     }
 
 
-def _pass(scene: Scene, passes: Passes, k: int) -> dict[str, Any]:
-    return {
-        **item_told(scene, int(passes.object[k])),
-        "order": int(passes.order[k]),
-        "entry_xy": passes.entry_xy[k].tolist(),
-        "exit_xy": passes.exit_xy[k].tolist(),
-        "entry_px": float(passes.entry_px[k]),
-        "exit_px": float(passes.exit_px[k]),
-        "entry": float(passes.entry[k]),
-        "exit": float(passes.exit[k]),
-        "point": passes.point_xy[k].tolist(),
-        "material": float(passes.material[k]),
-        "normal": passes.normal_xy[k].tolist(),
-        "weight": int(passes.weight[k]),
-    }
-
-
-def _near(miss: Miss) -> dict[str, Any]:
-    return {"distance": miss.distance, "ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy)}
+def _columns(table: Stops | Passes, columns: Sequence[str], row: int) -> dict[str, Any]:
+    """Columns of one row of a table, as JSON; those of points and normals lose their "_xy"."""
+    names = {"point_xy": "point", "normal_xy": "normal"}
+    return {names.get(column, column): getattr(table, column)[row].tolist() for column in columns}
 
 
 MOVED_MAX = 200
@@ -197,8 +172,7 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
     if not isinstance(now, Scene):
         raise InputError(f"now: expected a Scene, got {type(now).__name__}")
     before, after = then.items.stack(), now.items.stack()
-    was = {item: rank for rank, item in enumerate(before.ids.tolist())}
-    is_now = {item: rank for rank, item in enumerate(after.ids.tolist())}
+    was, is_now = ({item: rank for rank, item in enumerate(stack.ids.tolist())} for stack in (before, after))
     moved: list[dict[str, Any]] = []
     for item in sorted(was.keys() & is_now.keys()):
         old, new = before.box_xyxy[was[item]], after.box_xyxy[is_now[item]]
@@ -242,6 +216,8 @@ SHOTS_MAX = 24
 
 PLACEMENTS_AT_A_TIME = 2**16
 
+NO_BOXES: Ints = np.zeros((0, 4), np.int64)
+
 NEAR_OUTSIDE = 48
 """Width of the strip beyond the bounds in which samples are shown, px."""
 
@@ -280,11 +256,15 @@ def report_of(
     each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
     told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
     view = view_of(scene, fired)
-    sieve = None
+    sieve = {}
     if prefilter is not None or broadphase is not None:
         from .prefilter_trace import prefilter_trace  # few reports need it
 
-        sieve = prefilter_trace(scene, view, prefilter, broadphase)
+        trace = prefilter_trace(scene, view, prefilter, broadphase)
+        for (hits, _, row), shot in zip(each[: len(told)], told, strict=True):
+            shot["tested"] = trace.told(hits, row)
+        opened = [np.zeros(0, np.int64), *(trace.opened(hits) for hits in fired)]
+        sieve = {"filter": trace.to_dict(np.unique(np.concatenate(opened)))}
     return {
         "format": FORMAT,
         "version": version("hitplanes"),
@@ -300,37 +280,23 @@ def report_of(
         "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
         "shots": told,
         "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
-        **({} if sieve is None else {"filter": _sifted(sieve, fired, each if told else [], told)}),
+        **sieve,
         **({} if now is None else {"now": present_of(scene, now, fired, view)}),
     }
-
-
-def _sifted(
-    sieve: PrefilterTrace, fired: Sequence[Hits], each: Sequence[tuple[Hits, str, int]], told: Sequence[dict[str, Any]]
-) -> dict[str, Any]:
-    """Add the tested objects to each shot, and return the pre-filter's part of the report."""
-    for (hits, _, row), shot in zip(each, told, strict=True):
-        shot["tested"] = sieve.told(hits, row)
-    opened = [np.zeros(0, np.int64), *(sieve.opened(hits) for hits in fired)]
-    return sieve.to_dict(np.unique(np.concatenate(opened)))
 
 
 def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
     """Box of the world that a picture shows: the scene, and samples near it."""
     x, y, x_max, y_max = scene.extent()
-    reach = np.concatenate([np.zeros((0, 4), np.int64), *(_boxes(hits) for hits in fired)])
+    reach = np.concatenate([NO_BOXES, *(_boxes(hits) for hits in fired)])
     if not len(reach):
         return x, y, min(x_max, x + VIEW_MAX), min(y_max, y + VIEW_MAX)
     low, high = reach[:, :2].min(axis=0).tolist(), reach[:, 2:].max(axis=0).tolist()
     middle = np.concatenate([_anchors(hits) for hits in fired])
     over = VIEW_MAX // 4 if scene.bounds is None else NEAR_OUTSIDE
-    (x, x_max), (y, y_max) = (
-        _shown(*side, over)
-        for side in (
-            (x, x_max, low[0], high[0], *_ends(middle[:, 0])),
-            (y, y_max, low[1], high[1], *_ends(middle[:, 1])),
-        )
-    )
+    at_low, at_high = middle.min(axis=0).tolist(), middle.max(axis=0).tolist()
+    x, x_max = _shown(x, x_max, low[0], high[0], at_low[0], at_high[0], over)
+    y, y_max = _shown(y, y_max, low[1], high[1], at_low[1], at_high[1], over)
     return x, y, x_max, y_max
 
 
@@ -340,10 +306,6 @@ def _anchors(hits: Hits) -> Ints:
     some = hits.starts[:-1] < hits.starts[1:]
     at[some] = hits.first_xy[hits.starts[:-1][some]]
     return at
-
-
-def _ends(values: Ints) -> tuple[int, int]:
-    return int(values.min()), int(values.max())
 
 
 def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int, over: int) -> tuple[int, int]:
@@ -359,23 +321,17 @@ def _shown(first: int, last: int, low: int, high: int, at_low: int, at_high: int
 def _boxes(hits: Hits) -> Ints:
     """Boxes (n, 4) around the samples of each part of a batch that has samples."""
     if isinstance(hits, RayHits):
-        around = ray_boxes(hits)
-        return np.array([] if around is None else [around], np.int64).reshape(-1, 4)
+        ends = np.concatenate([pixel(hits.shots.at_256), hits.stop.cell_xy])  # rays, from starts to stops
+        return np.concatenate([ends.min(axis=0), ends.max(axis=0)])[None] if len(hits.stop) else NO_BOXES
     found = []
-    for placements in _placements_of(hits):
-        boxes = placements.boxes
+    burst, spread, _ = parts_of(hits.weapon)
+    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
+    for first in range(0, len(hits.shots), step):
+        boxes = placements_for(hits.weapon, hits.shots.take(first, first + step)).boxes
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
         if len(boxes):
             found.append(np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)]))
     return np.array(found, np.int64).reshape(-1, 4)
-
-
-def _placements_of(hits: Hits) -> Iterator[Placements]:
-    """Placements of a batch, in chunks of about PLACEMENTS_AT_A_TIME."""
-    burst, spread, _ = parts_of(hits.weapon)
-    step = max(1, PLACEMENTS_AT_A_TIME // ((burst.count if burst else 1) * (spread.count if spread else 1)))
-    for first in range(0, len(hits.shots), step):
-        yield placements_for(hits.weapon, hits.shots.take(first, first + step))
 
 
 def _checked(scene: Scene, fired: object) -> list[Hits]:
@@ -428,7 +384,10 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "aim": _degrees(hits, row),
         "seed": int(shots.seed[row]),
         "accept": None if accept == ALL else scene.category_names(accept),
-        "exclude": [{"owner": owner, "name": _name(scene, owner)} for owner in owners],
+        "exclude": [  # the scene need not have an owner, because owners are arbitrary ids
+            {"owner": owner, "name": scene.name_of(owner) if owner < scene.items.count else f"id {owner}"}
+            for owner in owners
+        ],
         "verdicts": hits.verdict_counts(row),
         "rows": _rows(scene, hits, row, margins),
         "why_not": _why_not(scene, hits, row, margins),
@@ -498,18 +457,18 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
 def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
     """Runs of the pixels of each verdict that occurs; the verdict of a pixel is the same for every pellet."""
     samples = hits.samples_at(row)
-    runs = {}
-    for verdict in Verdict:
-        xy = samples.xy[samples.verdict == verdict]
-        if len(xy):
-            runs[verdict.name.lower()] = Spans.from_runs(xy[:, 1], xy[:, 0], xy[:, 0]).runs().tolist()
-    return runs
+    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict].T for verdict in Verdict}
+    return {name: Spans.from_runs(y, x, x).runs().tolist() for name, (x, y) in of.items() if len(x)}
 
 
 def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
     """Batch of shots as JSON: totals, objects, all rows, and the heat map of the view."""
     first = np.cumsum([0, *(len(hits.shots) for hits in fired)]).tolist()
-    rows = [[row.shot + begin, *_flat(row)] for begin, hits in zip(first, fired, strict=False) for row in hits]
+    rows = [
+        [row.shot + begin, *row[1:-2], *row.first_xy, row.distance2]
+        for begin, hits in zip(first, fired, strict=False)
+        for row in hits
+    ]
     verdicts = np.zeros(len(Verdict), np.int64)
     for hits in fired:
         verdicts[: hits.verdicts.shape[1]] += hits.verdicts.sum(axis=0)
@@ -522,38 +481,25 @@ def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:
         "columns": [*(name for name in HitRow._fields if name not in ("first_xy", "distance2")), "x", "y", "distance2"],
         "rows": rows,
         "heat": heat_of(fired, view),
-        "plan": _distinct([hits.plan.to_dict() for hits in fired]),
+        "plan": list({json.dumps(plan): plan for plan in (hits.plan.to_dict() for hits in fired)}.values()),
     }
-
-
-def _distinct(plans: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Distinct plans."""
-    return list({json.dumps(plan): plan for plan in plans}.values())
 
 
 def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
     """Objects that were hit, sorted by the number of shots that hit them, then by pixels and id."""
-    shots: dict[int, set[int]] = {}
-    pixels: dict[int, int] = {}
-    weight: dict[int, int] = {}
-    for shot, _, item, _, count, heft, *_ in rows:
-        shots.setdefault(item, set()).add(shot)
-        pixels[item] = pixels.get(item, 0) + count
-        weight[item] = weight.get(item, 0) + heft
-    order = sorted(shots, key=lambda item: (-len(shots[item]), -pixels[item], item))
-    return [
-        {**item_told(scene, item), "shots": len(shots[item]), "pixels": pixels[item], "weight": weight[item]}
-        for item in order
+    of: dict[int, list[list[int]]] = {}
+    for row in rows:
+        of.setdefault(row[2], []).append(row)
+    told = [
+        {
+            **item_told(scene, item),
+            "shots": len({row[0] for row in own}),
+            "pixels": sum(row[4] for row in own),
+            "weight": sum(row[5] for row in own),
+        }
+        for item, own in of.items()
     ]
-
-
-def _flat(row: HitRow) -> list[int]:
-    return [row.round, row.object, row.samples, row.pixels, row.weight, row.pellets, *row.first_xy, row.distance2]
-
-
-def _name(scene: Scene, item: int) -> str:
-    """Name of an object; the scene need not have it, because owners are arbitrary ids."""
-    return scene.name_of(item) if item < scene.items.count else f"id {item}"
+    return sorted(told, key=lambda entry: (-entry["shots"], -entry["pixels"], entry["object"]))
 
 
 def _degrees(hits: Hits, row: int) -> float | None:

@@ -37,6 +37,9 @@ SKETCH = {
 }
 """Colours of what may be drawn of a pre-filter: volumes of items, volumes of shots, cells."""
 
+MARK_GROUND = (70, 74, 82)
+"""Colour of the ground of a mark in a legend."""
+
 TINT = 40
 """Opacity of a mark's ground, which shows all samples, even those too small for a shape each."""
 
@@ -282,13 +285,8 @@ class Signs:
             reach = BAR * self.size * _across(ahead)
             self.of(ENDS[reason]).line(stop - reach, stop + reach, 3.0 * self.size)
         if reason == "occluder":
-            self.cross(stop)
-
-    def cross(self, at: Floats) -> None:
-        """Mark where an occluder ended a ray."""
-        for slant in (np.array([1.0, 1.0]), np.array([1.0, -1.0])):
-            reach = CROSS * self.size * slant
-            self.of(ENDS["occluder"]).line(at - reach, at + reach, 2.6 * self.size)
+            for reach in CROSS * self.size * np.array([(1.0, 1.0), (1.0, -1.0)]):
+                self.of(ENDS[reason]).line(stop - reach, stop + reach, 2.6 * self.size)
 
     def through(self, begin: Floats, end: Floats, comes_out: bool = True) -> None:
         """Draw the part of a ray that lies in an object, where it goes in, and where it comes out, if it does."""
@@ -304,10 +302,6 @@ class Signs:
         self.of("normal").line(at + DOT * ahead, tip - 3 * ahead, FINE)
         self.of("normal").head(tip, ahead, 7.0)
 
-    def badge(self, at: Floats) -> None:
-        """Draw the disc of a number."""
-        self.of("number").line(at, at, 2 * BADGE)
-
     def miss(self, begin: Floats, end: Floats) -> None:
         """Draw the distance by which an object was missed as a dotted line between two bars."""
         strokes, across = self.of("near miss"), 4.5 * _across(_unit(end - begin))
@@ -315,15 +309,10 @@ class Signs:
         for at in (begin, end):
             strokes.line(at - across, at + across, FINE)
 
-    def sweep(self, begin: Floats, end: Floats, radius: float) -> None:
-        """Draw the area that a disc sweeps between two points."""
+    def sweep(self, begin: Floats, end: Floats, radius: float, name: str = "what it sweeps") -> None:
+        """Draw the area that a disc sweeps between two points, with an outline of that name."""
         self.of("swept").line(begin, end, 2 * radius)
-        self.of("what it sweeps").around(begin, end, radius, FINE)
-
-    def tested(self, at: Floats, radius: float) -> None:
-        """Draw the disc of a projectile at a point where it was tested."""
-        self.of("swept").line(at, at, 2 * radius)
-        self.of("tested only here").around(at, at, radius, FINE)
+        self.of(name).around(begin, end, radius, FINE)
 
     def contact(self, at: Floats, radius: float, pixel: Floats, factor: float) -> None:
         """Draw the disc at its first contact, and the middle of the pixel (of so many px) that it touches."""
@@ -364,8 +353,7 @@ def sign_mark(name: str) -> Image:
         signs.sweep(left + 4, right - 4, 5.0)
     else:
         signs.of(name).around(middle, middle, RING, FINE)
-    mark = np.empty((14, wide, 3), np.uint8)
-    mark[:] = (70, 74, 82)
+    mark = np.full((14, wide, 3), MARK_GROUND, np.uint8)
     signs.lay(mark)
     return mark
 
