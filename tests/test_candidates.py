@@ -240,7 +240,7 @@ def test_a_small_scene_gets_no_broad_phase_and_a_large_batch_does() -> None:
     scene = crowd(3, 20)
     for shots in (1, 1000):
         fire(scene, Disc(1), np.full((shots, 2), 50.0), strategy="direct")
-    assert scene.index("bvh").boxes is None
+    assert scene.derived.index("bvh").boxes is None
     many = crowd(4, 3000, 2000)
     at = np.random.default_rng(1).uniform(0, 2000, (3000, 2))
     hits = fire(many, Disc(1), at, strategy="spans")
@@ -259,7 +259,7 @@ def test_single_shots_make_a_broad_phase_when_it_would_have_paid(monkeypatch: py
     made = []
     for _ in range(due + 2):
         fire(scene, Point(), (3, 3), strategy="spans")
-        made.append(scene.index("bvh").boxes is not None)
+        made.append(scene.derived.index("bvh").boxes is not None)
     assert made.index(True) == due - 1
     scene.move(scene.ids(), (5, 5))  # to follow all would cost more than the shot saves
     assert not why(fire(scene, Point(), (3, 3), strategy="spans").plan.ran, "broad phase") or lost > 250.0 * 600
@@ -343,8 +343,8 @@ def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch
     monkeypatch.setattr(items, "JOURNAL_ROWS", remembered)
     rng = np.random.default_rng(8)
     scene = Scene()
-    index = scene.index(structure)
-    assert scene.index(structure) is index
+    index = scene.derived.index(structure)
+    assert scene.derived.index(structure) is index
     followed = 0
     for _ in range(120):
         for _ in range(int(rng.integers(0, 5))):
@@ -363,7 +363,7 @@ def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch
 
 def test_a_change_owes_what_it_changes() -> None:
     scene = crowd(2, 200)
-    index = scene.index("grid")
+    index = scene.derived.index("grid")
     assert index.build_cost(scene.items) == len(scene.items.stack())
     index.read(scene.items)
     scene.move([3, 7], (5, 5))
@@ -375,7 +375,7 @@ def test_a_change_owes_what_it_changes() -> None:
 
 def test_changes_that_no_answer_follows_do_not_pile_up() -> None:
     scene = crowd(2, 30)
-    index, fresh = scene.index("bvh"), Index("none")
+    index, fresh = scene.derived.index("bvh"), Index("none")
     index.read(scene.items)
     for i in range(500):
         scene.move(scene.ids()[i % 7 :], (i % 60, i % 50))
@@ -390,7 +390,7 @@ def test_an_index_that_has_grown_is_made_anew() -> None:
     """A grid chosen for one pixel is no grid for what came later."""
     scene = Scene()
     scene.add([[True]], (0, 0))
-    index = scene.index("grid")
+    index = scene.derived.index("grid")
     first = index.read(scene.items)
     for i in range(200):
         scene.add(np.ones((20, 20), np.bool_), (30 * (i % 20), 30 * (i // 20)))
@@ -427,7 +427,7 @@ def test_parts_of_a_pile_stay_within_their_chunk(monkeypatch: pytest.MonkeyPatch
 
 def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
     scene = crowd(2, 10)
-    index = scene.index("grid")
+    index = scene.derived.index("grid")
     index.regret = 5.0
     index.read(scene.items)
     assert index.regret == 0
@@ -435,7 +435,7 @@ def test_what_was_missed_is_forgotten_when_an_index_is_made() -> None:
 
 def test_an_index_forgets_boxes_that_came_and_went() -> None:
     scene = crowd(2, 300)
-    index = scene.index("bvh")
+    index = scene.derived.index("bvh")
     first = index.read(scene.items)
     rounds = 0
     while index.read(scene.items) is first:

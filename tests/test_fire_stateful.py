@@ -182,13 +182,13 @@ class ChangingScene(RuleBasedStateMachine):
             assert volley.fired(scene, strategy="built") == hits
         for broadphase in ("grid", "quadtree", "bvh"):
             assert volley.fired(scene, strategy="direct", broadphase=broadphase) == hits
-            scene.index(broadphase).read(scene.items).check()
+            scene.derived.index(broadphase).read(scene.items).check()
         return hits
 
     @rule()
     def planes_are_up_to_date(self) -> None:
         items = self._items()
-        plane = self.scene.label_plane()
+        plane = self.scene.derived.label_plane()
         assert (plane is None) == (self.scene.bounds is None)
         if plane is None:
             return
@@ -268,7 +268,7 @@ def redrawn(scene: Scene) -> np.ndarray:
 def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(items_module, "JOURNAL_ROWS", rows)
     scene, rng = crowd()
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     whole = plane.read(scene.items).size
     forgotten = caught_up = 0
@@ -288,7 +288,7 @@ def test_a_plane_that_lags_behind_what_the_journal_remembers(rows: int, monkeypa
 def test_one_change_of_more_than_the_journal_remembers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(items_module, "JOURNAL_ROWS", 3)
     scene, _ = crowd()
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     plane.read(scene.items)
     scene.move(range(12), (5, 5))
@@ -301,7 +301,7 @@ def test_one_change_of_more_than_the_journal_remembers(monkeypatch: pytest.Monke
 def test_only_what_changed_is_drawn_anew() -> None:
     scene = Scene((100, 100))
     ids = [scene.add(square(5), (10 * i, 10 * i)) for i in range(9)]
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     plane.read(scene.items)
     assert plane.redrawn == 100 * 100

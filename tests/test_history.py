@@ -475,8 +475,8 @@ def test_caches_are_there_for_the_next_shot() -> None:
     scene.move(0, (50, 50))
     history.record()
     past = history.at(0)
-    plane = past.label_plane()
-    assert plane is not None and plane.labels is not None and past.index("grid").boxes is not None
+    plane = past.derived.label_plane()
+    assert plane is not None and plane.labels is not None and past.derived.index("grid").boxes is not None
     for weapon in weapons:
         hits = fire(past, weapon, at, strategy="built")
         assert hits == fire(past, weapon, at, strategy="direct", prefilter="none")
@@ -493,9 +493,9 @@ def test_a_few_shots_make_no_plane_and_no_index() -> None:
     for falloff, whole in ((None, "visible set"), ("linear", "label plane")):
         for _ in range(3):
             hits = fire(past, Disc(3, falloff=falloff), (30, 30))
-        plane = past.label_plane()
+        plane = past.derived.label_plane()
         assert plane is not None and plane.labels is None
-        assert past.index("bvh").boxes is None
+        assert past.derived.index("bvh").boxes is None
         assert {whole, "broad phase", "volumes"} <= {stage.name for stage in hits.plan.left_out}
 
 

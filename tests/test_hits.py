@@ -555,7 +555,7 @@ def test_direct_makes_no_plane() -> None:
     scene = Scene((50, 40))
     scene.add(square(5), (3, 3))
     ran, left_out, _ = stages(fire(scene, Disc(3), (4, 4), strategy="direct"))
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None and plane.labels is None
     assert list(ran) == ["shots", "stack", "plan", "tiles", "patterns", "samples", "rows"]
     assert left_out["visible set"] == left_out["label plane"] == "tiles needs none"

@@ -130,7 +130,7 @@ def test_only_what_changed_is_redrawn() -> None:
     scene = Scene((100, 100))
     for x in range(5):
         scene.add(np.ones((4, 6), np.bool_), (10 * x + 2.5, 11.5))
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     assert plane.cost(scene.items) == 10_000
     plane.read(scene.items)
@@ -293,7 +293,7 @@ def test_a_short_step_is_drawn_as_one_box(many: bool, monkeypatch: pytest.Monkey
     scene = Scene((100, 60))
     ids = [scene.add(np.ones((4, 10), np.bool_), (20.5, 10.5))]
     ids += [scene.add(np.ones((4, 10), np.bool_), role="mover")] if many else []
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     wanted: list[tuple[tuple[float, float], list[list[int]]]] = [
         ((22.5, 11.5), [[16, 9, 27, 13]]),  # 60 px, and 80 in two
@@ -395,9 +395,9 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
     assert plane_fits(box) is fits
     scene = Scene(size, box[:2])
     if fits:
-        assert scene.label_plane() is scene.label_plane() is not None
+        assert scene.derived.label_plane() is scene.derived.label_plane() is not None
         return
-    assert scene.label_plane() is None
+    assert scene.derived.label_plane() is None
     message = f"bounds: expected a plane of sides up to 65535 px .*got {size[0]} x {size[1]}"
     for make in (lambda: LabelPlane(box), lambda: label_plane(scene.items.stack(), box), scene.planes):
         with pytest.raises(InputError, match=message):
@@ -405,7 +405,7 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
 
 
 def test_a_world_without_bounds_has_no_label_plane() -> None:
-    assert Scene().label_plane() is None
+    assert Scene().derived.label_plane() is None
 
 
 def test_a_plane_that_is_not_read_costs_nothing_to_ask_about() -> None:

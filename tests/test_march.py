@@ -372,7 +372,7 @@ def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, 
         found = []
         for busy in (False, True):
             scene = some_scene(np.random.default_rng(19), (400, 300))
-            field = scene.distance_field()
+            field = scene.derived.distance_field()
             assert field is not None
             if made:
                 fire(scene, Pistol(90), (2, 4), strategy="march")
@@ -384,8 +384,8 @@ def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, 
                 for strategy in ("walk", "cast"):
                     fire(scene, Pistol(90), at, aim=aim, strategy=strategy)
             assert field.is_made(scene.items) == made
-            assert field.regret_ns == 0, "only calls that choose count"
-            field.regret_ns = 1e3 * lost_us
+            assert field.regret == 0, "only calls that choose count"
+            field.regret = 1e3 * lost_us
             found.append(way_of(fire(scene, Pistol(90), at[:rays], aim=aim[:rays]).plan))
         assert len(set(found)) == 1
         ways.add(found[0])
@@ -396,13 +396,13 @@ def test_the_same_call_at_the_same_scene_goes_the_same_way(kernels: ModuleType, 
 @pytest.mark.usefixtures("fixed_costs")
 def test_the_plan_tells_what_was_lost_without_a_field() -> None:
     scene = some_scene(np.random.default_rng(21), (400, 300))
-    field = scene.distance_field()
+    field = scene.derived.distance_field()
     assert field is not None
     told = []
     for _ in range(2):
         plan = fire(scene, Pistol(90), (2.25, 4)).plan
         told.append(next(stage.why for stage in plan.left_out if stage.name == "march"))
-        lost = f"which would take 720 us to make: {field.regret_ns / 1e3:.0f} us lost so far"
+        lost = f"which would take 720 us to make: {field.regret / 1e3:.0f} us lost so far"
         assert told[-1].endswith(lost) and told[-1].startswith("about ")
     assert told[0] != told[1]
 

@@ -158,7 +158,7 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         {"strategy": "visible"},
         [
             *OF_BITS,
-            (visible.VisibleSets, "read", "visible set", 10**5),
+            (visible.Visible, "read", "visible set", 10**5),
             (visible.VisibleSet, "cells_for", "pre-filter", 10**6),
         ],
     ),
@@ -500,7 +500,7 @@ SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), 
 OF_SCENES = (
     "bits.bit_rows bits.cells bits.front_to_back bits.label_plane bits.span_walk bits.tiles bits.visible"
     " common.backend common.checks common.costs common.limits common.tables grid.fixed_point"
-    " grid.rasterize grid.spans late scene.items scene.render scene.scene scene.sprite"
+    " grid.rasterize grid.spans late scene.derived scene.items scene.render scene.scene scene.sprite"
 )
 OF_FIRE = (
     "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"

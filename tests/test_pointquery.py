@@ -81,7 +81,7 @@ def test_the_coarse_map_is_made_when_it_pays_and_gone_after_a_change(jit: bool) 
         return len(fire(scene, Point(), np.full((looks, 2), x), strategy="built"))
 
     assert [hits(20, 30), hits(50, 33)] == [30, 0]
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None and plane.cells(0) is None  # 63 looks were made, and it has 64 cells
     assert hits(20, 1) == 1
     cells = plane.cells(0)

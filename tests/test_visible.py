@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from hitplanes import Beam, Disc, Scene, fire
 from hitplanes.planes.bits import visible
 from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
 from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.scene.derived import VIEWS_MOST
 
 CORNERS = [(0, 0), (-(10**9), 10**9), (10**12, -(10**12))]
 
@@ -39,16 +40,48 @@ def composed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
     yield made
 
 
-def test_more_views_in_turn_than_are_kept_lose_anew_before_each_is_composed_again(composed: list[View]) -> None:
+@pytest.mark.parametrize("more", [0, 1])
+def test_each_of_the_kept_views_is_composed_once_and_one_more_never_in_vain(composed: list[View], more: int) -> None:
     scene = crowd(300)
-    known = scene.visible_sets()
-    views = [View(False, 1 << k, ()) for k in range(visible.VIEWS_MOST + 1)]
+    views = [View(False, 1 << k, ()) for k in range(VIEWS_MOST + more)]
     lost, cost, rounds = 1.0, 10.0, 200
     for _ in range(rounds):
         for view in views:
-            if known.kept(view, scene.version) is None and known.worth_building(view, scene.version, lost, cost):
-                known.read(view, scene.items, scene.bounds)
-    assert len(views) <= len(composed) <= rounds * len(views) * lost / cost
+            known = scene.derived.visible(view)
+            if known.made(scene.items) is None and known.worth_building(lost, cost):
+                known.read(scene.items)
+    assert len(composed) == (0 if more else len(views))
+
+
+def test_only_what_decides_hits_makes_a_visible_set_stale(composed: list[View]) -> None:
+    scene = crowd()
+    mover, hud = scene.add([[True]], role="mover"), scene.add([[True]], role="hud")
+    objects = scene.ids("hittable")
+    view = View(False, ALL, ())
+    known = scene.derived.visible(view)
+    first = known.read(scene.items)
+    changes: list[tuple[Callable[[], object], bool]] = [
+        (lambda: scene.move(mover, (5, 5)), False),
+        (lambda: scene.move([mover, hud], [(6, 6), (7, 7)]), False),
+        (lambda: scene.set(hud, angle=30), False),
+        (lambda: scene.add([[True]], role="mover"), False),
+        (lambda: scene.move([mover, objects[0]], [(6, 6), (7, 7)]), True),
+        (lambda: scene.move(int(objects[1]), (8, 8)), True),
+        (lambda: scene.set(mover, role="hittable"), True),
+        (lambda: scene.set(objects[2], categories=2), True),
+        (lambda: scene.remove(objects[3]), True),
+        (lambda: scene.remove(hud), False),
+    ]
+    for change, stale in changes:
+        change()
+        assert (known.made(scene.items) is None) == stale
+        again = known.read(scene.items)
+        assert (again is not first) == stale
+        assert fire(scene, Disc(9), [(50, 50), (200, 300)], strategy="visible") == fire(
+            scene, Disc(9), [(50, 50), (200, 300)], strategy="direct"
+        )
+        first = again
+    assert set(composed) == {view}
 
 
 @pytest.mark.parametrize("corner", CORNERS)

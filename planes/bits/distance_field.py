@@ -16,7 +16,6 @@ and each step looks at the cell on the other side.
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -28,6 +27,7 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, Ints, Labels
 from ..common.limits import HALF, SUB
 from ..grid.spans import Box, meets
+from ..scene.derived import Derivative
 from ..scene.items import Items
 from .label_plane import LabelPlane
 
@@ -322,23 +322,13 @@ def _reach(better: Any, crossings: Ints, rays: Ints, axis: int, place: Ints, of:
     crossings[rays] = better(crossings[rays], at)
 
 
-class DistanceField:
-    """City-block distances from the items on a label plane, made anew when the plane has changed.
-
-    Threads may read it as long as none changes the scene.
-
-    Parameters
-    ----------
-    labels : the label plane
-    regret_ns : time that calls lost without the field since the scene changed last
-    """
+class DistanceField(Derivative):
+    """City-block distances from the items on a label plane, made anew when the plane has changed."""
 
     def __init__(self, labels: LabelPlane) -> None:
+        super().__init__()
         self.labels = labels
-        self.regret_ns = 0.0
-        self._distance_field: Clearance | None = None
-        self._seen = -1
-        self._lock = threading.Lock()
+        self._made: Clearance | None = None
 
     @property
     def corner_xy(self) -> Ints:
@@ -348,15 +338,11 @@ class DistanceField:
     def is_made(self, items: Items) -> bool:
         """Whether the field is made for the scene as it is now."""
         with self._lock:
-            return self._is_made(items)
-
-    def _is_made(self, items: Items) -> bool:
-        if self._seen != items.version:
-            changes = items.changes(self._seen)
-            if changes is None or any(self._holds(box) for _, _, *both in changes for box in both):
-                self._distance_field, self.regret_ns = None, 0.0
-            self._seen = items.version
-        return self._distance_field is not None
+            if self._seen != items.version:
+                changes = self._unseen(items)
+                if changes is None or any(self._holds(box) for _, _, *both in changes for box in both):
+                    self._made, self.regret = None, 0.0
+            return self._made is not None
 
     def _holds(self, boxes_xyxy: Ints | Box) -> bool:
         """Whether any box overlaps the plane; a box that ends before it begins is empty."""
@@ -368,6 +354,6 @@ class DistanceField:
     def read(self, items: Items, labels: Labels) -> Clearance:
         """Distances (h + 2 PAD, w + 2 PAD) of the present version, from the labels of that version."""
         with self._lock:
-            if not self._is_made(items) or self._distance_field is None:
-                self._distance_field = kernels_of(sys.modules[__name__]).distances_of(labels != 0)
-            return self._distance_field
+            if not self.is_made(items) or self._made is None:
+                self._made = kernels_of(sys.modules[__name__]).distances_of(labels != 0)
+            return self._made

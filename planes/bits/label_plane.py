@@ -10,7 +10,6 @@ A coarse map of occupied cells spares most reads. `jit.scene` has the compiled k
 from __future__ import annotations
 
 import sys
-import threading
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,8 @@ from ..common.checks import Bools, InputError, Ints, Labels
 from ..common.limits import HALF, ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX, SUB
 from ..grid.fixed_point import pixel
 from ..grid.spans import Box, meets
-from ..scene.items import NEVER, Items, Stack, clipped
+from ..scene.derived import Derivative
+from ..scene.items import Items, Stack, clipped
 from .cells import within
 
 
@@ -137,10 +137,8 @@ def label_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
     return (labels >> 1).astype(np.int32)
 
 
-class LabelPlane:
+class LabelPlane(Derivative):
     """The label plane of a box of the world, kept up to date from the journal.
-
-    Threads may read it as long as none changes the scene.
 
     Parameters
     ----------
@@ -149,17 +147,16 @@ class LabelPlane:
     """
 
     def __init__(self, box_xyxy: Box) -> None:
+        super().__init__()
         _check_plane(box_xyxy)
         self.box_xyxy = box_xyxy
         self.size = (box_xyxy[2] - box_xyxy[0] + 1) * (box_xyxy[3] - box_xyxy[1] + 1)
         self.labels: Labels | None = None
         self.redrawn = 0
-        self._seen = NEVER  # version up to which changes are in `_dirty`
-        self._dirty: list[Ints] = []
+        self._dirty: list[Ints] = []  # of the changes up to `_seen`
         self._cost = self.size
         self._cells: Bools | None = None
         self._looks = 0
-        self._lock = threading.Lock()
 
     def cost(self, items: Items) -> int:
         """Pixels that must be redrawn before the plane can be read; each change is counted once."""
@@ -171,13 +168,12 @@ class LabelPlane:
     def _follow(self, items: Items) -> None:
         """Note the boxes that changes since the last call make dirty; if they are unknown or too many, give up."""
         known = self.labels is not None and self.labels.dtype == _kind(items)
-        changes = items.changes(self._seen) if known else None
-        for _, _, before, after in changes or ():
+        changes = self._unseen(items)
+        for _, _, before, after in changes or () if known else ():
             boxes, pixels = _dirt(np.reshape(before, (-1, 4)), np.reshape(after, (-1, 4)), self.box_xyxy)
             self._dirty.append(boxes)
             self._cost += pixels
-        self._seen = items.version
-        if changes is None or self._cost >= self.size:
+        if not known or changes is None or self._cost >= self.size:
             self.labels, self._dirty, self._cost = None, [], self.size
 
     def read(self, items: Items) -> Labels:

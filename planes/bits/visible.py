@@ -7,7 +7,6 @@ on their positions: they are computed once for a version of a scene, or only for
 
 from __future__ import annotations
 
-import threading
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Ints
 from ..common.limits import ALL
 from ..grid.spans import Box
+from ..scene.derived import NEVER, Derivative
 from ..scene.items import Items, Stack
 from . import bit_rows, cells
 from .bit_rows import WORD, Words
@@ -56,9 +56,6 @@ def moved(rows: Words, kept: Ints, sides: Ints, height: int) -> Words:
     found *= inside
     return found
 
-
-VIEWS_MOST = 4
-"""Most visible sets that a scene keeps, one for each view."""
 
 CELLS_BYTES = 2**25
 """Size of the cache of cells of a visible set, for the last few boxes of patterns, bytes."""
@@ -132,51 +129,37 @@ class VisibleSet:
         return sum(int(column.nbytes) for column in (seen.rank, seen.box_xyxy, seen.begin, seen.words))
 
 
-class VisibleSets:
-    """Visible sets of a scene for the last few views, and the time that calls lost for want of one.
+class Visible(Derivative):
+    """The visible set of one view of a scene; changes of items that decide no hit leave it as it is.
 
-    Threads may read them as long as none changes the scene.
+    Parameters
+    ----------
+    bounds : inclusive box of the world, or None
     """
 
-    def __init__(self) -> None:
-        self._version = -1
-        self._kept: dict[View, VisibleSet] = {}
-        self._regret: dict[View, float] = {}
-        self._lock = threading.Lock()
+    def __init__(self, view: View, bounds: Box | None) -> None:
+        super().__init__()
+        self._view, self._bounds = view, bounds
+        self._decided = NEVER
+        self._made: VisibleSet | None = None
 
-    def kept(self, view: View, version: int) -> VisibleSet | None:
-        """The visible set of a view and version, if it is made."""
-        return self._kept.get(view) if self._version == version else None
-
-    def worth_building(self, view: View, version: int, lost: float, cost: float) -> bool:
-        """Whether a view's calls, including this one, have lost as much time as the visible set costs.
-
-        So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
-        The count begins anew when a visible set is made, or the scene changes.
-        """
-        with self._lock:
-            self._forget(version)
-            self._regret[view] = self._regret.get(view, 0.0) + max(lost, 0.0)
-            return self._regret[view] > cost
-
-    def regret(self, view: View, version: int) -> float:
-        """The time that a view's calls have lost for want of its visible set, ns."""
-        return self._regret.get(view, 0.0) if self._version == version else 0.0
-
-    def read(self, view: View, items: Items, bounds: Box | None) -> VisibleSet:
-        """The visible set of the items as they are now, within the bounds of the scene."""
-        found = self.kept(view, items.version)
-        if found is None:
-            found = VisibleSet(items.stack(), items.tiles(), bounds, view)
+    def made(self, items: Items) -> VisibleSet | None:
+        """The visible set of the items as they are now, if it is made."""
+        if self._seen != items.version:
             with self._lock:
-                self._forget(items.version)
-                self._regret[view] = 0.0
-                self._kept = dict([*self._kept.items(), (view, found)][-VIEWS_MOST:])
-        return found
+                if self._decided != items.decided:
+                    self._made, self.regret, self._decided = None, 0.0, items.decided
+                self._seen = items.version
+        return self._made
 
-    def _forget(self, version: int) -> None:
-        if self._version != version:
-            self._kept, self._regret, self._version = {}, {}, version  # in this order: `kept` holds no lock
+    def read(self, items: Items) -> VisibleSet:
+        """The visible set of the items as they are now."""
+        found = self.made(items)
+        if found is None:
+            found = VisibleSet(items.stack(), items.tiles(), self._bounds, self._view)
+            with self._lock:
+                self._made, self.regret = found, 0.0
+        return found
 
 
 def in_front(boxes_xyxy: Ints, tiles: Ints, blocks: Bools) -> tuple[Ints, Ints]:

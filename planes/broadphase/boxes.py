@@ -8,7 +8,6 @@ Searches read rows by `take` and `flatnonzero`: indexing by brackets takes up to
 
 from __future__ import annotations
 
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, choice, integers, reals, shown
 from ..common.limits import CHUNK_PAIRS, INDEX_SLACK, STRUCTURES
 from ..grid.spans import meets
+from ..scene.derived import Derivative
 from ..scene.items import Items
 from ..volumes.volumes import Aabbs, Volumes
 
@@ -287,11 +287,10 @@ INDEX_GROWTH = 4
 """Growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes."""
 
 
-class Index:
+class Index(Derivative):
     """The broad phase of the items of a scene that decide hits, over their inclusive pixel boxes.
 
-    It follows the changes of the scene, at a cost proportional to them. Threads may query it while none changes the
-    scene.
+    It follows the changes of the scene, at a cost proportional to them.
 
     Parameters
     ----------
@@ -301,20 +300,17 @@ class Index:
     ----------
     boxes : the structure, None before the first query
     followed : number of boxes that were updated for the last query
-    regret : cost that callers have paid so far for not using the index, in their own unit
     """
 
     def __init__(self, structure: str) -> None:
+        super().__init__()
         self.structure = choice("structure", structure, tuple(STRUCTURES))
         self.boxes: BroadPhase | None = None
         self.followed = 0
-        self.regret = 0.0
         self._pending = np.zeros(0, np.int64)
-        self._seen = -1
         self._made_of = 0
         self._place_of = np.zeros(0, np.int64)
         self._item_of = np.zeros(0, np.int64)
-        self._lock = threading.RLock()
 
     def build_cost(self, items: Items) -> int:
         """Number of boxes that must be updated before the next query; each change is read once."""

@@ -21,7 +21,8 @@ from ..common.checks import Bools, InputError, Ints, flag, integer, real, shown,
 from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import quarter_turns, rounded_div
 from ..grid.spans import Box
-from .items import ARRANGEMENTS, COLUMNS, NEVER, NO_BOXES, UNARRANGED, Items, MaskAtlas
+from .derived import NEVER, Derived
+from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items, MaskAtlas
 from .scene import Scene
 from .sprite import variant_of
 
@@ -48,19 +49,15 @@ class PastItems(Items):
         before = Items() if earlier is None else earlier
         self.count = items.count
         self.version = self._forgotten = items.version
-        self._bounds, self._tiles = items._bounds, items._tiles  # these are by mask, not by item
-        with items._lock:  # a thread that reads the stack may rebuild the atlas
-            if items.atlas.wasteful:
-                items._compact()
-            kept = before.arrangement == items.arrangement
-            for name in COLUMNS:
-                changed = not kept or name in UNARRANGED
-                now = getattr(items, name)[: self.count] if changed else getattr(before, name)
-                setattr(self, name, _column(now, getattr(before, name)) if changed else now)
-            flat, self.arrangement = items.atlas.flat, items.arrangement
-            if items._stack is not None:
-                self._stack = (NEVER, items._stack[1].placed(NO_BOXES))  # only the order is kept
-        self.atlas = before.atlas if flat is before.atlas.flat else _full(flat)
+        (atlas, stack), self.by_mask, self.arrangement = items.settled(), items.by_mask, items.arrangement
+        kept = before.arrangement == items.arrangement
+        for name in COLUMNS:
+            changed = not kept or name in UNARRANGED
+            now = getattr(items, name)[: self.count] if changed else getattr(before, name)
+            setattr(self, name, _column(now, getattr(before, name)) if changed else now)
+        if stack is not None:
+            self._stack = (NEVER, stack.placed(NO_BOXES))  # only the order is kept
+        self.atlas = before.atlas if atlas.flat is before.atlas.flat else _full(atlas.flat)
         if kept:
             self.sprites, self.names, self.angles = before.sprites, before.names, before.angles
             self.variants, self.forms = before.variants, before.forms
@@ -146,6 +143,7 @@ class PastScene(Scene):
         super().__init__()
         self.tick = tick
         self.name, self.categories, self._bounds, pickled, self.items = moment
+        self.derived = Derived(self._bounds)
         try:
             self.weapons, self.shots = pickle.loads(pickled)
         except Exception as error:

@@ -23,6 +23,7 @@ from ..common.limits import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURN
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box
+from .derived import NEVER
 from .sprite import Sprite, Transform, Variant, variant_of
 
 if TYPE_CHECKING:
@@ -163,9 +164,6 @@ NOWHERE = (0, 0, -1, -1)
 Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
 """A version, the items that it changed, and their deciding boxes before and after; plain numbers for a single item."""
 
-NEVER = -1
-"""A version before all others."""
-
 PLACE, BOX = Struct("=2q"), Struct("=4q")
 """Layouts of a row of positions and of a row of boxes, to read and write a single item without an array."""
 
@@ -236,6 +234,14 @@ class MaskAtlas:
         return begin
 
 
+@dataclass
+class ByMask:
+    """What is derived from masks alone, by their numbers; the moments of a scene share it."""
+
+    tiles: TileAtlas | None = None
+    bounds: dict[Kind, Bounds] = field(default_factory=dict)
+
+
 COLUMNS: dict[str, tuple[int, ...]] = {
     "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
@@ -279,9 +285,9 @@ class Items:
         self._in_order = False  # whether the order of the last stack still holds
         self._journal_rows = 0
         self._forgotten = 0
+        self._decided = NEVER, 0  # version that was looked at, and `decided`
         self._stack: tuple[int, Stack] | None = None
-        self._bounds: dict[Kind, Bounds] = {}
-        self._tiles: list[TileAtlas] = []
+        self.by_mask = ByMask()
         self._imagery: tuple[int, list[Role]] | None = None
         self._lock = threading.Lock()
         self._allot()
@@ -400,6 +406,17 @@ class Items:
             self._journal_rows -= np.size(old)
             self._forgotten = version
 
+    @property
+    def decided(self) -> int:
+        """Version of the last change to an item that decides hits."""
+        seen, decided = self._decided
+        if seen != self.version:
+            changes = self.changes(seen)
+            boxes = ((version, np.vstack([before, after])) for version, _, before, after in changes or ())
+            last = next((version for version, box in boxes if (box[:, 0] <= box[:, 2]).any()), decided)
+            self._decided = self.version, self.version if changes is None else last
+        return self._decided[1]
+
     def changed_ids(self, version: int) -> Ints | None:
         """Sorted ids of the items that changed after a version; None if that is forgotten."""
         changes = self.changes(version)
@@ -435,6 +452,13 @@ class Items:
         role = self.role[ids]
         boxes[(role != HITTABLE) & (role != OCCLUDER)] = NOWHERE
         return boxes
+
+    def settled(self) -> tuple[MaskAtlas, Stack | None]:
+        """The atlas, rebuilt if too much of it is unused, and the last stack, whose order may be an earlier one."""
+        with self._lock:  # a thread that reads the stack may rebuild the atlas
+            if self.atlas.wasteful:
+                self._compact()
+            return self.atlas, None if self._stack is None else self._stack[1]
 
     @property
     def has_stack(self) -> bool:
@@ -503,18 +527,16 @@ class Items:
     def tiles(self) -> Tiles:
         """Bit rows of the masks of the stack."""
         stack = self.stack()
-        known = self._tiles[0].known(stack.forms) if self._tiles else None
+        atlas = self.by_mask.tiles = self.by_mask.tiles or late.tiles.TileAtlas()
+        known = atlas.known(stack.forms)
         if known is not None:
             return known
-
-        if not self._tiles:
-            self._tiles.append(late.tiles.TileAtlas())
         variants, ids = self.variants, stack.ids
-        return self._tiles[0].tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
+        return atlas.tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, px from the mask's pixel [0, 0], and the row for each item; no mask may be empty."""
-        bounds = self._bounds.setdefault(kind, late.fit.Bounds(kind))
+        bounds = self.by_mask.bounds.setdefault(kind, late.fit.Bounds(kind))
         return bounds.rows(self.mask[ids], self.sprites, self.variants, ids, len(self.stack()))
 
     def volumes(self, name: str, ids: Ints) -> Volumes:

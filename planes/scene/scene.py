@@ -26,29 +26,16 @@ from ..common.checks import (
     rising,
     within,
 )
-from ..common.limits import (
-    ALL,
-    CATEGORY_BITS,
-    COST_MAX,
-    LAYER_MAX,
-    POSITION_MAX,
-    REACH_MAX,
-    SCALE_BITS,
-    STRUCTURES,
-    SUB,
-)
+from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from ..common.tables import Text, typed
 from ..grid.fixed_point import quarter_turns, snap
 from ..grid.spans import Box
+from .derived import Derived
 from .items import ROLES, Items, Role
 from .render import Planes, plane_objects, plane_size
 from .sprite import FLIPS, Transform, as_sprite, transform_of, whole_scale
 
 if TYPE_CHECKING:
-    from ..bits.distance_field import DistanceField
-    from ..bits.label_plane import LabelPlane
-    from ..bits.visible import VisibleSets
-    from ..broadphase.boxes import Index
     from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
 
@@ -152,7 +139,6 @@ def _scale_rows(scale: object, n: int) -> tuple[list[int], list[int]]:
 
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
-INDEXES = tuple(STRUCTURES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")
 """Names of the planes of each role, in the order of ROLES."""
 
@@ -197,10 +183,7 @@ class Scene:
         self.items = Items()
         self.weapons: dict[str, Any] = {}
         self.shots: list[Any] = []
-        self._label_plane: LabelPlane | None = None
-        self._distance_field: DistanceField | None = None
-        self._indexes: dict[str, Index] = {}
-        self._visible_sets: VisibleSets | None = None
+        self.derived = Derived(self._bounds)
 
     @classmethod
     def from_planes(
@@ -445,31 +428,6 @@ class Scene:
             out[field] = late.label_plane.label_plane(self.items.stack_of(role), at)
             out[field].flags.writeable = False
         return Planes((x, y), **out)
-
-    def label_plane(self) -> LabelPlane | None:
-        """The label plane of the scene; None if it has no bounds, or too large ones."""
-        if self._label_plane is None and self.bounds is not None and late.label_plane.plane_fits(self.bounds):
-            self._label_plane = late.label_plane.LabelPlane(self.bounds)
-        return self._label_plane
-
-    def visible_sets(self) -> VisibleSets:
-        """The visible sets of the objects, for shots at many of them."""
-        if self._visible_sets is None:
-            self._visible_sets = late.visible.VisibleSets()
-        return self._visible_sets
-
-    def distance_field(self) -> DistanceField | None:
-        """The distance field by which rays march; None if there is no label plane."""
-        labels = self.label_plane()
-        if self._distance_field is None and labels is not None:
-            self._distance_field = late.distance_field.DistanceField(labels)
-        return self._distance_field
-
-    def index(self, structure: str) -> Index:
-        """The broad phase of the items that decide hits, kept up to date: "none", "grid", "quadtree" or "bvh"."""
-        if choice("structure", structure, INDEXES) not in self._indexes:
-            self._indexes[structure] = late.boxes.Index(structure)
-        return self._indexes[structure]
 
     def content_hash(self) -> str:
         """Hash of everything that decides hits; scenes of equal hash answer every shot alike."""

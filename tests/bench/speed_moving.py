@@ -294,7 +294,7 @@ def _steps(scene: Scene, moved: int, count: int, rng: Any) -> list[tuple[Any, Fl
 
 
 def _redraw(scene: Scene) -> Callable[[Any, int], Scene]:
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     plane.read(scene.items)
 
@@ -309,7 +309,7 @@ def _redraw(scene: Scene) -> Callable[[Any, int], Scene]:
 
 def check_drawn(scene: Scene) -> None:
     """Check that the plane that was drawn step by step is the one that is drawn at once."""
-    plane = scene.label_plane()
+    plane = scene.derived.label_plane()
     assert plane is not None
     if not np.array_equal(plane.read(scene.items), LabelPlane(plane.box_xyxy).read(scene.items)):
         raise DisagreementError(

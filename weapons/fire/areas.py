@@ -230,8 +230,9 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     """Rows by what is visible of all objects, listed by cells of shot positions."""
     assert request.view is not None  # the strategy has asked
     scene, plan, parts = request.scene, context.plan, []
-    kept = scene.visible_sets().kept(request.view, scene.version)
-    visible_set = kept or scene.visible_sets().read(request.view, scene.items, scene.bounds)
+    visible = scene.derived.visible(request.view)
+    kept = visible.made(scene.items)
+    visible_set = kept or visible.read(scene.items)
     plan.run("visible set", "what can be seen of all objects", 0 if kept else visible_set.nbytes)
     for begin, _, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
         windows = _windows(placements, plan)
@@ -303,7 +304,7 @@ def _rows_of(placements: Placements, found: RoundHits, ids: Ints) -> Rows:
 # house: way of areas
 def by_labels(request: Request, context: QueryContext) -> list[Rows]:
     """Rows of one-pixel shots, by the label of each pixel."""
-    plane, plan, parts = request.scene.label_plane(), context.plan, []
+    plane, plan, parts = request.scene.derived.label_plane(), context.plan, []
     assert plane is not None  # the strategy has asked
     labels, objects = plane.read(request.scene.items), request.stack.is_object
     plan.run("label plane", f"{plane.redrawn} px drawn anew", plane.redrawn * labels.itemsize)

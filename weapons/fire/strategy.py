@@ -79,7 +79,7 @@ def _visible_refuse(request: Request) -> str:
 
 def _visible_cost(request: Request) -> tuple[float, float]:
     now, scene = costs(), request.scene
-    known = request.view is not None and scene.visible_sets().kept(request.view, scene.version) is not None
+    known = request.view is not None and scene.derived.visible(request.view).made(scene.items) is not None
     made = 0.0 if known else now.visible_made + len(request.stack) * now.visible_item
     return now.visible_call + request.placements * now.visible_placement, made
 
@@ -91,11 +91,11 @@ def _labels_refuse(request: Request) -> str:
         return "shots refuse items, or pierce"
     if request.filtered:
         return "a pre-filter is asked for"
-    return "" if request.scene.label_plane() is not None else "the scene has no bounds that fit one plane"
+    return "" if request.scene.derived.label_plane() is not None else "the scene has no bounds that fit one plane"
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    now, plane = costs(), request.scene.label_plane()
+    now, plane = costs(), request.scene.derived.label_plane()
     assert plane is not None  # else it refuses
     drawn = len(request.stack) * now.labels_item if plane.labels is None else 0.0
     return now.labels_call, plane.cost(request.scene.items) * now.labels_pixel + drawn
@@ -168,11 +168,11 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
         if not made and cost < least:
             ready, least = way, cost
     if wanted is not None and wanted[1] < least and request.view is not None:
-        (way, cost, made), known, version = wanted, request.scene.visible_sets(), request.scene.version
-        if known.worth_building(request.view, version, least - cost, made):
+        (way, cost, made), visible = wanted, request.scene.derived.visible(request.view)
+        if visible.worth_building(least - cost, made):
             return way, f"{passed_over}calls have lost the {made / 1e3:.0f} us that it takes to make what it needs"
-        lost = known.regret(request.view, version)
-        passed_over += f"{way.name} would take {made / 1e3:.0f} us to make, {lost / 1e3:.0f} us lost so far; "
+        lost = visible.regret / 1e3
+        passed_over += f"{way.name} would take {made / 1e3:.0f} us to make, {lost:.0f} us lost so far; "
     return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
 
 
@@ -193,7 +193,7 @@ def _not_cast(ray: RayWeapon, _: Scene) -> str:
 
 
 def _not_marched(ray: RayWeapon, scene: Scene) -> str:
-    return _not_cast(ray, scene) or ("" if scene.distance_field() else "no bounds that fit one plane")
+    return _not_cast(ray, scene) or ("" if scene.derived.distance_field() else "no bounds that fit one plane")
 
 
 RAY_WAYS: dict[str, Callable[[RayWeapon, Scene], str]] = {
@@ -245,7 +245,7 @@ def chosen_ray_way(
         return RayChoice("walk", f"{why}every ray walks")
     walk, cast, march = _ray_costs(rays, stack, prepared).values()
     why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
-    field, saved_ns = scene.distance_field(), min(cast, walk) - march
+    field, saved_ns = scene.derived.distance_field(), min(cast, walk) - march
     if field is not None:
         why += f", {march / 1e3:.0f} us by march"
     other = RayChoice("cast" if cast < walk else "walk", why)
@@ -259,16 +259,13 @@ def way_of_rest(way: str, stack: Stack, rays: int) -> str:
 
 
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:
-    """March if the distance field is made, or as soon as calls have lost as much time without it as it takes to make.
-
-    So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
-    """
+    """March if the distance field is made, or if calls have lost as much time without it as it takes to make."""
     if field.is_made(scene.items):
         return other._replace(way="march")
-    field.regret_ns += saved_ns
     build = field.labels.cost(scene.items) * costs().labels_pixel + field.labels.size * costs().field_pixel
-    why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.regret_ns / 1e3:.0f} us lost so far"
-    return other._replace(way="march", why=why) if field.regret_ns > build else RayChoice(other.way, why, pending=True)
+    pays = field.worth_building(saved_ns, build)
+    why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.regret / 1e3:.0f} us lost so far"
+    return RayChoice("march" if pays else other.way, why, pending=not pays)
 
 
 def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack: Stack, asked: int) -> Candidates:
@@ -299,7 +296,7 @@ def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack
             why = "few pairs: every box is compared" if asked else "boxes are compared as samples are counted"
             return Candidates(scene.items, stack, wanted, None, text, why)
         structure = "bvh"
-    return Candidates(scene.items, stack, wanted, scene.index(structure), f"{text}, by {structure}")
+    return Candidates(scene.items, stack, wanted, scene.derived.index(structure), f"{text}, by {structure}")
 
 
 def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
@@ -309,8 +306,7 @@ def _bvh_pays(scene: Scene, items: int, placements: int) -> bool:
     answer = placements * now.bvh_placement + now.bvh_call
     if answer >= one_by_one:
         return False
-    index = scene.index("bvh")
+    index = scene.derived.index("bvh")
     if index.boxes is not None:
         return one_by_one > answer + index.build_cost(scene.items) * now.bvh_moved
-    index.regret += one_by_one - answer
-    return index.regret > items * now.bvh_item
+    return index.worth_building(one_by_one - answer, items * now.bvh_item)

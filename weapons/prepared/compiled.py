@@ -138,7 +138,7 @@ class PositionCache:
     def follow(self, stack: Stack) -> None:
         """Read the scene as it is now."""
         with self._lock:
-            visible_set = self._scene.visible_sets().kept(self._view, self._scene.version)
+            visible_set = self._scene.derived.visible(self._view).made(self._scene.items)
             if visible_set is not None:
                 self._use_visible(visible_set, stack)
                 return
@@ -206,7 +206,7 @@ class PositionCache:
         with self._lock:
             if not self._here[IS_VISIBLE]:
                 scene = self._scene
-                visible_set = scene.visible_sets().read(self._view, scene.items, scene.bounds)
+                visible_set = scene.derived.visible(self._view).read(scene.items)
                 self._use_visible(visible_set, scene.items.stack())
 
     def _buffer(self, pixels: Ints) -> Buffer:

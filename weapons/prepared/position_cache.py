@@ -203,10 +203,10 @@ class PositionCache:
 
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""
-        known, scene, now = self._scene.visible_sets(), self._scene, costs.NUMPY
-        made = now.visible_made + len(scene.items.stack()) * now.visible_item
-        if known.worth_building(self._view, scene.version, now.integers_placement + ns, made):
-            self._visible = known.read(self._view, scene.items, scene.bounds)
+        items, visible, now = self._scene.items, self._scene.derived.visible(self._view), costs.NUMPY
+        made = now.visible_made + len(items.stack()) * now.visible_item
+        if visible.made(items) or visible.worth_building(now.integers_placement + ns, made):
+            self._visible = visible.read(items)
         if ns > now.tiles_call:
             raise KeyError
 
@@ -222,7 +222,7 @@ class PositionCache:
 
     def _asked(self, i: int, j: int) -> Square:
         """Square (i, j), which is made if it does not exist; UNMADE if there is no visible set."""
-        visible = self._visible or self._scene.visible_sets().kept(self._view, self._scene.version)
+        visible = self._visible or self._scene.derived.visible(self._view).made(self._scene.items)
         if visible is None:
             return UNMADE
         with self._lock:

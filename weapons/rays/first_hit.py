@@ -270,7 +270,7 @@ def caster(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
 
 def marcher(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
     """Like `caster`, by march; a ray that is refused, or comes to several cells at once, is UNDECIDED."""
-    field = scene.distance_field()
+    field = scene.derived.distance_field()
     assert field is not None
     plane = field.labels.read(scene.items)
     distances, (left, top) = field.read(scene.items, plane), field.corner_xy.tolist()

@@ -61,7 +61,7 @@ def fired_rays(
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
     walks = chosen.way == "walk"
     candidates = choose(each * len(shots) if walks else 0)
-    field = scene.distance_field() if chosen.way == "march" else None
+    field = scene.derived.distance_field() if chosen.way == "march" else None
     through = Range(scene.items, stack, scene.bounds, candidates, plan, field=field)
     plan.run("plan", candidates.why if walks else chosen.why)
     step = max(1, RAYS_AT_ONCE // each)

@@ -167,7 +167,7 @@ def prefilter_trace(scene: Scene, view_xyxy: Box, prefilter: str | None, broadph
     structure = choice("broadphase", "none" if broadphase is None else broadphase, tuple(STRUCTURES))
     if wanted.name == "none" and structure != "none":
         raise InputError(f"broadphase: expected 'none' without a pre-filter, got {structure!r}")
-    return PrefilterTrace(scene, wanted, None if structure == "none" else scene.index(structure), view_xyxy)
+    return PrefilterTrace(scene, wanted, None if structure == "none" else scene.derived.index(structure), view_xyxy)
 
 
 def outline_of(volumes: Volumes, row: int) -> list[Floats]:

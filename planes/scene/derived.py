@@ -1,0 +1,105 @@
+"""What is derived from a scene and kept with it, and the base of all of it.
+
+Items count their changes by kind. Each derived thing compares the number of its kind, and is stale when that differs:
+
+| number of `Items` | changes with | what it makes stale |
+| --- | --- | --- |
+| `version` | every change | the stack; planes and indexes, which follow the journal from there |
+| `decided` | changes of items that decide hits | visible sets |
+| `arrangement` | all but places, velocities and costs | the columns of the stack, its tiles, roles that are drawn |
+
+Items keep what depends on nothing else: the stack and its tiles. What depends on bounds or shots hangs on `Derived`.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from .. import late
+from ..common.backend import LruCache
+from ..common.checks import choice
+from ..common.limits import STRUCTURES
+from ..grid.spans import Box
+
+if TYPE_CHECKING:
+    from ..bits.distance_field import DistanceField
+    from ..bits.label_plane import LabelPlane
+    from ..bits.visible import View, Visible
+    from ..broadphase.boxes import Index
+    from .items import Change, Items
+
+NEVER = -1
+"""A version before all others."""
+
+VIEWS_MOST = 8
+"""Most visible sets of a scene, one for each view."""
+
+
+class Derivative:
+    """Something derived from the items of a scene, made when calls have lost as much time without it as it takes.
+
+    Threads may read it as long as none changes the scene.
+
+    Attributes
+    ----------
+    regret : time that calls have lost for want of it, ns; it begins anew when the thing is made, or goes stale
+    """
+
+    def __init__(self) -> None:
+        self.regret = 0.0
+        self._seen = NEVER
+        self._lock = threading.RLock()
+
+    def worth_building(self, lost: float, cost: float) -> bool:
+        """Count the time that a call loses; whether all of it is more than what the thing costs to make.
+
+        So the total is at most twice that of the better choice (Karlin et al., "Competitive snoopy caching", 1988).
+        """
+        with self._lock:
+            self.regret += max(lost, 0.0)
+            return self.regret > cost
+
+    def _unseen(self, items: Items) -> list[Change] | None:
+        """Changes since the last call, the last first; None if they are forgotten."""
+        changes, self._seen = items.changes(self._seen), items.version
+        return changes
+
+
+class Derived:
+    """All that is derived from the items of a scene within its bounds; each thing is there when it is first asked for.
+
+    Parameters
+    ----------
+    bounds : inclusive box of the world, or None
+    """
+
+    def __init__(self, bounds: Box | None) -> None:
+        self._bounds = bounds
+        self._visible: LruCache[View, Visible] = LruCache(VIEWS_MOST, lambda _: 1)
+        self._label_plane: LabelPlane | None = None
+        self._distance_field: DistanceField | None = None
+        self._indexes: dict[str, Index] = {}
+
+    def visible(self, view: View) -> Visible:
+        """What is visible of the objects for shots of a view; those of the last few views are kept."""
+        return self._visible.get(view, lambda: late.visible.Visible(view, self._bounds))
+
+    def label_plane(self) -> LabelPlane | None:
+        """The label plane of the scene; None if it has no bounds, or too large ones."""
+        if self._label_plane is None and self._bounds is not None and late.label_plane.plane_fits(self._bounds):
+            self._label_plane = late.label_plane.LabelPlane(self._bounds)
+        return self._label_plane
+
+    def distance_field(self) -> DistanceField | None:
+        """The distance field by which rays march; None if there is no label plane."""
+        labels = self.label_plane()
+        if self._distance_field is None and labels is not None:
+            self._distance_field = late.distance_field.DistanceField(labels)
+        return self._distance_field
+
+    def index(self, structure: str) -> Index:
+        """The broad phase of the items that decide hits: "none", "grid", "quadtree" or "bvh"."""
+        if choice("structure", structure, tuple(STRUCTURES)) not in self._indexes:
+            self._indexes[structure] = late.boxes.Index(structure)
+        return self._indexes[structure]
