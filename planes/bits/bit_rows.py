@@ -264,9 +264,9 @@ def weights_of(rows: Words, windows: PatternBits, pattern: Ints | int, left: Int
 
 
 # house: row order
-def row_order(*keys: Ints) -> Ints:
-    """Order of rows by keys (n,), the most important first, then by place: the keys as one number, if that fits."""
-    if len(keys[0]) <= FEW_ROWS:
+def row_order(*keys: npt.NDArray[Any]) -> Ints:
+    """Order of rows by keys (n,), the most important first, then by place: whole keys as one number, if that fits."""
+    if len(keys[0]) <= FEW_ROWS or any(key.dtype.kind == "f" for key in keys):
         return np.lexsort(keys[::-1])
     least = [int(np.minimum.reduce(key)) for key in keys]
     bits = [(int(np.maximum.reduce(key)) - low).bit_length() for key, low in zip(keys, least, strict=True)]
@@ -276,7 +276,7 @@ def row_order(*keys: Ints) -> Ints:
     for key, low, size in zip(keys[1:], least[1:], bits[1:], strict=True):
         number <<= size
         number |= key - low
-    return number.argsort(kind="stable")
+    return np.asarray(number.argsort(kind="stable"))
 
 
 FEW_ROWS = 64

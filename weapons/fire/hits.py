@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
@@ -394,7 +395,6 @@ def _named(row: tuple[Any, ...]) -> HitRow:
     return HitRow._make((*row[:7], tuple(row[7]), row[8]))
 
 
-# house: row order
 def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_shot: int) -> Rows:
     """Add runs of hit pixels up to rows; a pixel hit by several pellets counts once in `pixels`."""
     rounds = int(placements.round.max(initial=0)) + 1
@@ -403,7 +403,7 @@ def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_sh
     origin = placements.origin_xy[met.placement]
     x = np.clip(origin[:, 0], met.x_first, met.x_last)  # the pixel of a run that is nearest to the origin
     distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
-    order = np.lexsort((x, met.y, distance2, group))
+    order = row_order(group, distance2, met.y, x)
     group, distance2 = group[order], distance2[order]
     first = np.flatnonzero(np.diff(group, prepend=-1))
     best = order[first]
@@ -413,7 +413,7 @@ def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_sh
     pellets, pixels = np.ones_like(samples), samples
     if int(placements.pellet.max(initial=0)):
         pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
-    sort = np.lexsort((met.rank[best], x[best], met.y[best], distance2[first], round_[best], shot[best]))
+    sort = row_order(shot[best], round_[best], distance2[first], met.y[best], x[best], met.rank[best])
     best = best[sort]
     return Rows(
         shot[best] + first_shot, round_[best], ids[met.rank[best]], samples[sort], pixels[sort], weight[sort],

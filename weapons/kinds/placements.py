@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
@@ -53,12 +54,11 @@ class ShotColumns(Columns):
         columns = [getattr(self, name).tolist() for name in names]
         return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
-    # house: row order
     @classmethod
     def gathered(cls: type[C], parts: Sequence[C], shots: Sequence[Ints]) -> C:
         """Rows of several parts in the order of shots; `shots` are the shot numbers of each part."""
         every = cls.joined([replace(part, shot=own[part.shot]) for part, own in zip(parts, shots, strict=True)])
-        return every.take(np.argsort(every.shot, kind="stable"))
+        return every.take(row_order(every.shot))
 
 
 Words = npt.NDArray[np.uint64]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import HALF, ITEMS_MAX, SUB, WEIGHT_FULL
@@ -404,12 +405,11 @@ def pixels_of(passes: Passes, cells: Contacts, some: Rays, rays: Rays) -> Ints:
     return found if len(some) == len(rays) else np.unique(found, axis=0)
 
 
-# house: row order
 def rows_of_passes(passes: Passes | Summed, pixels: Ints, rays: Rays) -> Rows:
     """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
     group = groups_of(passes, rounds)
-    order = np.lexsort((passes.order, passes.pellet, passes.entry_px, group))
+    order = row_order(group, passes.entry_px, passes.pellet, passes.order)
     begins = np.flatnonzero(np.diff(group[order], prepend=-1))
     best = order[begins]
     number = np.zeros(len(group), np.int64)
@@ -419,7 +419,7 @@ def rows_of_passes(passes: Passes | Summed, pixels: Ints, rays: Rays) -> Rows:
     pellets = np.bincount(number, minlength=len(best))
     distinct = samples if (pellets == 1).all() else _counted_once(pixels, group[best])
     ray_of = passes.shot[best], passes.round[best]
-    sort = np.lexsort((passes.order[best], passes.pellet[best], passes.entry_px[best], *ray_of[::-1]))
+    sort = row_order(*ray_of, passes.entry_px[best], passes.pellet[best], passes.order[best])
     best = best[sort]
     ray = (passes.shot[best] * rounds + passes.round[best]) * pellets_fired + passes.pellet[best]
     return Rows(
