@@ -724,7 +724,7 @@ WORDS: dict[str, Callable[[Any], object]] = {
     "prefilter of a past": lambda word: fire(past(), Disc(3), (1, 1), tick=0, prefilter=word),
     "prefilter of a report": lambda word: told(prefilter=word),
     "broadphase of a report": lambda word: told(broadphase=word),
-    "index": lambda word: world().derived.index(word),
+    "index": world().derived.index,
     "volumes": lambda word: world().volumes([0], word),
     "role": lambda word: world().ids(word),
     "flip": lambda word: world().add(Sprite.circle(1), flip=word),

@@ -80,12 +80,12 @@ class Clock:
 
 
 FIRING, RESOLVE, TRACING, RAYFIRE = call, spans, ray_walk, ray_call
-BITFIRE, RUNFIRE = areas, areas
+BITFIRE, RUNFIRE, PATTERNS = areas, areas, weapon_module
 OF_ALL = [(FIRING, "checked_shots", "shots", 1), (items.Items, "stack_of", "stack", 10)]
 OF_BITS = [
     *OF_ALL,
     (BITFIRE, "placements_for", "patterns", 200),
-    (BITFIRE, "pattern_bits_of", "patterns", 400),
+    (PATTERNS, "pattern_bits_of", "patterns", 400),
     (FIRING, "chosen_way", "plan", 10**3),
     (FIRING, "chosen_candidates", "plan", 2 * 10**3),
     (FIRING, "leave_out_unused", "rows", 4 * 10**3),

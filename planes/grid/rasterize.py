@@ -17,21 +17,29 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
-from ..common.limits import HALF, SUB
-from .fixed_point import isqrt, turned
+from ..common.limits import HALF, SUB, TRIG_BITS
+from .fixed_point import UNIT, isqrt, turned
 from .spans import Spans, each_pixel, ragged
 
 Runs = tuple[Ints, Ints, Ints]
 
+WIDEST = 2**40
+"""A column beyond all others, px."""
+
+QUOTIENT_ERROR = 2.0**-50
+"""A quotient of two numbers, each rounded to float64, times a row number has a relative error below it."""
+
 
 def disc(radius: int) -> Spans:
     """Centres at most `radius` from the origin."""
-    return _union([_disc_runs(np.zeros(2, np.int64), radius)])
+    y = _rows(-radius, radius)
+    return _union([(y, *_disc_rows(0, SUB * y, radius))])
 
 
 def ring(inner: int, outer: int) -> Spans:
@@ -94,45 +102,125 @@ def polygon(rings: Sequence[Ints]) -> Spans:
     return _union([touching, (y[::2], x[::2], x[1::2] - 1)])
 
 
+class RowRuns(NamedTuple):
+    """Runs of several shapes, row by row.
+
+    Parameters
+    ----------
+    shape, y : (k,) shape and row, sorted
+    parts : first and last pixels (k,) of parts of the shapes; a part has one run a row, an empty one from WIDEST to -WIDEST
+    """
+
+    shape: Ints
+    y: Ints
+    parts: list[tuple[Ints, Ints]]
+
+    def spans(self) -> Spans:
+        """The pixels of a single shape."""
+        return _union([(self.y, first, last) for first, last in self.parts])
+
+
+def convex_polygons(points: Ints) -> RowRuns | None:
+    """Centres inside polygons of points (n, m, 2), as `polygon` finds them; None if any is not convex.
+
+    A row of a convex polygon begins at an edge that goes up and ends at one that goes down, or the other way round.
+    """
+    step = np.roll(points, -1, axis=1) - points
+    following = np.roll(step, -1, axis=1)
+    turn = step[..., 0] * following[..., 1] - step[..., 1] * following[..., 0]
+    clockwise = (turn >= 0).all(axis=1)
+    up = step[..., 1] < 0
+    onward = ((turn != 0) | ((step * following).sum(axis=2) > 0)).all(axis=1)
+    once = onward & ((np.roll(up, -1, axis=1) != up).sum(axis=1) <= 2)  # it goes around only once
+    if not (once & (clockwise | (turn <= 0).all(axis=1)) & turn.any(axis=1) & step[..., 1].any(axis=1)).all():
+        return None
+    top = -(-points[..., 1].min(axis=1) // SUB)
+    shape, y = _ragged_rows(top, points[..., 1].max(axis=1) // SUB)
+    begin = np.searchsorted(shape, np.arange(len(points))) - top
+    first, last = np.full(len(y), WIDEST), np.full(len(y), -WIDEST)
+    for edge in range(points.shape[1]):
+        for side, upward in ((first, True), (last, False)):
+            at = np.flatnonzero((step[:, edge, 1] != 0) & ((step[:, edge, 1] < 0) == (clockwise == upward)))
+            (x0, y0), (dx, dy) = points[at, edge].T, step[at, edge].T
+            x0, y0, dx, dy = np.where(dy < 0, (x0 + dx, y0 + dy, -dx, -dy), (x0, y0, dx, dy))
+            which, row = _ragged_rows(-(-y0 // SUB), (y0 + dy) // SUB)
+            across = (x0 * dy - y0 * dx)[which] + (SUB * dx)[which] * row
+            per = (SUB * dy)[which]
+            side[begin[at][which] + row] = -(-across // per) if upward else across // per
+    return RowRuns(shape, y, [(first, last)])
+
+
 def beam(a: Ints, b: Ints, radius: int) -> Spans:
     """Centres at most `radius` from the segment ab, and the closed supercover of ab."""
-    (ax, ay), (bx, by) = np.asarray(a).tolist(), np.asarray(b).tolist()
-    dx, dy = bx - ax, by - ay
+    return beams(np.asarray(a), np.array([b]), radius).spans()
+
+
+def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
+    """Beams from one point (2,) to several (n, 2); see `beam`. Its own rows are a disc at each end and what is between.
+
+    These three are parts of a convex set, so the first and the last of their pixels bound all of a row.
+    """
+    step = b - a
+    low, high = np.minimum(a[1], b[:, 1]), np.maximum(a[1], b[:, 1])
+    reach = max(radius, HALF)
+    shape, y = _ragged_rows(-(-(low - reach) // SUB), (high + reach) // SUB)
+    first, last = _disc_rows(a[0], SUB * y - a[1], radius)
+    x, level = b[:, 0][shape], SUB * y - b[:, 1][shape]
+    for begin, end in (_disc_rows(x, level, radius), _between(a, step, radius, shape, y)):
+        first, last = np.minimum(first, begin), np.maximum(last, end)
+    return RowRuns(shape, y, [(first, last), _axis_rows(a, step, shape, y)])
+
+
+def _between(a: Ints, step: Ints, radius: int, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """Runs of the centres p beside segments: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|."""
+    dx, dy = step.T
     length2 = dx * dx + dy * dy
-    parts = [_segment_runs(a, b), _disc_runs(a, radius), _disc_runs(b, radius)]
-    if length2 == 0:
-        return _union(parts)
-    # Beside the segment: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|.
-    side = math.isqrt(radius * radius * length2)
-    y = _rows(min(ay, by) - radius, max(ay, by) + radius)
-    v = SUB * y - ay
-    along, across = dx * ax - dy * v, dy * ax + dx * v
-    x_min, x_max = ax * np.ones_like(y) + min(0, dx) - radius, ax * np.ones_like(y) + max(0, dx) + radius
-    for slope, limit in ((dx, along + length2), (-dx, -along), (dy, across + side), (-dy, side - across)):
-        x_min, x_max = _half_plane(slope, limit, x_min, x_max)
-    return _union([*parts, _closed(y, x_min, x_max)])
+    side = np.array([math.isqrt(radius * radius * n) for n in length2.tolist()], np.int64)
+    v = SUB * y - a[1]
+    along, across = (a[0] * dx)[shape] - dy[shape] * v, (a[0] * dy)[shape] + dx[shape] * v
+    first, last = _slab(along, along + length2[shape], dx[shape])
+    begin, end = _slab(across - side[shape], across + side[shape], dy[shape])
+    first, last = np.maximum(first, begin), np.minimum(last, end)
+    return _or_nothing(first, last, (first > last) | (length2 == 0)[shape])
 
 
 def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
-    """Centres within `reach` and within the half angle of the direction (c, s), and the supercover of the axis.
+    """Centres within `reach` and within the half angle of the direction (c, s), and the supercover of the axis."""
+    return cones(reach, np.array([[c, s]]), c_half, s_half).spans()
+
+
+def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
+    """Cones along several directions (n, 2); see `cone`.
 
     With u = x c + y s and v = y c - x s: |v| c_half <= u s_half. Up to 90 degrees correctly rounded cosines fall and
-    sines rise with the half angle, so a wider cone covers a narrower one. The products exceed 64 bits: Python integers.
+    sines rise with the half angle, so a wider cone covers a narrower one.
     """
-    y = _rows(-reach, reach)
-    half = isqrt(reach * reach - (SUB * y) ** 2)
-    axis = _segment_runs(np.zeros(2, np.int64), turned(np.array([reach, 0]), c, s))
-    if s_half == 0 and c_half > 0:
-        return _union([axis])
-    sides = []
-    for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
-        slope = -sign * s * c_half - c * s_half
-        limit = (s * s_half - sign * c * c_half) * SUB
-        sides.append(_half_plane(slope, y.astype(object) * limit, -half, half))
-    (a_min, a_max), (b_min, b_max) = sides
-    if c_half >= 0:
-        return _union([axis, _closed(y, np.maximum(a_min, b_min), np.minimum(a_max, b_max))])
-    return _union([axis, _closed(y, a_min, a_max), _closed(y, b_min, b_max)])
+    c, s = direction.T
+    axis = turned(np.array([[reach, 0]]), c, s)
+    low, high = _sector_ends(reach, c, s, c_half, s_half)
+    shape, y = _ragged_rows((low - HALF) // SUB, -(-(high + HALF) // SUB))
+    parts = [_axis_rows(np.zeros(2, np.int64), axis, shape, y)]
+    if s_half or c_half < 0:
+        first, last = _disc_rows(0, SUB * np.arange(int(y.min()), int(y.max()) + 1), reach)
+        first, last = first[y - y.min()], last[y - y.min()]
+        sides = []
+        for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
+            slope, limit = -sign * s * c_half - c * s_half, s * s_half - sign * c * c_half
+            begin, end = _half_plane(slope, limit, shape, y)
+            sides.append((np.maximum(first, begin), np.minimum(last, end)))
+        (a_first, a_last), (b_first, b_last) = sides
+        if c_half >= 0:
+            sides = [(np.maximum(a_first, b_first), np.minimum(a_last, b_last))]
+        parts += [_or_nothing(*side, side[0] > side[1]) for side in sides]
+    return RowRuns(shape, y, parts)
+
+
+def _sector_ends(reach: int, c: Ints, s: Ints, c_half: int, s_half: int) -> tuple[Ints, Ints]:
+    """Least and greatest y of sectors about the origin, rounded outward."""
+    one, other = s * c_half - c * s_half, s * c_half + c * s_half
+    low, high = (end(end(one, other) >> TRIG_BITS, 0) for end in (np.minimum, np.maximum))
+    low, high = np.where(-s >= c_half, -UNIT, low), np.where(s >= c_half, UNIT, high)
+    return (reach * low >> TRIG_BITS) - 1, (reach * high >> TRIG_BITS) + 2
 
 
 def segment(a: Ints, b: Ints) -> Spans:
@@ -146,12 +234,25 @@ def _segment_runs(a: Ints, b: Ints) -> Runs:
     return y, *Lines(ends[:1], ends[1:] - ends[:1], 0)._thin_runs(np.zeros_like(y), y)
 
 
-def _disc_runs(center: Ints, radius: int) -> Runs:
-    """Centres at most `radius` from a point."""
-    cx, cy = np.asarray(center).tolist()
-    y = _rows(cy - radius, cy + radius)
-    half = isqrt(radius * radius - (SUB * y - cy) ** 2)
-    return _closed(y, cx - half, cx + half)
+def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """Runs of the supercovers of segments from a point (2,), in rows of shapes; empty in rows that they do not meet."""
+    lines = Lines(np.broadcast_to(a, step.shape), step, 0)
+    low, high = np.minimum(a[1], a[1] + step[:, 1]) - HALF, np.maximum(a[1], a[1] + step[:, 1]) + HALF
+    first, last = lines._thin_runs(shape, y)
+    return _or_nothing(first, last, (SUB * y < low[shape]) | (SUB * y > high[shape]))
+
+
+def _disc_rows(x: Ints | int, level: Ints, radius: int) -> tuple[Ints, Ints]:
+    """Runs of the centres at most `radius` from a point at `x`, in rows at `level` (k,) from it, 1/256 px."""
+    rest = radius * radius - level * level
+    half = isqrt(np.maximum(rest, 0))
+    first, last = -((half - x) >> 8), (x + half) >> 8
+    return _or_nothing(first, last, (rest < 0) | (first > last))
+
+
+def _or_nothing(first: Ints, last: Ints, none: Bools) -> tuple[Ints, Ints]:
+    """Runs, of which some are empty; an empty one changes nothing where runs are joined."""
+    return np.where(none, WIDEST, first), np.where(none, -WIDEST, last)
 
 
 def _union(parts: Sequence[Runs]) -> Spans:
@@ -170,13 +271,42 @@ def _closed(y: Ints, low: Ints, high: Ints) -> Runs:
     return y, -(-low // SUB), high // SUB
 
 
-def _half_plane(slope: int, limit: Ints, x_min: Ints, x_max: Ints) -> tuple[Ints, Ints]:
-    """Narrow [x_min, x_max] to slope * x <= limit; limits may be Python integers of any size."""
-    if slope == 0:
-        return np.where(limit >= 0, x_min, x_max + 1), x_max
-    if slope > 0:
-        return x_min, np.minimum(x_max, limit // slope).astype(np.int64)
-    return np.maximum(x_min, -(limit // -slope)).astype(np.int64), x_max
+def _ragged_rows(first: Ints, last: Ints) -> tuple[Ints, Ints]:
+    """Rows first .. last of shapes (n,), as (shape, y)."""
+    shape, place = ragged(np.maximum(last - first + 1, 0))
+    return shape, first[shape] + place
+
+
+def _slab(low: Ints, high: Ints, slope: Ints) -> tuple[Ints, Ints]:
+    """Runs of the centres with low <= slope * x <= high, x in 1/256 px."""
+    low, high = np.where(slope < 0, -high, low), np.where(slope < 0, -low, high)
+    per, level = SUB * np.maximum(np.abs(slope), 1), slope == 0
+    none, all_ = level & ((low > 0) | (high < 0)), level & (low <= 0) & (high >= 0)
+    first, last = -(-low // per), high // per
+    return _or_nothing(np.where(all_, -WIDEST, first), np.where(all_, WIDEST, last), none)
+
+
+def _half_plane(slope: Ints, limit: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
+    """Runs of the centres with slope * x <= limit * y; both (n,) are below 2**62.
+
+    Their quotient is computed in float64. Where that is so near to a whole number that its error could matter, Python's
+    integers decide.
+    """
+    ratio = limit.astype(np.float64) / np.where(slope == 0, 1, slope).astype(np.float64)
+    bound = ratio[shape] * y
+    near = np.rint(bound)
+    upper = (slope > 0)[shape]
+    whole = np.where(upper, np.floor(bound), np.ceil(bound)).clip(-WIDEST, WIDEST).astype(np.int64)
+    doubt = (np.abs(bound - near) <= np.abs(bound) * QUOTIENT_ERROR) & (y != 0) & (slope != 0)[shape]
+    for i in np.flatnonzero(doubt).tolist():
+        a, b = int(slope[shape[i]]), int(limit[shape[i]]) * int(y[i])
+        whole[i] = max(-WIDEST, min(b // a if a > 0 else -(b // -a), WIDEST))
+    first, last = np.where(upper, -WIDEST, whole), np.where(upper, whole, WIDEST)
+    if not slope.all():
+        level = (slope == 0)[shape]
+        none = level & (limit[shape] * np.sign(y) < 0)
+        first, last = _or_nothing(np.where(level, -WIDEST, first), np.where(level, WIDEST, last), none)
+    return first, last
 
 
 def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:

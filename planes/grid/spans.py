@@ -219,7 +219,7 @@ PAYS = 0.75
 """Strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too."""
 
 
-def strips_of(strips: Sequence[Strip], boxes_xyxy: Ints) -> Ints:
+def strips_of(strips: Sequence[Strip] | Ints, boxes_xyxy: Ints) -> Ints:
     """Strips (n, 4) of patterns with boxes (n, 4); an empty array (0, 4) if they would reject too few boxes."""
     made = np.array(strips, np.int64).reshape(-1, 4)
     normal, side = np.abs(made[:, :2]), boxes_xyxy[:, 2:] - boxes_xyxy[:, :2]

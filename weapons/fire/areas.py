@@ -33,7 +33,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.areas import parts_of, pattern_of
 from ..kinds.placements import Placements, Shots, placements_for, placements_of
-from ..kinds.weapon import Weapon, big_of, fits, fits_at_reach, pattern_bits_of
+from ..kinds.weapon import Weapon, big_of, fits, fits_at_reach
 from .hits import Rows, rows_of_span_hits
 from .plan import Plan
 from .prefilter import Candidates, may_refuse, refused
@@ -122,7 +122,7 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
     first = placements_for(request.weapon, shots.take(0, 1))
     for begin, part in _chunks(shots, first, context.candidates):
         placements = first if len(shots) == 1 else placements_for(request.weapon, part)
-        plan.run("patterns", f"{len(placements.table.count)} distinct", placements.nbytes)
+        plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
         if placements.table.prefix is not None:
             plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
         rows.append(rows_of_span_hits(direct(placements, part, context), placements, request.stack.ids, begin))
@@ -169,7 +169,7 @@ def verdicts_by_tiles(request: Request, context: QueryContext) -> Ints:
 
 def _first_met(placements: Placements, tiles: OrderedTiles, rule: Rule, stack: Stack, shots: int) -> Ints:
     """Samples (N, 2) of shots that meet an object first, and an occluder first."""
-    windows = pattern_bits_of(placements.table.patterns)._replace(sums=NO_SUMS)
+    windows = placements.table.bits._replace(sums=NO_SUMS)
     found = kernels_of(front_to_back).front_to_back(placed_of(placements), placements.pellets, windows, tiles, rule)
     shot, _ = placements.shot_of(found.turn)
     column = 2 * shot + stack.occluder[found.rank]
@@ -267,7 +267,7 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
     while begin < len(shots):
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         placements = placements_for(request.weapon, part)
-        if len(part) > 1 < len(placements.table.patterns) and not fits(placements.table.patterns):
+        if len(part) > 1 < len(placements.table) and not placements.table.fits:
             step = len(part) // 2
             continue
         yield begin, part, placements
@@ -277,8 +277,8 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
 
 def _windows(placements: Placements, plan: Plan) -> PatternBits:
     """Bit rows of the patterns of placements."""
-    windows = pattern_bits_of(placements.table.patterns)
-    plan.run("patterns", f"{len(placements.table.patterns)} distinct", placements.nbytes)
+    windows = placements.table.bits
+    plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
     if len(windows.sums):
         plan.run("weights", "falloff of the hit pixels, by sums along rows")
     return windows

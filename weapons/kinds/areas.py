@@ -16,13 +16,13 @@ from hitplanes.planes.common.checks import InputError, Ints, choice, integer, sh
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
 from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned, unit
-from hitplanes.planes.grid.rasterize import beam, cone, disc, polygon, ring
+from hitplanes.planes.grid.rasterize import RowRuns, beams, cones, convex_polygons, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, Transform, rows_of, variant_of
 
 from .rays import Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
-from .weapon import FALLOFFS, LENGTH, Part, Pattern, Swept, Weapon, make_pattern
+from .weapon import FALLOFFS, LENGTH, WINDOW_CACHE_BYTES, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
 
 ORIGIN = np.zeros(2, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
@@ -51,6 +51,10 @@ class AreaWeapon(Weapon):
     def spans(self, c: int, s: int) -> Spans:
         """Pixels about the shot's pixel, aimed along the direction (c, s) of length 2**30."""
         raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+
+    def runs(self, direction: Ints) -> RowRuns | None:
+        """Runs of the patterns along directions (n, 2), all at once; None if this kind makes them one by one."""
+        return None
 
     def swept(self, c: int, s: int) -> Swept | None:
         """The segment that the pattern lies along, if it has one, and how far from it centres may lie."""
@@ -128,7 +132,12 @@ class Box(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """A closed rectangle whose edges lie between the pixels."""
-        return polygon([turned(self._corners(), c, s)])
+        runs = self.runs(np.array([[c, s]]))
+        return polygon([turned(self._corners(), c, s)]) if runs is None else runs.spans()
+
+    def runs(self, direction: Ints) -> RowRuns | None:
+        """Closed rectangles."""
+        return convex_polygons(turned(self._corners(), *direction.T[..., None]))
 
     def _corners(self) -> Ints:
         sides = [(HALF * (1 - n % 2), HALF * n) for n in (int(self.width), int(self.height))]
@@ -159,7 +168,13 @@ class Polygon(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """The filled rings."""
-        return polygon([turned(ring, c, s) for ring in self._rings()])
+        runs = self.runs(np.array([[c, s]]))
+        return polygon([turned(ring, c, s) for ring in self._rings()]) if runs is None else runs.spans()
+
+    def runs(self, direction: Ints) -> RowRuns | None:
+        """The filled rings, if they are convex."""
+        rings = self._rings()
+        return convex_polygons(turned(rings[0], *direction.T[..., None])) if len(rings) == 1 else None
 
     def _rings(self) -> list[Ints]:
         return [snap(ring) for ring in (self.points, *self.holes)]
@@ -185,8 +200,12 @@ class Cone(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """A closed sector."""
+        return self.runs(np.array([[c, s]])).spans()
+
+    def runs(self, direction: Ints) -> RowRuns:
+        """Closed sectors."""
         c_half, s_half = unit(self.angle / 2)
-        return cone(_snapped(self.reach), c, s, int(c_half), int(s_half))
+        return cones(_snapped(self.reach), direction, int(c_half), int(s_half))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +225,11 @@ class Beam(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """A segment with round ends."""
-        return beam(*self.swept(c, s))
+        return self.runs(np.array([[c, s]])).spans()
+
+    def runs(self, direction: Ints) -> RowRuns:
+        """Segments with round ends."""
+        return beams(ORIGIN, turned(np.array([_snapped(self.length), 0]), *direction.T), _snapped(self.width / 2))
 
     def swept(self, c: int, s: int) -> Swept:
         """The segment from the shot's pixel along the aim, and half the width."""
@@ -354,6 +377,9 @@ def pierces(weapon: Weapon) -> bool:
     return parts_of(weapon)[2].pierce
 
 
+FEW_AIMS = 8
+"""Most directions whose patterns are made one by one, and kept: shots at the same aims need them again."""
+
 _kept: LruCache[tuple[str, int, int], Pattern] = LruCache(
     PATTERN_CACHE_BYTES, lambda pattern: pattern.nbytes, lambda key: len(key[0])
 )
@@ -376,6 +402,23 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
     if straight:
         weapon._keep("_straight", ref(pattern))  # no longer than others are kept
     return pattern
+
+
+_kept_aims: LruCache[tuple[str, bytes], AimedPatterns] = LruCache(
+    WINDOW_CACHE_BYTES, lambda patterns: patterns.nbytes, lambda key: len(key[0]) + len(key[1])
+)
+
+
+def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
+    """Patterns of a weapon along distinct directions (n, 2); many are rasterized at once, if its kind can."""
+    if len(direction) <= FEW_AIMS or weapon.falloff is not None or weapon.runs(direction[:1]) is None:
+        return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
+
+    def make() -> AimedPatterns:
+        reach = -(-weapon.reach_256 // SUB)
+        return AimedPatterns(direction, lambda c, s: pattern_of(weapon, c, s), weapon.runs, reach)
+
+    return _kept_aims.get((weapon.text, direction.tobytes()), make)
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:

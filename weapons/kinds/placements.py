@@ -22,7 +22,7 @@ from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, un
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.scene import one_place, points
 
-from .areas import AreaWeapon, has_no_range, parts_of, pattern_of
+from .areas import AreaWeapon, has_no_range, parts_of, pattern_of, patterns_of
 from .weapon import PatternTable, Weapon
 
 C = TypeVar("C", bound="ShotColumns")
@@ -426,8 +426,7 @@ def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[Pat
         return pattern_of(plain, *direction).table, None
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
     c = (number + 2 * ONE) // (4 * ONE)
-    pairs = zip(c.tolist(), (number - c * (4 * ONE)).tolist(), strict=True)
-    return PatternTable([pattern_of(plain, c, s) for c, s in pairs]), which
+    return PatternTable(patterns_of(plain, np.stack([c, number - c * (4 * ONE)], axis=1))), which
 
 
 def _directions(n: int, aim: object) -> Ints | tuple[int, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, TypeVar
@@ -19,7 +19,9 @@ from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
-from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+from hitplanes.planes.grid.fixed_point import ONE, turned
+from hitplanes.planes.grid.rasterize import RowRuns
+from hitplanes.planes.grid.spans import NO_STRIPS, Spans, Strip, begins, ragged, strip_of, strips_of
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -210,20 +212,47 @@ class TableSpans(NamedTuple):
         return 5 * self.y.nbytes
 
 
+TABLE_BYTES = 40
+"""Bytes of a pattern's count and box in a table."""
+
+
 class PatternTable:
     """The distinct patterns of a call; their spans are joined when they are first read.
 
     Parameters
     ----------
     patterns : n patterns
-    count : (n,) pixels of each
-    box_xyxy : (n, 4) inclusive; x_max < x_min for an empty pattern
     """
 
     def __init__(self, patterns: Sequence[Pattern]) -> None:
         self.patterns = patterns
-        one = len(patterns) == 1
-        self.count, self.box_xyxy = patterns[0].sizes if one else _sizes([p.spans for p in patterns])
+
+    def __len__(self) -> int:
+        return len(self.patterns)
+
+    @cached_property
+    def count(self) -> Ints:
+        """Pixels (n,) of each."""
+        return self.patterns[0].sizes[0] if len(self) == 1 else _sizes([p.spans for p in self.patterns])[0]
+
+    @cached_property
+    def box_xyxy(self) -> Ints:
+        """Boxes (n, 4), inclusive; x_max < x_min for an empty pattern."""
+        if isinstance(self.patterns, AimedPatterns):
+            return self.bits.box_xyxy
+        return self.patterns[0].sizes[1] if len(self) == 1 else _sizes([p.spans for p in self.patterns])[1]
+
+    @property
+    def fits(self) -> bool:
+        """Whether the bit rows of all patterns are small enough to be made together."""
+        if isinstance(self.patterns, AimedPatterns):
+            return self.patterns.nbytes <= PATTERNS_BYTES_MOST
+        return fits(self.patterns)
+
+    @property
+    def bits(self) -> PatternBits:
+        """Bit rows of all patterns; those of the last calls are kept."""
+        return self.patterns.bits if isinstance(self.patterns, AimedPatterns) else pattern_bits_of(self.patterns)
 
     @property
     def runs(self) -> int:
@@ -246,7 +275,7 @@ class PatternTable:
     @property
     def nbytes(self) -> int:
         """Bytes of the columns of patterns, without spans and weights."""
-        return self.count.nbytes + self.box_xyxy.nbytes
+        return TABLE_BYTES * len(self)
 
     def laid(self, pattern: Ints, x: Ints, y: Ints, boxes_xyxy: Ints) -> Runs:
         """Runs of placed patterns (n,), each clipped to its own inclusive box (n, 4)."""
@@ -269,6 +298,115 @@ class PatternTable:
         if self.prefix is None:
             return (x_last - x_first + 1) * WEIGHT_FULL
         return np.asarray(self.prefix[ordinal + x_last + 1] - self.prefix[ordinal + x_first])
+
+
+class AimedPatterns(Sequence[Pattern]):
+    """Patterns of a weapon along several directions; their bit rows are made all at once, and each pattern when read.
+
+    Parameters
+    ----------
+    direction : (n, 2) cos and sin times 2**30
+    make : function of cos and sin that returns a pattern
+    runs : function of directions that returns the runs of all patterns; None if they must be made one by one
+    reach : greatest distance of a pixel, px
+    """
+
+    def __init__(
+        self, direction: Ints, make: Callable[[int, int], Pattern], runs: Callable[[Ints], RowRuns | None], reach: int
+    ) -> None:
+        self._direction, self._make, self._runs, self._reach = direction, make, runs, reach
+
+    def __len__(self) -> int:
+        return len(self._direction)
+
+    def __getitem__(self, i: Any) -> Any:
+        """The pattern of a direction."""
+        return self._make(*self._direction[i].tolist())
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the bit rows, at most."""
+        side = 2 * self._reach + 3
+        return len(self) * _window_bytes(side, side, False)
+
+    @cached_property
+    def bits(self) -> PatternBits:
+        """Bit rows of all patterns."""
+        straight, made = self._make(ONE, 0), []
+        for first in range(0, len(self), AIMS_AT_ONCE):
+            direction = self._direction[first : first + AIMS_AT_ONCE]
+            runs = self._runs(direction)
+            if runs is None:
+                return _made(list(self))
+            made.append(_bits_of_runs(runs, _normals(straight, direction)))
+        begin = np.cumsum([0, *(len(part.words) for part in made[:-1])]).tolist()
+        made = [part._replace(first=part.first + at) for part, at in zip(made, begin, strict=True)]
+        if not all(len(part.strips) for part in made):
+            made = [part._replace(strips=NO_STRIPS) for part in made]
+        return PatternBits(*map(np.concatenate, zip(*made, strict=True)))
+
+
+def _normals(straight: Pattern, direction: Ints) -> Ints:
+    """Normals (n, 2) of the strips of patterns: that of the straight one, turned; none if strips do not pay."""
+    a, b, low, high = straight.strip
+    x, y, x_max, y_max = straight.spans.box_xyxy or (0, 0, 0, 0)
+    normals, (c, s) = turned(np.array([[a, b]]), *direction.T), np.abs(direction.T)
+    wide, tall = x_max - x, y_max - y
+    sides = np.stack([wide * c + tall * s, wide * s + tall * c], axis=1) // ONE
+    strips = np.concatenate([normals, np.broadcast_to([low, high], normals.shape)], axis=1)
+    return normals if len(strips_of(strips, np.concatenate([np.zeros_like(sides), sides], axis=1))) else normals[:0]
+
+
+def _bits_of_runs(runs: RowRuns, normal: Ints) -> PatternBits:
+    """Bit rows of patterns from their runs; `normal` are those of the strips, or none."""
+    shape, y, parts = runs
+    first, last = parts[0]
+    for begin, end in parts[1:]:
+        first, last = np.minimum(first, begin), np.maximum(last, end)
+    filled = first <= last
+    if not filled.all():
+        shape, y, first, last = shape[filled], y[filled], first[filled], last[filled]
+        parts = [(begin[filled], end[filled]) for begin, end in parts]
+    begin = begins(shape).nonzero()[0]
+    end = np.append(begin[1:], len(shape)) - 1
+    box = np.stack([np.minimum.reduceat(first, begin), y[begin], np.maximum.reduceat(last, begin), y[end]], axis=1)
+    rows = box[:, 3] - box[:, 1] + (1 + 2 * WORD)
+    size = rows * ((2 * WORD - 2 + box[:, 2] - box[:, 0] + 1) // WORD + 1)
+    corner = np.cumsum(size) - size + WORD
+    words = np.zeros(int(size.sum()), np.uint64)
+    at, left, step = (corner - box[:, 1])[shape] + y, (box[:, 0] - (WORD - 1))[shape], rows[shape]
+    for part in parts:
+        _lay_runs(words, at, step, *(side - left for side in part))
+    strips = NO_STRIPS
+    if len(normal):
+        a, b = normal.T
+        across, ends = b[shape] * y, (a[shape] * first, a[shape] * last)
+        low = np.minimum.reduceat(np.minimum(*ends) + across, begin)
+        strips = np.stack([a, b, low, np.maximum.reduceat(np.maximum(*ends) + across, begin)], axis=1)
+    return PatternBits(box, corner, rows, words, strips, NO_SUMS, np.zeros(len(box), np.int64))
+
+
+def _lay_runs(words: Words, at: Ints, step: Ints, first: Ints, last: Ints) -> None:
+    """Set the bits of runs (k,), each in a row of its own.
+
+    Parameters
+    ----------
+    at, step : (k,) place of the row's first word, and from there to the next word of the row
+    first, last : (k,) bits of the row
+    """
+    if (first > last).any():
+        there = (first <= last).nonzero()[0]
+        at, step, first, last = at[there], step[there], first[there], last[there]
+    more = (last >> 6) - (first >> 6)
+    begin, end = _FULL << (first & 63).view(np.uint64), _FULL >> (~last & 63).view(np.uint64)
+    at = at + (first >> 6) * step
+    words[at] |= np.where(more == 0, begin & end, begin)
+    far = more.nonzero()[0]
+    at, step, more, end = at[far], step[far], more[far], end[far]
+    words[at + more * step] |= end
+    for k in range(1, int(more.max(initial=0))):
+        between = (more > k).nonzero()[0]
+        words[at[between] + k * step[between]] = _FULL
 
 
 def _joined(columns: Sequence[npt.NDArray[Kind]]) -> npt.NDArray[Kind]:
@@ -312,6 +450,9 @@ KEY_BYTES = 128
 def _bytes(windows: PatternBits) -> int:
     return ENTRY_BYTES + sum(column.nbytes for column in windows if isinstance(column, np.ndarray))
 
+
+AIMS_AT_ONCE = 256
+"""Directions whose patterns are rasterized at a time: 200 KB for each of their columns of rows."""
 
 _kept: LruCache[tuple[ref[Pattern], ...], PatternBits] = LruCache(
     WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key)
