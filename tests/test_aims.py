@@ -170,7 +170,7 @@ def test_quotients_that_are_nearly_whole_are_floored_by_integers(
     first, last = rasterize._half_plane(np.array([a]), np.array([b]), np.zeros_like(y), y)
     for row, begin, end in zip(rows, first.tolist(), last.tolist(), strict=True):
         if a == 0:
-            assert (begin <= end) == (0 <= b * row)
+            assert (begin <= end) == (b * row >= 0)
         elif a > 0:
             assert (begin, end) == (-rasterize.WIDEST, min(max(b * row // a, -rasterize.WIDEST), rasterize.WIDEST))
         else:

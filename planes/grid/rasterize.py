@@ -108,7 +108,7 @@ class RowRuns(NamedTuple):
     Parameters
     ----------
     shape, y : (k,) shape and row, sorted
-    parts : first and last pixels (k,) of parts of the shapes; a part has one run a row, an empty one from WIDEST to -WIDEST
+    parts : first and last pixels (k,) of parts, which have one run a row; an empty one is (WIDEST, -WIDEST)
     """
 
     shape: Ints

@@ -53,7 +53,12 @@ class AreaWeapon(Weapon):
         raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
 
     def runs(self, direction: Ints) -> RowRuns | None:
-        """Runs of the patterns along directions (n, 2), all at once; None if this kind makes them one by one."""
+        """Runs of the patterns along several directions at once; None if this kind makes them one by one.
+
+        Parameters
+        ----------
+        direction : (n, 2) cos and sin of the aims, times 2**30
+        """
         return None
 
     def swept(self, c: int, s: int) -> Swept | None:
@@ -136,7 +141,7 @@ class Box(AreaWeapon):
         return polygon([turned(self._corners(), c, s)]) if runs is None else runs.spans()
 
     def runs(self, direction: Ints) -> RowRuns | None:
-        """Closed rectangles."""
+        """Closed rectangles, along directions (n, 2)."""
         return convex_polygons(turned(self._corners(), *direction.T[..., None]))
 
     def _corners(self) -> Ints:
@@ -172,7 +177,7 @@ class Polygon(AreaWeapon):
         return polygon([turned(ring, c, s) for ring in self._rings()]) if runs is None else runs.spans()
 
     def runs(self, direction: Ints) -> RowRuns | None:
-        """The filled rings, if they are convex."""
+        """The filled rings, if they are convex, along directions (n, 2)."""
         rings = self._rings()
         return convex_polygons(turned(rings[0], *direction.T[..., None])) if len(rings) == 1 else None
 
@@ -203,7 +208,7 @@ class Cone(AreaWeapon):
         return self.runs(np.array([[c, s]])).spans()
 
     def runs(self, direction: Ints) -> RowRuns:
-        """Closed sectors."""
+        """Closed sectors, along directions (n, 2)."""
         c_half, s_half = unit(self.angle / 2)
         return cones(_snapped(self.reach), direction, int(c_half), int(s_half))
 
@@ -228,7 +233,7 @@ class Beam(AreaWeapon):
         return self.runs(np.array([[c, s]])).spans()
 
     def runs(self, direction: Ints) -> RowRuns:
-        """Segments with round ends."""
+        """Segments with round ends, along directions (n, 2)."""
         return beams(ORIGIN, turned(np.array([_snapped(self.length), 0]), *direction.T), _snapped(self.width / 2))
 
     def swept(self, c: int, s: int) -> Swept:
