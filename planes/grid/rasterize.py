@@ -547,7 +547,14 @@ def _far_roots(radius: int, v: Ints, length2: Ints) -> Ints:
 
 
 def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
-    """Cells of segments in the order in which they are entered.
+    """`cells_of` segments in the order in which they are entered: sorted by (segment, entry, y, x)."""
+    line, xy, entry, leave, scale = cells_of(start_256, end_256, radius_256)
+    order = np.lexsort((xy[:, 0], xy[:, 1], entry, line))
+    return line[order], xy[order], entry[order], leave[order], scale
+
+
+def cells_of(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
+    """Cells of segments, in any order.
 
     Parameters
     ----------
@@ -556,8 +563,7 @@ def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, In
 
     Returns
     -------
-    segment (k,), pixel (k, 2), entry (k,) and exit (k,), sorted by (segment, entry, y, x); and the scale (n,) of the
-    times: the time at each segment's end
+    segment (k,), pixel (k, 2), entry (k,) and exit (k,); and the scale (n,) of the times: the time at a segment's end
     """
     origin = (start_256 + HALF) // SUB
     lines = Lines(start_256 - SUB * origin, end_256 - start_256, radius_256)
@@ -566,8 +572,6 @@ def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, In
     low, high = np.minimum(reach[0], 0) - wide, np.maximum(reach[1], 0) + wide
     line, x, y = lines.candidates(np.concatenate([low, high], axis=1))
     entry, leave = lines.times(line, x, y)
-    order = np.lexsort((x, y, entry, line))
-    order = order[entry[order] <= leave[order]]
-    line = line[order]
-    xy = np.stack([x, y], axis=1)[order] + origin[line]
-    return line, xy, entry[order], leave[order], lines.scale
+    met = np.flatnonzero(entry <= leave)
+    line = line[met]
+    return line, np.stack([x[met], y[met]], axis=1) + origin[line], entry[met], leave[met], lines.scale

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,8 @@ import numpy as np
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints
 from hitplanes.planes.common.limits import DETAIL_SAMPLES_MAX, NEAR_PX, SUB
-from hitplanes.planes.grid.rasterize import Lines, cells
-from hitplanes.planes.grid.spans import Box, Spans, meets, slabs
+from hitplanes.planes.grid.rasterize import Lines, cells_of
+from hitplanes.planes.grid.spans import Box, Spans, meets, pieces, slabs
 from hitplanes.planes.scene.items import Stack, clipped
 from hitplanes.planes.scene.scene import Scene
 
@@ -27,6 +28,10 @@ from .samples import Behind, Blocked, Samples, WhyNot, unmet
 
 REACH_BITS = 23
 """Bits of a coordinate of a cell; cells lie within 2**22 px of their ray's origin, so x, y and the ray fit int64."""
+
+
+CELLS_AT_ONCE = 2**19
+"""Cells of rays counted at a time: 4 MB for each of their columns."""
 
 
 class Miss(NamedTuple):
@@ -125,11 +130,16 @@ class RayDetail:
     @cached_property
     def cells(self) -> tuple[Ints, Ints, Ints, Ints]:
         """Every cell as (ray, pixel (K, 2), verdict, rank of what decided it), in the order of the walk."""
-        rays, wide = self.rays, 2 * (self.lines.radius // SUB) + 3
-        most = int((np.abs(rays.step_256).sum(axis=1) // SUB + wide).sum()) * wide
+        ray, xy, entry, verdict, rank, blocked = self._decided()
+        order = np.lexsort((xy[:, 0], xy[:, 1], ~blocked, entry, ray))
+        return ray[order], xy[order], verdict[order], rank[order]
+
+    def _decided(self) -> tuple[Ints, Ints, Ints, Ints, Ints, Bools]:
+        """Every cell in any order, with its time of entry, and whether an accepted occluder lies there."""
+        rays, most = self.rays, int(_cells_most(self.rays, self.lines.radius).sum())
         if most > DETAIL_SAMPLES_MAX:
             raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {most}")
-        ray, xy, entry, _, scale = cells(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
+        ray, xy, entry, _, scale = cells_of(rays.start_256, rays.start_256 + rays.step_256, self.lines.radius)
         at = xy - rays.origin_xy[ray]
         every = _Keyed(ray, at[:, 0], at[:, 1])
         verdict, rank = self._met(every)
@@ -144,8 +154,7 @@ class RayDetail:
         blocked = np.zeros(len(ray), np.bool_)
         walls = self.met.take(np.flatnonzero(self.stack.occluder[self.met.rank]))
         blocked[every.places(walls.ray[walls.pair], walls.x, walls.y)[0]] = True
-        order = np.lexsort((xy[:, 0], xy[:, 1], ~blocked, entry, ray))
-        return ray[order], xy[order], verdict[order], rank[order]
+        return ray, xy, entry, verdict, rank, blocked
 
     def _met(self, every: _Keyed) -> tuple[Ints, Ints]:
         """Verdict of each cell, and the rank of the item that decided it; the front-most of several counts."""
@@ -169,7 +178,7 @@ class RayDetail:
 
     def counts(self) -> Ints:
         """Number of cells (N, 6) of each shot by verdict."""
-        ray, _, verdict, _ = self.cells
+        ray, _, _, verdict, _, _ = self._decided()
         n = len(Verdict)
         column = self.rays.shot[ray] * n + verdict
         return np.bincount(column, minlength=len(self.shots) * n).reshape(-1, n)
@@ -190,6 +199,30 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
     every, relative = touching(rays, parts[2], through)
     rules = steps_of(parts[2]) is not None, parts[2].inside == "ignore_until_exit"
     return RayDetail(stack, scene.bounds, shots, rays, lines, ends, met, every, relative.scale, *rules)
+
+
+def counted_verdicts(scene_of: Callable[[int], Scene], parts: Parts, shots: Shots) -> Ints:
+    """Number of cells (N, 6) of shots by verdict; many shots are walked at a time.
+
+    Parameters
+    ----------
+    scene_of : function of a shot that returns the scene that it was fired at
+    """
+    counts = [np.zeros((0, len(Verdict)), np.int64)]
+    rays = rays_of(parts, shots)
+    each = np.bincount(rays.shot, _cells_most(rays, parts[2].radius_256), len(shots)).astype(np.int64)
+    for part in pieces(each, CELLS_AT_ONCE):
+        for _, same in groupby(range(part.start, part.stop), lambda shot: id(scene_of(shot))):
+            numbers = list(same)
+            some = shots.take(numbers[0], numbers[-1] + 1)
+            counts.append(ray_detail(scene_of(numbers[0]), parts, some).counts())
+    return np.concatenate(counts)
+
+
+def _cells_most(rays: Rays, radius_256: int) -> Ints:
+    """Bounds (R,) on the number of cells of rays."""
+    wide = 2 * (radius_256 // SUB) + 3
+    return np.asarray((np.abs(rays.step_256).sum(axis=1) // SUB + wide) * wide)
 
 
 def pixels_of_rays(detail: RayDetail) -> dict[tuple[int, int], Spans]:

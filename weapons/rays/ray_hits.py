@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
-from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
@@ -331,8 +330,7 @@ class RayHits(Hits):
     @cached_property
     def verdicts(self) -> Ints:
         """Number of cells of each shot by verdict, counted when first asked for."""
-        none = np.zeros((0, len(Verdict)), np.int64)
-        verdicts = np.concatenate([none, *(self._rays(i).counts() for i in range(len(self.shots)))])
+        verdicts = late.ray_samples.counted_verdicts(self.scene_of, self._parts, self.shots)
         verdicts.flags.writeable = False
         return verdicts
 
