@@ -123,8 +123,7 @@ OF_RAYS = [
     (TRACING, "_started", "walk", 2 * 10**7),
     (contacts, "_end_at_occluders", "occluders", 10**8),
     (contacts, "_end_at_hits", "stops", 10**9),
-    (RAYFIRE, "stops_of", "stops", 2 * 10**9),
-    (RAYFIRE, "passes_of", "passes", 10**10),
+    (RAYFIRE, "Walk", "passes", 10**10),
     (RAYFIRE, "rows_of_passes", "rows", 10**11),
     (RAYFIRE, "pixels_of", "rows", 2 * 10**11),
 ]

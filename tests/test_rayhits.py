@@ -78,11 +78,25 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
                 "hitplanes.weapons.rays.ray_call.trace", lambda *given, calls=calls: calls.append(1) or trace(*given)
             )
             patch.setattr("hitplanes.weapons.rays.ray_call.WALKED_AT_ONCE", chunk)
+            patch.setattr("hitplanes.weapons.rays.ray_call.CELLS_KEPT", 5 * chunk)
+            patch.setattr("hitplanes.weapons.explain.ray_samples.CELLS_AT_ONCE", 50 * chunk)
             patch.setattr("hitplanes.planes.bits.cells.PAIRS_AT_ONCE", chunk * 8)
             patch.setattr("hitplanes.weapons.rays.contacts.CHUNK_SAMPLES", chunk)
             cut = fired(battle, scene=scene, **options)
             assert len(calls) >= -(-len(whole.stop) // chunk)
+            assert np.array_equal(whole.verdicts, cut.verdicts)
         same(whole, cut)
+
+
+def test_passes_are_made_when_they_are_read_also_if_the_scene_has_changed() -> None:
+    scene = Scene()
+    ids = [scene.add(np.ones((5, 5), np.bool_), (10 * i, 0)) for i in range(1, 4)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hitplanes.weapons.rays.ray_hits.normals_at", lambda *_: pytest.fail("nobody has asked"))
+        hits = fire(scene, Laser(40), (0, 0))
+    scene.remove(ids)
+    assert hits.passes.object.tolist() == ids and hits.passes.material.tolist() == [5, 5, 5]
+    assert hits.stop.reason.tolist() == [0]
 
 
 @pytest.mark.parametrize("rays", [1, 4, 128])

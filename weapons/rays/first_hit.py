@@ -32,7 +32,7 @@ from ..fire.prefilter import may_refuse, refused
 from ..kinds.placements import ONES, Shots
 from ..kinds.rays import RayWeapon
 from .contacts import Contacts, Rays, Reason, Terminations, endless, reasons_at
-from .ray_hits import Passes, Stops, Summed, groups_of, passes_of, rows_of_passes, stops_of, weights_at
+from .ray_hits import Passes, Stops, Summed, Walk, groups_of, rows_of_passes, weights_at
 from .ray_walk import Range, lines_of
 
 
@@ -97,8 +97,8 @@ class FirstHits:
         ends.fraction[stopped] = time / lines.scale[stopped]
         one = np.ones(len(stopped), np.int64)
         met = Contacts(stopped, ends.rank[stopped], one, ends.x[stopped], ends.y[stopped], time, time)
-        of = ends, self.rays, lines, lines.take(stopped), self.stack
-        return passes_of(met, *of, self.ray.fades)[0], stops_of(met, *of)
+        walk = Walk(self.rays, lines, met, ends, lines.take(stopped), self.stack, self.ray.fades)
+        return walk.passes, walk.stops
 
 
 def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:

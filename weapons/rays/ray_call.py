@@ -7,13 +7,12 @@ scene -> stack -> weapon -> rays -> way: walk -> pre-filter -> cells on pixels -
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.scene import Scene
@@ -27,7 +26,7 @@ from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
 from .contacts import Contacts, Parts, Rays, Terminations, rays_of
 from .first_hit import ENGINES, FirstHits
-from .ray_hits import Passes, RayHits, Stops, Told, passes_of, pixels_of, rows_of_passes, stops_of
+from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes
 from .ray_walk import Range, expected_cells, trace
 
 RAYS_AT_ONCE = 2**14
@@ -36,14 +35,16 @@ RAYS_AT_ONCE = 2**14
 WALKED_AT_ONCE, CHUNK_GROWTH = 1024, 4
 """Most rays that walk together, and the largest ratio of the numbers of two chunks in a row."""
 
+CELLS_KEPT = 2**21
+"""Most cells of rays that an answer keeps until its passes are read, 64 MB; passes of further rays are made at once."""
+
 C = TypeVar("C", Passes, Stops)
 Choose = Callable[[int], Candidates]
 """Function that chooses the pre-filter for a number of rays."""
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """Passes and stops of the rays of whole shots."""
+class Made(NamedTuple):
+    """Passes and stops of rays, which were made at once."""
 
     passes: Passes
     stops: Stops
@@ -66,7 +67,8 @@ def fired_rays(
     plan.run("plan", candidates.why if walks else chosen.why)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
-    found: list[tuple[int, Followed | FirstHits]] = []
+    found: list[tuple[int, Walk | Made | FirstHits]] = []
+    room = CELLS_KEPT
     for begin in range(0, max(len(shots), 1), step):
         some = shots.take(begin, min(begin + step, len(shots)))
         rays = rays_of(parts, some)
@@ -78,10 +80,9 @@ def fired_rays(
             found.append((begin, first))
             plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
         else:
-            through_objects, stops, pixels = _followed(rays, ray, some, through)
-            rows.append(rows_of_passes(through_objects, pixels, rays))
-            found.append((begin, Followed(through_objects, stops)))
-            plan.run("rows", "passes, gathered by object", rows[-1].nbytes)
+            followed, row, room = _followed(rays, ray, some, through, room)
+            rows.append(row)
+            found += [(begin, walk) for walk in followed]
         if begin:
             rows[-1].shot[:] += begin
     hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
@@ -91,7 +92,7 @@ def fired_rays(
     return hits
 
 
-def _told(found: list[tuple[int, Followed | FirstHits]]) -> Told:
+def _told(found: list[tuple[int, Walk | Made | FirstHits]]) -> Told:
     """Functions that join the passes and the stops of chunks of shots, given with the number of their first shot."""
     return (
         lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
@@ -166,23 +167,31 @@ def _walked(
         step = max(1, min(most, CHUNK_GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
 
 
-def _followed(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Passes, Stops, Ints]:
+def _followed(
+    rays: Rays, ray: RayWeapon, shots: Shots, through: Range, room: int
+) -> tuple[list[Walk | Made], Rows, int]:
     """Follow rays to their ends.
+
+    Parameters
+    ----------
+    room : number of cells that may be kept until passes are read
 
     Returns
     -------
-    passes, stops, and the pixels that were hit, as `pixels_of` returns them
+    the walks, or the passes of those that there is no room for; the rows; and the room that is left
     """
-    stack, plan = through.stack, through.plan
-    passes: list[Passes] = []
-    stops: list[Stops] = []
-    pixels: list[Ints] = []
+    walks: list[Walk | Made] = []
+    summed, pixels, plan = [], [], through.plan
     for some, met, ends, lines, relative in _walked(rays, ray, shots, through):
-        through_objects, walked = passes_of(met, ends, some, lines, relative, stack, ray.fades)
-        passes.append(through_objects)
-        plan.run("passes", "each ray through each object", through_objects.nbytes)
-        stops.append(stops_of(met, ends, some, lines, relative, stack))
-        plan.run("stops", "", stops[-1].nbytes)
-        pixels.append(pixels_of(through_objects, walked, some, rays))
-        plan.run("rows", "", pixels[-1].nbytes)
-    return Passes.joined(passes), Stops.joined(stops), np.concatenate(pixels)
+        walk = Walk(some, lines, met, ends, relative, through.stack, ray.fades)
+        plan.run("passes", "cells of each ray on each object; the rest when it is asked for", walk.walked.nbytes)
+        summed.append(walk.summed)
+        pixels.append(pixels_of(walk, rays))
+        plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
+        room -= len(met.x)
+        walks.append(walk if room >= 0 else Made(walk.passes, walk.stops))
+        if room < 0:
+            plan.run("passes", "", walk.passes.nbytes)
+    rows = rows_of_passes(Summed(*map(np.concatenate, zip(*summed, strict=True))), np.concatenate(pixels), rays)
+    plan.run("rows", "", rows.nbytes)
+    return walks, rows, room

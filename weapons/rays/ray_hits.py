@@ -102,51 +102,86 @@ class Stops(ShotColumns):
     normal_xy: Ints
 
 
-def passes_of(
-    met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack, falloff: str | None
-) -> tuple[Passes, Contacts]:
-    """Passes of rays through objects, and the cells of each pass.
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A chunk of rays that were followed to their ends; their passes and stops are made when they are read.
 
     Parameters
     ----------
+    rays, lines : (R,) the rays
     met : contacts with objects and occluders, also beyond the ends
-    lines, relative : the rays (R,); and the line of each pair of `met`, relative to the motion of its item
+    ends : (R,) where the rays end
+    relative : the line of each pair of `met`, relative to the motion of its item
+    stack : the items at the version that was fired at
+    falloff : of the weapon, or None
     """
-    chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
-    objects = met.take(chosen)
-    keep = ends.walked(objects)
-    chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]
-    walked = objects.only(keep)
-    cell = walked.first
-    order = np.lexsort((walked.rank, walked.x[cell], walked.y[cell], walked.entry[cell], walked.ray))
-    walked, chosen = walked.take(order), chosen[order]
-    ray, rank, cell = walked.ray, walked.rank, walked.first
-    entry = walked.entry[cell]
-    out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
-    scale, length = lines.scale[ray], lines.length[ray]
-    first_part, last_part = entry / scale, np.minimum(walked.leave[out] / scale, ends.fraction[ray])
-    last_part = np.maximum(last_part, first_part)
-    at, sides = np.stack([walked.x, walked.y], axis=1), relative.entered_by(chosen, walked.x[cell], walked.y[cell])
-    origin = rays.origin_xy[ray]
-    entry_xy = at[cell] + origin
-    return (
-        Passes(
-            rays.shot[ray], rays.round[ray], rays.pellet[ray], stack.ids[rank],
-            np.arange(len(ray)) - np.searchsorted(ray, ray),
-            entry_xy, at[out] + origin, first_part, last_part, first_part * length, last_part * length,
-            _material(walked, ends, lines) * length,
-            normals_at(stack, rank, entry_xy, sides),
-            weights_at(entry, scale, falloff),
-            points_at(rays, ray, first_part),
-            walked.count,
-            np.zeros_like(ray),
-        ),
-        walked,
-    )  # fmt: skip
+
+    rays: Rays
+    lines: Lines
+    met: Contacts
+    ends: Terminations
+    relative: Lines
+    stack: Stack
+    falloff: str | None
+
+    @cached_property
+    def _chosen(self) -> tuple[Contacts, Ints]:
+        """Walked cells of objects, in the order of the passes, and the pairs of `met` that they belong to."""
+        stack, met = self.stack, self.met
+        chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
+        objects = met.take(chosen)
+        keep = self.ends.walked(objects)
+        chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]
+        walked = objects.only(keep)
+        cell = walked.first
+        order = np.lexsort((walked.rank, walked.x[cell], walked.y[cell], walked.entry[cell], walked.ray))
+        return walked.take(order), chosen[order]
+
+    @property
+    def walked(self) -> Contacts:
+        """Walked cells of objects, in the order of the passes."""
+        return self._chosen[0]
+
+    @cached_property
+    def summed(self) -> Summed:
+        """What rows are summed up from."""
+        rays, walked = self.rays, self.walked
+        ray, cell = walked.ray, walked.first
+        entry, scale = walked.entry[cell], self.lines.scale[ray]
+        return Summed(
+            rays.shot[ray], rays.round[ray], rays.pellet[ray], self.stack.ids[walked.rank],
+            np.arange(len(ray)) - np.searchsorted(ray, ray), entry / scale * self.lines.length[ray],
+            weights_at(entry, scale, self.falloff), walked.count,
+            np.stack([walked.x[cell], walked.y[cell]], axis=1) + rays.origin_xy[ray],
+        )  # fmt: skip
+
+    @cached_property
+    def passes(self) -> Passes:
+        """Passes of the rays through objects."""
+        (walked, chosen), of, ends = self._chosen, self.summed, self.ends
+        ray, rank, cell = walked.ray, walked.rank, walked.first
+        out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
+        scale, length = self.lines.scale[ray], self.lines.length[ray]
+        first = walked.entry[cell] / scale
+        last = np.maximum(np.minimum(walked.leave[out] / scale, ends.fraction[ray]), first)
+        sides = self.relative.entered_by(chosen, walked.x[cell], walked.y[cell])
+        return Passes(
+            of.shot, of.round, of.pellet, of.object, of.order, of.entry_xy,
+            np.stack([walked.x[out], walked.y[out]], axis=1) + self.rays.origin_xy[ray],
+            first, last, of.entry_px, last * length,
+            _material(walked, ends, self.lines) * length,
+            normals_at(self.stack, rank, of.entry_xy, sides),
+            of.weight, points_at(self.rays, ray, first), of.samples, np.zeros_like(ray),
+        )  # fmt: skip
+
+    @cached_property
+    def stops(self) -> Stops:
+        """Stops of the rays."""
+        return stops_of(self.met, self.ends, self.rays, self.lines, self.relative, self.stack)
 
 
 def stops_of(met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack) -> Stops:
-    """Stops of rays; the parameters are those of `passes_of`."""
+    """Stops of rays; the parameters are those of `Walk`."""
     ends_at_once = (ends.reason == Reason.BUDGET) & (ends.rank < 0)
     cell_xy = pixel(rays.start_256 + rays.step_256 * ~ends_at_once[:, None])
     item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
@@ -387,23 +422,18 @@ def _rows_of(rows: Rows, passes: Passes) -> Ints:
     return np.asarray(order[np.searchsorted(of_row[order], of_pass)])
 
 
-def pixels_of(passes: Passes, cells: Contacts, some: Rays, rays: Rays) -> Ints:
-    """Pixels that rays `some` hit, as rows (group, x, y); none if no shot has several pellets.
-
-    Parameters
-    ----------
-    cells : cells of each pass
-    rays : all rays of the shots
-    """
+def pixels_of(walk: Walk, rays: Rays) -> Ints:
+    """Pixels that rays hit, as rows (group, x, y); none if no shot has several pellets; `rays` are all of the shots."""
     if not rays.pellet.any():
         return np.zeros((0, 3), np.int64)
-    group = groups_of(passes, int(rays.round.max(initial=0)) + 1)[cells.pair]
-    x, y = (np.stack([cells.x, cells.y], axis=1) + some.origin_xy[cells.ray[cells.pair]]).T
+    cells = walk.walked
+    group = groups_of(walk.summed, int(rays.round.max(initial=0)) + 1)[cells.pair]
+    x, y = (np.stack([cells.x, cells.y], axis=1) + walk.rays.origin_xy[cells.ray[cells.pair]]).T
     found = np.stack([group, x, y], axis=1)
-    return found if len(some) == len(rays) else np.unique(found, axis=0)
+    return found if len(walk.rays) == len(rays) else np.unique(found, axis=0)
 
 
-def rows_of_passes(passes: Passes | Summed, pixels: Ints, rays: Rays) -> Rows:
+def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays) -> Rows:
     """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
     group = groups_of(passes, rounds)
