@@ -401,7 +401,7 @@ class Lines:
         return np.array([math.isqrt(reach * reach * n) for n in self.length2.tolist()], np.int64)
 
     def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
-        """Cells of each segment within its own inclusive box (n, 4), as (segment, x, y).
+        """Cells of each segment within its own inclusive box (n, 4), as (segment, x, y), sorted by segment.
 
         For thick segments these include some cells that are not touched; `times` gives them an empty interval.
         """

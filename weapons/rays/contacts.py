@@ -198,11 +198,10 @@ def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box
         on = stack.masks[texel]
         pair, x, y = pair[on], x[on], y[on]
         entry, leave = own.times(pair, x, y)
-        order = np.flatnonzero(entry <= leave)
-        order = order[np.argsort(pair[order], kind="stable")]
-        count = np.bincount(pair[order], minlength=len(here))
+        met = np.flatnonzero(entry <= leave)
+        count = np.bincount(pair[met], minlength=len(here))
         some = np.flatnonzero(count)
-        found.append(Contacts(ray[here][some], item[some], count[some], x[order], y[order], entry[order], leave[order]))
+        found.append(Contacts(ray[here][some], item[some], count[some], x[met], y[met], entry[met], leave[met]))
     return Contacts.joined(found)
 
 
