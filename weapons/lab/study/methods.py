@@ -15,7 +15,7 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, integer
 from hitplanes.planes.common.limits import GOLDEN, HALF, SCALE_BITS, SEED_MAX, SUB
 from hitplanes.planes.grid.fixed_point import turned, unit
-from hitplanes.planes.scene.items import ROLES, Role
+from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
@@ -247,25 +247,7 @@ def _traced(call: Callable[[], Any]) -> tuple[int, int]:
 Target = tuple[int, Bools, tuple[int, int]]
 """An object's id, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
 
-SHOTS_MAX = 10**6
-"""Most shots of a study; all decisions of a method are in memory."""
-
-KEPT = ("layer", "cost", "position_256", "velocity_256")
-"""Columns of objects that are copied to another scene."""
-
-
-def only_hittable(scene: Scene) -> Scene:
-    """Copy the hittable objects of a scene to one without bounds and occluders, where no filter refuses them.
-
-    They keep their ids, names, layers, poses, masks and velocities. Each is its own owner, in the first category.
-    """
-    alone, items = Scene(name=scene.name), scene.items
-    for item in scene.ids(Role.HITTABLE).tolist():
-        alone.items.skip_to(item)
-        values: dict[str, object] = {name: getattr(items, name)[item] for name in KEPT}
-        values |= {"role": ROLES.index(Role.HITTABLE), "categories": 1, "owner": item}
-        alone.items.add(items.sprites[item], items.forms[item], items.angles[item], items.names[item], values)
-    return alone
+SHOTS_MAX = 10**6  # of a study; all decisions of a method are in memory
 
 
 def targets_of(scene: Scene) -> list[Target]:
@@ -289,7 +271,7 @@ def size_of(targets: list[Target]) -> float:
 def drawn_for(scene: Scene, shots: object, seed: object) -> tuple[int, int, Scene, list[Target]]:
     """Check the number of shots and the seed; return them, a copy of the hittable objects, and these as targets."""
     shots, seed = integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
-    alone = only_hittable(scene)
+    alone = copied(scene, scene.ids(Role.HITTABLE))
     return shots, seed, alone, targets_of(alone)
 
 
@@ -349,7 +331,7 @@ def fired_method(
     """Make a method that fires a batch in one call of `fire` with `arguments`; its set-up copies the scene."""
 
     def prepare() -> Callable[[], Hits]:
-        own = only_hittable(scene)
+        own = copied(scene, scene.ids())
         return lambda: fire(own, weapon, **arguments)
 
     return Method(setting, prepare, read)

@@ -26,10 +26,10 @@ from .methods import (
     Method,
     Question,
     ahead,
+    copied,
     drawn_for,
     drawn_places,
     fired_method,
-    only_hittable,
     size_of,
     velocities_of,
 )
@@ -185,7 +185,7 @@ def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int
     start, step, disc = flights.start_256 / SUB, flights.step_256 / SUB, Disc(flights.radius_256 / SUB)
 
     def prepare() -> Callable[[], list[Decisions]]:
-        own = only_hittable(alone)
+        own = copied(alone, alone.ids())
         ids = own.ids()
         moving = ids[own.items.velocity_256[ids].any(axis=1)]
         place, velocity = (getattr(own.items, name)[moving] / SUB for name in ("position_256", "velocity_256"))
