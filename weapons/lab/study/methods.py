@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import statistics
 import time
+import timeit
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,13 +27,10 @@ from ...kinds.weapon import Weapon
 
 @dataclass(frozen=True, eq=False)
 class Decisions(ShotColumns):
-    """Pairs (shot, object) that are hit; all other pairs are misses.
+    """Pairs (shot, object) that are hit, (K,) each; all other pairs are misses.
 
-    Parameters
-    ----------
-    shot, object : (K,) int64
-    xy : (K, 2) float, px, the places hit; NaN if the method gives none
-    share : (K,) float, the part of the shot that lies on the object, 0 to 1; NaN if the method gives none
+    `xy` are the places hit (K, 2), px, and `share` the part of the shot that lies on the object, 0 to 1; both are NaN
+    where a method gives none.
     """
 
     object: Ints
@@ -53,15 +50,10 @@ class Decisions(ShotColumns):
 
 
 class Errors(NamedTuple):
-    """Errors of a method.
+    """Numbers of true hits that a method misses and of its false hits, mean errors, and objects of wrong decisions.
 
-    Parameters
-    ----------
-    missed : number of true hits that the method misses
-    false : number of its hits that are not true
-    share : mean absolute error of the share, over all pairs hit in truth or by the method; None without such pairs
-    position : mean distance of the place hit from the true one, px, over pairs that both hit; None without such pairs
-    objects : the object of each wrong decision
+    `share` is the mean absolute error over all pairs hit in truth or by the method, `position` the mean distance of
+    the place hit from the true one, px, over pairs that both hit; None without such pairs.
     """
 
     missed: int
@@ -105,14 +97,11 @@ def _mean(values: Floats) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method at one setting, which is a point of a curve.
+    """A method at one setting (a number in the unit of the curve, a word, or None), which is a point of a curve.
 
-    Parameters
-    ----------
-    setting : a number in the unit of the curve, or a word; None if there is nothing to set
-    prepare : set-up; returns the function that is timed as a run
-    read : converts the answer of a run to decisions; not timed
-    kept_bytes : returns the bytes that stay between runs, given an answer; None traces them, which slows the set-up
+    `prepare` sets it up and returns the function that is timed as a run; `read` converts the answer of a run to
+    decisions. `kept_bytes` returns the bytes that stay between runs, given an answer; None traces them, which slows the
+    set-up.
     """
 
     setting: float | str | None
@@ -123,15 +112,10 @@ class Method:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A method at all its settings.
+    """A method at all its settings, from coarse to fine; `setting` names their unit.
 
-    Parameters
-    ----------
-    name : name of the method
-    setting : name and unit of the setting; "" if there is nothing to set
-    methods : points of the curve, from coarse to fine
-    note : caveat for the comparison, for example that the method answers an easier question
-    left_out : why the method was not measured; it then has no points
+    `note` is a caveat for the comparison, for example that the method answers an easier question; `left_out` says why
+    a curve has no points.
     """
 
     name: str
@@ -143,18 +127,10 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """A question, its true answers, and the methods that are compared on it.
+    """A question, its true answers and their source, and the curves of the methods that are compared on it.
 
-    Parameters
-    ----------
-    name : one word, for files
-    asks : the question, a sentence
-    shots : number of shots
-    truth : the true answers
-    truth_told : source of the true answers
-    curves : curves of the methods
-    aimed : (N,) the object near which each shot is, for errors by kind of object; None if that has no meaning
-    by_share : whether the error is that of the share instead of the number of wrong decisions
+    `aimed` is the object near which each shot is, (N,), for errors by kind of object; None if that has no meaning.
+    `by_share` says whether the error is that of the share instead of the number of wrong decisions.
     """
 
     name: str
@@ -167,11 +143,8 @@ class Question:
     by_share: bool = False
 
 
-RUNS_MAX = 1000
-"""Most runs of a fast method."""
-
-SLOW = 0.5
-"""Seconds after which a slow method stops, even before the requested number of runs."""
+RUNS_MAX = 1000  # of a fast method
+SLOW = 0.5  # seconds after which a slow method stops, even before the requested number of runs
 
 
 class Cost(NamedTuple):
@@ -192,27 +165,15 @@ class Cost(NamedTuple):
 def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     """Set a method up, run it to warm up, then time `runs` runs and at least `seconds` seconds; fewer if it is slow.
 
-    Memory is traced in a separate run, as tracing takes time.
-
-    Returns
-    -------
-    the answer of a run, and the cost
+    Memory is traced in a separate run, as tracing takes time. Returned are the answer of a run, and the cost.
     """
     begin = time.perf_counter()
     run = method.prepare()
     answer = run()
     setup = time.perf_counter() - begin
     times: list[float] = []
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        while not times or _goes_on(times, runs, seconds):
-            begin = time.perf_counter()
-            run()
-            times.append(time.perf_counter() - begin)
-    finally:
-        if collects:
-            gc.enable()
+    while not times or (len(times) < RUNS_MAX and sum(times) < (max(seconds, SLOW) if len(times) < runs else seconds)):
+        times.append(timeit.timeit(run, number=1))  # without garbage collection
 
     def again() -> Any:
         """Set up once more, with the first run."""
@@ -221,17 +182,9 @@ def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
         return own
 
     kept = _traced(again)[0] if method.kept_bytes is None else method.kept_bytes(answer)
-    needed = _traced(run)[1]
-    return answer, Cost(
-        max(setup - min(times), 0.0), min(times), statistics.median(times), max(times), len(times), kept, needed
-    )
-
-
-def _goes_on(times: list[float], runs: int, seconds: float) -> bool:
-    """Return whether to time another run."""
-    if len(times) < runs:
-        return sum(times) < max(seconds, SLOW)
-    return sum(times) < seconds and len(times) < RUNS_MAX
+    least = min(times)
+    middle, most = statistics.median(times), max(times)
+    return answer, Cost(max(setup - least, 0.0), least, middle, most, len(times), kept, _traced(run)[1])
 
 
 def _traced(call: Callable[[], Any]) -> tuple[int, int]:
@@ -248,6 +201,7 @@ Target = tuple[int, Bools, tuple[int, int]]
 """An object's id, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
 
 SHOTS_MAX = 10**6  # of a study; all decisions of a method are in memory
+TRIES = 1000  # most tries per shot, before the scene is an error for lack of room
 
 
 def targets_of(scene: Scene) -> list[Target]:
@@ -281,15 +235,8 @@ def drawn_places(
     """Draw random places and directions, each in the grown box of a random object; around (0, 0) without objects.
 
     Each try takes four draws of splitmix64: object, x, y, angle. A taken place is replaced by the next try.
-
-    Parameters
-    ----------
-    grow_256 : how far boxes are grown on all sides, 1/256 px
-    taken : returns which of the places (n, 2) are refused
-
-    Returns
-    -------
-    places (shots, 2) in 1/256 px, angles (shots,) in degrees, and the target near each place (shots,)
+    Boxes are grown on all sides by `grow_256`; `taken` returns which of the places (n, 2) are refused. Returned are
+    places (shots, 2) in 1/256 px, angles (shots,) in degrees, and the target near each place (shots,).
 
     Raises
     ------
@@ -313,10 +260,6 @@ def drawn_places(
         near.append(which[good])
         begin, free = begin + shots, free + len(good)
     return np.concatenate(places)[:shots], np.concatenate(angles)[:shots], np.concatenate(near)[:shots]
-
-
-TRIES = 1000
-"""Most tries per shot, before the scene is an error for lack of room."""
 
 
 def ahead(length: float, degrees: Floats) -> Ints:
