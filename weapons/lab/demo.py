@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +21,7 @@ from hitplanes.planes.broadphase.quadtree import Quadtree
 from hitplanes.planes.common.checks import Bools, Floats, Image, InputError, Ints, choice, integer, path_of
 from hitplanes.planes.common.limits import SUB, TRIG_BITS
 from hitplanes.planes.files.png import check_output, cv2, write_bytes, write_png
-from hitplanes.planes.files.scene_folder import empty_folder
+from hitplanes.planes.files.scene_folder import new_folder
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.planes.scene.render import blend
 
@@ -30,11 +29,8 @@ from ..report.canvas import CARD, FAINT, INK, PAGE_GROUND, Entry, Legend, Text, 
 from ..report.phrases import percent
 from ..report.symbols import MARKS
 
-NO_DITHER = 3
-"""Value by which OpenCV does not dither, unlike its documentation; -1 to 2 put dots on plain areas."""
-
-COLORS = 6
-"""Bits of the palette; 64 colours are enough for flat drawings, and make small files."""
+NO_DITHER = 3  # for OpenCV, unlike its documentation; -1 to 2 put dots on plain areas
+COLORS = 6  # bits of the palette; 64 colours are enough for flat drawings, and make small files
 
 
 def can_write_gif() -> bool:
@@ -43,13 +39,7 @@ def can_write_gif() -> bool:
 
 
 def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
-    """Write frames (h, w, 3) of RGB bytes as an endless GIF; an error leaves no incomplete file.
-
-    Raises
-    ------
-    InputError
-        If this OpenCV writes no GIF, or the file cannot be written.
-    """
+    """Write frames (h, w, 3) of RGB bytes as an endless GIF; an error leaves no incomplete file."""
     path = check_output(path)
     if not can_write_gif():
         raise InputError(f"output: expected the name of a folder: OpenCV {cv2.__version__} writes no GIF, got {path}")
@@ -64,63 +54,32 @@ def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
         write_bytes(path, aside.read_bytes())
 
 
-def write_frames(folder: Path, frames: Iterable[Image]) -> int:
-    """Write frames (h, w, 3) of RGB bytes as 000.png, 001.png, ..., and return their number.
-
-    An error or an interrupt removes the files.
-
-    Raises
-    ------
-    InputError
-        If the folder is neither new nor empty, or cannot be written to.
-    """
+def write_frames(folder: Path, frames: Iterable[Image]) -> None:
+    """Write frames (h, w, 3) of RGB bytes as 000.png, 001.png, ...; an error or an interrupt removes the files."""
     folder = path_of("output", folder)
-    made, written = empty_folder(folder), 0
-    try:
+    with new_folder(folder) as files:
         for frame in frames:
-            write_png(folder / f"{written:03}.png", frame)
-            written += 1
-    except BaseException:
-        with suppress(OSError):
-            for number in range(written + 1):
-                (folder / f"{number:03}.png").unlink(missing_ok=True)
-            if made:
-                folder.rmdir()
-        raise
-    return written
+            files.append(folder / f"{len(files):03}.png")
+            write_png(files[-1], frame)
 
 
-FRAMES = 80
-"""Frames of a round; the next round is the same."""
-
-MILLISECONDS = 70
-"""Duration of a frame."""
-
-WIDTH, HEIGHT = 300, 248
-"""Size of the world, px; each of the two panes shows it."""
-
+FRAMES = 80  # of a round; the next round is the same
+MILLISECONDS = 70  # duration of a frame
+SEED = 22  # of the boxes' orbits
 FLOCKS, FLOCK, WANDERERS = 3, 60, 120
 """Number of flocks, boxes in each, and boxes that move on their own."""
 
+WIDTH, HEIGHT = 300, 248
+"""Size of the world, px; each of the two panes shows it."""
 MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392
 """Space around the two panes, between them and above them, and height of the page, px."""
-
 NAME, BAR, CHART = 96, 160, 180
 """Widths of a bar's name, of the longest bar, and of the chart of all frames, px."""
-
-WALL = 6
-"""Least distance of a box's centre from the edge of the world, px."""
-
+WALL = 6  # least distance of a box's centre from the edge of the world, px
 MIDDLE = np.array([WIDTH / 2, HEIGHT / 2])
-
-QUERY_HALF = np.array([20.0, 16.0])
-"""Half the sides of the query, which is the box of a shot, px."""
-
+QUERY_HALF = np.array([20.0, 16.0])  # half the sides of the query, which is the box of a shot, px
 QUERY_REACH, QUERY_TURNS = np.array([[112.0, 88.0]]), np.array([[1, 2]])
 """Amplitudes (px) and turns of the figure of eight along which the query moves."""
-
-SEED = 22
-"""Random seed of the boxes' orbits."""
 
 
 class Kind(NamedTuple):
@@ -147,29 +106,17 @@ REST: Color = (88, 94, 106)
 CELL: Color = (80, 86, 98)
 ON_THE_WAY: Color = (62, 116, 148)
 
-TINT = 84
-"""Opacity of an opened leaf, of 255."""
-
-RING = 1.4
-"""Thickness of a ring, px."""
-
-ROOM = 16
-"""Padding around a picture, in which discs may begin, px."""
+TINT = 84  # opacity of an opened leaf, of 255
+RING = 1.4  # thickness of a ring, px
+ROOM = 16  # padding around a picture, in which discs may begin, px
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame: the structure, and the work of one query.
+    """A frame: the nodes of the structure (C,), the boxes (N, 4), px, and the work of one query (4,).
 
-    Parameters
-    ----------
-    cells : nodes of the structure
-    visited : (C,) bool, nodes that the query visited
-    nodes : number of comparisons or look-ups of nodes
-    boxes : (N, 4) float, px
-    tests : number of comparisons of boxes; a box in several leaves counts in each
-    tested, found : (N,) bool, boxes that were compared with the query, and that overlap it
-    query : (4,) float, px
+    It visited nodes; comparisons or look-ups of `nodes` and of boxes (`tests`) are counted, a box in several leaves in
+    each. `tested` boxes were compared with the query, and `found` ones overlap it.
     """
 
     cells: Cells
@@ -193,18 +140,7 @@ class Moment:
 
 
 def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
-    """Move boxes in a structure, and query it at each step.
-
-    Parameters
-    ----------
-    kind : one of KINDS
-    frames : number of steps of a round, at least 1
-
-    Raises
-    ------
-    InputError
-        If the structure is unknown, or `frames` is less than 1.
-    """
+    """Move boxes in a structure, one of KINDS, and query it at each of the steps of a round."""
     kind = choice("kind", kind, KINDS)
     frames = integer("frames", frames, 1, 2**31)
     places, half = _orbits(frames)
@@ -234,8 +170,7 @@ def _orbits(frames: int) -> tuple[Floats, Floats]:
     Boxes of a flock circle its centre, which circles the middle of the world; others circle their own centres.
     """
     rng = np.random.default_rng(SEED)
-    n, reach = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]])
-    turns = np.array([[1, 1], [-1, 1], [1, -1]])
+    n, reach, turns = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]]), np.array([[1, 1], [-1, 1], [1, -1]])
     leaders = _on_ellipse(frames, np.tile(MIDDLE, (FLOCKS, 1)), reach, turns, rng)
     reach = np.abs(rng.normal(0, 22, (n, 2))) + 3
     own = _on_ellipse(frames, np.zeros((n, 2)), reach, rng.choice([-2, -1, 1, 2], (n, 2)), rng)
@@ -258,32 +193,23 @@ def _on_ellipse(frames: int, middle: Floats, reach: Floats, turns: Ints, rng: np
 def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
     """Write a round of a structure as a GIF, or as PNG files into a folder, and return the path.
 
-    Parameters
-    ----------
-    kind : one of KINDS
-    output : a file that ends in .gif, or a folder. If OpenCV writes no GIF, the name without .gif is the folder.
-
-    Raises
-    ------
-    InputError
-        If the structure is unknown, or the output has another ending or cannot be written.
+    The output ends in .gif or is a folder. If OpenCV writes no GIF, the name without .gif is the folder.
     """
     output = path_of("output", output)
     gif = output.suffix.lower() == ".gif"
     if not gif and output.suffix and not output.is_dir():
         wanted = "a name that ends in .gif, or of a folder, without an ending"
         raise InputError(f"--output: expected {wanted}, got {output.name!r}")
-    pictures = demo_frames(kind, frames)
     if gif and can_write_gif():
-        write_gif(output, pictures, MILLISECONDS)
-        return output
-    folder = output.with_suffix("") if gif else output
-    write_frames(folder, pictures)
-    return folder
+        write_gif(output, demo_frames(kind, frames), MILLISECONDS)
+    else:
+        output = output.with_suffix("") if gif else output
+        write_frames(output, demo_frames(kind, frames))
+    return output
 
 
 def demo_frames(kind: str, frames: int = FRAMES) -> Iterator[Image]:
-    """Yield the frames of a round, (h, w, 3) RGB bytes; parameters and errors are those of `moments`."""
+    """Yield the frames of a round, (h, w, 3) RGB bytes."""
     history: list[Moment] = []
     for moment in moments(kind, frames):
         history.append(moment)
