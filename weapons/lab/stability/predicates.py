@@ -46,13 +46,8 @@ from .truth import is_simple
 Whole = npt.NDArray[np.int64]
 
 PX, HALF = 256, 128
-
-MOST = 3
-"""Largest distance by which rows are moved off a tie, 1/256 px."""
-
-SHARED = 32
-"""Consecutive rows that share a weapon."""
-
+MOST = 3  # largest distance by which rows are moved off a tie, 1/256 px
+SHARED = 32  # consecutive rows that share a weapon
 TENS = 10 ** np.arange(13)
 
 
@@ -128,16 +123,6 @@ def _shifted(rng: Rng, *columns: Whole, units: Mapping[int, int], low: int, high
     return tuple(column + units[k] * by if k in units else column for k, column in enumerate(columns))
 
 
-def _beside(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
-    """Replace pixels by others near the ones aimed at."""
-    return start, end, cells + _wide(rng, len(cells), 1) * (rng.random((len(cells), 1)) < 0.6)
-
-
-def _with_length(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
-    """Give shots without length a length of 1/256 px."""
-    return start, end + (start == end).all(axis=1)[:, None], cells
-
-
 _near_ray = partial(_passing_ray, size=1500, least=0)
 _far_ray = partial(_shifted, units={0: PX, 1: PX, 2: 1})
 
@@ -150,8 +135,15 @@ RAYS: dict[str, Make] = {
     "fast": partial(_passing_ray, size=3 * 10**7, least=1),  # about 10^6 px long
     "scene": _then(_corner_ray, partial(_far_ray, low=9, high=10)),
 }
-CELL_FAMILIES = {name: _then(make, _beside) for name, make in RAYS.items() if name != "fast"}
-RAY_FAMILIES = {name: _then(make, _with_length) for name, make in RAYS.items()}
+CELL_FAMILIES = {  # of pixels near the ones aimed at
+    name: _then(make, lambda rng, a, b, c: (a, b, c + _wide(rng, len(c), 1) * (rng.random((len(c), 1)) < 0.6)))
+    for name, make in RAYS.items()
+    if name != "fast"
+}
+RAY_FAMILIES = {  # shots without length have one of 1/256 px
+    name: _then(make, lambda _, a, b, cells: (a, b + (a == b).all(axis=1)[:, None], cells))
+    for name, make in RAYS.items()
+}
 
 
 # Flights: start, unit vector and how often it is flown, radius, pixel, where that moves
@@ -285,25 +277,17 @@ Array = npt.NDArray[Any]
 Method = Callable[..., Bools]
 Families = Mapping[str, Make]
 
-APART = 2**22
-"""Distance between the areas of two rows, px; more than twice the reach of any shot."""
-
-ABREAST = 32
-"""Areas side by side in x."""
+APART = 2**22  # px between the areas of two rows; more than twice the reach of any shot
+ABREAST = 32  # areas side by side in x
 
 
 @dataclass(frozen=True)
 class Predicate:
     """A predicate that methods decide.
 
-    Parameters
-    ----------
-    truth : exact answer, given a row of numbers
-    ours, naive : answers of hitplanes and of the textbook, given columns
-    families : makers of columns
-    rows, quick : number of rows of a family in a full run, and in a quick one
-    block : number of rows at a time
-    cost : relative cost of a row
+    `truth` is the exact answer, given a row of numbers; `ours` and `naive` are the answers of hitplanes and of the
+    textbook, given the columns that a family makes. A family has so many rows in a full run and in a quick one, made by
+    the block; `cost` is the relative cost of a row.
     """
 
     name: str
@@ -323,8 +307,7 @@ class Predicate:
 
 
 def _pairs(*kinds: str, without: tuple[str, ...] = ()) -> Families:
-    both = (kinds[0], kinds[1])
-    return {family: shape_pairs(both, family) for family in MAKERS if family not in without}
+    return {family: shape_pairs((kinds[0], kinds[1]), family) for family in MAKERS if family not in without}
 
 
 # Ours: volumes
