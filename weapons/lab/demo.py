@@ -148,20 +148,17 @@ def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
     structure = KINDS[kind].make(_around(places[0], half))
     ids = structure.ids
     for centres, aim in zip(places, track, strict=True):
-        boxes = _around(centres, half)
+        boxes, query = _around(centres, half), _around(aim, QUERY_HALF)
         structure.move(ids, boxes)
-        yield _moment(structure, boxes, _around(aim, QUERY_HALF))
+        work, cells = structure.work(query[None]), structure.cell_boxes()
+        met = work.tested[1], structure.query(query[None])[1]
+        tested, found = (np.isin(np.arange(len(boxes)), numbers) for numbers in met)
+        visited = np.isin(cells.number, work.visited[1])
+        yield Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _around(centre: Floats, half: Floats) -> Floats:
     return np.concatenate((centre - half, centre + half), axis=-1)
-
-
-def _moment(structure: BroadPhase, boxes: Floats, query: Floats) -> Moment:
-    work, cells = structure.work(query[None]), structure.cell_boxes()
-    tested, found = (np.isin(np.arange(len(boxes)), met) for met in (work.tested[1], structure.query(query[None])[1]))
-    visited = np.isin(cells.number, work.visited[1])
-    return Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _orbits(frames: int) -> tuple[Floats, Floats]:
@@ -219,8 +216,7 @@ def demo_frames(kind: str, frames: int = FRAMES) -> Iterator[Image]:
 def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Image:
     """Draw the last moment of a history: both steps, a legend, and the tests made so far."""
     now, shown = history[-1], KINDS[kind]
-    page = np.empty((PAGE_HEIGHT, 2 * (MARGIN + WIDTH) + GAP, 3), np.uint8)
-    page[:] = PAGE_GROUND
+    page = np.full((PAGE_HEIGHT, 2 * (MARGIN + WIDTH) + GAP, 3), PAGE_GROUND, np.uint8)
     left, right = MARGIN, MARGIN + WIDTH + GAP
     page[TOP : TOP + HEIGHT, left : left + WIDTH] = _first_step(now)
     page[TOP : TOP + HEIGHT, right : right + WIDTH] = _second_step(now)
@@ -265,8 +261,7 @@ def _second_step(now: Moment) -> Image:
 
 def _pane(now: Moment, tint: int) -> Image:
     """Return a pane in which the opened leaves are tinted."""
-    pane = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    pane[:] = CARD
+    pane = np.full((HEIGHT, WIDTH, 3), CARD, np.uint8)
     for box in _distinct(now.cells.box[now.entered]):
         x0, y0, x1, y1 = _corners(box)
         if x0 < x1 and y0 < y1:
@@ -276,9 +271,8 @@ def _pane(now: Moment, tint: int) -> Image:
 
 def _discs(pane: Image, now: Moment, which: Bools, color: Color, more: int = 0, hollow: bool = False) -> None:
     """Draw the inscribed discs of boxes, or rings, with a radius larger by `more` px."""
-    centre = (now.boxes[:, :2] + now.boxes[:, 2:]) / 2
-    radius = (now.boxes[:, 2] - now.boxes[:, 0]) / 2
-    _round(pane, centre[which], radius[which] + more, color, hollow)
+    low, high = now.boxes[which, :2], now.boxes[which, 2:]
+    _round(pane, (low + high) / 2, (high - low)[:, 0] / 2 + more, color, hollow)
 
 
 def _round(picture: Image, centre: Floats, radius: Floats, color: Color, hollow: bool = False) -> None:
@@ -308,8 +302,7 @@ def _frame(pane: Image, box: Floats, color: Color, thick: int = 1) -> None:
 
 def _legend(now: Moment, width: int) -> Legend:
     """Return a legend with a mark for each style of cell and box."""
-    marks = np.empty((6, 14, 14, 3), np.uint8)
-    marks[:] = CARD
+    marks = np.full((6, 14, 14, 3), CARD, np.uint8)
     query, entered, way, rest, tested, found = marks
     cv2.rectangle(query, (1, 3), (12, 10), INK, 2)
     blend(entered, VISITED, np.full((14, 14), TINT, np.uint8), 0, 0)
@@ -333,20 +326,18 @@ def _counters(page: Image, name: str, history: Sequence[Moment], frames: int) ->
     left, n = MARGIN + NAME, len(now.boxes)
     texts = []
     text = f"{now.tests} boxes + {now.nodes} {'cells' if now.cells.leaf.all() else 'nodes'}"
-    rows = (("brute force", n, REST, f"{n} boxes"), (name, now.cost, VISITED, text))
-    for row, (word, tests, color, count_text) in enumerate(rows):
-        y, wide = top + 22 * row, round(BAR * tests / n)
+    rows = (top, "brute force", n, REST, f"{n} boxes", FAINT), (top + 22, name, now.cost, VISITED, text, INK)
+    for y, word, tests, color, count_text, ink in rows:
+        wide = round(BAR * tests / n)
         page[y : y + 13, left : left + wide] = color
-        texts.append(Text(left - 8, y + 11, word, FAINT, right=True))
-        texts.append(Text(left + wide + 8, y + 11, count_text, INK if row else FAINT))
+        texts += [Text(left - 8, y + 11, word, FAINT, right=True), Text(left + wide + 8, y + 11, count_text, ink)]
     for count, color in ((now.tests, TESTED), (now.found.sum(), FOUND)):
         page[top + 22 : top + 35, left : left + round(BAR * count / n)] = color
-    _chart(page[top : top + 35, page.shape[1] - MARGIN - CHART : page.shape[1] - MARGIN], history, frames)
-    saved = 1 - sum(moment.cost for moment in history) / (n * len(history))
-    middle = page.shape[1] - MARGIN - CHART - 10
-    texts.append(Text(middle, top + 11, "tests saved so far", FAINT, right=True))
-    texts.append(Text(middle, top + 33, percent(saved), INK, bold=True, right=True))
-    return texts
+    right = page.shape[1] - MARGIN
+    _chart(page[top : top + 35, right - CHART : right], history, frames)
+    saved = percent(1 - sum(moment.cost for moment in history) / (n * len(history)))
+    texts.append(Text(right - CHART - 10, top + 11, "tests saved so far", FAINT, right=True))
+    return [*texts, Text(right - CHART - 10, top + 33, saved, INK, bold=True, right=True)]
 
 
 def _chart(part: Image, history: Sequence[Moment], frames: int) -> None:
