@@ -153,14 +153,9 @@ examples:
 """
 
 
-NAMED = 8
-"""Most objects that a line of output names."""
-
-USAGE_MAX = 300
-"""Longest usage error, characters."""
-
-SHOWN = ("quadtree", "grid", "bvh")
-"""Structures that the demo can show."""
+NAMED = 8  # most objects that a line of output names
+USAGE_MAX = 300  # characters of a usage error
+SHOWN = ("quadtree", "grid", "bvh")  # structures that the demo can show
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -168,9 +163,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     open_streams()
     try:
         try:
-            return _ran(argv)
+            arguments = parser().parse_args(argv)
+            return arguments.run(arguments) or 0
         finally:
-            _flush()
+            with _printing():
+                sys.stdout.flush()
     except InputError as error:
         _complain(" ".join(str(error).split()))
         return 2
@@ -182,11 +179,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
     finally:
         _let_go(sys.stderr)
-
-
-def _ran(argv: Sequence[str] | None) -> int:
-    arguments = parser().parse_args(argv)
-    return arguments.run(arguments) or 0
 
 
 def open_streams() -> None:
@@ -205,12 +197,6 @@ def _is_open(number: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def _flush() -> None:
-    """Flush stdout."""
-    with _printing():
-        sys.stdout.flush()
 
 
 @contextmanager
