@@ -21,17 +21,9 @@ if TYPE_CHECKING:
 DPI = 160  # a picture of 11 inches is 1760 px wide, and readable when shown at 1000
 INK, FAINT, PAPER, HATCH = "#1d2733", "#66707c", "#ffffff", "#cfd5db"
 LOOK: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "hatch.color": HATCH,
-    "hatch.linewidth": 0.8,
-    "savefig.facecolor": PAPER,
-}
+    "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": FAINT, "axes.labelcolor": INK, "text.color": INK,
+    "xtick.color": INK, "ytick.color": INK, "hatch.color": HATCH, "hatch.linewidth": 0.8, "savefig.facecolor": PAPER,
+}  # fmt: skip
 """Style of all diagrams."""
 
 
@@ -64,23 +56,12 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
 Style = tuple[str, str]
 """Colour and mark of a curve."""
 STYLES: dict[str, Style] = {
-    "pixel planes": (BLUE, "o"),
-    "pixels, pre-filter": (SKY, "D"),
-    "pixels, broad phase": (SKY, "s"),
-    "circle": (PURPLE, "o"),
-    "circle about the pivot": (PURPLE, "P"),
-    "box, re-boxed": (ORANGE, "X"),
-    "box, refitted": (ORANGE, "s"),
-    "oriented box": (RED, "D"),
-    "boxes": (ORANGE, "v"),
-    "convex polygon": (GREEN, "^"),
-    "hull": (GREEN, "*"),
-    "polygon": (GREEN, "p"),
-    "triangles": (RED, "<"),
-    "pymunk": (BLACK, "P"),
-    "shapely": (BLACK, "X"),
-    "pygame": (BLACK, "*"),
-}
+    "pixel planes": (BLUE, "o"), "pixels, pre-filter": (SKY, "D"), "pixels, broad phase": (SKY, "s"),
+    "circle": (PURPLE, "o"), "circle about the pivot": (PURPLE, "P"), "box, re-boxed": (ORANGE, "X"),
+    "box, refitted": (ORANGE, "s"), "oriented box": (RED, "D"), "boxes": (ORANGE, "v"), "convex polygon": (GREEN, "^"),
+    "hull": (GREEN, "*"), "polygon": (GREEN, "p"), "triangles": (RED, "<"), "pymunk": (BLACK, "P"),
+    "shapely": (BLACK, "X"), "pygame": (BLACK, "*"),
+}  # fmt: skip
 OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (SKY, "<"))
 """Styles for all other methods, in turn."""
 
@@ -88,25 +69,28 @@ OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (
 def work_precision(question: Mapping[str, Any], title: str) -> Figure:
     """Draw a question of a study, given as JSON.
 
-    Points without an error lie on a separate floor, which is labelled with the bound for this number of shots. The
-    Pareto front goes through the points for which no other is both faster and more accurate.
+    Points without an error lie on a separate floor, below all others and below one wrong decision in all shots, which
+    is labelled with the bound for this number of shots. The Pareto front goes through the points for which no other is
+    both faster and more accurate.
     """
     from matplotlib.figure import Figure
 
-    found = places(question)
-    floor = _floor(question, found)
+    found, wrong, least = places(question), question["error"] == "wrong", bound(question)
+    errors = [place.error for place in found if place.error > 0]
+    floor = min([*errors, 1 / max(question["shots"], 1)] if wrong else errors or [1.0]) / 3
     others = iter(OTHERS * len(question["curves"]))
     with looking_alike():
         figure = Figure(figsize=SIZE, layout="constrained")
         plot = figure.add_subplot()
-        _draw_front(plot, front(found), floor)
+        x, y = zip(*[(place.us, place.error or floor) for place in front(found)], strict=True)
+        label = "Pareto front: none is faster and less wrong"
+        plot.plot(x, y, color="#c3c9d0", linewidth=7, alpha=0.8, drawstyle="steps-post", label=label, zorder=1)
         for curve in question["curves"]:
             own = [place for place in found if place.curve == curve["name"]]
             if own:
                 _draw_curve(plot, own, curve["setting"], STYLES.get(curve["name"]) or next(others), floor)
         _write_words(plot, found, floor)
         _draw_axes(plot, question)
-        wrong, least = question["error"] == "wrong", bound(question)
         if wrong:  # the smallest error rate that this number of shots can show
             _draw_level(plot, least, (6, 3), 0.8, "3/n", (1.0, 3, 0), va="center", fontsize=7.5, color=FAINT)
         if any(place.error == 0 for place in found):
@@ -129,13 +113,6 @@ def _draw_axes(plot: Axes, question: Mapping[str, Any]) -> None:
     plot.xaxis.set_minor_formatter("")
     least, most = plot.get_xlim()
     plot.set_xlim(min(least, most / DECADES), max(most, least * DECADES))
-
-
-def _floor(question: Mapping[str, Any], found: Sequence[Place]) -> float:
-    """Return the height of points without an error: below all others, and below one wrong decision in all shots."""
-    least = min((place.error for place in found if place.error > 0), default=1.0)
-    one = least if question["error"] == "share" else 1 / max(question["shots"], 1)
-    return min(least, one) / 3
 
 
 def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, floor: float) -> None:
@@ -175,13 +152,6 @@ def _write_words(plot: Axes, found: Sequence[Place], floor: float) -> None:
                           ha="center", va="bottom", path_effects=_halo(), zorder=4)  # fmt: skip
             near = []
         near.append((x, y, word))
-
-
-def _draw_front(plot: Axes, best: Sequence[Place], floor: float) -> None:
-    """Draw the Pareto front as steps."""
-    x, y = [place.us for place in best], [place.error or floor for place in best]
-    label = "Pareto front: none is faster and less wrong"
-    plot.plot(x, y, color="#c3c9d0", linewidth=7, alpha=0.8, drawstyle="steps-post", label=label, zorder=1)
 
 
 def _draw_level(

@@ -133,19 +133,12 @@ def _point(method: Method, question: Question, errors: Errors, cost: Cost, kinds
     """Return the errors and the cost of a method at one setting, as JSON."""
     us = {name: 1e6 * getattr(cost, name) / question.shots for name in ("least", "median", "most")}
     return {
-        "setting": method.setting,
-        "missed": errors.missed,
-        "false": errors.false,
-        "wrong_per_shot": errors.wrong / question.shots,
-        "share_error": errors.share,
+        "setting": method.setting, "missed": errors.missed, "false": errors.false,
+        "wrong_per_shot": errors.wrong / question.shots, "share_error": errors.share,
         "position_error_px": errors.position,
-        "wrong_per_shot_by_kind": _by_kind(errors.objects, question.aimed, kinds),
-        "us_per_shot": us,
-        "runs": cost.runs,
-        "setup_ms": 1e3 * cost.setup,
-        "kept_bytes": cost.kept_bytes,
-        "run_bytes": cost.run_bytes,
-    }
+        "wrong_per_shot_by_kind": _by_kind(errors.objects, question.aimed, kinds), "us_per_shot": us, "runs": cost.runs,
+        "setup_ms": 1e3 * cost.setup, "kept_bytes": cost.kept_bytes, "run_bytes": cost.run_bytes,
+    }  # fmt: skip
 
 
 def _by_kind(wrong: Ints, aimed: Ints | None, kinds: Sequence[str]) -> dict[str, float]:
