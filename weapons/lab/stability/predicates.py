@@ -379,10 +379,6 @@ def _beam_pixels(unit: Array, times: Array, radius: Array, cells: Array, places:
     return _by_weapon(keys, lambda k: Beam(k[0] / SUB, 2 * k[1] / SUB), cells + places, places, unit)
 
 
-def _polygon(ring: list[Any]) -> Weapon:
-    return Polygon([(x / SUB, y / SUB) for k, (x, y) in enumerate(ring) if [x, y] != ring[k - 1]])
-
-
 ROUND = ("needles", "parallel", "shared")
 """Families that need sides, which circles lack."""
 
@@ -442,7 +438,10 @@ PREDICATES = (
     ),
     Predicate(
         "polygon's pixels", lambda ring, cell, _: truth.polygon_holds(ring, [SUB * v for v in cell]),
-        lambda rings, cells, places: _by_weapon(rings, _polygon, cells + places, places),
+        lambda rings, cells, places: _by_weapon(
+            rings, lambda ring: Polygon([(x / SUB, y / SUB) for k, (x, y) in enumerate(ring) if [x, y] != ring[k - 1]]),
+            cells + places, places,
+        ),
         textbook.pattern_pixels, PATTERN_FAMILIES, *FIRED,
     ),
 )  # fmt: skip

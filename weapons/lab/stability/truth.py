@@ -106,16 +106,11 @@ def is_simple(ring: Row) -> bool:
         back = sum((after[i] - b[i]) * (a[i] - b[i]) for i in (0, 1)) > 0
         if a == b or (back and _turn(a, b, after) == 0):
             return False  # a side without length, or one that turns back
-        others = sides[k + 2 : len(sides) - (k == 0)]
-        if any(_touch(a, b, *other) for other in others):
-            return False
+        for c, d in sides[k + 2 : len(sides) - (k == 0)]:
+            ends = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
+            if _cross(a, b, c, d) or any(_on_side(p, q, r) for p, q, r in ends):
+                return False
     return True
-
-
-def _touch(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Whether two segments share a point."""
-    ends = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
-    return _cross(a, b, c, d) or any(_on_side(p, q, r) for p, q, r in ends)
 
 
 def polygon_holds(ring: Row, p: Row) -> bool:

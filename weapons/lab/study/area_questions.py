@@ -36,7 +36,6 @@ from .methods import (
     scaled,
     size_of,
     targets_of,
-    unscaled,
 )
 from .truth import Round, Straight, discs_on_shapes, parts_of_discs, placed_rings
 
@@ -154,7 +153,7 @@ def _decided_by_planes(fired: Fired, scale: float) -> Decisions:
     found = []
     for hits, ids in fired:
         xy, share = hits.first_xy.astype(np.float64), hits.samples / hits.verdicts.sum(axis=1)[hits.shot]
-        found.append(Decisions(hits.shot, ids[hits.object], unscaled(xy, scale), share))
+        found.append(Decisions(hits.shot, ids[hits.object], (xy + 0.5) / scale - 0.5, share))
     return Decisions.joined(found)
 
 

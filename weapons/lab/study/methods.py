@@ -80,13 +80,10 @@ def errors_of(found: Decisions, truth: Decisions) -> Errors:
     share = [np.where(r >= 0, np.append(d.share, 0.0)[r], 0.0) for r, d in zip(row, (found, truth), strict=True)]
     apart = found.xy[row[0, both]] - truth.xy[row[1, both]]
     missed, false = row < 0
-    return Errors(
-        int(missed.sum()),
-        int(false.sum()),
-        None if len(found) and np.isnan(found.share).all() else _mean(np.abs(share[0] - share[1])),
-        _mean(np.sqrt((apart**2).sum(axis=1))),
-        pairs[missed | false] % objects,
-    )
+    untold = len(found) and np.isnan(found.share).all()
+    off = None if untold else _mean(np.abs(share[0] - share[1]))
+    far = _mean(np.sqrt((apart**2).sum(axis=1)))
+    return Errors(int(missed.sum()), int(false.sum()), off, far, pairs[missed | false] % objects)
 
 
 def _mean(values: Floats) -> float | None:
@@ -237,11 +234,6 @@ def drawn_places(
     Each try takes four draws of splitmix64: object, x, y, angle. A taken place is replaced by the next try.
     Boxes are grown on all sides by `grow_256`; `taken` returns which of the places (n, 2) are refused. Returned are
     places (shots, 2) in 1/256 px, angles (shots,) in degrees, and the target near each place (shots,).
-
-    Raises
-    ------
-    InputError
-        If nearly all of very many places are taken.
     """
     boxes = np.array([[x, y, x + m.shape[1] - 1, y + m.shape[0] - 1] for _, m, (x, y) in targets] or [[0, 0, 0, 0]])
     low, high = SUB * boxes[:, :2] - HALF - grow_256, SUB * boxes[:, 2:] + HALF + grow_256
@@ -285,11 +277,6 @@ def scaled(xy: Floats, factor: float) -> Floats:
     return (xy + 0.5) * factor - 0.5
 
 
-def unscaled(xy: Floats, factor: float) -> Floats:
-    """Invert `scaled`."""
-    return (xy + 0.5) / factor - 0.5
-
-
 def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     """Copy objects at a scale to a scene without bounds and occluders; ids count from 0 in the given order.
 
@@ -297,18 +284,13 @@ def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     """
     alone, items = Scene(), scene.items
     for item in ids.tolist():
-        form = items.forms[item]
+        form, place = items.forms[item], scaled(items.position_256[item] / SUB, factor).tolist()
         alone.add(
-            items.sprites[item],
-            scaled(items.position_256[item] / SUB, factor).tolist(),
-            angle=items.angles[item],
+            items.sprites[item], place, angle=items.angles[item], flip=form.flip, frame=form.frame,
             scale=[v / (1 << SCALE_BITS) * factor for v in (form.scale_x, form.scale_y)],
-            flip=form.flip,
-            frame=form.frame,
-            layer=int(items.layer[item]),
+            layer=int(items.layer[item]), name=items.names[item],
             velocity_xy=(items.velocity_256[item] / SUB * factor).tolist(),
-            name=items.names[item],
-        )
+        )  # fmt: skip
     return alone
 
 

@@ -68,8 +68,11 @@ def _supercover(alone: Scene, start: Ints, step: Ints) -> tuple[Curve, ...]:
     """Return curves of `fire`: by default, with each pre-filter, and with each broad phase."""
     shot = {"at": start / SUB, "toward": (start + step) / SUB}
 
+    def entered(hits: RayHits) -> Decisions:
+        return Decisions.of(hits.passes.shot, hits.passes.object, hits.passes.entry_xy.astype(np.float64))
+
     def by(setting: str | None, **ways: str) -> Method:
-        return fired_method(setting, alone, Pistol(None), _entered, **shot, **ways)
+        return fired_method(setting, alone, Pistol(None), entered, **shot, **ways)
 
     filters = tuple(by(name, prefilter=name, broadphase="none") for name in ("none", "box", "circle", "swept"))
     phases = tuple(by(name, broadphase=name) for name in ("grid", "quadtree", "bvh"))
@@ -78,14 +81,6 @@ def _supercover(alone: Scene, start: Ints, step: Ints) -> tuple[Curve, ...]:
         Curve("supercover, pre-filter", "pre-filter", filters, "the same answers: only time differs"),
         Curve("supercover, broad phase", "broad phase", phases, "the same answers: only time differs"),
     )
-
-
-def _entered(hits: RayHits) -> Decisions:
-    return Decisions.of(hits.passes.shot, hits.passes.object, hits.passes.entry_xy.astype(np.float64))
-
-
-def _touched(hits: RayHits) -> Decisions:
-    return Decisions.of(hits.passes.shot, hits.passes.object, np.asarray(hits.passes.point_xy))
 
 
 def _stepping(alone: Scene, start: Ints, step: Ints, length: int) -> Curve:
@@ -149,7 +144,11 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     first = impacts(flights, targets, velocities)
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
     once, *substeps = (_overlapping(alone, flights, None if n == 1 else n, n) for n in (1, *SUBSTEPS))
-    swept = fired_method(None, alone, Projectile(speed, radius), _touched, at=start / SUB, toward=(start + way) / SUB)
+    swept = fired_method(
+        None, alone, Projectile(speed, radius),
+        lambda hits: Decisions.of(hits.passes.shot, hits.passes.object, np.asarray(hits.passes.point_xy)),
+        at=start / SUB, toward=(start + way) / SUB,
+    )  # fmt: skip
     ends = Segments(start / SUB, (start + flights.step_256) / SUB)
     return Question(
         "movers",

@@ -170,13 +170,12 @@ def flown(speed_256: int, toward_256: Ints) -> Ints:
 
     The direction is rounded to 2**-30, then the end to 1/256 px, half to even.
     """
-    ends = [[_along(speed_256, c, x * x + y * y) for c in (x, y)] for x, y in toward_256.tolist()]
+    ends = []
+    for x, y in toward_256.tolist():
+        cosines = [(math.isqrt(4 * ONE * ONE * c * c // (x * x + y * y)) + 1) // 2 for c in (x, y)]
+        signed = [k if c > 0 else -k for k, c in zip(cosines, (x, y), strict=True)]
+        ends.append([round(Fraction(k * speed_256, ONE)) for k in signed])
     return np.array(ends, np.int64).reshape(-1, 2)
-
-
-def _along(speed_256: int, part: int, square: int) -> int:
-    cosine = (math.isqrt(4 * ONE * ONE * part * part // square) + 1) // 2
-    return round(Fraction(cosine * speed_256 * (1 if part > 0 else -1), ONE))
 
 
 def impacts(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Impacts:
@@ -404,19 +403,15 @@ def placed_rings(
 def discs_on_shapes(at: Floats, radius: float, shapes: Sequence[Round | Straight]) -> Touched:
     """Find the closed discs around points (N, 2) that touch closed shapes."""
     found = []
+    off = (np.arange(STRIPS) + 0.5) * (2 * radius / STRIPS) - radius
+    half = np.sqrt(radius**2 - off**2)
     for k, shape in enumerate(shapes):
         low, high = shape.box
         for shot in np.flatnonzero(((at >= low - radius) & (at <= high + radius)).all(axis=1)).tolist():
-            if shape.meets(at[shot], radius):
-                found.append((shot, k, *shape.nearest(at[shot]).tolist(), _share(at[shot], radius, shape)))
+            place = at[shot]
+            if shape.meets(place, radius):
+                chords = shape.chords(place[1] + off, place[0] - half, place[0] + half)
+                found.append((shot, k, *shape.nearest(place).tolist(), float(chords.sum() / (2 * half.sum()))))
     table = np.array(sorted(found), np.float64).reshape(-1, 5)
     shot, item = table[:, :2].T.astype(np.int64)
     return Touched(shot, item, table[:, 2:4], table[:, 4])
-
-
-def _share(at: Floats, radius: float, shape: Round | Straight) -> float:
-    """Return the part of a disc's area that a shape covers."""
-    step = 2 * radius / STRIPS
-    off = (np.arange(STRIPS) + 0.5) * step - radius
-    half = np.sqrt(radius**2 - off**2)
-    return float(shape.chords(at[1] + off, at[0] - half, at[0] + half).sum() / (2 * half.sum()))
