@@ -186,17 +186,12 @@ def open_streams() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         if getattr(sys, name) is None:
             null = os.open(os.devnull, os.O_WRONLY)
-            if null > number and not _is_open(number):
-                os.dup2(null, number)
+            if null > number:
+                try:
+                    os.fstat(number)
+                except OSError:  # it is closed
+                    os.dup2(null, number)
             setattr(sys, name, os.fdopen(null, "w", encoding="utf-8", closefd=False))
-
-
-def _is_open(number: int) -> bool:
-    try:
-        os.fstat(number)
-    except OSError:
-        return False
-    return True
 
 
 @contextmanager

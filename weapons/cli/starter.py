@@ -70,11 +70,6 @@ def write_starter(folder: Path) -> None:
     """Write the scene into a new or empty folder.
 
     scene.json is written last, so an incomplete scene cannot be loaded. An error or an interrupt removes all files.
-
-    Raises
-    ------
-    InputError
-        If the folder holds something, or cannot be made.
     """
     draw = {"meadow": _meadow, "balloon": _balloon, "bullseye": _bullseye, "crate": _crate, "ground": _ground}
     images = {f"{name}.png": image() for name, image in {**draw, "score": _score}.items()}
