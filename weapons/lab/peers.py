@@ -267,20 +267,13 @@ def _first_masks(pygame: Any, targets: list[Target], rays: Segments) -> Run:
     """Return a run that finds the shots that hit, the rank of the first mask of each, and the pixel."""
     world = masks_in_pygame(pygame, targets)
     shots = _pairs(np.rint(rays.start_xy), np.rint(rays.end_xy))
-    return lambda: [
-        (shot, *first) for shot, ends in enumerate(shots) if (first := _first_mask(world, *ends)) is not None
-    ]
+    return lambda: [(shot, *first) for shot, ends in enumerate(shots) if (first := _first_mask(world, *ends))]
 
 
-def _first_mask(
-    world: list[tuple[Any, Any]], start: tuple[float, ...], end: tuple[float, ...]
-) -> tuple[int, int, int] | None:
+def _first_mask(world: list[tuple[Any, Any]], start: Any, end: Any) -> tuple[int, int, int] | None:
     """Return the index of the first mask on a line, and the pixel."""
-    ways = []
-    for rank, (rect, _) in enumerate(world):
-        clipped = rect.clipline(start, end)
-        if clipped:
-            ways.append((math.dist(start, clipped[0]), rank, clipped))
+    lines = [(rank, rect.clipline(start, end)) for rank, (rect, _) in enumerate(world)]
+    ways = [(math.dist(start, clipped[0]), rank, clipped) for rank, clipped in lines if clipped]
     best: tuple[float, int, int, int] | None = None
     for far, rank, clipped in sorted(ways):
         if best is not None and far > best[0]:

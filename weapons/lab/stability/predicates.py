@@ -180,6 +180,11 @@ FLIGHT_FAMILIES: dict[str, Make] = {
 # Patterns: what they are, the pixel that is asked for from the shot's own, and where that is
 
 
+def _placed(make: Callable[..., Columns], **others: Make) -> dict[str, Make]:
+    """Return the families of patterns near the origin, far from it, and in scenes at 10^9, with others between them."""
+    return {"near": make, "far": partial(make, places=(0, 12)), **others, "scene": partial(make, places=(9, 10))}
+
+
 def _disc(rng: Rng, n: int, least: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
     """Make discs and pixels at their rim: exactly on it, off by 1 to 3, or anywhere."""
     groups = -(-n // SHARED)
@@ -203,14 +208,10 @@ def _one_px_disc(rng: Rng, n: int) -> Columns:
     return radius, _wide(rng, n, 1), _places(rng, n)
 
 
-DISC_FAMILIES: dict[str, Make] = {
-    "near": partial(_disc, least=5, most=400),
-    "far": partial(_disc, least=5, most=400, places=(0, 12)),
-    "lattice": partial(_disc, least=1, most=40),
-    "one": _one_px_disc,
-    "vast": partial(_disc, least=5500, most=5642),
-    "scene": partial(_disc, least=5, most=400, places=(9, 10)),
-}
+DISC_FAMILIES = _placed(
+    partial(_disc, least=5, most=400), lattice=partial(_disc, least=1, most=40), one=_one_px_disc,
+    vast=partial(_disc, least=5500, most=5642),
+)  # fmt: skip
 
 
 def _beam(rng: Rng, n: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
@@ -235,14 +236,9 @@ def _thin_beam(rng: Rng, n: int) -> Columns:
     return unit, times, radius, along + _wide(rng, n, 1), places
 
 
-BEAM_FAMILIES: dict[str, Make] = {
-    "near": partial(_beam, most=400),
-    "far": partial(_beam, most=400, places=(0, 12)),
-    "needles": _thin_beam,
-    "lattice": partial(_beam, most=20),
-    "vast": partial(_beam, most=10_000),
-    "scene": partial(_beam, most=400, places=(9, 10)),
-}
+BEAM_FAMILIES = _placed(
+    partial(_beam, most=400), needles=_thin_beam, lattice=partial(_beam, most=20), vast=partial(_beam, most=10_000)
+)
 
 
 def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin: int = 1) -> Columns:
@@ -262,15 +258,10 @@ def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin
     return every, near + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.3), _places(rng, n, *places)
 
 
-PATTERN_FAMILIES: dict[str, Make] = {
-    "near": partial(_pattern, size=300),
-    "far": partial(_pattern, size=300, places=(0, 12)),
-    "needles": partial(_pattern, size=5000, thin=1000),
-    "lattice": partial(_pattern, size=6),
-    "one": partial(_pattern, size=1),
-    "vast": partial(_pattern, size=10_000),
-    "scene": partial(_pattern, size=300, places=(9, 10)),
-}
+PATTERN_FAMILIES = _placed(
+    partial(_pattern, size=300), needles=partial(_pattern, size=5000, thin=1000), lattice=partial(_pattern, size=6),
+    one=partial(_pattern, size=1), vast=partial(_pattern, size=10_000),
+)  # fmt: skip
 
 
 Array = npt.NDArray[Any]
