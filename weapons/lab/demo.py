@@ -99,13 +99,8 @@ KINDS = {
 """Structures by name, coarser than the fastest so that their cells can be seen."""
 
 Color = tuple[int, int, int]
-FOUND: Color = MARKS["hit"][0]
-TESTED: Color = (246, 228, 150)
-VISITED: Color = MARKS["occluded"][0]
-REST: Color = (88, 94, 106)
-CELL: Color = (80, 86, 98)
-ON_THE_WAY: Color = (62, 116, 148)
-
+FOUND, VISITED = MARKS["hit"][0], MARKS["occluded"][0]
+TESTED, REST, CELL, ON_THE_WAY = (246, 228, 150), (88, 94, 106), (80, 86, 98), (62, 116, 148)
 TINT = 84  # opacity of an opened leaf, of 255
 RING = 1.4  # thickness of a ring, px
 ROOM = 16  # padding around a picture, in which discs may begin, px

@@ -30,9 +30,7 @@ from hitplanes.planes.volumes import fit
 from ..kinds.areas import Disc
 from .study.methods import Curve, Decisions, Method, Target
 
-PYGAME_MOST = 2**30
-"""Largest coordinate for pygame's rectangles, px; they hold C ints, and a sum of two coordinates must fit."""
-
+PYGAME_MOST = 2**30  # px in pygame's rectangles; they hold C ints, and a sum of two coordinates must fit
 Array = npt.NDArray[Any]
 Run = Callable[[], Any]
 

@@ -20,11 +20,8 @@ from hitplanes.planes.common.checks import Bools, Floats
 from .truth import has_area, is_convex, is_simple
 
 Rng = np.random.Generator
-Columns = tuple[npt.NDArray[Any], ...]
-"""Arguments of a predicate, row by row."""
-
-Make = Callable[[Rng, int], Columns]
-"""Function that makes n rows."""
+Columns = tuple[npt.NDArray[Any], ...]  # arguments of a predicate, row by row
+Make = Callable[[Rng, int], Columns]  # makes n rows
 
 FAMILIES = {
     "near": "near touching, 1 to 3 ulp",

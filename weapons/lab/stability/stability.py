@@ -265,14 +265,8 @@ FILES = ("stability.json", "stability.md", "stability.png")
 def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: TextIO | None = sys.stderr) -> Study:
     """Ask all questions, and write the JSON, the table and, if matplotlib is installed, the picture.
 
-    A quick run asks a few hundred rows for each cell instead of up to a million. Progress is drawn on the stream.
-
-    Raises
-    ------
-    InputError
-        If the folder holds other files, or cannot be made or written.
-    KeyboardInterrupt
-        After the results so far were written.
+    A quick run asks a few hundred rows for each cell instead of up to a million. Progress is drawn on the stream. An
+    interrupt writes the results so far. A folder that holds other files is refused.
     """
     seed = integer("seed", seed, 0, SEED_MAX)
     folder = path_of("output", folder)

@@ -105,8 +105,7 @@ def _shape(scene: Scene, item: int) -> Round | Straight | None:
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
 PREFILTERS = ("none", "box", "circle", "oriented box", "4 boxes", "polygon")
 BROADPHASES = ("none", "grid", "quadtree", "bvh")
-Fired = list[tuple[Hits, Ints]]
-"""Hits, and the ids of the objects that were fired at."""
+Fired = list[tuple[Hits, Ints]]  # with the ids of the objects that were fired at
 
 
 def plane_curves(discs: Discs) -> list[Curve]:
@@ -162,8 +161,7 @@ CORNERS = (4, 5, 6, 8, 12, 16, 24)
 TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
 POINTS_AT_ONCE = 1 << 16  # that are tested against volumes
 FINEST = 12  # px, largest radius at which every pixel is tested for the share; larger discs use a coarser lattice
-Make = Callable[[Scene], list[Volumes]]
-"""Function that returns the volumes of a scene's objects in the world, with one row per object."""
+Make = Callable[[Scene], list[Volumes]]  # in the world, one row per object
 
 
 def volume_curves(discs: Discs) -> list[Curve]:

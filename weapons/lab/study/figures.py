@@ -53,8 +53,7 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
 """Colours that the colour-blind can tell apart: Okabe and Ito, "Color universal design" (2008)."""
-Style = tuple[str, str]
-"""Colour and mark of a curve."""
+Style = tuple[str, str]  # colour and mark of a curve
 STYLES: dict[str, Style] = {
     "pixel planes": (BLUE, "o"), "pixels, pre-filter": (SKY, "D"), "pixels, broad phase": (SKY, "s"),
     "circle": (PURPLE, "o"), "circle about the pivot": (PURPLE, "P"), "box, re-boxed": (ORANGE, "X"),

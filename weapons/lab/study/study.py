@@ -33,10 +33,8 @@ PACKAGES = ("hitplanes", "numpy", "opencv-python-headless", "pymunk", "shapely",
 
 SPREAD_PART = 5  # by which blasts are fewer than other shots, as thousands of pellets take long
 Json = Mapping[str, Any]
-Show = Callable[[str, int, int], None]
-"""Function of the next measurement's name, the number of points done, and the number of all points."""
-Keep = Callable[[dict[str, Any]], None]
-"""Function that stores the unfinished study, given as JSON."""
+Show = Callable[[str, int, int], None]  # of the next measurement's name, the number of points done, and of all points
+Keep = Callable[[dict[str, Any]], None]  # stores the unfinished study, given as JSON
 
 
 @dataclass(frozen=True)
@@ -384,16 +382,9 @@ FILES = ("study.json", "study.csv", "study.md", *(f"{name}.png" for name in QUES
 def write_study(
     scene: Scene, folder: Path, seed: int, effort: Effort, error: float, progress: Progress
 ) -> tuple[dict[str, Any], list[str]]:
-    """Run a study and write it to a new folder or that of an earlier study.
+    """Run a study and write it to a new folder or that of an earlier study; an interrupt writes what was measured.
 
     Returned are the study as JSON, and the names of the questions that have a diagram.
-
-    Raises
-    ------
-    InputError
-        If the folder holds other files, or cannot be written.
-    KeyboardInterrupt
-        After the points measured so far were written.
     """
     folder = path_of("output", folder)
     own_folder(folder, FILES)
