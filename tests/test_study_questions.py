@@ -21,9 +21,9 @@ from hitplanes.weapons.lab.study.methods import (
     Method,
     Question,
     ahead,
+    copied,
     drawn_places,
     errors_of,
-    only_hittable,
     size_of,
     targets_of,
     velocities_of,
@@ -251,7 +251,7 @@ def test_a_finer_step_misses_less_and_all_it_misses_is_crossed() -> None:
 def test_fixed_steps_are_the_pixels_of_points_along_the_ray() -> None:
     scene = scene_of(3, 12)
     question = rays_question(scene, 40, 1)
-    targets = targets_of(only_hittable(scene))
+    targets = targets_of(scene)
     length = round(4 * size_of(targets))
     start, angle, _ = drawn_places(targets, 40, 1, SUB * length // 2, lambda xy: touching(xy, 0, targets))
     step = ahead(length, angle)
@@ -344,7 +344,7 @@ def test_share_by_pellets_is_off_by_one_over_their_root() -> None:
     assert -0.6 < slope < -0.4
 
 
-def test_only_hittable_keeps_what_can_be_hit() -> None:
+def test_a_copy_keeps_what_can_be_hit() -> None:
     scene = Scene((50, 50), categories=("a",))
     scene.add(Sprite.box(9, 9), role="occluder")
     duck = scene.add(Sprite.polygon([(0, 0), (9, 2), (3, 8)]), (3.25, 70), angle=33, scale=(2, 1.5), flip="x",
@@ -352,15 +352,15 @@ def test_only_hittable_keeps_what_can_be_hit() -> None:
     gone = scene.add(Sprite.circle(3))
     last = scene.add(Sprite.circle(3), (9, 9), owner=duck)
     scene.remove(gone)
-    alone = only_hittable(scene)
-    assert alone.bounds is None and alone.ids().tolist() == [duck, last]
-    assert [alone.name_of(i) for i in (duck, last)] == ["duck", scene.name_of(last)]
-    for item in (duck, last):
-        (mask, corner), (expected, place) = alone.mask(item), scene.mask(item)
+    alone = copied(scene, scene.ids("hittable"))
+    assert alone.bounds is None and alone.ids().tolist() == [0, 1]
+    assert [alone.name_of(i) for i in (0, 1)] == ["duck", scene.name_of(last)]
+    for new, item in enumerate((duck, last)):
+        (mask, corner), (expected, place) = alone.mask(new), scene.mask(item)
         assert np.array_equal(mask, expected) and corner == place
-    assert alone.items.layer[duck] == 3 and alone.items.velocity_256[duck].tolist() == [256, 512]
-    assert alone.items.categories[[duck, last]].tolist() == [1, 1] and alone.items.owner[last] == last
-    assert [target[0] for target in targets_of(alone)] == [duck, last]
+    assert alone.items.layer[0] == 3 and alone.items.velocity_256[0].tolist() == [256, 512]
+    assert alone.items.categories[[0, 1]].tolist() == [1, 1] and alone.items.owner[[0, 1]].tolist() == [0, 1]
+    assert [target[0] for target in targets_of(alone)] == [0, 1]
 
 
 def test_places_are_about_objects_and_those_taken_are_not_drawn() -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -429,6 +429,21 @@ def empty_folder(folder: Path) -> bool:
     if held:
         raise InputError(f"folder: expected a new or empty folder, got {folder} with {held[0]!r} in it")
     return False
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[list[Path]]:
+    """Make a folder unless it exists and is empty; after an error, remove it and the files that are listed."""
+    made, files = empty_folder(folder), list[Path]()
+    try:
+        yield files
+    except BaseException:
+        with suppress(OSError):
+            for path in files:
+                path.unlink(missing_ok=True)
+            if made:
+                folder.rmdir()
+        raise
 
 
 def own_folder(folder: Path, names: Sequence[str]) -> None:

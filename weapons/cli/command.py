@@ -153,14 +153,9 @@ examples:
 """
 
 
-NAMED = 8
-"""Most objects that a line of output names."""
-
-USAGE_MAX = 300
-"""Longest usage error, characters."""
-
-SHOWN = ("quadtree", "grid", "bvh")
-"""Structures that the demo can show."""
+NAMED = 8  # most objects that a line of output names
+USAGE_MAX = 300  # characters of a usage error
+SHOWN = ("quadtree", "grid", "bvh")  # structures that the demo can show
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -168,9 +163,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     open_streams()
     try:
         try:
-            return _ran(argv)
+            arguments = parser().parse_args(argv)
+            return arguments.run(arguments) or 0
         finally:
-            _flush()
+            with _printing():
+                sys.stdout.flush()
     except InputError as error:
         _complain(" ".join(str(error).split()))
         return 2
@@ -184,33 +181,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         _let_go(sys.stderr)
 
 
-def _ran(argv: Sequence[str] | None) -> int:
-    arguments = parser().parse_args(argv)
-    return arguments.run(arguments) or 0
-
-
 def open_streams() -> None:
     """Open stdout and stderr if they were closed, or the next file that is opened would take their number."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         if getattr(sys, name) is None:
             null = os.open(os.devnull, os.O_WRONLY)
-            if null > number and not _is_open(number):
-                os.dup2(null, number)
+            if null > number:
+                try:
+                    os.fstat(number)
+                except OSError:  # it is closed
+                    os.dup2(null, number)
             setattr(sys, name, os.fdopen(null, "w", encoding="utf-8", closefd=False))
-
-
-def _is_open(number: int) -> bool:
-    try:
-        os.fstat(number)
-    except OSError:
-        return False
-    return True
-
-
-def _flush() -> None:
-    """Flush stdout."""
-    with _printing():
-        sys.stdout.flush()
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, Image, path_of
 from hitplanes.planes.common.tables import Mask
 from hitplanes.planes.files.png import write_png, write_text
-from hitplanes.planes.files.scene_folder import FILE_NAME, empty_folder, laid_out
+from hitplanes.planes.files.scene_folder import FILE_NAME, laid_out, new_folder
 
 SCHEMAS = Path(__file__).parent.parent / "schemas"
 
@@ -71,44 +70,22 @@ def write_starter(folder: Path) -> None:
     """Write the scene into a new or empty folder.
 
     scene.json is written last, so an incomplete scene cannot be loaded. An error or an interrupt removes all files.
-
-    Raises
-    ------
-    InputError
-        If the folder holds something, or cannot be made.
     """
-    images = {
-        "meadow.png": _meadow(),
-        "balloon.png": _balloon(),
-        "bullseye.png": _bullseye(),
-        "crate.png": _crate(),
-        "ground.png": _ground(),
-        "score.png": _score(),
-    }
+    draw = {"meadow": _meadow, "balloon": _balloon, "bullseye": _bullseye, "crate": _crate, "ground": _ground}
+    images = {f"{name}.png": image() for name, image in {**draw, "score": _score}.items()}
     folder = path_of("folder", folder)
-    made = empty_folder(folder)
-    try:
+    with new_folder(folder) as files:
+        files += [folder / name for name in (FILE_NAME, SCHEMA_NAME, *images)]
         for name, image in images.items():
             write_png(folder / name, image)
         write_text(folder / SCHEMA_NAME, (SCHEMAS / "scene.json").read_text(encoding="utf-8"))
         write_text(folder / FILE_NAME, laid_out(SCENE) + "\n")
-    except BaseException:
-        with suppress(OSError):
-            for name in (FILE_NAME, SCHEMA_NAME, *images):
-                (folder / name).unlink(missing_ok=True)
-            if made:
-                folder.rmdir()
-        raise
 
 
-def _grid(width: int, height: int) -> tuple[Floats, Floats]:
-    """Return the x and y (h, w) of the pixel centres, from the centre of the image."""
+def _clear(width: int, height: int) -> tuple[Image, Floats, Floats]:
+    """Return a clear image, and the x and y (h, w) of its pixel centres, from its centre."""
     y, x = np.mgrid[:height, :width].astype(np.float64)
-    return x - (width - 1) / 2, y - (height - 1) / 2
-
-
-def _clear(width: int, height: int) -> Image:
-    return np.zeros((height, width, 4), np.uint8)
+    return np.zeros((height, width, 4), np.uint8), x - (width - 1) / 2, y - (height - 1) / 2
 
 
 def _paint(image: Image, where: Bools, color: Color) -> None:
@@ -148,8 +125,7 @@ def _meadow() -> Image:
 
 def _balloon() -> Image:
     """A round balloon with a knot and a string."""
-    x, y = _grid(44, 84)
-    image = _clear(44, 84)
+    image, x, y = _clear(44, 84)
     top = y + 18
     _paint(image, (x / 19) ** 2 + (top / 22) ** 2 < 1, RED)
     _paint(image, (abs(x) < (top - 19) / 1.5) & (top > 20) & (top < 27), RED)
@@ -162,8 +138,7 @@ def _balloon() -> Image:
 
 def _bullseye() -> Image:
     """Rings on a post."""
-    x, y = _grid(60, 96)
-    image = _clear(60, 96)
+    image, x, y = _clear(60, 96)
     top = y + 18
     _paint(image, (abs(x) < 4) & (top > 0) & (y < 47), WOOD)
     far = np.hypot(x, top)
@@ -175,8 +150,7 @@ def _bullseye() -> Image:
 
 def _crate() -> Image:
     """Boards in a frame, with a brace across."""
-    x, y = _grid(54, 54)
-    image = _clear(54, 54)
+    image, x, y = _clear(54, 54)
     reach = np.maximum(abs(x), abs(y))
     _paint(image, reach < 26, WOOD)
     frame = (reach > 20) | (abs(x + y) < 5)
@@ -189,7 +163,7 @@ def _crate() -> Image:
 def _ground() -> Image:
     """A strip of grass, its blades along the top."""
     y, x = np.mgrid[:26, :WIDTH].astype(np.float64)
-    image = _clear(WIDTH, 26)
+    image, _, _ = _clear(WIDTH, 26)
     blade = 5 + 2.5 * np.sin(x * 1.9) + 2 * np.sin(x * 0.7 + 1)
     _paint(image, y > blade, GRASS)
     return _shaded(image, 1.1 - 0.25 * np.clip((y - blade) / 16, 0, 1) + 0.05 * np.sin(x * 2.3 + y))

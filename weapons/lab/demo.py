@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +21,7 @@ from hitplanes.planes.broadphase.quadtree import Quadtree
 from hitplanes.planes.common.checks import Bools, Floats, Image, InputError, Ints, choice, integer, path_of
 from hitplanes.planes.common.limits import SUB, TRIG_BITS
 from hitplanes.planes.files.png import check_output, cv2, write_bytes, write_png
-from hitplanes.planes.files.scene_folder import empty_folder
+from hitplanes.planes.files.scene_folder import new_folder
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.planes.scene.render import blend
 
@@ -30,11 +29,8 @@ from ..report.canvas import CARD, FAINT, INK, PAGE_GROUND, Entry, Legend, Text, 
 from ..report.phrases import percent
 from ..report.symbols import MARKS
 
-NO_DITHER = 3
-"""Value by which OpenCV does not dither, unlike its documentation; -1 to 2 put dots on plain areas."""
-
-COLORS = 6
-"""Bits of the palette; 64 colours are enough for flat drawings, and make small files."""
+NO_DITHER = 3  # for OpenCV, unlike its documentation; -1 to 2 put dots on plain areas
+COLORS = 6  # bits of the palette; 64 colours are enough for flat drawings, and make small files
 
 
 def can_write_gif() -> bool:
@@ -43,13 +39,7 @@ def can_write_gif() -> bool:
 
 
 def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
-    """Write frames (h, w, 3) of RGB bytes as an endless GIF; an error leaves no incomplete file.
-
-    Raises
-    ------
-    InputError
-        If this OpenCV writes no GIF, or the file cannot be written.
-    """
+    """Write frames (h, w, 3) of RGB bytes as an endless GIF; an error leaves no incomplete file."""
     path = check_output(path)
     if not can_write_gif():
         raise InputError(f"output: expected the name of a folder: OpenCV {cv2.__version__} writes no GIF, got {path}")
@@ -64,63 +54,32 @@ def write_gif(path: Path, frames: Iterable[Image], milliseconds: int) -> None:
         write_bytes(path, aside.read_bytes())
 
 
-def write_frames(folder: Path, frames: Iterable[Image]) -> int:
-    """Write frames (h, w, 3) of RGB bytes as 000.png, 001.png, ..., and return their number.
-
-    An error or an interrupt removes the files.
-
-    Raises
-    ------
-    InputError
-        If the folder is neither new nor empty, or cannot be written to.
-    """
+def write_frames(folder: Path, frames: Iterable[Image]) -> None:
+    """Write frames (h, w, 3) of RGB bytes as 000.png, 001.png, ...; an error or an interrupt removes the files."""
     folder = path_of("output", folder)
-    made, written = empty_folder(folder), 0
-    try:
+    with new_folder(folder) as files:
         for frame in frames:
-            write_png(folder / f"{written:03}.png", frame)
-            written += 1
-    except BaseException:
-        with suppress(OSError):
-            for number in range(written + 1):
-                (folder / f"{number:03}.png").unlink(missing_ok=True)
-            if made:
-                folder.rmdir()
-        raise
-    return written
+            files.append(folder / f"{len(files):03}.png")
+            write_png(files[-1], frame)
 
 
-FRAMES = 80
-"""Frames of a round; the next round is the same."""
-
-MILLISECONDS = 70
-"""Duration of a frame."""
-
-WIDTH, HEIGHT = 300, 248
-"""Size of the world, px; each of the two panes shows it."""
-
+FRAMES = 80  # of a round; the next round is the same
+MILLISECONDS = 70  # duration of a frame
+SEED = 22  # of the boxes' orbits
 FLOCKS, FLOCK, WANDERERS = 3, 60, 120
 """Number of flocks, boxes in each, and boxes that move on their own."""
 
+WIDTH, HEIGHT = 300, 248
+"""Size of the world, px; each of the two panes shows it."""
 MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392
 """Space around the two panes, between them and above them, and height of the page, px."""
-
 NAME, BAR, CHART = 96, 160, 180
 """Widths of a bar's name, of the longest bar, and of the chart of all frames, px."""
-
-WALL = 6
-"""Least distance of a box's centre from the edge of the world, px."""
-
+WALL = 6  # least distance of a box's centre from the edge of the world, px
 MIDDLE = np.array([WIDTH / 2, HEIGHT / 2])
-
-QUERY_HALF = np.array([20.0, 16.0])
-"""Half the sides of the query, which is the box of a shot, px."""
-
+QUERY_HALF = np.array([20.0, 16.0])  # half the sides of the query, which is the box of a shot, px
 QUERY_REACH, QUERY_TURNS = np.array([[112.0, 88.0]]), np.array([[1, 2]])
 """Amplitudes (px) and turns of the figure of eight along which the query moves."""
-
-SEED = 22
-"""Random seed of the boxes' orbits."""
 
 
 class Kind(NamedTuple):
@@ -140,36 +99,19 @@ KINDS = {
 """Structures by name, coarser than the fastest so that their cells can be seen."""
 
 Color = tuple[int, int, int]
-FOUND: Color = MARKS["hit"][0]
-TESTED: Color = (246, 228, 150)
-VISITED: Color = MARKS["occluded"][0]
-REST: Color = (88, 94, 106)
-CELL: Color = (80, 86, 98)
-ON_THE_WAY: Color = (62, 116, 148)
-
-TINT = 84
-"""Opacity of an opened leaf, of 255."""
-
-RING = 1.4
-"""Thickness of a ring, px."""
-
-ROOM = 16
-"""Padding around a picture, in which discs may begin, px."""
+FOUND, VISITED = MARKS["hit"][0], MARKS["occluded"][0]
+TESTED, REST, CELL, ON_THE_WAY = (246, 228, 150), (88, 94, 106), (80, 86, 98), (62, 116, 148)
+TINT = 84  # opacity of an opened leaf, of 255
+RING = 1.4  # thickness of a ring, px
+ROOM = 16  # padding around a picture, in which discs may begin, px
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame: the structure, and the work of one query.
+    """A frame: the nodes of the structure (C,), the boxes (N, 4), px, and the work of one query (4,).
 
-    Parameters
-    ----------
-    cells : nodes of the structure
-    visited : (C,) bool, nodes that the query visited
-    nodes : number of comparisons or look-ups of nodes
-    boxes : (N, 4) float, px
-    tests : number of comparisons of boxes; a box in several leaves counts in each
-    tested, found : (N,) bool, boxes that were compared with the query, and that overlap it
-    query : (4,) float, px
+    It visited nodes; comparisons or look-ups of `nodes` and of boxes (`tests`) are counted, a box in several leaves in
+    each. `tested` boxes were compared with the query, and `found` ones overlap it.
     """
 
     cells: Cells
@@ -193,18 +135,7 @@ class Moment:
 
 
 def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
-    """Move boxes in a structure, and query it at each step.
-
-    Parameters
-    ----------
-    kind : one of KINDS
-    frames : number of steps of a round, at least 1
-
-    Raises
-    ------
-    InputError
-        If the structure is unknown, or `frames` is less than 1.
-    """
+    """Move boxes in a structure, one of KINDS, and query it at each of the steps of a round."""
     kind = choice("kind", kind, KINDS)
     frames = integer("frames", frames, 1, 2**31)
     places, half = _orbits(frames)
@@ -212,20 +143,17 @@ def moments(kind: str, frames: int = FRAMES) -> Iterator[Moment]:
     structure = KINDS[kind].make(_around(places[0], half))
     ids = structure.ids
     for centres, aim in zip(places, track, strict=True):
-        boxes = _around(centres, half)
+        boxes, query = _around(centres, half), _around(aim, QUERY_HALF)
         structure.move(ids, boxes)
-        yield _moment(structure, boxes, _around(aim, QUERY_HALF))
+        work, cells = structure.work(query[None]), structure.cell_boxes()
+        met = work.tested[1], structure.query(query[None])[1]
+        tested, found = (np.isin(np.arange(len(boxes)), numbers) for numbers in met)
+        visited = np.isin(cells.number, work.visited[1])
+        yield Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _around(centre: Floats, half: Floats) -> Floats:
     return np.concatenate((centre - half, centre + half), axis=-1)
-
-
-def _moment(structure: BroadPhase, boxes: Floats, query: Floats) -> Moment:
-    work, cells = structure.work(query[None]), structure.cell_boxes()
-    tested, found = (np.isin(np.arange(len(boxes)), met) for met in (work.tested[1], structure.query(query[None])[1]))
-    visited = np.isin(cells.number, work.visited[1])
-    return Moment(cells, visited, work.compared, boxes, work.tested.shape[1], tested, found, query)
 
 
 def _orbits(frames: int) -> tuple[Floats, Floats]:
@@ -234,8 +162,7 @@ def _orbits(frames: int) -> tuple[Floats, Floats]:
     Boxes of a flock circle its centre, which circles the middle of the world; others circle their own centres.
     """
     rng = np.random.default_rng(SEED)
-    n, reach = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]])
-    turns = np.array([[1, 1], [-1, 1], [1, -1]])
+    n, reach, turns = FLOCKS * FLOCK, np.array([[96, 70], [82, 84], [104, 56]]), np.array([[1, 1], [-1, 1], [1, -1]])
     leaders = _on_ellipse(frames, np.tile(MIDDLE, (FLOCKS, 1)), reach, turns, rng)
     reach = np.abs(rng.normal(0, 22, (n, 2))) + 3
     own = _on_ellipse(frames, np.zeros((n, 2)), reach, rng.choice([-2, -1, 1, 2], (n, 2)), rng)
@@ -258,32 +185,23 @@ def _on_ellipse(frames: int, middle: Floats, reach: Floats, turns: Ints, rng: np
 def write_demo(kind: str, output: Path, frames: int = FRAMES) -> Path:
     """Write a round of a structure as a GIF, or as PNG files into a folder, and return the path.
 
-    Parameters
-    ----------
-    kind : one of KINDS
-    output : a file that ends in .gif, or a folder. If OpenCV writes no GIF, the name without .gif is the folder.
-
-    Raises
-    ------
-    InputError
-        If the structure is unknown, or the output has another ending or cannot be written.
+    The output ends in .gif or is a folder. If OpenCV writes no GIF, the name without .gif is the folder.
     """
     output = path_of("output", output)
     gif = output.suffix.lower() == ".gif"
     if not gif and output.suffix and not output.is_dir():
         wanted = "a name that ends in .gif, or of a folder, without an ending"
         raise InputError(f"--output: expected {wanted}, got {output.name!r}")
-    pictures = demo_frames(kind, frames)
     if gif and can_write_gif():
-        write_gif(output, pictures, MILLISECONDS)
-        return output
-    folder = output.with_suffix("") if gif else output
-    write_frames(folder, pictures)
-    return folder
+        write_gif(output, demo_frames(kind, frames), MILLISECONDS)
+    else:
+        output = output.with_suffix("") if gif else output
+        write_frames(output, demo_frames(kind, frames))
+    return output
 
 
 def demo_frames(kind: str, frames: int = FRAMES) -> Iterator[Image]:
-    """Yield the frames of a round, (h, w, 3) RGB bytes; parameters and errors are those of `moments`."""
+    """Yield the frames of a round, (h, w, 3) RGB bytes."""
     history: list[Moment] = []
     for moment in moments(kind, frames):
         history.append(moment)
@@ -293,8 +211,7 @@ def demo_frames(kind: str, frames: int = FRAMES) -> Iterator[Image]:
 def picture_of(kind: str, history: Sequence[Moment], frames: int = FRAMES) -> Image:
     """Draw the last moment of a history: both steps, a legend, and the tests made so far."""
     now, shown = history[-1], KINDS[kind]
-    page = np.empty((PAGE_HEIGHT, 2 * (MARGIN + WIDTH) + GAP, 3), np.uint8)
-    page[:] = PAGE_GROUND
+    page = np.full((PAGE_HEIGHT, 2 * (MARGIN + WIDTH) + GAP, 3), PAGE_GROUND, np.uint8)
     left, right = MARGIN, MARGIN + WIDTH + GAP
     page[TOP : TOP + HEIGHT, left : left + WIDTH] = _first_step(now)
     page[TOP : TOP + HEIGHT, right : right + WIDTH] = _second_step(now)
@@ -339,8 +256,7 @@ def _second_step(now: Moment) -> Image:
 
 def _pane(now: Moment, tint: int) -> Image:
     """Return a pane in which the opened leaves are tinted."""
-    pane = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    pane[:] = CARD
+    pane = np.full((HEIGHT, WIDTH, 3), CARD, np.uint8)
     for box in _distinct(now.cells.box[now.entered]):
         x0, y0, x1, y1 = _corners(box)
         if x0 < x1 and y0 < y1:
@@ -350,9 +266,8 @@ def _pane(now: Moment, tint: int) -> Image:
 
 def _discs(pane: Image, now: Moment, which: Bools, color: Color, more: int = 0, hollow: bool = False) -> None:
     """Draw the inscribed discs of boxes, or rings, with a radius larger by `more` px."""
-    centre = (now.boxes[:, :2] + now.boxes[:, 2:]) / 2
-    radius = (now.boxes[:, 2] - now.boxes[:, 0]) / 2
-    _round(pane, centre[which], radius[which] + more, color, hollow)
+    low, high = now.boxes[which, :2], now.boxes[which, 2:]
+    _round(pane, (low + high) / 2, (high - low)[:, 0] / 2 + more, color, hollow)
 
 
 def _round(picture: Image, centre: Floats, radius: Floats, color: Color, hollow: bool = False) -> None:
@@ -382,8 +297,7 @@ def _frame(pane: Image, box: Floats, color: Color, thick: int = 1) -> None:
 
 def _legend(now: Moment, width: int) -> Legend:
     """Return a legend with a mark for each style of cell and box."""
-    marks = np.empty((6, 14, 14, 3), np.uint8)
-    marks[:] = CARD
+    marks = np.full((6, 14, 14, 3), CARD, np.uint8)
     query, entered, way, rest, tested, found = marks
     cv2.rectangle(query, (1, 3), (12, 10), INK, 2)
     blend(entered, VISITED, np.full((14, 14), TINT, np.uint8), 0, 0)
@@ -407,20 +321,18 @@ def _counters(page: Image, name: str, history: Sequence[Moment], frames: int) ->
     left, n = MARGIN + NAME, len(now.boxes)
     texts = []
     text = f"{now.tests} boxes + {now.nodes} {'cells' if now.cells.leaf.all() else 'nodes'}"
-    rows = (("brute force", n, REST, f"{n} boxes"), (name, now.cost, VISITED, text))
-    for row, (word, tests, color, count_text) in enumerate(rows):
-        y, wide = top + 22 * row, round(BAR * tests / n)
+    rows = (top, "brute force", n, REST, f"{n} boxes", FAINT), (top + 22, name, now.cost, VISITED, text, INK)
+    for y, word, tests, color, count_text, ink in rows:
+        wide = round(BAR * tests / n)
         page[y : y + 13, left : left + wide] = color
-        texts.append(Text(left - 8, y + 11, word, FAINT, right=True))
-        texts.append(Text(left + wide + 8, y + 11, count_text, INK if row else FAINT))
+        texts += [Text(left - 8, y + 11, word, FAINT, right=True), Text(left + wide + 8, y + 11, count_text, ink)]
     for count, color in ((now.tests, TESTED), (now.found.sum(), FOUND)):
         page[top + 22 : top + 35, left : left + round(BAR * count / n)] = color
-    _chart(page[top : top + 35, page.shape[1] - MARGIN - CHART : page.shape[1] - MARGIN], history, frames)
-    saved = 1 - sum(moment.cost for moment in history) / (n * len(history))
-    middle = page.shape[1] - MARGIN - CHART - 10
-    texts.append(Text(middle, top + 11, "tests saved so far", FAINT, right=True))
-    texts.append(Text(middle, top + 33, percent(saved), INK, bold=True, right=True))
-    return texts
+    right = page.shape[1] - MARGIN
+    _chart(page[top : top + 35, right - CHART : right], history, frames)
+    saved = percent(1 - sum(moment.cost for moment in history) / (n * len(history)))
+    texts.append(Text(right - CHART - 10, top + 11, "tests saved so far", FAINT, right=True))
+    return [*texts, Text(right - CHART - 10, top + 33, saved, INK, bold=True, right=True)]
 
 
 def _chart(part: Image, history: Sequence[Moment], frames: int) -> None:

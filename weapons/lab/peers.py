@@ -30,9 +30,7 @@ from hitplanes.planes.volumes import fit
 from ..kinds.areas import Disc
 from .study.methods import Curve, Decisions, Method, Target
 
-PYGAME_MOST = 2**30
-"""Largest coordinate for pygame's rectangles, px; they hold C ints, and a sum of two coordinates must fit."""
-
+PYGAME_MOST = 2**30  # px in pygame's rectangles; they hold C ints, and a sum of two coordinates must fit
 Array = npt.NDArray[Any]
 Run = Callable[[], Any]
 
@@ -131,9 +129,7 @@ def ray_curves(targets: list[Target], rays: Segments) -> tuple[Curve, ...]:
 def mover_curve(targets: list[Target], flights: Segments, radius: float, moving: bool) -> Curve:
     """Return pymunk's curve for flying discs against hulls, which uses thick segments as swept discs.
 
-    Parameters
-    ----------
-    moving : whether objects move; the curve is then left out, as objects stand still in a query of pymunk
+    It is left out if objects move, as they stand still in a query of pymunk.
     """
     note = "a thick segment, swept, against convex hulls of the masks; in floats"
     run, read = partial(_first_hulls, targets=targets, rays=flights, radius=radius), partial(_along, flights)
@@ -221,10 +217,6 @@ def _overlaps(pygame: Any, targets: list[Target], disc: Bools, corner: Ints) -> 
     return run
 
 
-FirstHits = tuple[list[Any], dict[Any, int]]
-"""The first hit of each segment, or None, and the object of each shape."""
-
-
 def _first_hulls(pymunk: Any, targets: list[Target], rays: Segments, radius: float) -> Run:
     """Return a run that finds the first hull on each segment."""
     space, item_of = hulls_in_pymunk(pymunk, targets)
@@ -232,7 +224,7 @@ def _first_hulls(pymunk: Any, targets: list[Target], rays: Segments, radius: flo
     return lambda: ([ask(start, end, radius, every) for start, end in shots], item_of)
 
 
-def _along(rays: Segments, answer: FirstHits) -> tuple[Ints, Ints, Floats]:
+def _along(rays: Segments, answer: tuple[list[Any], dict[Any, int]]) -> tuple[Ints, Ints, Floats]:
     """Return the segments that hit, their objects, and the points, at a fraction of the segment.
 
     The fraction is used as it is right (0) for a segment that begins in a hull; pymunk's point is then the end.
@@ -273,20 +265,13 @@ def _first_masks(pygame: Any, targets: list[Target], rays: Segments) -> Run:
     """Return a run that finds the shots that hit, the rank of the first mask of each, and the pixel."""
     world = masks_in_pygame(pygame, targets)
     shots = _pairs(np.rint(rays.start_xy), np.rint(rays.end_xy))
-    return lambda: [
-        (shot, *first) for shot, ends in enumerate(shots) if (first := _first_mask(world, *ends)) is not None
-    ]
+    return lambda: [(shot, *first) for shot, ends in enumerate(shots) if (first := _first_mask(world, *ends))]
 
 
-def _first_mask(
-    world: list[tuple[Any, Any]], start: tuple[float, ...], end: tuple[float, ...]
-) -> tuple[int, int, int] | None:
+def _first_mask(world: list[tuple[Any, Any]], start: Any, end: Any) -> tuple[int, int, int] | None:
     """Return the index of the first mask on a line, and the pixel."""
-    ways = []
-    for rank, (rect, _) in enumerate(world):
-        clipped = rect.clipline(start, end)
-        if clipped:
-            ways.append((math.dist(start, clipped[0]), rank, clipped))
+    lines = [(rank, rect.clipline(start, end)) for rank, (rect, _) in enumerate(world)]
+    ways = [(math.dist(start, clipped[0]), rank, clipped) for rank, clipped in lines if clipped]
     best: tuple[float, int, int, int] | None = None
     for far, rank, clipped in sorted(ways):
         if best is not None and far > best[0]:
@@ -359,27 +344,19 @@ def _by_row(columns: tuple[Array, ...]) -> Any:
     return zip(*(column.tolist() for column in columns), strict=True)
 
 
-def _static(pymunk: Any) -> Any:
-    return pymunk.Body(body_type=pymunk.Body.STATIC)
+SHAPES: dict[str, Callable[..., Any]] = {
+    "circle": lambda m, body, center, radius: m.Circle(body, radius, tuple(center)),
+    "segment": lambda m, body, a, b, radius: m.Segment(body, tuple(a), tuple(b), radius),
+    "poly": lambda m, body, ring: m.Poly(body, [tuple(p) for p in ring]),
+}
+"""How pymunk makes a shape from the numbers of a row."""
 
 
-def _circle(pymunk: Any, body: Any, center: Any, radius: float) -> Any:
-    return pymunk.Circle(body, radius, tuple(center))
-
-
-def _segment(pymunk: Any, body: Any, a: Any, b: Any, radius: float) -> Any:
-    return pymunk.Segment(body, tuple(a), tuple(b), radius)
-
-
-def _poly(pymunk: Any, body: Any, ring: Any) -> Any:
-    return pymunk.Poly(body, [tuple(p) for p in ring])
-
-
-def _contacts(make_a: Any, make_b: Any, taken: int, pymunk: Any, *columns: Array) -> list[bool]:
+def _contacts(kind_a: str, kind_b: str, taken: int, pymunk: Any, *columns: Array) -> list[bool]:
     """Make two shapes per row, from the first columns and from the rest, and ask whether they are in contact."""
-    body, found = _static(pymunk), []
+    body, found = pymunk.Body(body_type=pymunk.Body.STATIC), []
     for row in _by_row(columns):
-        a, b = make_a(pymunk, body, *row[:taken]), make_b(pymunk, body, *row[taken:])
+        a, b = SHAPES[kind_a](pymunk, body, *row[:taken]), SHAPES[kind_b](pymunk, body, *row[taken:])
         a.cache_bb()
         b.cache_bb()
         try:
@@ -390,10 +367,10 @@ def _contacts(make_a: Any, make_b: Any, taken: int, pymunk: Any, *columns: Array
 
 
 def _rays_on_squares(pymunk: Any, start: Array, end: Array, cells: Array) -> list[bool]:
-    body, found = _static(pymunk), []
+    body, found = pymunk.Body(body_type=pymunk.Body.STATIC), []
     for a, b, (x, y) in _by_row((start / 256, end / 256, cells)):
         ring = [(x - 0.5, y - 0.5), (x + 0.5, y - 0.5), (x + 0.5, y + 0.5), (x - 0.5, y + 0.5)]
-        square = _poly(pymunk, body, ring)
+        square = pymunk.Poly(body, ring)
         square.cache_bb()
         inside = square.point_query(tuple(a)).distance <= 0  # segment_query misses a shape around the start
         found.append(inside or square.segment_query(tuple(a), tuple(b), 0) is not None)
@@ -435,12 +412,12 @@ TABLE: dict[str, dict[str, Callable[..., Any]]] = {
         ),
     },
     "pymunk": {
-        "circles": partial(_contacts, _circle, _circle, 2),
+        "circles": partial(_contacts, "circle", "circle", 2),
         "boxes": lambda m, *columns: [m.BB(*a, *b).intersects(m.BB(*c, *d)) for a, b, c, d in _by_row(columns)],
-        "capsule, circle": partial(_contacts, _segment, _circle, 3),
-        "circle, polygon": partial(_contacts, _poly, _circle, 1),
-        "polygons": partial(_contacts, _poly, _poly, 1),
-        "oriented boxes": partial(_contacts, _poly, _poly, 1),
+        "capsule, circle": partial(_contacts, "segment", "circle", 3),
+        "circle, polygon": partial(_contacts, "poly", "circle", 1),
+        "polygons": partial(_contacts, "poly", "poly", 1),
+        "oriented boxes": partial(_contacts, "poly", "poly", 1),
         "ray, 1-px target": _rays_on_squares,
     },
     "pygame-ce": {"circles": _circles_in_pygame},

@@ -20,11 +20,8 @@ from hitplanes.planes.common.checks import Bools, Floats
 from .truth import has_area, is_convex, is_simple
 
 Rng = np.random.Generator
-Columns = tuple[npt.NDArray[Any], ...]
-"""Arguments of a predicate, row by row."""
-
-Make = Callable[[Rng, int], Columns]
-"""Function that makes n rows."""
+Columns = tuple[npt.NDArray[Any], ...]  # arguments of a predicate, row by row
+Make = Callable[[Rng, int], Columns]  # makes n rows
 
 FAMILIES = {
     "near": "near touching, 1 to 3 ulp",
@@ -50,9 +47,7 @@ TRIPLES = np.array([(1, 0, 1), (0, 1, 1), (3, 4, 5), (4, 3, 5), (5, 12, 13), (12
 """Integer vectors of integer length, and the length; integer shapes along them touch exactly."""
 
 SQUARE = np.array([(-1.0, -1), (1, -1), (1, 1), (-1, 1)])
-
 POWERS = np.array([float(f"1e{k}") for k in range(-20, 21)])
-
 ULPS = 3
 
 
@@ -247,8 +242,8 @@ def _whole_contact(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
 
 def _far(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
     by = directions(rng, n) * decades(rng, n, 0, 12)[:, None]
-    a, b = (s.moved(by) for s in _contact(rng, kinds, n))
-    a, b = _nudged(rng, (a, b))
+    a, b = _contact(rng, kinds, n)
+    a, b = _nudged(rng, (a.moved(by), b.moved(by)))
     some = rng.random(n) < 0.4
     one, two = (s.moved(np.rint(by)) for s in _whole_contact(rng, kinds, n))
     return a.where(some, one), b.where(some, two)
@@ -283,14 +278,13 @@ def _shared(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
     rows, corner = np.arange(n), rng.integers(0, b.points.shape[1], n)
     points = b.points + (p - b.points[rows, corner])[:, None]
     points[rows, corner] = p
-    if kinds[1] == "oriented box":
-        out = -across(q - p) * rng.uniform(0.1, 1, (n, 1))
-        joined = np.stack([q, p, p + out, q + out], axis=1)
-    elif kinds[1] == "polygon":
+    joined = points
+    if kinds[1] in ("oriented box", "polygon"):
         out, step = -across(q - p) * rng.uniform(0.1, 1, (n, 1)), q - p
-        joined = np.stack([q, p, p + out - step * 0.3, p + 2 * out + step * 0.4, q + out + step * 0.3], axis=1)
-    else:
-        joined = points
+        sides = [q, p, p + out, q + out]
+        if kinds[1] == "polygon":
+            sides = [q, p, p + out - step * 0.3, p + 2 * out + step * 0.4, q + out + step * 0.3]
+        joined = np.stack(sides, axis=1)
     b = Shapes(np.where((rng.random(n) < 0.5)[:, None, None], joined, points), b.radius)
     one, two = _nudged(rng, (a, b))
     kept = rng.random(n) < 0.5
@@ -299,7 +293,8 @@ def _shared(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
 
 def _at_scale(rng: Rng, kinds: tuple[str, str], n: int, low: int, high: int) -> Pair:
     power = rng.integers(low, high, n)
-    a, b = _nudged(rng, tuple(s.scaled(power) for s in _contact(rng, kinds, n)))  # type: ignore[arg-type]
+    a, b = _contact(rng, kinds, n)
+    a, b = _nudged(rng, (a.scaled(power), b.scaled(power)))
     one, two = (s.scaled(power) for s in _whole_contact(rng, kinds, n))
     some = rng.random(n) < 0.5
     return a.where(some, one), b.where(some, two)
@@ -319,13 +314,23 @@ MAKERS: dict[str, Callable[[Rng, tuple[str, str], int], Pair]] = {
 }
 
 
+STORED: dict[str, Callable[[Shapes], Columns]] = {
+    "circle": lambda s: (s.points[:, 0], s.radius),
+    "capsule": lambda s: (s.points[:, 0], s.points[:, 1], s.radius),
+    "box": lambda s: (s.points.min(axis=1), s.points.max(axis=1)),
+    "oriented box": lambda s: (s.points,),
+    "polygon": lambda s: (s.points,),
+}
+"""Columns by which a predicate is told of each kind of shape."""
+
+
 def shape_pairs(kinds: tuple[str, str], family: str) -> Make:
     """Return a maker of pairs of two kinds, as arguments of `truth`; polygons are exactly convex as stored."""
     sided = sum(kind in ("polygon", "oriented box") for kind in kinds)  # they come first
 
     def make(rng: Rng, n: int) -> Columns:
         pair = MAKERS[family](rng, kinds, n)
-        return tuple(column for kind, shapes in zip(kinds, pair, strict=True) for column in _stored(kind, shapes))
+        return tuple(column for kind, shapes in zip(kinds, pair, strict=True) for column in STORED[kind](shapes))
 
     return _filled(make, lambda *row: all(map(is_convex, row[:sided])))
 
@@ -345,22 +350,8 @@ def _filled(make: Make, valid: Callable[..., bool]) -> Make:
     return filled
 
 
-def _stored(kind: str, shapes: Shapes) -> Columns:
-    points = shapes.points
-    if kind == "circle":
-        return points[:, 0], shapes.radius
-    if kind == "capsule":
-        return points[:, 0], points[:, 1], shapes.radius
-    if kind == "box":
-        return points.min(axis=1), points.max(axis=1)
-    return (points,)
-
-
-POINTS = 16
-"""Points that are tested against each polygon."""
-
-TRIANGLE_CORNERS = 7
-"""Corners of a polygon."""
+POINTS = 16  # that are tested against each polygon
+TRIANGLE_CORNERS = 7  # of a polygon
 
 
 def stars(rng: Rng, n: int, low: float = 0.4) -> Floats:
@@ -482,12 +473,7 @@ def _touching3(rng: Rng, n: int, size: Any = 1.0, thin: Any = 1.0) -> Columns:
     return np.where(back, b, a), np.where(back, a, b)
 
 
-def _near3(rng: Rng, n: int) -> Columns:
-    return nudged(rng, *_touching3(rng, n))
-
-
-def _far3(rng: Rng, n: int) -> Columns:
-    by = (_space_directions(rng, n) * decades(rng, n, 0, 12)[:, None])[:, None]
+def _near3(rng: Rng, n: int, by: Any = 0.0) -> Columns:
     return nudged(rng, *(t + by for t in _touching3(rng, n)))
 
 
@@ -531,7 +517,7 @@ def _scaled3(rng: Rng, n: int, low: int, high: int) -> Columns:
 
 _TRIANGLES: dict[str, Make] = {
     "near": _near3,
-    "far": _far3,
+    "far": lambda rng, n: _near3(rng, n, (_space_directions(rng, n) * decades(rng, n, 0, 12)[:, None])[:, None]),
     "ratio": lambda rng, n: nudged(rng, *_touching3(rng, n, size=decades(rng, n, -12, 0))),
     "needles": lambda rng, n: nudged(rng, *_touching3(rng, n, thin=decades(rng, n, -16, -2))),
     "shared": _shared3,

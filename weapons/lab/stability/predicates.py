@@ -46,13 +46,8 @@ from .truth import is_simple
 Whole = npt.NDArray[np.int64]
 
 PX, HALF = 256, 128
-
-MOST = 3
-"""Largest distance by which rows are moved off a tie, 1/256 px."""
-
-SHARED = 32
-"""Consecutive rows that share a weapon."""
-
+MOST = 3  # largest distance by which rows are moved off a tie, 1/256 px
+SHARED = 32  # consecutive rows that share a weapon
 TENS = 10 ** np.arange(13)
 
 
@@ -128,16 +123,6 @@ def _shifted(rng: Rng, *columns: Whole, units: Mapping[int, int], low: int, high
     return tuple(column + units[k] * by if k in units else column for k, column in enumerate(columns))
 
 
-def _beside(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
-    """Replace pixels by others near the ones aimed at."""
-    return start, end, cells + _wide(rng, len(cells), 1) * (rng.random((len(cells), 1)) < 0.6)
-
-
-def _with_length(rng: Rng, start: Whole, end: Whole, cells: Whole) -> Columns:
-    """Give shots without length a length of 1/256 px."""
-    return start, end + (start == end).all(axis=1)[:, None], cells
-
-
 _near_ray = partial(_passing_ray, size=1500, least=0)
 _far_ray = partial(_shifted, units={0: PX, 1: PX, 2: 1})
 
@@ -150,8 +135,15 @@ RAYS: dict[str, Make] = {
     "fast": partial(_passing_ray, size=3 * 10**7, least=1),  # about 10^6 px long
     "scene": _then(_corner_ray, partial(_far_ray, low=9, high=10)),
 }
-CELL_FAMILIES = {name: _then(make, _beside) for name, make in RAYS.items() if name != "fast"}
-RAY_FAMILIES = {name: _then(make, _with_length) for name, make in RAYS.items()}
+CELL_FAMILIES = {  # of pixels near the ones aimed at
+    name: _then(make, lambda rng, a, b, c: (a, b, c + _wide(rng, len(c), 1) * (rng.random((len(c), 1)) < 0.6)))
+    for name, make in RAYS.items()
+    if name != "fast"
+}
+RAY_FAMILIES = {  # shots without length have one of 1/256 px
+    name: _then(make, lambda _, a, b, cells: (a, b + (a == b).all(axis=1)[:, None], cells))
+    for name, make in RAYS.items()
+}
 
 
 # Flights: start, unit vector and how often it is flown, radius, pixel, where that moves
@@ -188,6 +180,11 @@ FLIGHT_FAMILIES: dict[str, Make] = {
 # Patterns: what they are, the pixel that is asked for from the shot's own, and where that is
 
 
+def _placed(make: Callable[..., Columns], **others: Make) -> dict[str, Make]:
+    """Return the families of patterns near the origin, far from it, and in scenes at 10^9, with others between them."""
+    return {"near": make, "far": partial(make, places=(0, 12)), **others, "scene": partial(make, places=(9, 10))}
+
+
 def _disc(rng: Rng, n: int, least: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
     """Make discs and pixels at their rim: exactly on it, off by 1 to 3, or anywhere."""
     groups = -(-n // SHARED)
@@ -211,14 +208,10 @@ def _one_px_disc(rng: Rng, n: int) -> Columns:
     return radius, _wide(rng, n, 1), _places(rng, n)
 
 
-DISC_FAMILIES: dict[str, Make] = {
-    "near": partial(_disc, least=5, most=400),
-    "far": partial(_disc, least=5, most=400, places=(0, 12)),
-    "lattice": partial(_disc, least=1, most=40),
-    "one": _one_px_disc,
-    "vast": partial(_disc, least=5500, most=5642),
-    "scene": partial(_disc, least=5, most=400, places=(9, 10)),
-}
+DISC_FAMILIES = _placed(
+    partial(_disc, least=5, most=400), lattice=partial(_disc, least=1, most=40), one=_one_px_disc,
+    vast=partial(_disc, least=5500, most=5642),
+)  # fmt: skip
 
 
 def _beam(rng: Rng, n: int, most: int, places: tuple[int, int] = (0, 2)) -> Columns:
@@ -243,14 +236,9 @@ def _thin_beam(rng: Rng, n: int) -> Columns:
     return unit, times, radius, along + _wide(rng, n, 1), places
 
 
-BEAM_FAMILIES: dict[str, Make] = {
-    "near": partial(_beam, most=400),
-    "far": partial(_beam, most=400, places=(0, 12)),
-    "needles": _thin_beam,
-    "lattice": partial(_beam, most=20),
-    "vast": partial(_beam, most=10_000),
-    "scene": partial(_beam, most=400, places=(9, 10)),
-}
+BEAM_FAMILIES = _placed(
+    partial(_beam, most=400), needles=_thin_beam, lattice=partial(_beam, most=20), vast=partial(_beam, most=10_000)
+)
 
 
 def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin: int = 1) -> Columns:
@@ -270,40 +258,27 @@ def _pattern(rng: Rng, n: int, size: int, places: tuple[int, int] = (0, 2), thin
     return every, near + _wide(rng, n, 1) * (rng.random((n, 1)) < 0.3), _places(rng, n, *places)
 
 
-PATTERN_FAMILIES: dict[str, Make] = {
-    "near": partial(_pattern, size=300),
-    "far": partial(_pattern, size=300, places=(0, 12)),
-    "needles": partial(_pattern, size=5000, thin=1000),
-    "lattice": partial(_pattern, size=6),
-    "one": partial(_pattern, size=1),
-    "vast": partial(_pattern, size=10_000),
-    "scene": partial(_pattern, size=300, places=(9, 10)),
-}
+PATTERN_FAMILIES = _placed(
+    partial(_pattern, size=300), needles=partial(_pattern, size=5000, thin=1000), lattice=partial(_pattern, size=6),
+    one=partial(_pattern, size=1), vast=partial(_pattern, size=10_000),
+)  # fmt: skip
 
 
 Array = npt.NDArray[Any]
 Method = Callable[..., Bools]
 Families = Mapping[str, Make]
 
-APART = 2**22
-"""Distance between the areas of two rows, px; more than twice the reach of any shot."""
-
-ABREAST = 32
-"""Areas side by side in x."""
+APART = 2**22  # px between the areas of two rows; more than twice the reach of any shot
+ABREAST = 32  # areas side by side in x
 
 
 @dataclass(frozen=True)
 class Predicate:
     """A predicate that methods decide.
 
-    Parameters
-    ----------
-    truth : exact answer, given a row of numbers
-    ours, naive : answers of hitplanes and of the textbook, given columns
-    families : makers of columns
-    rows, quick : number of rows of a family in a full run, and in a quick one
-    block : number of rows at a time
-    cost : relative cost of a row
+    `truth` is the exact answer, given a row of numbers; `ours` and `naive` are the answers of hitplanes and of the
+    textbook, given the columns that a family makes. A family has so many rows in a full run and in a quick one, made by
+    the block; `cost` is the relative cost of a row.
     """
 
     name: str
@@ -323,8 +298,7 @@ class Predicate:
 
 
 def _pairs(*kinds: str, without: tuple[str, ...] = ()) -> Families:
-    both = (kinds[0], kinds[1])
-    return {family: shape_pairs(both, family) for family in MAKERS if family not in without}
+    return {family: shape_pairs((kinds[0], kinds[1]), family) for family in MAKERS if family not in without}
 
 
 # Ours: volumes
@@ -396,10 +370,6 @@ def _beam_pixels(unit: Array, times: Array, radius: Array, cells: Array, places:
     return _by_weapon(keys, lambda k: Beam(k[0] / SUB, 2 * k[1] / SUB), cells + places, places, unit)
 
 
-def _polygon(ring: list[Any]) -> Weapon:
-    return Polygon([(x / SUB, y / SUB) for k, (x, y) in enumerate(ring) if [x, y] != ring[k - 1]])
-
-
 ROUND = ("needles", "parallel", "shared")
 """Families that need sides, which circles lack."""
 
@@ -459,7 +429,10 @@ PREDICATES = (
     ),
     Predicate(
         "polygon's pixels", lambda ring, cell, _: truth.polygon_holds(ring, [SUB * v for v in cell]),
-        lambda rings, cells, places: _by_weapon(rings, _polygon, cells + places, places),
+        lambda rings, cells, places: _by_weapon(
+            rings, lambda ring: Polygon([(x / SUB, y / SUB) for k, (x, y) in enumerate(ring) if [x, y] != ring[k - 1]]),
+            cells + places, places,
+        ),
         textbook.pattern_pixels, PATTERN_FAMILIES, *FIRED,
     ),
 )  # fmt: skip

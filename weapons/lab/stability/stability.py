@@ -28,7 +28,7 @@ from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
 from ..peers import PEERS, installed, of_peer
-from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike
+from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike, save_figure
 from ..study.study import markdown_table
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
@@ -140,13 +140,7 @@ class Study:
 
 
 def load_study(path: Path) -> Study:
-    """Read a `stability.json`.
-
-    Raises
-    ------
-    InputError
-        If the file is not one.
-    """
+    """Read a `stability.json`; any other file is an InputError."""
     path = path_of("path", path)
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -161,21 +155,13 @@ def load_study(path: Path) -> Study:
 
 
 EMPTY = "#f3f5f7"
-
 WIDTH, LEFT, RIGHT = 11.0, 1.75, 0.85
 """Widths of the picture and of its margins, inches."""
-
 ROW, GAP, NAMES, HEADING, SCALE = 0.255, 0.42, 1.1, 0.62, 0.85
 """Heights of a row, a block's title, the columns' names, the picture's title, and the scale, inches."""
-
-LIGHTEST = 0.12
-"""Start of the colour scale; lighter colours look like none."""
-
-DARK = 0.5
-"""Brightness of a colour below which text on it is white."""
-
-FULL = 7
-"""Length of a text that fills a cell, characters."""
+LIGHTEST = 0.12  # start of the colour scale; lighter colours look like none
+DARK = 0.5  # brightness of a colour below which text on it is white
+FULL = 7  # characters that fill a cell
 
 
 def heat_figure(study: Study) -> Figure:
@@ -216,8 +202,7 @@ def _block(axes: Axes, study: Study, method: str, predicates: list[str]) -> None
     from matplotlib.patches import Rectangle
 
     wide, high = len(FAMILIES), len(predicates)
-    corner = (-0.5, -0.5)
-    axes.add_patch(Rectangle(corner, wide, high, facecolor=EMPTY, edgecolor=HATCH, linewidth=0, hatch="////"))
+    axes.add_patch(Rectangle((-0.5, -0.5), wide, high, facecolor=EMPTY, edgecolor=HATCH, linewidth=0, hatch="////"))
     for y, predicate in enumerate(predicates):
         for x, family in enumerate(FAMILIES):
             cell = study.cell(predicate, family)
@@ -236,13 +221,12 @@ def _square(axes: Axes, x: int, y: int, per_million: float) -> None:
     """Draw a cell, with its colour and text."""
     from matplotlib.patches import Rectangle
 
-    color, rim = (_color(per_million), 0.0) if per_million else ((1.0, 1.0, 1.0), 0.8)
+    color, rim, text = (_color(per_million), 0.0, rate(per_million)) if per_million else ((1.0, 1.0, 1.0), 0.8, "0")
     axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=PAPER, linewidth=0))
     axes.add_patch(Rectangle((x - 0.47, y - 0.45), 0.94, 0.9, facecolor=color, edgecolor=HATCH, linewidth=rim))
     dark = color[0] * 0.3 + color[1] * 0.59 + color[2] * 0.11 < DARK
-    text = rate(per_million) if per_million else "0"
-    size = 8 if len(text) < FULL else 7
-    axes.text(x, y, text, ha="center", va="center_baseline", color=PAPER if dark else INK, size=size)
+    ink, size = PAPER if dark else INK, 8 if len(text) < FULL else 7
+    axes.text(x, y, text, ha="center", va="center_baseline", color=ink, size=size)
 
 
 def _color(per_million: float) -> tuple[float, float, float]:
@@ -273,32 +257,16 @@ def _scale(figure: Figure, height: float) -> None:
     figure.text(LEFT / WIDTH + 0.52, 0.57 / height, "0: none wrong      hatched: not asked", va="center")
 
 
-ONE_BY_ONE = ("pymunk", "pygame-ce")
-"""Libraries that are called row by row."""
-
-ONE_BY_ONE_MOST = 10**5
-"""Most rows of a cell that these libraries answer."""
-
+ONE_BY_ONE, ONE_BY_ONE_MOST = ("pymunk", "pygame-ce"), 10**5
+"""Libraries that are called row by row, and the most rows of a cell that they answer."""
 FILES = ("stability.json", "stability.md", "stability.png")
-"""Files that a run writes."""
 
 
 def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: TextIO | None = sys.stderr) -> Study:
     """Ask all questions, and write the JSON, the table and, if matplotlib is installed, the picture.
 
-    Parameters
-    ----------
-    folder : a new or empty folder, or that of an earlier run
-    seed : random seed of the questions
-    quick : whether to ask a few hundred rows for each cell instead of up to a million
-    stream : stream on which progress is drawn
-
-    Raises
-    ------
-    InputError
-        If the folder holds other files, or cannot be made or written.
-    KeyboardInterrupt
-        After the results so far were written.
+    A quick run asks a few hundred rows for each cell instead of up to a million. Progress is drawn on the stream. An
+    interrupt writes the results so far. A folder that holds other files is refused.
     """
     seed = integer("seed", seed, 0, SEED_MAX)
     folder = path_of("output", folder)
@@ -320,17 +288,15 @@ def run_stability(folder: Path, seed: int = 0, quick: bool = False, stream: Text
 
 
 def _ask(study: Study, progress: Progress, keep: Callable[[], None]) -> None:
-    plan = [(p, family) for p in PREDICATES for family in p.families]
-    weights = [p.cost * (p.quick if study.quick else p.rows) for p, _ in plan]
-    progress.begin(sum(weights), 0, 0)
+    plan = [(p, family, p.quick if study.quick else p.rows) for p in PREDICATES for family in p.families]
+    progress.begin(sum(p.cost * asked for p, _, asked in plan), 0, 0)
     done = 0
-    for (predicate, family), weight in zip(plan, weights, strict=True):
-        asked = predicate.quick if study.quick else predicate.rows
+    for predicate, family, asked in plan:
         cell = Cell(predicate.name, family, asked)
         study.cells.append(cell)
         for rows in _blocks(predicate, family, cell, study):
-            progress.show(sum(c.rows for c in study.cells), done + weight * rows // asked)
-        done += weight
+            progress.show(sum(c.rows for c in study.cells), done + predicate.cost * rows)
+        done += predicate.cost * asked
         keep()
 
 
@@ -373,14 +339,8 @@ def _write(study: Study, folder: Path) -> None:
     """Write the JSON, the tables and, if matplotlib is installed, the picture."""
     _keep(study, folder)
     write_text(folder / FILES[1], markdown(study))
-    if find_spec("matplotlib") is None:
-        return
-    from ..study.figures import save_figure
-
-    save_figure(heat_figure(study), folder / FILES[2])
-
-
-# In words
+    if find_spec("matplotlib") is not None:
+        save_figure(heat_figure(study), folder / FILES[2])
 
 
 def markdown(study: Study) -> str:
@@ -410,10 +370,10 @@ def _head(study: Study) -> list[str]:
 def _table(
     study: Study, predicates: Sequence[str], families: Sequence[str], entry: Callable[[Cell], str]
 ) -> Iterator[str]:
-    rows = []
-    for predicate in predicates:
-        cells = [study.cell(predicate, family) for family in families]
-        rows.append([predicate, *("-" if cell is None else entry(cell) for cell in cells)])
+    rows = [
+        [name, *("-" if (cell := study.cell(name, family)) is None else entry(cell) for family in families)]
+        for name in predicates
+    ]
     return markdown_table(["predicate", *(FAMILIES[f] for f in families)], rows, numbers=True)
 
 

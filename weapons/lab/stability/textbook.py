@@ -123,7 +123,8 @@ def _coplanar(a: Floats, b: Floats, normal: Floats) -> Bools:
     found = point_polygon(q, p[:, 0]) | point_polygon(p, q[:, 0])
     for i in range(3):
         for j in range(3):
-            found |= _sides_cross(p[:, i - 1], p[:, i], q[:, j - 1], q[:, j])
+            a0, a1, b0, b1 = p[:, i - 1], p[:, i], q[:, j - 1], q[:, j]
+            found |= (_turn(a0, a1, b0) * _turn(a0, a1, b1) <= 0) & (_turn(b0, b1, a0) * _turn(b0, b1, a1) <= 0)
     return found
 
 
@@ -131,21 +132,12 @@ def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
     return np.asarray((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
 
 
-def _sides_cross(a: Floats, b: Floats, c: Floats, d: Floats) -> Bools:
-    sides, others = _turn(a, b, c) * _turn(a, b, d), _turn(c, d, a) * _turn(c, d, b)
-    return np.asarray((sides <= 0) & (others <= 0))
-
-
 # Rays and patterns, in px
-
-
-def _px(*values: Array) -> list[Floats]:
-    return [value / 256.0 for value in values]
 
 
 def ray_targets(start: Array, end: Array, cells: Array) -> Bools:
     """Clip the ray to the slabs of the box (Kay and Kajiya)."""
-    a, b = _px(start, end)
+    a, b = start / 256, end / 256
     return _slabs(a, b - a, cells)
 
 
@@ -157,7 +149,7 @@ def _slabs(a: Floats, step: Floats, cells: Array) -> Bools:
 
 def ray_cells(start: Array, end: Array, cells: Array) -> Bools:
     """Walk from cell to cell across the nearest wall, up to the last cell (Amanatides and Woo)."""
-    a, b = _px(start, end)
+    a, b = start / 256, end / 256
     step = b - a
     at, last = np.floor(a + 0.5), np.floor(b + 0.5)
     sign = np.sign(step)
@@ -176,7 +168,7 @@ def ray_cells(start: Array, end: Array, cells: Array) -> Bools:
 
 def flights(start: Array, unit: Array, times: Array, radius: Array, cells: Array, velocity: Array) -> Bools:
     """Move the centre by the relative step; test its distance from the pixel's centre, and the slabs of the pixel."""
-    a, step, r = _px(start, unit * times[:, None] - velocity, radius)
+    a, step, r = start / 256, (unit * times[:, None] - velocity) / 256, radius / 256
     return np.asarray((_distance2(cells.astype(np.float64), a, a + step) <= r * r) | _slabs(a, step, cells))
 
 

@@ -15,8 +15,7 @@ Row = Sequence[Any]
 Point = Sequence[int]
 Ring = Sequence[Point]
 
-HALF = 128
-"""From a pixel's centre to its edge, in 1/256 px."""
+HALF = 128  # from a pixel's centre to its edge, in 1/256 px
 
 
 def whole(numbers: Sequence[Any]) -> list[int]:
@@ -34,10 +33,6 @@ def _rows(*rows: Row, width: int = 2) -> list[list[tuple[int, ...]]]:
     for row in rows:
         ends.append(ends[-1] + len(row))
     return [points[first:last] for first, last in pairwise(ends)]
-
-
-def _sign(value: int) -> int:
-    return (value > 0) - (value < 0)
 
 
 def _turn(a: Point, b: Point, c: Point) -> int:
@@ -96,10 +91,10 @@ def is_convex(ring: Row) -> bool:
     """Whether points go once around a convex polygon and turn the same way at each of them."""
     (ring,) = _rows(ring)
     n = len(ring)
-    turns = {_sign(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n])) for k in range(n)}
+    turns = [_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) for k in range(n)]
     ahead = [tuple(q) > tuple(p) for p, q in _sides(ring)]
     returns = sum(p != q for p, q in zip(ahead, ahead[1:] + ahead[:1], strict=True))
-    return len(turns) == 1 and turns != {0} and returns == 2
+    return (min(turns) > 0 or max(turns) < 0) and returns == 2
 
 
 def is_simple(ring: Row) -> bool:
@@ -108,23 +103,14 @@ def is_simple(ring: Row) -> bool:
     sides = list(_sides(ring))
     for k, (a, b) in enumerate(sides):
         after = sides[(k + 1) % len(sides)][1]
-        if a == b or (_turn(a, b, after) == 0 and _beyond(after, b, a)):
+        back = sum((after[i] - b[i]) * (a[i] - b[i]) for i in (0, 1)) > 0
+        if a == b or (back and _turn(a, b, after) == 0):
             return False  # a side without length, or one that turns back
-        others = sides[k + 2 : len(sides) - (k == 0)]
-        if any(_touch(a, b, *other) for other in others):
-            return False
+        for c, d in sides[k + 2 : len(sides) - (k == 0)]:
+            ends = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
+            if _cross(a, b, c, d) or any(_on_side(p, q, r) for p, q, r in ends):
+                return False
     return True
-
-
-def _beyond(p: Point, corner: Point, q: Point) -> bool:
-    """Whether p and q, on one line with a corner, lie on the same side of it."""
-    return (p[0] - corner[0]) * (q[0] - corner[0]) + (p[1] - corner[1]) * (q[1] - corner[1]) > 0
-
-
-def _touch(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Whether two segments share a point."""
-    ends = ((a, c, d), (b, c, d), (c, a, b), (d, a, b))
-    return _cross(a, b, c, d) or any(_on_side(p, q, r) for p, q, r in ends)
 
 
 def polygon_holds(ring: Row, p: Row) -> bool:
@@ -185,7 +171,7 @@ def _edge_meets(p: Point, q: Point, triangle: Ring) -> bool:
     a, b, c = triangle
     normal = _cross3(_minus(b, a), _minus(c, a))
     at_p, at_q = _dot(normal, _minus(p, a)), _dot(normal, _minus(q, a))
-    if _sign(at_p) * _sign(at_q) > 0:
+    if at_p * at_q > 0:
         return False
     drop = max(range(3), key=lambda k: abs(normal[k]))
     flat = _upright([_without(corner, drop) for corner in triangle])
@@ -223,13 +209,9 @@ def segment_meets_cell(a: Point, b: Point, cell: Point) -> bool:
     if max(abs(ax), abs(ay)) <= HALF or max(abs(bx), abs(by)) <= HALF:
         return True
     diagonals = (((-HALF, -HALF), (HALF, HALF)), ((-HALF, HALF), (HALF, -HALF)))
-    return any(_segments_meet((ax, ay), (bx, by), *diagonal) for diagonal in diagonals)
-
-
-def _segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Whether two segments that do not lie on one line meet."""
-    sides = _turn(c, d, a), _turn(c, d, b)
-    return sides != (0, 0) and sides[0] * sides[1] <= 0 and _turn(a, b, c) * _turn(a, b, d) <= 0
+    a, b = (ax, ay), (bx, by)
+    sides = ((_turn(c, d, a), _turn(c, d, b), _turn(a, b, c) * _turn(a, b, d)) for c, d in diagonals)
+    return any((p or q) and p * q <= 0 and ends <= 0 for p, q, ends in sides)
 
 
 def disc_flies_into(a: Point, step: Point, radius: int, cell: Point, cell_step: Point) -> bool:
@@ -246,5 +228,4 @@ def in_disc(radius: int, cell: Point) -> bool:
 
 def in_beam(end: Point, radius: int, cell: Point) -> bool:
     """Whether a pixel's centre lies within the radius of a segment from (0, 0), or its square meets the segment."""
-    centre = [256 * v for v in cell]
-    return _near(centre, (0, 0), end, radius) or segment_meets_cell((0, 0), end, cell)
+    return disc_flies_into((0, 0), end, radius, cell, (0, 0))

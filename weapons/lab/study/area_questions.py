@@ -36,28 +36,19 @@ from .methods import (
     scaled,
     size_of,
     targets_of,
-    unscaled,
 )
 from .truth import Round, Straight, discs_on_shapes, parts_of_discs, placed_rings
 
-REACH = 8
-"""Median size of the objects, in radii of the disc."""
-
-RADIUS_MAX = 32
-"""Largest radius of a disc, px; at scale 4 it becomes 128 px, with 51,000 samples per shot."""
+REACH = 8  # median size of the objects, in radii of the disc
+RADIUS_MAX = 32  # px of a disc; at scale 4 it becomes 128 px, with 51,000 samples per shot
 
 
 @dataclass(frozen=True, eq=False)
 class Discs:
-    """Shots with discs of one radius, and the objects that they are fired at.
+    """Shots with discs of one radius, px, around `at` (N, 2), and the objects that they are fired at, numbered from 0.
 
-    Parameters
-    ----------
-    scene : the objects, numbered from 0
-    exact : (M,) whether the exact shape of an object is known
-    at : (N, 2) px; whole numbers if no shape is exact
-    aimed : (N,) the object near which a shot is
-    radius : px
+    `exact` (M,) says whether the exact shape of an object is known; places are whole numbers if none is. `aimed` (N,)
+    is the object near which a shot is.
     """
 
     scene: Scene
@@ -68,16 +59,9 @@ class Discs:
 
 
 def discs_at(alone: Scene, shots: int, seed: int) -> Discs:
-    """Draw discs, each uniformly in the box of an object grown by twice the radius.
-
-    Parameters
-    ----------
-    alone : the objects, numbered from 0, each with a pixel
-    shots : number of discs
-    seed : random seed of the places
-    """
+    """Draw discs, each uniformly in the box of an object grown by twice the radius."""
     targets, count = targets_of(alone), len(alone)
-    exact = np.array([_is_exact(alone, item) for item in range(count)], np.bool_)
+    exact = np.array([_shape(alone, item) is not None for item in range(count)], np.bool_)
     radius = min(max(1, round(size_of(targets) / REACH)), RADIUS_MAX)
     place, _, near = drawn_places(targets, shots, seed, 2 * SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = place / SUB if exact.any() else pixel(place).astype(np.float64)
@@ -97,23 +81,19 @@ def areas_question(discs: Discs, curves: Sequence[Curve]) -> Question:
 def _truth(discs: Discs) -> Decisions:
     """Return the exact shapes and the masks that discs touch, with places and shares."""
     exact = np.flatnonzero(discs.exact)
-    of = discs_on_shapes(discs.at, discs.radius, [_shape(discs.scene, item) for item in exact.tolist()])
+    shapes = [shape for item in exact.tolist() if (shape := _shape(discs.scene, item))]
+    of = discs_on_shapes(discs.at, discs.radius, shapes)
     masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
     on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
     on_masks = Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole)
     return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), on_masks])
 
 
-def _is_exact(scene: Scene, item: int) -> bool:
-    """Whether the exact shape of an object is known, which holds for polygons and circles, but not for ellipses."""
+def _shape(scene: Scene, item: int) -> Round | Straight | None:
+    """Return the exact shape of an object in the world, which is known of polygons and circles, but not of ellipses."""
     form, outline = scene.items.forms[item], scene.items.sprites[item].outline
-    return outline is not None and (outline.radius is None or form.scale_x == form.scale_y)
-
-
-def _shape(scene: Scene, item: int) -> Round | Straight:
-    """Return the exact shape of an object in the world."""
-    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
-    assert outline is not None  # it is exact
+    if outline is None or (outline.radius is not None and form.scale_x != form.scale_y):
+        return None
     position = scene.items.position_256[item] / SUB
     scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
     if outline.radius is not None:
@@ -125,9 +105,7 @@ def _shape(scene: Scene, item: int) -> Round | Straight:
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
 PREFILTERS = ("none", "box", "circle", "oriented box", "4 boxes", "polygon")
 BROADPHASES = ("none", "grid", "quadtree", "bvh")
-
-Fired = list[tuple[Hits, Ints]]
-"""Hits, and the ids of the objects that were fired at."""
+Fired = list[tuple[Hits, Ints]]  # with the ids of the objects that were fired at
 
 
 def plane_curves(discs: Discs) -> list[Curve]:
@@ -151,11 +129,7 @@ def _at_full_scale(discs: Discs, word: str, **how: str) -> Method:
 
 
 def _at_scale(discs: Discs, scale: float) -> Callable[[], Fired]:
-    """Return a run at a scale.
-
-    Shapes are drawn at that scale. A mask has no finer detail, so above full scale its pixels and those of the disc
-    become squares of pixels.
-    """
+    """Return a run with shapes drawn at a scale; above full scale pixels of masks and of the disc become squares."""
     exact = discs.exact | (scale <= 1)
     drawn, squares = np.flatnonzero(exact), np.flatnonzero(~exact)
     runs: list[Callable[[], tuple[Hits, Ints]]] = []
@@ -178,22 +152,16 @@ def _decided_by_planes(fired: Fired, scale: float) -> Decisions:
     found = []
     for hits, ids in fired:
         xy, share = hits.first_xy.astype(np.float64), hits.samples / hits.verdicts.sum(axis=1)[hits.shot]
-        found.append(Decisions(hits.shot, ids[hits.object], unscaled(xy, scale), share))
+        found.append(Decisions(hits.shot, ids[hits.object], (xy + 0.5) / scale - 0.5, share))
     return Decisions.joined(found)
 
 
 BOXES = (1, 2, 4, 8, 16, 32, 64)
 CORNERS = (4, 5, 6, 8, 12, 16, 24)
 TOLERANCES = (8.0, 4.0, 2.0, 1.0, 0.5)
-
-POINTS_AT_ONCE = 1 << 16
-"""Points that are tested against volumes at a time."""
-
-FINEST = 12
-"""Largest radius at which every pixel is tested for the share, px; larger discs use a coarser lattice."""
-
-Make = Callable[[Scene], list[Volumes]]
-"""Function that returns the volumes of a scene's objects in the world, with one row per object."""
+POINTS_AT_ONCE = 1 << 16  # that are tested against volumes
+FINEST = 12  # px, largest radius at which every pixel is tested for the share; larger discs use a coarser lattice
+Make = Callable[[Scene], list[Volumes]]  # in the world, one row per object
 
 
 def volume_curves(discs: Discs) -> list[Curve]:
@@ -273,7 +241,7 @@ def _method(discs: Discs, setting: float | None, make: Make) -> Method:
         made = make(alone)
         volumes = joined(made) if made else Circles(np.zeros((0, 2)), 0.0)
         box = volumes.bounds()
-        return lambda: (volumes, *_touched(volumes, box.min, box.max, discs))
+        return lambda: (volumes, *_touched(volumes, box, discs))
 
     return Method(setting, prepare, lambda found: _decided(discs, *found), lambda found: _stored(found[0]))
 
@@ -288,12 +256,12 @@ def _stored(volumes: Volumes) -> int:
     return core.points.nbytes + core.radius.nbytes * isinstance(volumes, Circles)
 
 
-def _touched(volumes: Volumes, low: Floats, high: Floats, discs: Discs) -> tuple[Ints, Ints]:
-    """Return the pairs (shots, objects) whose disc and volume touch; `low` and `high` are corners of bounding boxes."""
-    near = np.ones((len(discs.at), len(low)), np.bool_)
+def _touched(volumes: Volumes, box: Aabbs, discs: Discs) -> tuple[Ints, Ints]:
+    """Return the pairs (shots, objects) whose disc and volume touch, given the bounding boxes of the volumes."""
+    near = np.ones((len(discs.at), len(volumes)), np.bool_)
     for axis in range(2):
         place = discs.at[:, axis, None]
-        near &= (place + discs.radius >= low[:, axis]) & (place - discs.radius <= high[:, axis])
+        near &= (place + discs.radius >= box.min[:, axis]) & (place - discs.radius <= box.max[:, axis])
     shot, item = np.nonzero(near)
     touching = overlap(volumes.take(item), Circles(discs.at[shot], discs.radius))
     return shot[touching], item[touching]
@@ -326,26 +294,18 @@ def _looked_at(radius: float) -> Floats:
 ROUND, LONG, HOLE, CONCAVE, PARTS, TURNED, COMPACT = (
     "round", "long and thin", "with a hole", "concave", "several parts", "turned", "compact",
 )  # fmt: skip
-
-ROUND_LEAST = 0.85
-"""Least part of its enclosing circle that a round mask fills."""
-
-LONG_LEAST = 3.0
-"""Least ratio of the sides of the oriented box of a long and thin mask."""
-
-CONCAVE_MOST = 0.85
-"""Part of its hull below which a mask is concave."""
-
-TURNED_DEG = 15.0
-"""Least angle to the axes of a turned object, degrees."""
+ROUND_LEAST = 0.85  # part of its enclosing circle that a round mask fills
+LONG_LEAST = 3.0  # ratio of the sides of the oriented box of a long and thin mask
+CONCAVE_MOST = 0.85  # part of its hull below which a mask is concave
+TURNED_DEG = 15.0  # least angle to the axes of a turned object, degrees
 
 
 def kind_of(scene: Scene, item: int) -> str:
     """Classify the shape of an object that has pixels; the first kind that applies is returned."""
     mask, _ = scene.mask(item)
     off, radius = abs((scene.items.angles[item] + 45) % 90 - 45), float(fit.least_circle(mask).radius[0])
-    corners, (x, y) = fit.oriented_box(mask).points, fit.hull(mask).points.T
-    sides = [math.sqrt(float((side**2).sum())) for side in np.diff(corners[:3], axis=0)]
+    short, long = sorted(np.hypot(*np.diff(fit.oriented_box(mask).points[:3], axis=0).T).tolist())
+    x, y = fit.hull(mask).points.T
     hull_area = abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
     if _regions(mask, diagonal=True) > 1:
         return PARTS
@@ -355,7 +315,7 @@ def kind_of(scene: Scene, item: int) -> str:
         return ROUND
     if off >= TURNED_DEG:
         return TURNED
-    if max(sides) >= LONG_LEAST * min(sides):
+    if long >= LONG_LEAST * short:
         return LONG
     return CONCAVE if mask.sum() < CONCAVE_MOST * hull_area else COMPACT
 

@@ -18,23 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.patheffects import AbstractPathEffect
 
 
-DPI = 160
-"""Resolution; a picture of 11 inches is 1760 px wide, and readable when shown at 1000."""
-
+DPI = 160  # a picture of 11 inches is 1760 px wide, and readable when shown at 1000
 INK, FAINT, PAPER, HATCH = "#1d2733", "#66707c", "#ffffff", "#cfd5db"
-
 LOOK: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "hatch.color": HATCH,
-    "hatch.linewidth": 0.8,
-    "savefig.facecolor": PAPER,
-}
+    "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": FAINT, "axes.labelcolor": INK, "text.color": INK,
+    "xtick.color": INK, "ytick.color": INK, "hatch.color": HATCH, "hatch.linewidth": 0.8, "savefig.facecolor": PAPER,
+}  # fmt: skip
 """Style of all diagrams."""
 
 
@@ -50,55 +39,28 @@ def looking_alike() -> Iterator[None]:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG; equal figures give equal bytes.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Write a figure as PNG; equal figures give equal bytes."""
     data = io.BytesIO()
     with looking_alike():
         figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
     write_bytes(path, data.getvalue())
 
 
-SIZE = (11.0, 7.2)
-"""Size of a diagram, inches."""
-
+SIZE = (11.0, 7.2)  # of a diagram, inches
+DECADES = 30  # least ratio of the ends of the time axis to the data
+CLOSE = 1.12  # points whose times are within this ratio share a label
 BLACK, ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
 """Colours that the colour-blind can tell apart: Okabe and Ito, "Color universal design" (2008)."""
-
-DECADES = 30
-"""Least ratio of the ends of the time axis to the data."""
-
-CLOSE = 1.12
-"""Points whose times are within this ratio share a label."""
-
-
-Style = tuple[str, str]
-"""Colour and mark of a curve."""
-
+Style = tuple[str, str]  # colour and mark of a curve
 STYLES: dict[str, Style] = {
-    "pixel planes": (BLUE, "o"),
-    "pixels, pre-filter": (SKY, "D"),
-    "pixels, broad phase": (SKY, "s"),
-    "circle": (PURPLE, "o"),
-    "circle about the pivot": (PURPLE, "P"),
-    "box, re-boxed": (ORANGE, "X"),
-    "box, refitted": (ORANGE, "s"),
-    "oriented box": (RED, "D"),
-    "boxes": (ORANGE, "v"),
-    "convex polygon": (GREEN, "^"),
-    "hull": (GREEN, "*"),
-    "polygon": (GREEN, "p"),
-    "triangles": (RED, "<"),
-    "pymunk": (BLACK, "P"),
-    "shapely": (BLACK, "X"),
-    "pygame": (BLACK, "*"),
-}
+    "pixel planes": (BLUE, "o"), "pixels, pre-filter": (SKY, "D"), "pixels, broad phase": (SKY, "s"),
+    "circle": (PURPLE, "o"), "circle about the pivot": (PURPLE, "P"), "box, re-boxed": (ORANGE, "X"),
+    "box, refitted": (ORANGE, "s"), "oriented box": (RED, "D"), "boxes": (ORANGE, "v"), "convex polygon": (GREEN, "^"),
+    "hull": (GREEN, "*"), "polygon": (GREEN, "p"), "triangles": (RED, "<"), "pymunk": (BLACK, "P"),
+    "shapely": (BLACK, "X"), "pygame": (BLACK, "*"),
+}  # fmt: skip
 OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (SKY, "<"))
 """Styles for all other methods, in turn."""
 
@@ -106,28 +68,34 @@ OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (
 def work_precision(question: Mapping[str, Any], title: str) -> Figure:
     """Draw a question of a study, given as JSON.
 
-    Points without an error lie on a separate floor, which is labelled with the bound for this number of shots. The
-    Pareto front goes through the points for which no other is both faster and more accurate.
+    Points without an error lie on a separate floor, below all others and below one wrong decision in all shots, which
+    is labelled with the bound for this number of shots. The Pareto front goes through the points for which no other is
+    both faster and more accurate.
     """
     from matplotlib.figure import Figure
 
-    found = places(question)
-    floor = _floor(question, found)
+    found, wrong, least = places(question), question["error"] == "wrong", bound(question)
+    errors = [place.error for place in found if place.error > 0]
+    floor = min([*errors, 1 / max(question["shots"], 1)] if wrong else errors or [1.0]) / 3
     others = iter(OTHERS * len(question["curves"]))
     with looking_alike():
         figure = Figure(figsize=SIZE, layout="constrained")
         plot = figure.add_subplot()
-        _draw_front(plot, front(found), floor)
+        x, y = zip(*[(place.us, place.error or floor) for place in front(found)], strict=True)
+        label = "Pareto front: none is faster and less wrong"
+        plot.plot(x, y, color="#c3c9d0", linewidth=7, alpha=0.8, drawstyle="steps-post", label=label, zorder=1)
         for curve in question["curves"]:
             own = [place for place in found if place.curve == curve["name"]]
             if own:
                 _draw_curve(plot, own, curve["setting"], STYLES.get(curve["name"]) or next(others), floor)
         _write_words(plot, found, floor)
         _draw_axes(plot, question)
-        if question["error"] == "wrong":
-            _draw_bound(plot, question)
+        if wrong:  # the smallest error rate that this number of shots can show
+            _draw_level(plot, least, (6, 3), 0.8, "3/n", (1.0, 3, 0), va="center", fontsize=7.5, color=FAINT)
         if any(place.error == 0 for place in found):
-            _draw_floor(plot, question, floor)
+            plot.set_ylim(bottom=floor / 1.8)
+            text = f"none wrong in {question['shots']} shots: under 3/n = {least:.2g}" if wrong else "no error"
+            _draw_level(plot, floor, (2, 3), 1, text, (0.01, 0, -11), fontsize=8, color=INK)
         plot.set_title(f"{title}\n{question['asks']}", loc="left", weight="bold", size=11)
         figure.legend(loc="outside right upper", frameon=False, fontsize=9, title="method", alignment="left")
     return figure
@@ -144,13 +112,6 @@ def _draw_axes(plot: Axes, question: Mapping[str, Any]) -> None:
     plot.xaxis.set_minor_formatter("")
     least, most = plot.get_xlim()
     plot.set_xlim(min(least, most / DECADES), max(most, least * DECADES))
-
-
-def _floor(question: Mapping[str, Any], found: Sequence[Place]) -> float:
-    """Return the height of points without an error: below all others, and below one wrong decision in all shots."""
-    least = min((place.error for place in found if place.error > 0), default=1.0)
-    one = least if question["error"] == "share" else 1 / max(question["shots"], 1)
-    return min(least, one) / 3
 
 
 def _draw_curve(plot: Axes, own: Sequence[Place], setting: str, style: Style, floor: float) -> None:
@@ -192,27 +153,9 @@ def _write_words(plot: Axes, found: Sequence[Place], floor: float) -> None:
         near.append((x, y, word))
 
 
-def _draw_front(plot: Axes, best: Sequence[Place], floor: float) -> None:
-    """Draw the Pareto front as steps."""
-    x, y = [place.us for place in best], [place.error or floor for place in best]
-    label = "Pareto front: none is faster and less wrong"
-    plot.plot(x, y, color="#c3c9d0", linewidth=7, alpha=0.8, drawstyle="steps-post", label=label, zorder=1)
-
-
-def _draw_bound(plot: Axes, question: Mapping[str, Any]) -> None:
-    """Draw the smallest error rate that this number of shots can show."""
-    least = bound(question)
-    plot.axhline(least, color=FAINT, linewidth=0.8, linestyle=(0, (6, 3)), zorder=0)
-    plot.annotate("3/n", (1.0, least), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
-                  va="center", fontsize=7.5, color=FAINT)  # fmt: skip
-
-
-def _draw_floor(plot: Axes, question: Mapping[str, Any], floor: float) -> None:
-    """Draw the line of points without an error, with its meaning."""
-    plot.axhline(floor, color=FAINT, linewidth=1, linestyle=(0, (2, 3)), zorder=0)
-    plot.set_ylim(bottom=floor / 1.8)
-    text = "no error"
-    if question["error"] == "wrong":
-        text = f"none wrong in {question['shots']} shots: under 3/n = {bound(question):.2g}"
-    plot.annotate(text, (0.01, floor), (0, -11), xycoords=("axes fraction", "data"), textcoords="offset points",
-                  fontsize=8, color=INK)  # fmt: skip
+def _draw_level(
+    plot: Axes, y: float, dashes: tuple[int, int], width: float, text: str, at: tuple[float, int, int], **how: Any
+) -> None:
+    """Draw a level line, and a text at a part of its length, moved by a number of points."""
+    plot.axhline(y, color=FAINT, linewidth=width, linestyle=(0, dashes), zorder=0)
+    plot.annotate(text, (at[0], y), at[1:], xycoords=("axes fraction", "data"), textcoords="offset points", **how)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import statistics
 import time
+import timeit
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, integer
 from hitplanes.planes.common.limits import GOLDEN, HALF, SCALE_BITS, SEED_MAX, SUB
 from hitplanes.planes.grid.fixed_point import turned, unit
-from hitplanes.planes.scene.items import ROLES, Role
+from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
@@ -27,13 +27,10 @@ from ...kinds.weapon import Weapon
 
 @dataclass(frozen=True, eq=False)
 class Decisions(ShotColumns):
-    """Pairs (shot, object) that are hit; all other pairs are misses.
+    """Pairs (shot, object) that are hit, (K,) each; all other pairs are misses.
 
-    Parameters
-    ----------
-    shot, object : (K,) int64
-    xy : (K, 2) float, px, the places hit; NaN if the method gives none
-    share : (K,) float, the part of the shot that lies on the object, 0 to 1; NaN if the method gives none
+    `xy` are the places hit (K, 2), px, and `share` the part of the shot that lies on the object, 0 to 1; both are NaN
+    where a method gives none.
     """
 
     object: Ints
@@ -53,15 +50,10 @@ class Decisions(ShotColumns):
 
 
 class Errors(NamedTuple):
-    """Errors of a method.
+    """Numbers of true hits that a method misses and of its false hits, mean errors, and objects of wrong decisions.
 
-    Parameters
-    ----------
-    missed : number of true hits that the method misses
-    false : number of its hits that are not true
-    share : mean absolute error of the share, over all pairs hit in truth or by the method; None without such pairs
-    position : mean distance of the place hit from the true one, px, over pairs that both hit; None without such pairs
-    objects : the object of each wrong decision
+    `share` is the mean absolute error over all pairs hit in truth or by the method, `position` the mean distance of
+    the place hit from the true one, px, over pairs that both hit; None without such pairs.
     """
 
     missed: int
@@ -88,13 +80,10 @@ def errors_of(found: Decisions, truth: Decisions) -> Errors:
     share = [np.where(r >= 0, np.append(d.share, 0.0)[r], 0.0) for r, d in zip(row, (found, truth), strict=True)]
     apart = found.xy[row[0, both]] - truth.xy[row[1, both]]
     missed, false = row < 0
-    return Errors(
-        int(missed.sum()),
-        int(false.sum()),
-        None if len(found) and np.isnan(found.share).all() else _mean(np.abs(share[0] - share[1])),
-        _mean(np.sqrt((apart**2).sum(axis=1))),
-        pairs[missed | false] % objects,
-    )
+    untold = len(found) and np.isnan(found.share).all()
+    off = None if untold else _mean(np.abs(share[0] - share[1]))
+    far = _mean(np.sqrt((apart**2).sum(axis=1)))
+    return Errors(int(missed.sum()), int(false.sum()), off, far, pairs[missed | false] % objects)
 
 
 def _mean(values: Floats) -> float | None:
@@ -105,14 +94,11 @@ def _mean(values: Floats) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method at one setting, which is a point of a curve.
+    """A method at one setting (a number in the unit of the curve, a word, or None), which is a point of a curve.
 
-    Parameters
-    ----------
-    setting : a number in the unit of the curve, or a word; None if there is nothing to set
-    prepare : set-up; returns the function that is timed as a run
-    read : converts the answer of a run to decisions; not timed
-    kept_bytes : returns the bytes that stay between runs, given an answer; None traces them, which slows the set-up
+    `prepare` sets it up and returns the function that is timed as a run; `read` converts the answer of a run to
+    decisions. `kept_bytes` returns the bytes that stay between runs, given an answer; None traces them, which slows the
+    set-up.
     """
 
     setting: float | str | None
@@ -123,15 +109,10 @@ class Method:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A method at all its settings.
+    """A method at all its settings, from coarse to fine; `setting` names their unit.
 
-    Parameters
-    ----------
-    name : name of the method
-    setting : name and unit of the setting; "" if there is nothing to set
-    methods : points of the curve, from coarse to fine
-    note : caveat for the comparison, for example that the method answers an easier question
-    left_out : why the method was not measured; it then has no points
+    `note` is a caveat for the comparison, for example that the method answers an easier question; `left_out` says why
+    a curve has no points.
     """
 
     name: str
@@ -143,18 +124,10 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """A question, its true answers, and the methods that are compared on it.
+    """A question, its true answers and their source, and the curves of the methods that are compared on it.
 
-    Parameters
-    ----------
-    name : one word, for files
-    asks : the question, a sentence
-    shots : number of shots
-    truth : the true answers
-    truth_told : source of the true answers
-    curves : curves of the methods
-    aimed : (N,) the object near which each shot is, for errors by kind of object; None if that has no meaning
-    by_share : whether the error is that of the share instead of the number of wrong decisions
+    `aimed` is the object near which each shot is, (N,), for errors by kind of object; None if that has no meaning.
+    `by_share` says whether the error is that of the share instead of the number of wrong decisions.
     """
 
     name: str
@@ -167,11 +140,8 @@ class Question:
     by_share: bool = False
 
 
-RUNS_MAX = 1000
-"""Most runs of a fast method."""
-
-SLOW = 0.5
-"""Seconds after which a slow method stops, even before the requested number of runs."""
+RUNS_MAX = 1000  # of a fast method
+SLOW = 0.5  # seconds after which a slow method stops, even before the requested number of runs
 
 
 class Cost(NamedTuple):
@@ -192,27 +162,15 @@ class Cost(NamedTuple):
 def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
     """Set a method up, run it to warm up, then time `runs` runs and at least `seconds` seconds; fewer if it is slow.
 
-    Memory is traced in a separate run, as tracing takes time.
-
-    Returns
-    -------
-    the answer of a run, and the cost
+    Memory is traced in a separate run, as tracing takes time. Returned are the answer of a run, and the cost.
     """
     begin = time.perf_counter()
     run = method.prepare()
     answer = run()
     setup = time.perf_counter() - begin
     times: list[float] = []
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        while not times or _goes_on(times, runs, seconds):
-            begin = time.perf_counter()
-            run()
-            times.append(time.perf_counter() - begin)
-    finally:
-        if collects:
-            gc.enable()
+    while not times or (len(times) < RUNS_MAX and sum(times) < (max(seconds, SLOW) if len(times) < runs else seconds)):
+        times.append(timeit.timeit(run, number=1))  # without garbage collection
 
     def again() -> Any:
         """Set up once more, with the first run."""
@@ -221,17 +179,9 @@ def measured(method: Method, runs: int, seconds: float) -> tuple[Any, Cost]:
         return own
 
     kept = _traced(again)[0] if method.kept_bytes is None else method.kept_bytes(answer)
-    needed = _traced(run)[1]
-    return answer, Cost(
-        max(setup - min(times), 0.0), min(times), statistics.median(times), max(times), len(times), kept, needed
-    )
-
-
-def _goes_on(times: list[float], runs: int, seconds: float) -> bool:
-    """Return whether to time another run."""
-    if len(times) < runs:
-        return sum(times) < max(seconds, SLOW)
-    return sum(times) < seconds and len(times) < RUNS_MAX
+    least = min(times)
+    middle, most = statistics.median(times), max(times)
+    return answer, Cost(max(setup - least, 0.0), least, middle, most, len(times), kept, _traced(run)[1])
 
 
 def _traced(call: Callable[[], Any]) -> tuple[int, int]:
@@ -247,25 +197,8 @@ def _traced(call: Callable[[], Any]) -> tuple[int, int]:
 Target = tuple[int, Bools, tuple[int, int]]
 """An object's id, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
 
-SHOTS_MAX = 10**6
-"""Most shots of a study; all decisions of a method are in memory."""
-
-KEPT = ("layer", "cost", "position_256", "velocity_256")
-"""Columns of objects that are copied to another scene."""
-
-
-def only_hittable(scene: Scene) -> Scene:
-    """Copy the hittable objects of a scene to one without bounds and occluders, where no filter refuses them.
-
-    They keep their ids, names, layers, poses, masks and velocities. Each is its own owner, in the first category.
-    """
-    alone, items = Scene(name=scene.name), scene.items
-    for item in scene.ids(Role.HITTABLE).tolist():
-        alone.items.skip_to(item)
-        values: dict[str, object] = {name: getattr(items, name)[item] for name in KEPT}
-        values |= {"role": ROLES.index(Role.HITTABLE), "categories": 1, "owner": item}
-        alone.items.add(items.sprites[item], items.forms[item], items.angles[item], items.names[item], values)
-    return alone
+SHOTS_MAX = 10**6  # of a study; all decisions of a method are in memory
+TRIES = 1000  # most tries per shot, before the scene is an error for lack of room
 
 
 def targets_of(scene: Scene) -> list[Target]:
@@ -289,7 +222,7 @@ def size_of(targets: list[Target]) -> float:
 def drawn_for(scene: Scene, shots: object, seed: object) -> tuple[int, int, Scene, list[Target]]:
     """Check the number of shots and the seed; return them, a copy of the hittable objects, and these as targets."""
     shots, seed = integer("shots", shots, 1, SHOTS_MAX), integer("seed", seed, 0, SEED_MAX)
-    alone = only_hittable(scene)
+    alone = copied(scene, scene.ids(Role.HITTABLE))
     return shots, seed, alone, targets_of(alone)
 
 
@@ -299,20 +232,8 @@ def drawn_places(
     """Draw random places and directions, each in the grown box of a random object; around (0, 0) without objects.
 
     Each try takes four draws of splitmix64: object, x, y, angle. A taken place is replaced by the next try.
-
-    Parameters
-    ----------
-    grow_256 : how far boxes are grown on all sides, 1/256 px
-    taken : returns which of the places (n, 2) are refused
-
-    Returns
-    -------
-    places (shots, 2) in 1/256 px, angles (shots,) in degrees, and the target near each place (shots,)
-
-    Raises
-    ------
-    InputError
-        If nearly all of very many places are taken.
+    Boxes are grown on all sides by `grow_256`; `taken` returns which of the places (n, 2) are refused. Returned are
+    places (shots, 2) in 1/256 px, angles (shots,) in degrees, and the target near each place (shots,).
     """
     boxes = np.array([[x, y, x + m.shape[1] - 1, y + m.shape[0] - 1] for _, m, (x, y) in targets] or [[0, 0, 0, 0]])
     low, high = SUB * boxes[:, :2] - HALF - grow_256, SUB * boxes[:, 2:] + HALF + grow_256
@@ -333,10 +254,6 @@ def drawn_places(
     return np.concatenate(places)[:shots], np.concatenate(angles)[:shots], np.concatenate(near)[:shots]
 
 
-TRIES = 1000
-"""Most tries per shot, before the scene is an error for lack of room."""
-
-
 def ahead(length: float, degrees: Floats) -> Ints:
     """Return steps (N, 2) of a length in px along angles, rounded once to 1/256 px."""
     along = np.stack([np.full(len(degrees), round(SUB * length)), np.zeros(len(degrees), np.int64)], axis=1)
@@ -349,7 +266,7 @@ def fired_method(
     """Make a method that fires a batch in one call of `fire` with `arguments`; its set-up copies the scene."""
 
     def prepare() -> Callable[[], Hits]:
-        own = only_hittable(scene)
+        own = copied(scene, scene.ids())
         return lambda: fire(own, weapon, **arguments)
 
     return Method(setting, prepare, read)
@@ -360,11 +277,6 @@ def scaled(xy: Floats, factor: float) -> Floats:
     return (xy + 0.5) * factor - 0.5
 
 
-def unscaled(xy: Floats, factor: float) -> Floats:
-    """Invert `scaled`."""
-    return (xy + 0.5) / factor - 0.5
-
-
 def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     """Copy objects at a scale to a scene without bounds and occluders; ids count from 0 in the given order.
 
@@ -372,18 +284,13 @@ def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     """
     alone, items = Scene(), scene.items
     for item in ids.tolist():
-        form = items.forms[item]
+        form, place = items.forms[item], scaled(items.position_256[item] / SUB, factor).tolist()
         alone.add(
-            items.sprites[item],
-            scaled(items.position_256[item] / SUB, factor).tolist(),
-            angle=items.angles[item],
+            items.sprites[item], place, angle=items.angles[item], flip=form.flip, frame=form.frame,
             scale=[v / (1 << SCALE_BITS) * factor for v in (form.scale_x, form.scale_y)],
-            flip=form.flip,
-            frame=form.frame,
-            layer=int(items.layer[item]),
+            layer=int(items.layer[item]), name=items.names[item],
             velocity_xy=(items.velocity_256[item] / SUB * factor).tolist(),
-            name=items.names[item],
-        )
+        )  # fmt: skip
     return alone
 
 

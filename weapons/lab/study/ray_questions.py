@@ -15,7 +15,6 @@ from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.scene.scene import Scene
 
 from ...fire.call import fire
-from ...fire.hits import Hits
 from ...kinds.areas import Disc, Point, Spread
 from ...kinds.rays import Pistol, Projectile
 from ...rays.ray_hits import RayHits
@@ -26,21 +25,18 @@ from .methods import (
     Method,
     Question,
     ahead,
+    copied,
     drawn_for,
     drawn_places,
     fired_method,
-    only_hittable,
     size_of,
     velocities_of,
 )
 from .truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
 STEPS = tuple(2.0**k for k in range(4, -5, -1))
-LENGTH_MAX = 1000
-"""Longest rays, px; at a step of 1/16 px they have 16,000 points."""
-
-PLANE_MOST = 2**24
-"""Largest plane in which rays are looked up, px."""
+LENGTH_MAX = 1000  # px of a ray; at a step of 1/16 px it has 16,000 points
+PLANE_MOST = 2**24  # px of the plane in which rays are looked up
 
 
 def rays_question(scene: Scene, shots: int, seed: int) -> Question:
@@ -48,12 +44,6 @@ def rays_question(scene: Scene, shots: int, seed: int) -> Question:
 
     Rays are four median sizes of the objects long, in whole px, at most 1000. They begin near an object, at most half
     their length away (see `drawn_places`), but not in one.
-
-    Parameters
-    ----------
-    scene : its hittable objects take part
-    shots : number of rays
-    seed : random seed of the rays
     """
     shots, seed, alone, targets = drawn_for(scene, shots, seed)
     length = min(max(1, round(4 * size_of(targets))), LENGTH_MAX)
@@ -78,8 +68,11 @@ def _supercover(alone: Scene, start: Ints, step: Ints) -> tuple[Curve, ...]:
     """Return curves of `fire`: by default, with each pre-filter, and with each broad phase."""
     shot = {"at": start / SUB, "toward": (start + step) / SUB}
 
+    def entered(hits: RayHits) -> Decisions:
+        return Decisions.of(hits.passes.shot, hits.passes.object, hits.passes.entry_xy.astype(np.float64))
+
     def by(setting: str | None, **ways: str) -> Method:
-        return fired_method(setting, alone, Pistol(None), _first, **shot, **ways)
+        return fired_method(setting, alone, Pistol(None), entered, **shot, **ways)
 
     filters = tuple(by(name, prefilter=name, broadphase="none") for name in ("none", "box", "circle", "swept"))
     phases = tuple(by(name, broadphase=name) for name in ("grid", "quadtree", "bvh"))
@@ -88,10 +81,6 @@ def _supercover(alone: Scene, start: Ints, step: Ints) -> tuple[Curve, ...]:
         Curve("supercover, pre-filter", "pre-filter", filters, "the same answers: only time differs"),
         Curve("supercover, broad phase", "broad phase", phases, "the same answers: only time differs"),
     )
-
-
-def _first(hits: RayHits) -> Decisions:
-    return Decisions.of(hits.passes.shot, hits.passes.object, hits.passes.entry_xy.astype(np.float64))
 
 
 def _stepping(alone: Scene, start: Ints, step: Ints, length: int) -> Curve:
@@ -134,9 +123,7 @@ def _looked_up(labels: npt.NDArray[np.int32], start: Floats, step: Floats, parts
 
 
 SUBSTEPS = tuple(2**k for k in range(1, 7))
-
-MOVER_RADIUS_MAX = 32
-"""Largest radius of a disc, px; it is tested up to 64 times a frame, with all its samples."""
+MOVER_RADIUS_MAX = 32  # px; a disc is tested up to 64 times a frame, with all its samples
 
 
 def movers_question(scene: Scene, shots: int, seed: int) -> Question:
@@ -144,12 +131,6 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
 
     A disc flies eight median sizes of the objects in a frame. Its radius is a sixth of a size, 1 to 32 px. Discs begin
     near an object, at most half their flight away (see `drawn_places`), but not on one. All lengths are whole px.
-
-    Parameters
-    ----------
-    scene : its hittable objects take part
-    shots : number of discs
-    seed : random seed of the flights
     """
     shots, seed, alone, targets = drawn_for(scene, shots, seed)
     size = size_of(targets)
@@ -163,7 +144,11 @@ def movers_question(scene: Scene, shots: int, seed: int) -> Question:
     first = impacts(flights, targets, velocities)
     point = (flights.start_256[first.flight] + first.time[:, None] * flights.step_256[first.flight]) / SUB
     once, *substeps = (_overlapping(alone, flights, None if n == 1 else n, n) for n in (1, *SUBSTEPS))
-    swept = fired_method(None, alone, Projectile(speed, radius), _impacts, at=start / SUB, toward=(start + way) / SUB)
+    swept = fired_method(
+        None, alone, Projectile(speed, radius),
+        lambda hits: Decisions.of(hits.passes.shot, hits.passes.object, np.asarray(hits.passes.point_xy)),
+        at=start / SUB, toward=(start + way) / SUB,
+    )  # fmt: skip
     ends = Segments(start / SUB, (start + flights.step_256) / SUB)
     return Question(
         "movers",
@@ -185,7 +170,7 @@ def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int
     start, step, disc = flights.start_256 / SUB, flights.step_256 / SUB, Disc(flights.radius_256 / SUB)
 
     def prepare() -> Callable[[], list[Decisions]]:
-        own = only_hittable(alone)
+        own = copied(alone, alone.ids())
         ids = own.ids()
         moving = ids[own.items.velocity_256[ids].any(axis=1)]
         place, velocity = (getattr(own.items, name)[moving] / SUB for name in ("position_256", "velocity_256"))
@@ -206,16 +191,8 @@ def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int
     return Method(setting, prepare, Decisions.joined)
 
 
-def _impacts(hits: RayHits) -> Decisions:
-    """Return the first objects, and the centre of the disc at the hit."""
-    passes = hits.passes
-    return Decisions.of(passes.shot, passes.object, np.asarray(passes.point_xy))
-
-
 PELLETS = tuple(2**k for k in range(2, 13))
-
-RADIUS_MAX = 64
-"""Largest radius of a blast, px; the truth tests each of its pixels for each shot and object."""
+RADIUS_MAX = 64  # px of a blast; the truth tests each of its pixels for each shot and object
 
 
 def spread_question(scene: Scene, shots: int, seed: int) -> Question:
@@ -223,12 +200,6 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
 
     The radius of the blasts is half the median size of the objects, in whole px, at most 64. Centres lie in the box of
     an object grown by the radius (see `drawn_places`).
-
-    Parameters
-    ----------
-    scene : its hittable objects take part
-    shots : number of blasts
-    seed : random seed of the places and of the pellets
     """
     shots, seed, alone, targets = drawn_for(scene, shots, seed)
     radius = min(max(1, round(size_of(targets) / 2)), RADIUS_MAX)
@@ -242,11 +213,11 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
             n, alone, weapon, lambda h: Decisions.of(h.shot, h.object, share=h.samples / n), at=at, seed=seed
         )
 
-    def shares(hits: Hits) -> Decisions:
-        return Decisions(hits.shot, hits.object, hits.first_xy.astype(np.float64), hits.samples / parts.whole)
-
     note = "a share is a part of the pellets; it does not tell where it hit"
-    every = fired_method(None, alone, Disc(radius, pierce=True), shares, at=at)
+    every = fired_method(
+        None, alone, Disc(radius, pierce=True),
+        lambda h: Decisions(h.shot, h.object, h.first_xy.astype(np.float64), h.samples / parts.whole), at=at,
+    )  # fmt: skip
     return Question(
         "spread",
         f"How much of a blast of {radius} px lies on each object?",

@@ -31,14 +31,10 @@ from .ray_questions import movers_question, rays_question, spread_question
 FORMAT = "hitplanes-study/1"
 PACKAGES = ("hitplanes", "numpy", "opencv-python-headless", "pymunk", "shapely", "pygame-ce")
 
-SPREAD_PART = 5
-"""Factor by which blasts are fewer than other shots, as thousands of pellets take long."""
-
-Show = Callable[[str, int, int], None]
-"""Function of the next measurement's name, the number of points done, and the number of all points."""
-
-Keep = Callable[[dict[str, Any]], None]
-"""Function that stores the unfinished study, given as JSON."""
+SPREAD_PART = 5  # by which blasts are fewer than other shots, as thousands of pellets take long
+Json = Mapping[str, Any]
+Show = Callable[[str, int, int], None]  # of the next measurement's name, the number of points done, and of all points
+Keep = Callable[[dict[str, Any]], None]  # stores the unfinished study, given as JSON
 
 
 @dataclass(frozen=True)
@@ -57,23 +53,14 @@ class Effort:
 
 
 def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -> dict[str, Any]:
-    """Measure all methods on the hittable objects of a scene.
+    """Measure all methods on the hittable objects of a scene; equal seeds give equal decisions.
 
-    Parameters
-    ----------
-    seed : random seed of the shots; equal seeds give equal decisions
-    show : called before each point
-    keep : called with the study after each point and at the end
-
-    Returns
-    -------
-    the study as JSON; its `complete` is false until the end
+    `show` is called before each point, `keep` after each point and at the end. Returned is the study as JSON, whose
+    `complete` is false until the end.
     """
     ids = scene.ids("hittable")
     ids = ids[scene.items.size_wh[ids, 0] > 0]
-    chosen = ids  # at most so many, evenly from the first to the last
-    if len(ids) > effort.objects:
-        chosen = ids[np.linspace(0, len(ids) - 1, effort.objects).astype(np.int64)]
+    chosen = ids[np.linspace(0, len(ids) - 1, min(len(ids), effort.objects)).astype(np.int64)]  # evenly
     alone = copied(scene, chosen)
     discs = discs_at(alone, effort.shots, seed)
     questions = _questions(alone, discs, effort.shots, seed)
@@ -89,8 +76,14 @@ def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -
         "versions": {"python": platform.python_version(), **versions(*PACKAGES)},
         "kinds": {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)},
         "plan": {"shots": effort.shots, **plan},
-        "questions": [_progress_text(question) for question in questions],
-    }
+        "questions": [
+            {
+                "name": q.name, "asks": q.asks, "truth": q.truth_told, "shots": q.shots, "hits": len(q.truth),
+                "error": "share" if q.by_share else "wrong", "curves": [],
+            }
+            for q in questions
+        ],
+    }  # fmt: skip
     _measure(study, questions, kinds, effort, show, keep)
     study["complete"] = True
     keep(study)
@@ -134,48 +127,26 @@ def _questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Questi
     ]
 
 
-def _progress_text(question: Question) -> dict[str, Any]:
-    return {
-        "name": question.name,
-        "asks": question.asks,
-        "truth": question.truth_told,
-        "shots": question.shots,
-        "hits": len(question.truth),
-        "error": "share" if question.by_share else "wrong",
-        "curves": [],
-    }
-
-
 def _point(method: Method, question: Question, errors: Errors, cost: Cost, kinds: Sequence[str]) -> dict[str, Any]:
     """Return the errors and the cost of a method at one setting, as JSON."""
-    shots = max(question.shots, 1)
-    us = {name: 1e6 * getattr(cost, name) / shots for name in ("least", "median", "most")}
+    us = {name: 1e6 * getattr(cost, name) / question.shots for name in ("least", "median", "most")}
     return {
-        "setting": method.setting,
-        "missed": errors.missed,
-        "false": errors.false,
-        "wrong_per_shot": errors.wrong / shots,
-        "share_error": errors.share,
+        "setting": method.setting, "missed": errors.missed, "false": errors.false,
+        "wrong_per_shot": errors.wrong / question.shots, "share_error": errors.share,
         "position_error_px": errors.position,
-        "wrong_per_shot_by_kind": _by_kind(errors.objects, question.aimed, kinds),
-        "us_per_shot": us,
-        "runs": cost.runs,
-        "setup_ms": 1e3 * cost.setup,
-        "kept_bytes": cost.kept_bytes,
-        "run_bytes": cost.run_bytes,
-    }
+        "wrong_per_shot_by_kind": _by_kind(errors.objects, question.aimed, kinds), "us_per_shot": us, "runs": cost.runs,
+        "setup_ms": 1e3 * cost.setup, "kept_bytes": cost.kept_bytes, "run_bytes": cost.run_bytes,
+    }  # fmt: skip
 
 
 def _by_kind(wrong: Ints, aimed: Ints | None, kinds: Sequence[str]) -> dict[str, float]:
     """Return wrong decisions per shot near an object, by kind of object, without kinds that no shot is near."""
     if aimed is None or not len(aimed):
         return {}
-    of, count = np.bincount(wrong, minlength=len(kinds)), np.bincount(aimed, minlength=len(kinds))
-    rows = {kind: np.array([k == kind for k in kinds]) for kind in dict.fromkeys(kinds)}
-    return {kind: float(of[mask].sum() / count[mask].sum()) for kind, mask in rows.items() if count[mask].any()}
+    names = np.array(kinds)
+    count = {kind: (np.count_nonzero(names[wrong] == kind), np.count_nonzero(names[aimed] == kind)) for kind in kinds}
+    return {kind: of / near for kind, (of, near) in count.items() if near}
 
-
-Json = Mapping[str, Any]
 
 RANKED = {"circle": "circle", "axis-aligned box": "box, refitted", "bounding box, oriented": "oriented box"}
 """The three volumes that textbooks rank, and the names of their curves."""
@@ -230,12 +201,7 @@ def places(question: Json) -> list[Place]:
 
 
 def bound(question: Json) -> float:
-    """Return the upper bound (95 % confidence) of the error rate when no shot was wrong: 3 / shots.
-
-    References
-    ----------
-    Hanley and Lippman-Hand, "If nothing goes wrong, is everything all right?" (1983).
-    """
+    """Return the upper bound (95 % confidence) of the error rate when no shot was wrong (Hanley, Lippman-Hand 1983)."""
     return 3 / max(int(question["shots"]), 1)
 
 
@@ -295,12 +261,7 @@ def ranks(study: Json, error: float) -> list[list[str]]:
 
 
 def markdown(study: Json, error: float, pictures: Sequence[str] = ()) -> str:
-    """Return the whole study as Markdown.
-
-    Parameters
-    ----------
-    pictures : names of the questions that have a diagram
-    """
+    """Return the whole study as Markdown; `pictures` are the names of the questions that have a diagram."""
     return "\n".join(_lines(study, error, pictures)) + "\n"
 
 
@@ -393,11 +354,10 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: 
 
 def _bytes(count: int) -> str:
     """Return a number of bytes as text."""
-    for unit in ("B", "KB", "MB"):
-        if count < 1000 or unit == "MB":
-            break
-        count = round(count / 1000)
-    return f"{count} {unit}"
+    units = ["MB", "KB", "B"]
+    while count >= 1000 and len(units) > 1:
+        count, _ = round(count / 1000), units.pop()
+    return f"{count} {units[-1]}"
 
 
 def csv_of(study: Json) -> str:
@@ -422,18 +382,9 @@ FILES = ("study.json", "study.csv", "study.md", *(f"{name}.png" for name in QUES
 def write_study(
     scene: Scene, folder: Path, seed: int, effort: Effort, error: float, progress: Progress
 ) -> tuple[dict[str, Any], list[str]]:
-    """Run a study and write it to a new folder or that of an earlier study.
+    """Run a study and write it to a new folder or that of an earlier study; an interrupt writes what was measured.
 
-    Returns
-    -------
-    the study as JSON, and the names of the questions that have a diagram
-
-    Raises
-    ------
-    InputError
-        If the folder holds other files, or cannot be written.
-    KeyboardInterrupt
-        After the points measured so far were written.
+    Returned are the study as JSON, and the names of the questions that have a diagram.
     """
     folder = path_of("output", folder)
     own_folder(folder, FILES)
@@ -462,12 +413,12 @@ def _write_tables(study: Mapping[str, Any], folder: Path, error: float) -> list[
     drawn: list[str] = []
     write_text(folder / FILES[1], csv_of(study))
     write_text(folder / FILES[2], markdown(study, error))
-    if find_spec("matplotlib") is not None:
-        from .figures import save_figure, work_precision
+    if find_spec("matplotlib") is None:
+        return drawn
+    from .figures import save_figure, work_precision
 
-        for question in study["questions"]:
-            if places(question):
-                save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
-                drawn.append(question["name"])
-                write_text(folder / FILES[2], markdown(study, error, drawn))
+    for question in filter(places, study["questions"]):
+        save_figure(work_precision(question, study["scene"]["name"]), folder / f"{question['name']}.png")
+        drawn.append(question["name"])
+        write_text(folder / FILES[2], markdown(study, error, drawn))
     return drawn

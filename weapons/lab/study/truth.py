@@ -28,16 +28,11 @@ Bools = npt.NDArray[np.bool_]
 Target = tuple[int, Bools, tuple[int, int]]
 """An object's number, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
 
-PX, HALF = 256, 128
-ONE = 2**30
-
-FINE = 2**320
-"""Roots are truncated to multiples of 1 / FINE."""
-
+PX, HALF, ONE = 256, 128, 2**30
+FINE = 2**320  # roots are truncated to multiples of 1 / FINE
 SAME = Fraction(1, 2**256)
 """Times closer than this are equal: different roots of the quadratics below, whose coefficients are below 2**62, differ
 by more than 2**-250."""
-
 SLACK = 2.0**-20
 """Tolerance by which floats preselect the first touch. A grazing touch loses half of the digits of the root, which is
 2**-25 of the radius."""
@@ -57,18 +52,13 @@ def _between(target: Target, low: Ints, high: Ints) -> Ints:
     return np.asarray(np.argwhere(mask[y:y_end, x:x_end])[:, ::-1] + (x, y) + corner)
 
 
-# --- discs -----------------------------------------------------------------------------------------------------------
+# Discs
 
 
 class Parts(NamedTuple):
-    """Discs and objects that share pixels.
+    """Discs and objects that share pixels (K,), how many, and the one nearest to the disc's centre (K, 2).
 
-    Parameters
-    ----------
-    disc, object : (K,)
-    pixels : (K,) number of shared pixels
-    nearest_xy : (K, 2) shared pixel nearest to the disc's centre; of several the least (y, x)
-    whole : number of pixels of a disc
+    Of several nearest ones it is the least (y, x). `whole` is the number of pixels of a disc.
     """
 
     disc: Ints
@@ -79,13 +69,9 @@ class Parts(NamedTuple):
 
 
 def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> Parts:
-    """Count the pixels that discs share with objects, regardless of objects in front.
+    """Count the pixels that discs around whole pixels (N, 2) share with objects, regardless of objects in front.
 
-    Parameters
-    ----------
-    center_xy : (N, 2) whole pixels
-    radius : px; a pixel belongs to a disc when its centre is no farther away
-    targets : in any order
+    A pixel belongs to a disc when its centre is no farther away than the radius, px.
     """
     side = np.arange(-radius, radius + 1)
     y, x = (grid.ravel() for grid in np.meshgrid(side, side, indexing="ij"))
@@ -106,23 +92,15 @@ def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> P
     return Parts(rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3:], len(xy))
 
 
-# --- rays ------------------------------------------------------------------------------------------------------------
+# Rays
 
 
 def first_pixels(start_256: Ints, step_256: Ints, targets: Sequence[Target]) -> tuple[Ints, Ints, Ints]:
-    """Find the first pixel that each closed segment touches.
+    """Find the first pixel that each closed segment (start, and vector to its end; up to 2**28) touches.
 
     The first pixel is the one entered first. Of several entered at once it is the least (y, x), with the front-most
-    object there.
-
-    Parameters
-    ----------
-    start_256, step_256 : (N, 2) starts of segments, and vectors to their ends; up to 2**28
-    targets : front to back
-
-    Returns
-    -------
-    the segments (K,) that touch anything, in order; their objects (K,); their pixels (K, 2)
+    object there: targets are given front to back. Returned are the segments (K,) that touch anything, in order, their
+    objects (K,), and their pixels (K, 2).
     """
     box = _boxes(targets)
     found: list[tuple[int, int, int, int]] = []
@@ -158,7 +136,7 @@ def _entries(away: Ints, step: Ints) -> tuple[Ints, Ints]:
     return times.max(axis=1), met
 
 
-# --- flying discs ----------------------------------------------------------------------------------------------------
+# Flying discs
 
 
 class Flights(NamedTuple):
@@ -192,25 +170,19 @@ def flown(speed_256: int, toward_256: Ints) -> Ints:
 
     The direction is rounded to 2**-30, then the end to 1/256 px, half to even.
     """
-    ends = [[_along(speed_256, c, x * x + y * y) for c in (x, y)] for x, y in toward_256.tolist()]
+    ends = []
+    for x, y in toward_256.tolist():
+        cosines = [(math.isqrt(4 * ONE * ONE * c * c // (x * x + y * y)) + 1) // 2 for c in (x, y)]
+        signed = [k if c > 0 else -k for k, c in zip(cosines, (x, y), strict=True)]
+        ends.append([round(Fraction(k * speed_256, ONE)) for k in signed])
     return np.array(ends, np.int64).reshape(-1, 2)
 
 
-def _along(speed_256: int, part: int, square: int) -> int:
-    cosine = (math.isqrt(4 * ONE * ONE * part * part // square) + 1) // 2
-    return round(Fraction(cosine * speed_256 * (1 if part > 0 else -1), ONE))
-
-
 def impacts(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> Impacts:
-    """Find the first touch of each disc.
+    """Find the first touch of each disc; coordinates are up to 2**29, all velocities (M, 2) added.
 
-    Of several pixels touched at once it is the least (y, x), with the front-most object there.
-
-    Parameters
-    ----------
-    flights : coordinates up to 2**29, all velocities added
-    targets : front to back
-    velocity_256 : (M, 2) steps of the targets in the frame
+    Of several pixels touched at once it is the least (y, x), with the front-most object there: targets are given front
+    to back.
     """
     found = []
     for number, near in _nearby(flights, targets, velocity_256):
@@ -218,9 +190,9 @@ def impacts(flights: Flights, targets: Sequence[Target], velocity_256: Ints) -> 
         if first is not None:
             time, row = first
             found.append((number, targets[near.rank[row]][0], time, *near.xy[row].tolist()))
-    columns = list(zip(*found, strict=True)) or [()] * 5
-    whole = [np.array(columns[i], np.int64) for i in (0, 1, 3, 4)]
-    return Impacts(whole[0], whole[1], np.array(columns[2], np.float64), np.stack(whole[2:], axis=1))
+    rows = np.array(found, np.float64).reshape(-1, 5)
+    whole = rows.astype(np.int64)
+    return Impacts(whole[:, 0], whole[:, 1], rows[:, 2], whole[:, 3:])
 
 
 def touching(points_256: Ints, radius_256: int, targets: Sequence[Target]) -> Bools:
@@ -270,7 +242,10 @@ def _first(near: _Near, radius: int) -> tuple[float, int] | None:
     length = np.maximum(np.sqrt((near.step.astype(np.float64) ** 2).sum(axis=1)), 1)
     slack = SLACK * (1 + radius / length)
     could = np.flatnonzero(about - slack <= (about + slack).min())
-    exact = {int(row): _time(near.away[row].tolist(), near.step[row].tolist(), radius) for row in could}
+    exact = {}
+    for row in could.tolist():
+        away, step = near.away[row].tolist(), near.step[row].tolist()
+        exact[row] = min(t for t in (_disc_time(away, step, radius), _square_time(away, step)) if t is not None)
     least = min(exact.values())
     row = min(
         (row for row, time in exact.items() if time - least <= SAME),
@@ -281,14 +256,6 @@ def _first(near: _Near, radius: int) -> tuple[float, int] | None:
 
 def _times(near: _Near, radius: int) -> Floats:
     """Return when the disc touches pixels: approximate times, and inf exactly for those that it misses."""
-    about = _disc_times(near, radius)
-    if radius * radius < 2 * HALF * HALF:  # a larger disc reaches the pixel's centre first
-        about = np.minimum(about, _square_times(near))
-    return about
-
-
-def _disc_times(near: _Near, radius: int) -> Floats:
-    """Return when the disc touches the centres of pixels: approximate times, and inf exactly for misses."""
     away, step = near.away, near.step
     square, along = (step * step).sum(axis=1), (away * step).sum(axis=1)
     cross = np.abs(away[:, 0] * step[:, 1] - away[:, 1] * step[:, 0])
@@ -299,23 +266,14 @@ def _disc_times(near: _Near, radius: int) -> Floats:
     passes = (along > 0) & (along < square) & (cross <= side)
     reach = radius * np.sqrt(square.astype(np.float64))
     root = np.sqrt(np.maximum((reach - cross) * (reach + cross), 0))
-    time = np.where(begins, 0, (along - root) / np.maximum(square, 1))
-    return np.where(begins | ends | passes, time, np.inf)
-
-
-def _square_times(near: _Near) -> Floats:
-    """Return when the disc's centre enters the squares of pixels: approximate times, and inf exactly for misses."""
-    away, step = near.away, near.step
+    centre = np.where(begins | ends | passes, np.where(begins, 0, (along - root) / np.maximum(square, 1)), np.inf)
+    if radius * radius >= 2 * HALF * HALF:  # it reaches the pixel's centre before its own enters the square
+        return centre
     low, high = np.minimum(step, 0) - HALF, np.maximum(step, 0) + HALF
-    cross = np.abs(away[:, 0] * step[:, 1] - away[:, 1] * step[:, 0])
     apart = ((away < low) | (away > high)).any(axis=1) | (cross > HALF * np.abs(step).sum(axis=1))
     sides = (away * np.sign(step) - HALF) / np.maximum(np.abs(step), 1)
-    return np.where(apart, np.inf, np.maximum(np.where(step == 0, 0, sides).max(axis=1), 0))
-
-
-def _time(away: list[int], step: list[int], radius: int) -> Fraction:
-    """Return the exact time of the first touch of one pixel, which must be touched."""
-    return min(time for time in (_disc_time(away, step, radius), _square_time(away, step)) if time is not None)
+    square_entered = np.where(apart, np.inf, np.maximum(np.where(step == 0, 0, sides).max(axis=1), 0))
+    return np.minimum(centre, square_entered)
 
 
 def _disc_time(away: list[int], step: list[int], radius: int) -> Fraction | None:
@@ -343,12 +301,10 @@ def _square_time(away: list[int], step: list[int]) -> Fraction | None:
     return entry if entry <= leave else None
 
 
-STRIPS = 1024
-"""Strips into which a disc is cut; the error of a share is about STRIPS**-1.5, or 1 in 30,000."""
+STRIPS = 1024  # into which a disc is cut; the error of a share is about STRIPS**-1.5, or 1 in 30,000
 
 
-@dataclass(frozen=True, eq=False)
-class Touched:
+class Touched(NamedTuple):
     """Hits as columns: shot and object (K,), point nearest to the shot (K, 2), share of the disc (K,)."""
 
     shot: Ints
@@ -428,10 +384,8 @@ class Straight:
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (end[:, 0] - begin[:, 0]) / (end[:, 1] - begin[:, 1])
             x = begin[:, 0] + (y[:, None] - begin[:, 1]) * slope
-        x = np.sort(np.where(straddles, x, np.inf), axis=1)
-        if x.shape[1] % 2:
-            x = np.append(x, np.full((len(x), 1), np.inf), axis=1)
-        left, right = (np.clip(v, low[:, None], high[:, None]) for v in (x[:, ::2], x[:, 1::2]))
+        x = np.clip(np.sort(np.where(straddles, x, np.inf), axis=1), low[:, None], high[:, None])
+        left, right = x[:, :-1:2], x[:, 1::2]  # a line crosses an even number of edges
         return np.asarray((right - left).sum(axis=1))
 
 
@@ -449,18 +403,15 @@ def placed_rings(
 def discs_on_shapes(at: Floats, radius: float, shapes: Sequence[Round | Straight]) -> Touched:
     """Find the closed discs around points (N, 2) that touch closed shapes."""
     found = []
+    off = (np.arange(STRIPS) + 0.5) * (2 * radius / STRIPS) - radius
+    half = np.sqrt(radius**2 - off**2)
     for k, shape in enumerate(shapes):
         low, high = shape.box
         for shot in np.flatnonzero(((at >= low - radius) & (at <= high + radius)).all(axis=1)).tolist():
-            if shape.meets(at[shot], radius):
-                found.append((shot, k, *shape.nearest(at[shot]).tolist(), _share(at[shot], radius, shape)))
+            place = at[shot]
+            if shape.meets(place, radius):
+                chords = shape.chords(place[1] + off, place[0] - half, place[0] + half)
+                found.append((shot, k, *shape.nearest(place).tolist(), float(chords.sum() / (2 * half.sum()))))
     table = np.array(sorted(found), np.float64).reshape(-1, 5)
-    return Touched(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4])
-
-
-def _share(at: Floats, radius: float, shape: Round | Straight) -> float:
-    """Return the part of a disc's area that a shape covers."""
-    step = 2 * radius / STRIPS
-    off = (np.arange(STRIPS) + 0.5) * step - radius
-    half = np.sqrt(radius**2 - off**2)
-    return float(shape.chords(at[1] + off, at[0] - half, at[0] + half).sum() / (2 * half.sum()))
+    shot, item = table[:, :2].T.astype(np.int64)
+    return Touched(shot, item, table[:, 2:4], table[:, 4])
