@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from hitplanes import Disc, History, Pistol, Scene, Sprite, fire
+from hitplanes import Disc, History, InputError, Pistol, Scene, Sprite, fire, warm_up
 from hitplanes.planes.common import backend
 
 ROOT = Path(__file__).parent.parent
@@ -408,3 +408,59 @@ def test_shots_hit_the_same_where_kernels_are_damaged(tmp_path: Path) -> None:
     for told in (first, second, third):
         assert [rows for rows, _ in told] == [first[0][0]] * 3
     assert [why for _, why in first] == [[]] * 3 and len(second[1][1]) == len(third[1][1]) == 1
+
+
+AFTER_WARM_UP = """
+import sys
+import numpy as np
+from hitplanes import Beam, Disc, Laser, Pistol, Point, Scene, Spread, Sprite, fire, prepare, use_jit, warm_up
+from hitplanes.planes.common.backend import COMPILED
+from hitplanes.planes.jit import cache
+
+steps = []
+assert warm_up(lambda done, of: steps.append((done, of))) > 0
+assert [done for done, _ in steps] == list(range(steps[0][1] + 1)), steps
+def ready():
+    # argument types that each kernel is ready for
+    jit = [vars(sys.modules[name]) for name in sorted(set(COMPILED.values())) if name in sys.modules]
+    kernels = {id(kernel): kernel for module in jit for kernel in module.values()}
+    return {k: len(v.signatures) for k, v in kernels.items() if isinstance(getattr(v, "_cache", None), cache._Kept)}
+
+before = ready()
+scene = Scene((300, 200))
+ids = [scene.add(Sprite.circle(9), (20 * i, 90)) for i in range(1, 12)]
+scene.add(Sprite.box(20, 20), (100, 120), role="occluder")
+at = np.random.default_rng(1).uniform(0, 200, (300, 2))
+for weapon in (Point(), Disc(20), Disc(20, falloff="linear"), Spread(Disc(2), 8, 20), Beam(50, 4)):
+    for strategy in ("auto", "direct", "built"):
+        fire(scene, weapon, at, aim=20, strategy=strategy)
+    prepare(scene, weapon).fire((50, 50), aim=20)
+for weapon in (Pistol(90), Laser(90), Laser(90, width=5)):
+    for strategy in ("cast", "march", "walk"):
+        fire(scene, weapon, at, aim=20, strategy=strategy)
+    prepare(scene, weapon).fire((50, 50), aim=20)
+scene.move(np.array(ids), np.random.default_rng(2).uniform(0, 200, (len(ids), 2)))
+scene.move(ids[0], (5, 5))
+scene.set(ids[1], angle=33)
+fire(scene, Point(), at, strategy="labels")
+scene.planes()
+assert ready() == before
+print(len(before), end="")
+"""
+
+
+def test_after_a_warm_up_nothing_is_compiled() -> None:
+    pytest.importorskip("numba")
+    for command in ([sys.executable, "-m", "hitplanes", "warm-up"], [sys.executable, "-c", AFTER_WARM_UP]):
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert run.returncode == 0, run.stderr
+        if "warm-up" in command:
+            assert run.stdout.startswith("all kernels are ready: ") and run.stderr.startswith("0 of ")
+        else:
+            assert int(run.stdout) > 20
+
+
+def test_a_warm_up_needs_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hitplanes.planes.common.backend.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"^jit: expected numba, .* got no such module$"):
+        warm_up()

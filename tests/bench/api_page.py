@@ -45,7 +45,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Weapons of other weapons, and their JSON": ("Spread", "Rounds", "Weapon", "arsenal_of", "weapon_from_json"),
     "The past, and records": ("History", "PastScene", "FixedStep", "ShotRecord", "replay"),
     "Reports": ("report_of", "picture_of_report"),
-    "The process": ("use_jit", "use_threads", "__version__"),
+    "The process": ("use_jit", "warm_up", "use_threads", "__version__"),
 }
 """The names of `hitplanes` in the order in which a user meets them."""
 

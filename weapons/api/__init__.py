@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from hitplanes.weapons.kinds.weapon import Weapon as Weapon
     from hitplanes.weapons.prepared.prepare import Ready as Ready
     from hitplanes.weapons.prepared.prepare import prepare as prepare
+    from hitplanes.weapons.prepared.warm_up import warm_up as warm_up
     from hitplanes.weapons.rays.contacts import Reason as Reason
     from hitplanes.weapons.rays.ray_hits import RayHits as RayHits
     from hitplanes.weapons.replay.record import ShotRecord as ShotRecord
@@ -94,6 +95,7 @@ _HOME = {
     **dict.fromkeys(("Reason",), "weapons.rays.contacts"),
     **dict.fromkeys(("RayHits",), "weapons.rays.ray_hits"),
     **dict.fromkeys(("Ready", "prepare"), "weapons.prepared.prepare"),
+    **dict.fromkeys(("warm_up",), "weapons.prepared.warm_up"),
     **dict.fromkeys(("report_of",), "weapons.report.report"),
     **dict.fromkeys(("picture_of_report",), "weapons.report.picture"),
     **dict.fromkeys(("ShotRecord", "replay"), "weapons.replay.record"),

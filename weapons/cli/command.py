@@ -113,6 +113,11 @@ examples:
   hitplanes stability -o stability/ --seed 7
 """
 
+WARM_UP_HELP = """\
+Compile all kernels of the extra jit once, and keep them on disk. Later processes of this user load them in a moment,
+instead of compiling them in the middle of a game. hitplanes.warm_up() does the same.
+"""
+
 REPLAY_HELP = """\
 Fire the shots of a record again and print how the first different result differs. A game writes a record by firing
 with hitplanes.ShotRecord.
@@ -273,6 +278,7 @@ def parser() -> argparse.ArgumentParser:
     sub = _command(commands, replay, "fire a record of shots again, and compare", REPLAY_HELP, REPLAY_EXAMPLES)
     sub.add_argument("record", type=Path, metavar="RECORD.jsonl", help="file that hitplanes.ShotRecord wrote")
     _add_measurements(commands)
+    _command(commands, warm_up, "compile all kernels of the extra jit", WARM_UP_HELP, "")
     sub = _command(commands, demo, "animate a quadtree, a grid or a BVH", DEMO_HELP, DEMO_EXAMPLES)
     sub.add_argument("kind", choices=SHOWN, metavar="KIND", help=f"one of {', '.join(SHOWN)}")
     text = "a file that ends in .gif, or a new folder for PNG files (default: demo.gif)"
@@ -325,7 +331,7 @@ def _command(
     """Add a subcommand named like its function; those that fire take a scene first."""
     raw = argparse.RawDescriptionHelpFormatter
     sub: argparse.ArgumentParser = commands.add_parser(
-        run.__name__, help=summary, description=text, epilog=examples, formatter_class=raw
+        run.__name__.replace("_", "-"), help=summary, description=text, epilog=examples, formatter_class=raw
     )
     sub.set_defaults(run=run)
     if run in (report, fire, replay):
@@ -516,6 +522,17 @@ def demo(arguments: argparse.Namespace) -> None:
     from ..lab.demo import KINDS, write_demo  # only this subcommand needs all structures
 
     _say(f"a {KINDS[arguments.kind].name} in motion is in {write_demo(arguments.kind, arguments.output)}")
+
+
+def warm_up(_: argparse.Namespace) -> None:
+    """Compile all kernels."""
+    from ..prepared.warm_up import warm_up as compile_all  # needs numba
+
+    def progress(done: int, steps: int) -> None:
+        """Print how far it is."""
+        print(f"{done} of {steps} steps", file=sys.stderr, flush=True)
+
+    _say(f"all kernels are ready: {compile_all(progress):.1f} s")
 
 
 def stability(arguments: argparse.Namespace) -> int:
