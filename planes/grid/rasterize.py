@@ -39,7 +39,7 @@ QUOTIENT_ERROR = 2.0**-50
 def disc(radius: int) -> Spans:
     """Centres at most `radius` from the origin."""
     y = _rows(-radius, radius)
-    return _union([(y, *_disc_rows(0, SUB * y, radius))])
+    return _union([(y, *_disc_about(np.zeros(2, np.int64), radius, y))])
 
 
 def ring(inner: int, outer: int) -> Spans:
@@ -164,7 +164,7 @@ def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     low, high = np.minimum(a[1], b[:, 1]), np.maximum(a[1], b[:, 1])
     reach = max(radius, HALF)
     shape, y = _ragged_rows(-(-(low - reach) // SUB), (high + reach) // SUB)
-    first, last = _disc_rows(a[0], SUB * y - a[1], radius)
+    first, last = _disc_about(a, radius, y)
     x, level = b[:, 0][shape], SUB * y - b[:, 1][shape]
     for begin, end in (_disc_rows(x, level, radius), _between(a, step, radius, shape, y)):
         first, last = np.minimum(first, begin), np.maximum(last, end)
@@ -201,8 +201,7 @@ def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
     shape, y = _ragged_rows((low - HALF) // SUB, -(-(high + HALF) // SUB))
     parts = [_axis_rows(np.zeros(2, np.int64), axis, shape, y)]
     if s_half or c_half < 0:
-        first, last = _disc_rows(0, SUB * np.arange(int(y.min()), int(y.max()) + 1), reach)
-        first, last = first[y - y.min()], last[y - y.min()]
+        first, last = _disc_about(np.zeros(2, np.int64), reach, y)
         sides = []
         for sign in (1, -1):  # sign * v * c_half <= u * s_half  is  slope * x <= limit * y
             slope, limit = -sign * s * c_half - c * s_half, s * s_half - sign * c * c_half
@@ -236,18 +235,38 @@ def _segment_runs(a: Ints, b: Ints) -> Runs:
 
 def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
     """Runs of the supercovers of segments from a point (2,), in rows of shapes; empty in rows that they do not meet."""
-    lines = Lines(np.broadcast_to(a, step.shape), step, 0)
-    low, high = np.minimum(a[1], a[1] + step[:, 1]) - HALF, np.maximum(a[1], a[1] + step[:, 1]) + HALF
-    first, last = lines._thin_runs(shape, y)
-    return _or_nothing(first, last, (SUB * y < low[shape]) | (SUB * y > high[shape]))
+    (dx, dy), (x0, y0) = np.ascontiguousarray(step.T), a.tolist()
+    per, slope = np.maximum(np.abs(dy), 1), dx * np.sign(dy)
+    base, top, low = (x0 * per - y0 * slope)[shape], SUB * y - HALF, SUB * y + HALF
+    np.maximum(top, (y0 + np.minimum(dy, 0))[shape], out=top)
+    np.minimum(low, (y0 + np.maximum(dy, 0))[shape], out=low)
+    none = top > low
+    enter, leave = base + top * slope[shape], base + low * slope[shape]
+    if not dy.all():
+        leave += np.where(dy == 0, dx, 0)[shape]
+    cell = (SUB * per)[shape]
+    half = cell >> 1
+    return _or_nothing(-((half - np.minimum(enter, leave)) // cell), (np.maximum(enter, leave) + half) // cell, none)
 
 
-def _disc_rows(x: Ints | int, level: Ints, radius: int) -> tuple[Ints, Ints]:
-    """Runs of the centres at most `radius` from a point at `x`, in rows at `level` (k,) from it, 1/256 px."""
-    rest = radius * radius - level * level
-    half = isqrt(np.maximum(rest, 0))
-    first, last = -((half - x) >> 8), (x + half) >> 8
-    return _or_nothing(first, last, (rest < 0) | (first > last))
+def _disc_rows(x: Ints, level: Ints, radius: int) -> tuple[Ints, Ints]:
+    """Runs of the centres at most `radius` from points at `x` (k,), in rows at `level` (k,) from them, 1/256 px."""
+    first, last = np.full(len(level), WIDEST), np.full(len(level), -WIDEST)
+    near = np.flatnonzero(np.abs(level) <= radius)
+    level, x = level[near], x[near]
+    half = isqrt(radius * radius - level * level)
+    first[near], last[near] = -((half - x) >> 8), (x + half) >> 8
+    none = near[first[near] > last[near]]
+    first[none], last[none] = WIDEST, -WIDEST
+    return first, last
+
+
+def _disc_about(center: Ints, radius: int, y: Ints) -> tuple[Ints, Ints]:
+    """Runs of the centres at most `radius` from one point (2,), in rows y; each row is computed once."""
+    top = int(y.min(initial=0))
+    row = np.arange(top, int(y.max(initial=0)) + 1)
+    first, last = _disc_rows(np.broadcast_to(center[0], row.shape), SUB * row - center[1], radius)
+    return first[y - top], last[y - top]
 
 
 def _or_nothing(first: Ints, last: Ints, none: Bools) -> tuple[Ints, Ints]:
