@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import Beam, Box, Cone, Disc, Polygon, Rounds, Scene, Spread, Stencil, Weapon, fire
+from hitplanes.planes.bits.tiles import big_pattern
 from hitplanes.planes.grid import rasterize
 from hitplanes.planes.grid.fixed_point import ONE, unit
-from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
-from hitplanes.weapons.kinds.weapon import AimedPatterns, columns_of
+from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
 
 STAR = Polygon([(0, 0), (50, 10), (30, 40), (20, 10)])
 WEAPONS: dict[str, AreaWeapon] = {
@@ -53,7 +53,8 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str) -> None:
     for i, (c, s) in enumerate(direction.tolist()):
         spans = weapon.spans(c, s)
         assert patterns[i].spans == spans
-        words = columns_of(spans)
+        words, big, own = columns_of(spans), big_of_bits(bits, i), big_pattern(spans)
+        assert vars(big) | {"depths": 0} == vars(own) | {"depths": 0}
         assert tuple(bits.box_xyxy[i]) == spans.box_xyxy
         assert bits.rows[i] == words.shape[1] and bits.first[i] == begin + 64
         assert np.array_equal(bits.words[begin : begin + words.size], words.reshape(-1))
@@ -68,18 +69,6 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str) -> None:
 def test_strips_are_kept_for_long_patterns_alone() -> None:
     kept = {name for name, weapon in WEAPONS.items() if len(patterns_of(weapon, directions(5)).bits.strips)}  # type: ignore[attr-defined]
     assert {"long box", "beam"} <= kept and not kept & {"disc", "pixel"}
-
-
-def drawn(weapon: AreaWeapon, c: int, s: int) -> Spans:
-    """The polygon of a weapon by the even-odd rule."""
-    rings = [weapon._corners()] if isinstance(weapon, Box) else weapon._rings()  # type: ignore[attr-defined]
-    return rasterize.polygon([rasterize.turned(ring, c, s) for ring in rings])
-
-
-@pytest.mark.parametrize("name", [name for name, weapon in WEAPONS.items() if isinstance(weapon, Box | Polygon)])
-def test_convex_polygons_are_those_of_the_even_odd_rule(name: str) -> None:
-    for c, s in directions(7, 200).tolist():
-        assert WEAPONS[name].spans(c, s) == drawn(WEAPONS[name], c, s)
 
 
 coordinates = st.integers(-700, 700)
@@ -130,6 +119,8 @@ MORE: dict[str, Weapon] = {
     "spread": Spread(Box(9, 4), 3, 20),
     "rounds": Rounds(Cone(60, 30), 3, recoil_deg=7),
     "disc of one shape": Disc(20),
+    "nothing": Polygon([(0.2, 0.2), (0.4, 0.2), (0.3, 0.4)]),
+    "nothing at some aims": Polygon([(0.2, -0.1), (40.2, -0.1), (40.2, 0.1), (0.2, 0.1)]),
 }
 
 
@@ -149,8 +140,9 @@ def test_shots_at_many_aims_are_those_of_each_alone(name: str, corner: tuple[int
 def test_the_same_aims_are_rasterized_once() -> None:
     direction = directions(11)
     first = patterns_of(Beam(77, 5), direction)
-    assert patterns_of(Beam(77, 5), direction.copy()) is first
-    assert patterns_of(Beam(78, 5), direction) is not first
+    assert isinstance(first, AimedPatterns)
+    assert patterns_of(Beam(77, 5), direction.copy()).bits is first.bits  # type: ignore[attr-defined]
+    assert patterns_of(Beam(78, 5), direction).bits is not first.bits  # type: ignore[attr-defined]
     few = patterns_of(Beam(77, 5), direction[:FEW_AIMS])
     assert not isinstance(few, AimedPatterns) and few[0] is pattern_of(Beam(77, 5), *direction[0].tolist())
     assert pattern_of(Beam(77, 5), ONE, 0).spans == Beam(77, 5).spans(ONE, 0)

@@ -128,7 +128,7 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     step = np.roll(points, -1, axis=1) - points
     following = np.roll(step, -1, axis=1)
     turn = step[..., 0] * following[..., 1] - step[..., 1] * following[..., 0]
-    clockwise = (turn >= 0).all(axis=1)
+    clockwise: Bools = np.asarray((turn >= 0).all(axis=1))
     up = step[..., 1] < 0
     onward = ((turn != 0) | ((step * following).sum(axis=2) > 0)).all(axis=1)
     once = onward & ((np.roll(up, -1, axis=1) != up).sum(axis=1) <= 2)  # it goes around only once
@@ -138,15 +138,15 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     shape, y = _ragged_rows(top, points[..., 1].max(axis=1) // SUB)
     begin = np.searchsorted(shape, np.arange(len(points))) - top
     first, last = np.full(len(y), WIDEST), np.full(len(y), -WIDEST)
-    for edge in range(points.shape[1]):
-        for side, upward in ((first, True), (last, False)):
-            at = np.flatnonzero((step[:, edge, 1] != 0) & ((step[:, edge, 1] < 0) == (clockwise == upward)))
-            (x0, y0), (dx, dy) = points[at, edge].T, step[at, edge].T
-            x0, y0, dx, dy = np.where(dy < 0, (x0 + dx, y0 + dy, -dx, -dy), (x0, y0, dx, dy))
-            which, row = _ragged_rows(-(-y0 // SUB), (y0 + dy) // SUB)
-            across = (x0 * dy - y0 * dx)[which] + (SUB * dx)[which] * row
-            per = (SUB * dy)[which]
-            side[begin[at][which] + row] = -(-across // per) if upward else across // per
+    ends = np.concatenate([points, step], axis=2).reshape(-1, 4)
+    rises = ((step[..., 1] < 0) == clockwise[:, None]).reshape(-1)
+    for side, upward in ((first, True), (last, False)):
+        at = np.flatnonzero((ends[:, 3] != 0) & (rises == upward))
+        x0, y0, dx, dy = ends[at].T
+        x0, y0, dx, dy = np.where(dy < 0, (x0 + dx, y0 + dy, -dx, -dy), (x0, y0, dx, dy))
+        edge, row = _ragged_rows(-(-y0 // SUB), (y0 + dy) // SUB)
+        across, per = (x0 * dy - y0 * dx)[edge] + (SUB * dx)[edge] * row, (SUB * dy)[edge]
+        side[begin[at // points.shape[1]][edge] + row] = -(-across // per) if upward else across // per
     return RowRuns(shape, y, [(first, last)])
 
 

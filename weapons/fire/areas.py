@@ -33,7 +33,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.areas import parts_of, pattern_of
 from ..kinds.placements import Placements, Shots, placements_for, placements_of
-from ..kinds.weapon import Weapon, big_of, fits, fits_at_reach
+from ..kinds.weapon import Weapon, fits, fits_at_reach
 from .hits import Rows, rows_of_span_hits
 from .plan import Plan
 from .prefilter import Candidates, may_refuse, refused
@@ -325,7 +325,7 @@ def by_integers(request: Request, context: QueryContext) -> list[Rows]:
     tiles, placements = scene.items.tiles(), placements_for(request.weapon, shots)
     ground = Ground(request.stack, tiles, tiles.boxes(request.stack.box_xyxy), context.pierce, context.bounds)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
-    patterns = [big_of(pattern) for pattern in placements.table.patterns]
+    patterns = placements.table.bigs
     plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)
     near = accepted(met_boxes(placements.boxes, ground.boxes_xyxy), ground, shots, placements.shot)
     hits = hit_by_few(placed_of(placements), patterns, near, ground)

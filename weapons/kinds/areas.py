@@ -22,7 +22,7 @@ from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, Transform, rows_of, variant_of
 
 from .rays import Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
-from .weapon import FALLOFFS, LENGTH, WINDOW_CACHE_BYTES, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
+from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
 
 ORIGIN = np.zeros(2, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
@@ -137,8 +137,7 @@ class Box(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """A closed rectangle whose edges lie between the pixels."""
-        runs = self.runs(np.array([[c, s]]))
-        return polygon([turned(self._corners(), c, s)]) if runs is None else runs.spans()
+        return polygon([turned(self._corners(), c, s)])
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """Closed rectangles, along directions (n, 2)."""
@@ -173,8 +172,7 @@ class Polygon(AreaWeapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """The filled rings."""
-        runs = self.runs(np.array([[c, s]]))
-        return polygon([turned(ring, c, s) for ring in self._rings()]) if runs is None else runs.spans()
+        return polygon([turned(ring, c, s) for ring in self._rings()])
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """The filled rings, if they are convex, along directions (n, 2)."""
@@ -383,7 +381,7 @@ def pierces(weapon: Weapon) -> bool:
 
 
 FEW_AIMS = 8
-"""Most directions whose patterns are made one by one, and kept: shots at the same aims need them again."""
+"""Most directions whose patterns are made one by one."""
 
 _kept: LruCache[tuple[str, int, int], Pattern] = LruCache(
     PATTERN_CACHE_BYTES, lambda pattern: pattern.nbytes, lambda key: len(key[0])
@@ -409,21 +407,16 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
     return pattern
 
 
-_kept_aims: LruCache[tuple[str, bytes], AimedPatterns] = LruCache(
-    WINDOW_CACHE_BYTES, lambda patterns: patterns.nbytes, lambda key: len(key[0]) + len(key[1])
-)
-
-
 def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
-    """Patterns of a weapon along distinct directions (n, 2); many are rasterized at once, if its kind can."""
-    if len(direction) <= FEW_AIMS or weapon.falloff is not None or weapon.runs(direction[:1]) is None:
+    """Patterns of a weapon along distinct directions (n, 2): of many only the bit rows are made, if its kind can.
+
+    A few are made one by one, because other calls may need some of them again. Weights need all pixels.
+    """
+    if len(direction) <= FEW_AIMS or type(weapon).runs is AreaWeapon.runs or weapon.falloff is not None:
         return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
 
-    def make() -> AimedPatterns:
-        reach = -(-weapon.reach_256 // SUB)
-        return AimedPatterns(direction, lambda c, s: pattern_of(weapon, c, s), weapon.runs, reach)
-
-    return _kept_aims.get((weapon.text, direction.tobytes()), make)
+    reach = -(-weapon.reach_256 // SUB)
+    return AimedPatterns(weapon.text, direction, lambda c, s: pattern_of(weapon, c, s), weapon.runs, reach)
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:

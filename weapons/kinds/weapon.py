@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
-from hitplanes.planes.bits.tiles import BigPattern, big_pattern
+from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
 from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
@@ -250,6 +250,11 @@ class PatternTable:
         return fits(self.patterns)
 
     @property
+    def bigs(self) -> list[BigPattern]:
+        """All patterns as integer rows; those of the last calls are kept."""
+        return self.patterns.bigs if isinstance(self.patterns, AimedPatterns) else [big_of(p) for p in self.patterns]
+
+    @property
     def bits(self) -> PatternBits:
         """Bit rows of all patterns; those of the last calls are kept."""
         return self.patterns.bits if isinstance(self.patterns, AimedPatterns) else pattern_bits_of(self.patterns)
@@ -305,6 +310,7 @@ class AimedPatterns(Sequence[Pattern]):
 
     Parameters
     ----------
+    text : the weapon as JSON
     direction : (n, 2) cos and sin times 2**30
     make : function of cos and sin that returns a pattern
     runs : function of directions that returns the runs of all patterns; None if they must be made one by one
@@ -312,9 +318,14 @@ class AimedPatterns(Sequence[Pattern]):
     """
 
     def __init__(
-        self, direction: Ints, make: Callable[[int, int], Pattern], runs: Callable[[Ints], RowRuns | None], reach: int
+        self,
+        text: str,
+        direction: Ints,
+        make: Callable[[int, int], Pattern],
+        runs: Callable[[Ints], RowRuns | None],
+        reach: int,
     ) -> None:
-        self._direction, self._make, self._runs, self._reach = direction, make, runs, reach
+        self._text, self._direction, self._make, self._runs, self._reach = text, direction, make, runs, reach
 
     def __len__(self) -> int:
         return len(self._direction)
@@ -331,14 +342,24 @@ class AimedPatterns(Sequence[Pattern]):
 
     @cached_property
     def bits(self) -> PatternBits:
-        """Bit rows of all patterns."""
+        """Bit rows of all patterns; those of the last calls are kept."""
+        return _kept_aims.get((self._text, self._direction.tobytes()), self._rasterized)
+
+    @property
+    def bigs(self) -> list[BigPattern]:
+        """All patterns as integer rows; those of the last calls are kept."""
+        keys = ((self._text, one.tobytes()) for one in self._direction)
+        return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
+
+    def _rasterized(self) -> PatternBits:
         straight, made = self._make(ONE, 0), []
         for first in range(0, len(self), AIMS_AT_ONCE):
             direction = self._direction[first : first + AIMS_AT_ONCE]
             runs = self._runs(direction)
-            if runs is None:
+            part = None if runs is None else _bits_of_runs(runs, len(direction), _normals(straight, direction))
+            if part is None:
                 return _made(list(self))
-            made.append(_bits_of_runs(runs, _normals(straight, direction)))
+            made.append(part)
         begin = np.cumsum([0, *(len(part.words) for part in made[:-1])]).tolist()
         made = [part._replace(first=part.first + at) for part, at in zip(made, begin, strict=True)]
         if not all(len(part.strips) for part in made):
@@ -357,8 +378,13 @@ def _normals(straight: Pattern, direction: Ints) -> Ints:
     return normals if len(strips_of(strips, np.concatenate([np.zeros_like(sides), sides], axis=1))) else normals[:0]
 
 
-def _bits_of_runs(runs: RowRuns, normal: Ints) -> PatternBits:
-    """Bit rows of patterns from their runs; `normal` are those of the strips, or none."""
+def _bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
+    """Bit rows of `count` patterns from their runs; None if one is empty.
+
+    Parameters
+    ----------
+    normal : (count, 2) normals of the strips, or none
+    """
     shape, y, parts = runs
     first, last = parts[0]
     for begin, end in parts[1:]:
@@ -368,6 +394,8 @@ def _bits_of_runs(runs: RowRuns, normal: Ints) -> PatternBits:
         shape, y, first, last = shape[filled], y[filled], first[filled], last[filled]
         parts = [(begin[filled], end[filled]) for begin, end in parts]
     begin = begins(shape).nonzero()[0]
+    if len(begin) < count:
+        return None
     end = np.append(begin[1:], len(shape)) - 1
     box = np.stack([np.minimum.reduceat(first, begin), y[begin], np.maximum.reduceat(last, begin), y[end]], axis=1)
     rows = box[:, 3] - box[:, 1] + (1 + 2 * WORD)
@@ -458,9 +486,15 @@ _kept: LruCache[tuple[ref[Pattern], ...], PatternBits] = LruCache(
     WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key)
 )
 
+_kept_aims: LruCache[tuple[str, bytes], PatternBits] = LruCache(
+    WINDOW_CACHE_BYTES, _bytes, lambda key: len(key[0]) + len(key[1])
+)
+
 _kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lambda words: words.nbytes + ENTRY_BYTES)
 
-_kept_bigs: LruCache[ref[Pattern], BigPattern] = LruCache(WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES)
+_kept_bigs: LruCache[ref[Pattern] | tuple[str, bytes], BigPattern] = LruCache(
+    WINDOW_CACHE_BYTES, lambda big: big.nbytes + ENTRY_BYTES
+)
 
 _FULL = np.uint64(2**64 - 1)
 
@@ -488,6 +522,16 @@ def pattern_bits_of(patterns: Sequence[Pattern]) -> PatternBits:
 def big_of(pattern: Pattern) -> BigPattern:
     """A pattern as integer rows; those of the last calls are kept."""
     return _kept_bigs.get(ref(pattern), lambda: big_pattern(pattern.spans))
+
+
+def big_of_bits(bits: PatternBits, k: int) -> BigPattern:
+    """Pattern k of several as integer rows; the last column of words is empty."""
+    x, y, x_max, y_max = bits.box_xyxy[k].tolist()
+    stride, high, step = stride_of(x_max - x + 1), y_max - y + 1, bits.rows.item(k)
+    first = bits.first.item(k)
+    columns = [bits.words[first + c * step : first + c * step + high] for c in range(stride // WORD)]
+    rows = int.from_bytes(np.stack(columns, axis=1).astype("<u8", copy=False).tobytes(), "little") >> WORD - 1
+    return BigPattern(x, y, x_max - x + 1, high, stride, rows, Depths(rows, stride, x, y))
 
 
 def _made(patterns: Sequence[Pattern]) -> PatternBits:
