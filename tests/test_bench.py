@@ -60,10 +60,10 @@ def test_the_other_sections_run(monkeypatch: Any) -> None:
     monkeypatch.setattr(speed, "bandwidth", dict)
     lines: list[str] = []
     found = speed.measured(
-        TINY, ["special", "single", "preparation", "rewind", "huge", "planner", "floors"], lines.append
+        TINY, ["special", "weapons", "single", "preparation", "rewind", "huge", "planner", "floors"], lines.append
     )
     assert {cell["section"] for cell in found["cells"]} == {
-        "special", "single", "preparation", "rewind", "huge", "planner", "floors",
+        "special", "weapons", "single", "preparation", "rewind", "huge", "planner", "floors",
     }  # fmt: skip
     assert all(cell["sides"] for cell in found["cells"])
 

@@ -28,6 +28,7 @@ from speed_moving import moving, moving_rays, redrawn
 from speed_single import preparation, single
 from speed_static import modes, special, static
 from speed_targets import judged
+from speed_weapons import weapons
 from strategies import planner
 
 import hitplanes
@@ -37,6 +38,7 @@ from hitplanes.planes.files.png import write_text
 SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
     "static": static,
     "special": special,
+    "weapons": weapons,
     "moving": moving,
     "moving rays": moving_rays,
     "redrawn": redrawn,
