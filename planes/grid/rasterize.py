@@ -224,13 +224,9 @@ def _sector_ends(reach: int, c: Ints, s: Ints, c_half: int, s_half: int) -> tupl
 
 def segment(a: Ints, b: Ints) -> Spans:
     """Closed supercover of a segment: every pixel whose closed square touches it; the ends may be swapped."""
-    return _union([_segment_runs(a, b)])
-
-
-def _segment_runs(a: Ints, b: Ints) -> Runs:
-    ends = np.array([a, b], np.int64)
-    y = _rows(int(ends[:, 1].min()) - HALF, int(ends[:, 1].max()) + HALF)
-    return y, *Lines(ends[:1], ends[1:] - ends[:1], 0)._thin_runs(np.zeros_like(y), y)
+    a, b = np.asarray(a), np.asarray(b)
+    y = _rows(min(a[1], b[1]) - HALF, max(a[1], b[1]) + HALF)
+    return _union([(y, *_axis_rows(a, np.array([b - a]), np.zeros_like(y), y))])
 
 
 def _axis_rows(a: Ints, step: Ints, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
