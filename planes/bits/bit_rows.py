@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Ints
-from ..grid.spans import Box, begins, meets_strip
+from ..grid.rasterize import RowRuns
+from ..grid.spans import NO_STRIPS, Box, begins, meets_strip
 
 Words = npt.NDArray[np.uint64]
 Sums = npt.NDArray[np.uint32]
@@ -144,6 +145,65 @@ class PatternBits(NamedTuple):
     strips: Ints
     sums: Sums
     first_sum: Ints
+
+
+def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
+    """Bit rows of `count` patterns from their runs; None if one is empty.
+
+    Parameters
+    ----------
+    normal : (count, 2) normals of the strips, or none
+    """
+    shape, y, parts = runs
+    first, last = parts[0]
+    for begin, end in parts[1:]:
+        first, last = np.minimum(first, begin), np.maximum(last, end)
+    filled = first <= last
+    if not filled.all():
+        shape, y, first, last = shape[filled], y[filled], first[filled], last[filled]
+        parts = [(begin[filled], end[filled]) for begin, end in parts]
+    begin = begins(shape).nonzero()[0]
+    if len(begin) < count:
+        return None
+    end = np.append(begin[1:], len(shape)) - 1
+    box = np.stack([np.minimum.reduceat(first, begin), y[begin], np.maximum.reduceat(last, begin), y[end]], axis=1)
+    rows = box[:, 3] - box[:, 1] + (1 + 2 * WORD)
+    size = rows * ((2 * WORD - 2 + box[:, 2] - box[:, 0] + 1) // WORD + 1)
+    corner = np.cumsum(size) - size + WORD
+    words = np.zeros(int(size.sum()), np.uint64)
+    at, left, step = (corner - box[:, 1])[shape] + y, (box[:, 0] - (WORD - 1))[shape], rows[shape]
+    for part in parts:
+        _lay_runs(words, at, step, *(side - left for side in part))
+    strips = NO_STRIPS
+    if len(normal):
+        a, b = normal.T
+        across, ends = b[shape] * y, (a[shape] * first, a[shape] * last)
+        low = np.minimum.reduceat(np.minimum(*ends) + across, begin)
+        strips = np.stack([a, b, low, np.maximum.reduceat(np.maximum(*ends) + across, begin)], axis=1)
+    return PatternBits(box, corner, rows, words, strips, NO_SUMS, np.zeros(len(box), np.int64))
+
+
+def _lay_runs(words: Words, at: Ints, step: Ints, first: Ints, last: Ints) -> None:
+    """Set the bits of runs (k,), each in a row of its own.
+
+    Parameters
+    ----------
+    at, step : (k,) place of the row's first word, and from there to the next word of the row
+    first, last : (k,) bits of the row
+    """
+    if (first > last).any():
+        there = (first <= last).nonzero()[0]
+        at, step, first, last = at[there], step[there], first[there], last[there]
+    more = (last >> 6) - (first >> 6)
+    begin, end = _FULL << (first & 63).view(np.uint64), _FULL >> (~last & 63).view(np.uint64)
+    at = at + (first >> 6) * step
+    words[at] |= np.where(more == 0, begin & end, begin)
+    far = more.nonzero()[0]
+    at, step, more, end = at[far], step[far], more[far], end[far]
+    words[at + more * step] |= end
+    for k in range(1, int(more.max(initial=0))):
+        between = (more > k).nonzero()[0]
+        words[at[between] + k * step[between]] = _FULL
 
 
 class Placed(NamedTuple):

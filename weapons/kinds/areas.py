@@ -383,6 +383,9 @@ def pierces(weapon: Weapon) -> bool:
 FEW_AIMS = 8
 """Most directions whose patterns are made one by one."""
 
+FADING_MOST = 512
+"""Longest reach, px, of patterns with weights that are made at once: the weights of all pixels around are needed."""
+
 _kept: LruCache[tuple[str, int, int], Pattern] = LruCache(
     PATTERN_CACHE_BYTES, lambda pattern: pattern.nbytes, lambda key: len(key[0])
 )
@@ -410,13 +413,16 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
 def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
     """Patterns of a weapon along distinct directions (n, 2): of many only the bit rows are made, if its kind can.
 
-    A few are made one by one, because other calls may need some of them again. Weights need all pixels.
+    A few are made one by one, because other calls may need some of them again.
     """
-    if len(direction) <= FEW_AIMS or type(weapon).runs is AreaWeapon.runs or weapon.falloff is not None:
+    far = weapon.falloff is not None and weapon.reach_256 > SUB * FADING_MOST
+    if len(direction) <= FEW_AIMS or type(weapon).runs is AreaWeapon.runs or far:
         return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
 
-    reach = -(-weapon.reach_256 // SUB)
-    return AimedPatterns(weapon.text, direction, lambda c, s: pattern_of(weapon, c, s), weapon.runs, reach)
+    def make(c: int, s: int) -> Pattern:
+        return pattern_of(weapon, c, s)
+
+    return AimedPatterns(weapon.text, direction, make, weapon.runs, weapon.reach_256, weapon.falloff)
 
 
 def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...] = (Weapon,)) -> Weapon:

@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
+from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words, bits_of_runs
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
 from hitplanes.planes.common.backend import LruCache
@@ -21,7 +21,7 @@ from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid.fixed_point import ONE, turned
 from hitplanes.planes.grid.rasterize import RowRuns
-from hitplanes.planes.grid.spans import NO_STRIPS, Spans, Strip, begins, ragged, strip_of, strips_of
+from hitplanes.planes.grid.spans import NO_STRIPS, Spans, Strip, ragged, strip_of, strips_of
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -314,7 +314,8 @@ class AimedPatterns(Sequence[Pattern]):
     direction : (n, 2) cos and sin times 2**30
     make : function of cos and sin that returns a pattern
     runs : function of directions that returns the runs of all patterns; None if they must be made one by one
-    reach : greatest distance of a pixel, px
+    reach_256 : greatest distance of a pixel, 1/256 px
+    falloff : as in `make_pattern`
     """
 
     def __init__(
@@ -323,9 +324,11 @@ class AimedPatterns(Sequence[Pattern]):
         direction: Ints,
         make: Callable[[int, int], Pattern],
         runs: Callable[[Ints], RowRuns | None],
-        reach: int,
+        reach_256: int,
+        falloff: str | None,
     ) -> None:
-        self._text, self._direction, self._make, self._runs, self._reach = text, direction, make, runs, reach
+        self._text, self._direction, self._make, self._runs = text, direction, make, runs
+        self._reach_256, self._falloff = reach_256, falloff
 
     def __len__(self) -> int:
         return len(self._direction)
@@ -337,8 +340,8 @@ class AimedPatterns(Sequence[Pattern]):
     @property
     def nbytes(self) -> int:
         """Bytes of the bit rows, at most."""
-        side = 2 * self._reach + 3
-        return len(self) * _window_bytes(side, side, False)
+        side = 2 * -(-self._reach_256 // SUB) + 3
+        return len(self) * _window_bytes(side, side, self._falloff is not None)
 
     @cached_property
     def bits(self) -> PatternBits:
@@ -356,7 +359,7 @@ class AimedPatterns(Sequence[Pattern]):
         for first in range(0, len(self), AIMS_AT_ONCE):
             direction = self._direction[first : first + AIMS_AT_ONCE]
             runs = self._runs(direction)
-            part = None if runs is None else _bits_of_runs(runs, len(direction), _normals(straight, direction))
+            part = None if runs is None else bits_of_runs(runs, len(direction), _normals(straight, direction))
             if part is None:
                 return _made(list(self))
             made.append(part)
@@ -364,7 +367,27 @@ class AimedPatterns(Sequence[Pattern]):
         made = [part._replace(first=part.first + at) for part, at in zip(made, begin, strict=True)]
         if not all(len(part.strips) for part in made):
             made = [part._replace(strips=NO_STRIPS) for part in made]
-        return PatternBits(*map(np.concatenate, zip(*made, strict=True)))
+        bits = PatternBits(*map(np.concatenate, zip(*made, strict=True)))
+        return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
+
+
+def _with_sums(bits: PatternBits, falloff: str, reach_256: int) -> PatternBits:
+    """Add the sums of weights along rows; they depend on the place alone, so those of all patterns are of one table."""
+    every = _kept_sums.get((falloff, reach_256), lambda: _sums_around(falloff, reach_256))
+    boxes = (bits.box_xyxy + len(every) // 2).tolist()
+    parts = [every[y : y_max + 1, x : x_max + 2].reshape(-1) for x, y, x_max, y_max in boxes]
+    size = np.array([part.size for part in parts])
+    return bits._replace(sums=_joined(parts), first_sum=np.cumsum(size) - size)
+
+
+def _sums_around(falloff: str, reach_256: int) -> Sums:
+    """Sums of weights along the rows around the origin, modulo 2**32, as far as a pattern reaches, and 1 px more."""
+    far = -(-reach_256 // SUB) + 1
+    side = np.arange(-far, far + 1)
+    weights = falloff_weights((side[:, None] ** 2 + side**2).reshape(-1), falloff, reach_256)
+    sums = np.zeros((len(side), len(side) + 1), np.uint32)
+    np.cumsum(weights.reshape(len(side), -1), axis=1, dtype=np.uint32, out=sums[:, 1:])
+    return sums
 
 
 def _normals(straight: Pattern, direction: Ints) -> Ints:
@@ -376,65 +399,6 @@ def _normals(straight: Pattern, direction: Ints) -> Ints:
     sides = np.stack([wide * c + tall * s, wide * s + tall * c], axis=1) // ONE
     strips = np.concatenate([normals, np.broadcast_to([low, high], normals.shape)], axis=1)
     return normals if len(strips_of(strips, np.concatenate([np.zeros_like(sides), sides], axis=1))) else normals[:0]
-
-
-def _bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
-    """Bit rows of `count` patterns from their runs; None if one is empty.
-
-    Parameters
-    ----------
-    normal : (count, 2) normals of the strips, or none
-    """
-    shape, y, parts = runs
-    first, last = parts[0]
-    for begin, end in parts[1:]:
-        first, last = np.minimum(first, begin), np.maximum(last, end)
-    filled = first <= last
-    if not filled.all():
-        shape, y, first, last = shape[filled], y[filled], first[filled], last[filled]
-        parts = [(begin[filled], end[filled]) for begin, end in parts]
-    begin = begins(shape).nonzero()[0]
-    if len(begin) < count:
-        return None
-    end = np.append(begin[1:], len(shape)) - 1
-    box = np.stack([np.minimum.reduceat(first, begin), y[begin], np.maximum.reduceat(last, begin), y[end]], axis=1)
-    rows = box[:, 3] - box[:, 1] + (1 + 2 * WORD)
-    size = rows * ((2 * WORD - 2 + box[:, 2] - box[:, 0] + 1) // WORD + 1)
-    corner = np.cumsum(size) - size + WORD
-    words = np.zeros(int(size.sum()), np.uint64)
-    at, left, step = (corner - box[:, 1])[shape] + y, (box[:, 0] - (WORD - 1))[shape], rows[shape]
-    for part in parts:
-        _lay_runs(words, at, step, *(side - left for side in part))
-    strips = NO_STRIPS
-    if len(normal):
-        a, b = normal.T
-        across, ends = b[shape] * y, (a[shape] * first, a[shape] * last)
-        low = np.minimum.reduceat(np.minimum(*ends) + across, begin)
-        strips = np.stack([a, b, low, np.maximum.reduceat(np.maximum(*ends) + across, begin)], axis=1)
-    return PatternBits(box, corner, rows, words, strips, NO_SUMS, np.zeros(len(box), np.int64))
-
-
-def _lay_runs(words: Words, at: Ints, step: Ints, first: Ints, last: Ints) -> None:
-    """Set the bits of runs (k,), each in a row of its own.
-
-    Parameters
-    ----------
-    at, step : (k,) place of the row's first word, and from there to the next word of the row
-    first, last : (k,) bits of the row
-    """
-    if (first > last).any():
-        there = (first <= last).nonzero()[0]
-        at, step, first, last = at[there], step[there], first[there], last[there]
-    more = (last >> 6) - (first >> 6)
-    begin, end = _FULL << (first & 63).view(np.uint64), _FULL >> (~last & 63).view(np.uint64)
-    at = at + (first >> 6) * step
-    words[at] |= np.where(more == 0, begin & end, begin)
-    far = more.nonzero()[0]
-    at, step, more, end = at[far], step[far], more[far], end[far]
-    words[at + more * step] |= end
-    for k in range(1, int(more.max(initial=0))):
-        between = (more > k).nonzero()[0]
-        words[at[between] + k * step[between]] = _FULL
 
 
 def _joined(columns: Sequence[npt.NDArray[Kind]]) -> npt.NDArray[Kind]:
@@ -489,6 +453,8 @@ _kept: LruCache[tuple[ref[Pattern], ...], PatternBits] = LruCache(
 _kept_aims: LruCache[tuple[str, bytes], PatternBits] = LruCache(
     WINDOW_CACHE_BYTES, _bytes, lambda key: len(key[0]) + len(key[1])
 )
+
+_kept_sums: LruCache[tuple[str, int], Sums] = LruCache(WINDOW_CACHE_BYTES, lambda sums: sums.nbytes)
 
 _kept_columns: LruCache[ref[Pattern], Words] = LruCache(WINDOW_CACHE_BYTES, lambda words: words.nbytes + ENTRY_BYTES)
 
