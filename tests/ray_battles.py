@@ -164,7 +164,8 @@ class Battle:
         for n in range(count):
             start = (a[0] + n * snapped(recoil_xy[0]), a[1] + n * snapped(recoil_xy[1]))
             for k in range(fan):
-                turns = (recoil_deg * n, angle * (k / (fan - 1) - 1 / 2) if gun.sweep else 0.0)
+                around = (k - fan // 2) / fan if angle == 360 else k / max(fan - 1, 1) - 1 / 2
+                turns = (recoil_deg * n, angle * around if gun.sweep else 0.0)
                 dx, dy = self._displacement(shot, turns)
                 for pellet in range(scattered):
                     x = y = 0

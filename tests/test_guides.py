@@ -78,12 +78,12 @@ def test_golden_recipe_runs_as_ci_would(pytester: pytest.Pytester, monkeypatch: 
 @pytest.mark.parametrize("radius", [1, 7, 40, 97])
 def test_no_pixel_lies_between_two_rays_of_the_fan(radius: int) -> None:
     """The number of rays that the recipe of the explosion gives."""
-    assert "ceil(tau * radius) + 1" in text_of(RECIPES)
+    assert "count = ceil(tau * radius)\n" in text_of(RECIPES)
     scene = Scene.from_planes(hittable=np.ones((2 * radius + 5, 2 * radius + 5), bool))
     at = (radius + 2, radius + 2)
     disc, fan = (
         set(map(tuple, fire(scene, weapon, at).pixels_at()[0, 0].pixels().tolist()))
-        for weapon in (Disc(radius), Sweep(Laser(radius), 360, ceil(tau * radius) + 1))
+        for weapon in (Disc(radius), Sweep(Laser(radius), 360, ceil(tau * radius)))
     )
     assert disc <= fan
 

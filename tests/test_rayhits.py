@@ -605,3 +605,24 @@ def test_cells_that_are_too_many_are_refused_and_nothing_else(monkeypatch: pytes
             ask()
     assert [why.object for why in hits.why_not()] == [1] and hits.nearest_miss() is not None
     assert list(hits.pixels_at()) == [(0, 0)] and hits.blockers() == []
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 7, 8, 360])
+def test_a_full_circle_fires_no_direction_twice_and_one_along_the_aim(count: int) -> None:
+    hits = fire(Scene(), Sweep(Pistol(1000), 360, count), (0, 0), aim=30)
+    x, y = hits.stop.point_xy.T
+    around = np.sort(np.mod(np.degrees(np.arctan2(y, x)) - 30 + 1e-3, 360))
+    assert np.allclose(around, 360 / count * np.arange(count) + 1e-3, atol=1e-3)
+
+
+def test_a_circle_of_eight_hits_all_around() -> None:
+    scene = Scene()
+    ways = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)]
+    ids = [scene.add(np.ones((5, 5), np.bool_), (40 * x, 40 * y)) for x, y in ways]
+    hits = fire(scene, Sweep(Pistol(80), 360, 8), (0, 0))
+    assert sorted(hits.object.tolist()) == ids and hits.samples.tolist() == [1] * 8
+
+
+def test_an_open_fan_has_a_ray_on_both_sides() -> None:
+    hits = fire(Scene(), Sweep(Pistol(100), 90, 3), (0, 0))
+    assert hits.stop.point_xy.round().tolist() == [[71, -71], [100, 0], [71, 71]]

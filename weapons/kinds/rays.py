@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from hitplanes.planes.common.backend import cached_attribute
-from hitplanes.planes.common.checks import InputError
+from hitplanes.planes.common.checks import Floats, InputError
 from hitplanes.planes.common.limits import PELLETS_MAX, REACH_MAX, STEPS_MAX
 from hitplanes.planes.common.tables import Number, Optional, Value, Whole, Word
 from hitplanes.planes.grid.fixed_point import snap
@@ -177,14 +179,20 @@ class Projectile(RayWeapon):
         return 1
 
 
+FULL_CIRCLE = 360
+
+
 @dataclass(frozen=True, eq=False)
 class Sweep(Weapon):
-    """A fan of `count` rays of a weapon, spread evenly over `angle` degrees about the aim."""
+    """A fan of `count` rays of a weapon, spread evenly over `angle` degrees about the aim.
+
+    A fan has a ray on both of its sides. A full circle, of 360 degrees, has none twice, and one along the aim.
+    """
 
     kind: ClassVar[str] = "sweep"
     table: ClassVar[dict[str, Value]] = {
         "ray": Part("ray", (RayWeapon,), "a weapon of one ray"),
-        "angle": Number(0, 360),
+        "angle": Number(0, FULL_CIRCLE),
         "count": Whole(2, PELLETS_MAX),
     }
     ray: RayWeapon
@@ -196,6 +204,13 @@ class Sweep(Weapon):
         super().__post_init__()
         if self.ray.length_256 is None:
             raise InputError("ray: expected a weapon with a range, got one that ends where it is aimed")
+
+    @property
+    def turns(self) -> Floats:
+        """Degrees (count,) from the aim to each ray; those of both sides differ only in their signs."""
+        if self.angle == FULL_CIRCLE:
+            return np.asarray(FULL_CIRCLE * ((np.arange(self.count) - self.count // 2) / self.count))
+        return np.asarray(self.angle * ((2 * np.arange(self.count) - self.count + 1) / (2 * (self.count - 1))))
 
 
 def ends_at_first(ray: RayWeapon) -> bool:

@@ -82,8 +82,7 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -
     if burst:
         ahead = recoiled(ahead, round_, burst.recoil_deg)
     if isinstance(several, Sweep):
-        # Numerators are odd over one denominator, so that both sides of the fan mirror each other.
-        c, s = unit(several.angle * ((2 * np.arange(several.count) - several.count + 1) / (2 * (several.count - 1))))
+        c, s = unit(several.turns)
         ahead = turned(ahead, c[pellet], s[pellet])
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
