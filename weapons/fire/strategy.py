@@ -56,9 +56,10 @@ def expected_near(stack: Stack, reach: int) -> float:
     """Expected number of items near a placement, if they are spread evenly over the box around all."""
     if not len(stack):
         return 0.0
-    item_wh, world_wh = stack.sizes
-    share = ((item_wh + 2 * reach + 1) / world_wh).clip(max=1.0)
-    return len(stack) * float(share.prod())
+    near = float(len(stack))
+    for side, world in zip(*(sizes.tolist() for sizes in stack.sizes), strict=True):
+        near *= min((side + 2 * reach + 1) / world, 1.0)
+    return near
 
 
 def _tiles_refuse(request: Request) -> str:

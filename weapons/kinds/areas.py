@@ -356,6 +356,8 @@ def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, 
 
 def _parts_of(weapon: object) -> Parts:
     """Parts of a weapon; they are not kept with it, as the weapon may be one of them: a reference cycle."""
+    if isinstance(weapon, AreaWeapon) and KINDS.get(weapon.kind) is type(weapon):
+        return (None, None, weapon), None
     if not isinstance(weapon, Weapon):
         return None, None
     burst = weapon if isinstance(weapon, Rounds) else None
