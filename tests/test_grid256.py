@@ -392,7 +392,7 @@ def test_quarter_turns_split_the_angle(degrees: float) -> None:
     assert (k, c, s) == oracle.quarter_turns(degrees)
     for _ in range(k):
         c, s = -s, c
-    assert (c, s) == unit(degrees)
+    assert (c, s) == unit(degrees) == fixed_point.unit_of(degrees)
 
 
 points_256 = st.tuples(st.integers(-(2**28), 2**28), st.integers(-(2**28), 2**28))

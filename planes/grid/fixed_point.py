@@ -140,6 +140,14 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
     return (k + more) % 4, c, s
 
 
+def unit_of(degrees: float) -> tuple[int, int]:
+    """`unit` of one angle, in Python integers."""
+    quarter, c, s = quarter_turns(degrees)
+    for _ in range(quarter):
+        c, s = -s, c
+    return c, s
+
+
 def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
     """Turn points (N, 2) about the origin by one direction, or by one each (N,); rounded once, half to even."""
     x, y = points_256[..., 0], points_256[..., 1]

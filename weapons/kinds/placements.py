@@ -5,6 +5,7 @@ No state is kept, so any shot of a batch can be fired again alone, in any order,
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -18,7 +19,7 @@ from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
 from hitplanes.planes.grid import fixed_point
-from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, unit_toward
+from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.scene import one_place, points
 
@@ -434,8 +435,7 @@ def _directions(n: int, aim: object) -> Ints | tuple[int, int]:
     if aim is None:
         return STRAIGHT
     if isinstance(aim, int | float):
-        c, s = unit(reals("aim", aim, ()))
-        return int(c), int(s)
+        return unit_of(aim if type(aim) is float and math.isfinite(aim) else float(reals("aim", aim, ())))
     return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
 
 
