@@ -439,7 +439,7 @@ def test_caches_of_patterns_hold_no_more_than_they_count(kind: str, monkeypatch:
     work_out(DISTINCT[kind](99))
     limit = 2**17
     made = caches(monkeypatch, limit)
-    monkeypatch.setattr("hitplanes.planes.scene.sprite._kept", LruCache(1, lambda variant: variant.mask.nbytes))
+    monkeypatch.setattr("hitplanes.planes.scene.variants._kept", LruCache(1, lambda variant: variant.mask.nbytes))
     tracemalloc.start()
     for i in range(20):
         work_out(DISTINCT[kind](i))

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from hitplanes import Scene
 from hitplanes.planes.common.checks import Bools, InputError
 from hitplanes.planes.common.limits import CORNERS, PLACE
-from hitplanes.planes.scene.sprite import Sprite, Variant, frame_pivot, transform_of, variant_of
+from hitplanes.planes.scene.sprite import Sprite, frame_pivot
+from hitplanes.planes.scene.variants import Variant, transform_of, variant_of
 from hitplanes.planes.volumes import fit
 from hitplanes.planes.volumes.fit import KINDS, Kind, bounding, fitted, moved
 from hitplanes.planes.volumes.volumes import Aabbs, Circles, Parts, Polygons, Volumes

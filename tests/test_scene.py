@@ -81,7 +81,7 @@ def lean(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 64)
     monkeypatch.setattr("hitplanes.planes.bits.tiles.ATLAS_SLACK", 8)
     monkeypatch.setattr("hitplanes.planes.broadphase.boxes.INDEX_SLACK", 8)
-    for cache in ("hitplanes.planes.scene.sprite._kept", "hitplanes.planes.volumes.fit._fitted"):
+    for cache in ("hitplanes.planes.scene.variants._kept", "hitplanes.planes.volumes.fit._fitted"):
         monkeypatch.setattr(cache, LruCache(1, lambda _: 2))
     gc.collect()
     gc.disable()

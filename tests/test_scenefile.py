@@ -193,6 +193,25 @@ def test_a_scene_of_every_kind_is_saved_and_loaded(tmp_path: Path) -> None:
     assert third.content_hash() == scene.content_hash()
 
 
+def test_steps_of_angles_are_read_and_saved(tmp_path: Path) -> None:
+    """One object of each kind of source, with a step, and the same without, turned to the step itself."""
+    sources: list[dict[str, Any]] = [
+        {"image": "sheet.png"},
+        {"polygon": [[-9, 0], [9, 0], [4, 3]]},
+        {"circle": 4},
+        {"box_wh": [9, 2]},
+    ]
+    sources.append({"mask": ["###.", "#..."]})
+    pose = {"position_xy": [20, 20], "scale": [2, 1]}
+    stepped = [{**source, **pose, "angle": 47, "angle_step": 45} for source in sources]
+    free = [{**source, **pose, "angle": 45} for source in sources]
+    scene = load_scene(folder_of(tmp_path / "first", {"format": FORMAT, "objects": {"hittable": stepped + free}}))
+    for each in (scene, reloaded(scene, tmp_path / "second")):
+        variants = each.items.variants
+        assert all(np.array_equal(*(v.mask for v in pair)) for pair in zip(variants[:5], variants[5:], strict=True))
+        assert [sprite.angle_step for sprite in each.items.sprites] == [45] * 5 + [None] * 5
+
+
 def test_the_gallery_is_saved_and_loaded(tmp_path: Path) -> None:
     reloaded(load_scene(GALLERY), tmp_path / "gallery")
 

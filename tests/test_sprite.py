@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import oracle_raster
@@ -24,19 +25,10 @@ from hypothesis import strategies as st
 from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import VARIANT_BYTES
-from hitplanes.planes.scene import sprite as module
-from hitplanes.planes.scene import sprite as turning
+from hitplanes.planes.scene import variants
 from hitplanes.planes.scene.scene import Scene
-from hitplanes.planes.scene.sprite import (
-    Sprite,
-    Transform,
-    Variant,
-    as_sprite,
-    picture_of,
-    rows_of,
-    transform_of,
-    variant_of,
-)
+from hitplanes.planes.scene.sprite import Sprite, as_sprite, rows_of
+from hitplanes.planes.scene.variants import Transform, Variant, picture_of, transform_of, variant_of, variants_of
 from hitplanes.planes.volumes.fit import KINDS, Kind, bounding
 
 ROOT = Path(__file__).parent.parent
@@ -123,32 +115,55 @@ def test_placed_mask_is_the_reference(
     assert placed(sprite_of(mask, pivot), position, flip=flip, scale=scale, angle=angle) == expected
 
 
-@pytest.mark.parametrize("name", ["hitplanes.planes.scene.sprite", "hitplanes.planes.jit.scene"])
+@pytest.mark.parametrize("name", ["hitplanes.planes.scene.variants", "hitplanes.planes.jit.scene"])
 @LAWS
-@given(masks(), st.integers(0, 2**32))
-def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(name: str, mask: np.ndarray, seed: int) -> None:
+@given(masks(), masks(), st.integers(0, 2**32))
+def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(
+    name: str, mask: np.ndarray, other: np.ndarray, seed: int
+) -> None:
     """Steps of a few parts, so that many places are on borders; both kernels choose the same of several squares."""
-    if name.endswith("jit"):
+    if name.endswith("jit.scene"):
         pytest.importorskip("numba")
     rng = random.Random(seed)
-    (h, w), (width, height) = mask.shape, (rng.randint(1, 12), rng.randint(1, 12))
-    unit, step = (rng.randint(1, 6), rng.randint(1, 6)), (rng.randint(-9, 9), rng.randint(-9, 9))
-    first = rng.randint(-9, unit[0] * w + 9), rng.randint(-9, unit[1] * h + 9)
-    given = mask, (width, height), first, step, unit
-    found, held = importlib.import_module(name).resample(*given)
-    for j, i in itertools.product(range(height), range(width)):
-        place = first[0] + i * step[0] + j * step[1], first[1] + j * step[0] - i * step[1]
-        x, y = ({p // u, -(-p // u) - 1} for p, u in zip(place, unit, strict=True))
-        squares = itertools.product(y, x)
-        inside = [square for square in squares if 0 <= square[0] < h and 0 <= square[1] < w]
-        assert held[j, i] == any(mask[square] for square in inside)
-        assert (divmod(int(found[j, i]), w) in inside) if inside else found[j, i] == -1
-        assert not inside or held[j, i] == mask.reshape(-1)[found[j, i]]
-    assert np.array_equal(found, turning.resample(*given)[0])
-    box, area = importlib.import_module(name).sides_of(held)
-    places = np.argwhere(held)
-    assert area == len(places)
-    assert box == ((*places.min(axis=0)[::-1], *places.max(axis=0)[::-1]) if area else (0, 0, -1, -1))
+    frames, which = [mask, other], np.array([0, 1, 1])
+    h, w = (max(frame.shape[axis] for frame in frames) for axis in (0, 1))
+    planes = np.zeros((2, h + 2, w + 2), np.bool_)
+    for plane, frame in zip(planes, frames, strict=True):
+        plane[1 : frame.shape[0] + 1, 1 : frame.shape[1] + 1] = frame
+    unit, (width, height) = (rng.randint(1, 6), rng.randint(1, 6)), (rng.randint(1, 12), rng.randint(1, 12))
+    step = np.array([[[rng.randint(-9, 9) for _ in range(2)] for _ in range(2)] for _ in which])
+    first = np.array([[rng.randint(-9, u * side + 9) for u, side in zip(unit, (w, h), strict=True)] for _ in which])
+    given = planes, which, first, step, unit, (width, height)
+    found = importlib.import_module(name).resample(*given)
+    in_frame = np.zeros(planes.shape, np.bool_)
+    in_frame[:, 1:-1, 1:-1] = True
+    both = [np.where(in_frame.reshape(-1)[places], places, -1) for places in (found, variants.resample(*given))]
+    assert np.array_equal(*both)
+    for n, j, i in itertools.product(range(3), range(height), range(width)):
+        place = first[n] + i * step[n, :, 0] + j * step[n, :, 1]
+        x, y = ({int(p // u), int(-(-p // u) - 1)} for p, u in zip(place, unit, strict=True))
+        inside = {(int(which[n]), row, column) for row in y & set(range(h)) for column in x & set(range(w))}
+        k, row, column = (int(v) for v in np.unravel_index(found[n, j, i], planes.shape))
+        assert planes[k, row, column] == any(planes[k, row + 1, column + 1] for k, row, column in inside)
+        assert (k, row - 1, column - 1) in inside if inside else not planes[k, row, column]
+
+
+@AGAINST
+@given(st.lists(st.tuples(masks(), pivots, st.sampled_from(FLIPS), scales, angles), min_size=1, max_size=6))
+def test_masks_that_are_made_together_are_those_made_alone(jit: bool, poses: list[tuple]) -> None:
+    """Frames of several sizes and scales, some of them twice; large ones are made in strips."""
+    sprites = [sprite_of(mask, pivot) for mask, pivot, *_ in poses]
+    forms = [posed(sprite, *pose) for sprite, (_, _, *pose) in zip(sprites, poses, strict=True)]
+    alone = [[variant_of(Sprite(sprite.frames, sprite.pivot_256), form) for form in forms] for sprite in sprites]
+    pairs = list(itertools.product(sprites, forms))
+    with mock.patch.object(variants, "MAPPED_PIXELS", 60):
+        together = variants_of(*zip(*pairs, strict=True))
+        again = variants_of(*zip(*pairs, strict=True))
+    assert all(one is other for one, other in zip(together, again, strict=True))
+    for one, other in zip(together, itertools.chain.from_iterable(alone), strict=True):
+        assert np.array_equal(one.mask, other.mask)
+        assert (one.form, one.pivot_x, one.pivot_y, one.area) == (other.form, other.pivot_x, other.pivot_y, other.area)
+        assert not one.mask.flags.writeable
 
 
 @pytest.mark.parametrize("flip", FLIPS)
@@ -167,6 +182,36 @@ def test_a_turn_keeps_the_pivot_where_it_is_between_the_pixels(angle: float, piv
     for scale in ((1.0, 1.0), (1.0, 1.5)):
         expected = oracle.placed_mask(mask.tolist(), pivot, turn_of("x", scale, angle), (77, -300))
         assert placed(sprite_of(mask, pivot), (77, -300), flip="x", scale=scale, angle=angle) == expected
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7, 72, 65_536])
+def test_a_sprite_with_a_step_turns_by_whole_steps_of_a_turn(steps: int) -> None:
+    mask = np.array([[1, 1, 0, 1, 0], [1, 0, 0, 0, 0], [1, 1, 1, 0, 0]], bool)
+    stepped, free = Sprite.from_mask(mask, angle_step=360 / steps), Sprite.from_mask(mask)
+    for turn, number, rest in itertools.product((-360 * 10**9, 0, 360), (0, 1, 2, steps - 1), (-0.49, 0, 0.49)):
+        asked, nearest = turn + (number + rest) * 360 / steps, number % steps * 360 / steps
+        form = posed(stepped, angle=asked)
+        assert form == posed(free, angle=nearest), asked
+        assert np.array_equal(variant_of(stepped, form).mask, variant_of(free, form).mask)
+
+
+def test_steps_hold_for_every_kind_of_sprite_and_in_the_scene() -> None:
+    image = np.full((3, 9, 4), 255, np.uint8)
+    outline = [(-9, -1), (9, -1), (4, 2)]
+    kinds: list[tuple[Callable[..., Sprite], tuple]] = [
+        (Sprite.from_image, (image,)),
+        (Sprite.from_mask, (image[..., 3] > 0,)),
+        (Sprite.polygon, (outline,)),
+        (Sprite.box, (9, 2)),
+        (Sprite.circle, (9,)),
+    ]
+    scene, poses = Scene(), ((0, 0), (14.9, 0), (15.1, 30), (350, 0), (-40, -30), (44, 30))
+    for (make, what), (angle, nearest) in itertools.product(kinds, poses):
+        sprites = make(*what, angle_step=30), make(*what)
+        stepped, free = (scene.add(sprite, (0, 0), scale=(2, 1)) for sprite in sprites)
+        scene.set([stepped, free], angle=[angle, nearest])
+        assert np.array_equal(*(scene.items.variants[item].mask for item in (stepped, free)))
+        assert scene.items.angles[stepped] == angle
 
 
 def test_the_scene_places_by_the_same_rule() -> None:
@@ -511,6 +556,9 @@ def test_a_sprite_keeps_what_it_was_given() -> None:
         (lambda: Sprite.polygon([(0, 0, 0)] * 3), r"points_xy: expected shape \(any, 2\), got \(3, 3\)"),
         (lambda: Sprite.polygon([(0, 0), (1, 1), (2, 0)], [[(0, 0)]]), r"holes\[0\]: expected 3 points"),
         (lambda: Sprite.polygon([(0, 0), (1, 1), (2**16, 0)]), r"points_xy\[2\]\[0\]: expected a number within"),
+        (lambda: Sprite.circle(3, angle_step=7), "angle_step: expected 360 degrees by a whole number, .*got 7"),
+        (lambda: Sprite.from_mask(MASK, angle_step=0), "angle_step: expected a number from 0.0054.* to 360, got 0"),
+        (lambda: Sprite.box(3, 1, angle_step=math.nan), "angle_step: expected a finite number"),
         (lambda: Sprite.circle(-1), "radius: expected a number from 0 to 32768, got -1"),
         (lambda: Sprite.circle("3"), "radius: expected numbers"),  # type: ignore[arg-type]
         (lambda: Sprite.box(1, -1), "height: expected a number from 0"),
@@ -582,8 +630,8 @@ def test_variants_are_made_once() -> None:
 
 
 def test_the_cache_is_bounded_and_forgets_the_longest_unused(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = LruCache(20_000, module._kept.size)
-    monkeypatch.setattr(module, "_kept", kept)
+    kept = LruCache(20_000, variants._kept.size)
+    monkeypatch.setattr(variants, "_kept", kept)
     sprite = as_sprite(np.ones((20, 20), np.bool_))
     first = variant_of(sprite, Transform())
     for angle in range(1, 90):

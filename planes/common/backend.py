@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
@@ -50,7 +50,7 @@ Part = TypeVar("Part")
 
 COMPILED = {
     "hitplanes.planes.grid.fixed_point": "hitplanes.planes.jit.scene",
-    "hitplanes.planes.scene.sprite": "hitplanes.planes.jit.scene",
+    "hitplanes.planes.scene.variants": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.scene",
     "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
@@ -189,12 +189,28 @@ class LruCache(Generic[Key, Value]):
             if found is not None:
                 self.values.move_to_end(key)
                 return found
-            made = self.values[key] = make()
-            self.bytes += self.size(made) + self.key_size(key)
-            while self.bytes > self.limit and len(self.values) > 1:
-                old, value = self.values.popitem(last=False)
-                self.bytes -= self.size(value) + self.key_size(old)
-            return made
+            return self._keep(key, make())
+
+    def get_all(self, keys: Sequence[Key], make: Callable[[list[int]], Sequence[Value]]) -> list[Value]:
+        """Return the values of keys; `make` makes those of the given rows, of which no two have the same key."""
+        with self._lock:
+            found = [self.values.get(key) for key in keys]
+            missing = {key: row for row, key in enumerate(keys) if found[row] is None}
+            for key, value in zip(keys, found, strict=True):
+                if value is not None:
+                    self.values.move_to_end(key)
+            made = dict(zip(missing, make(list(missing.values())), strict=True)) if missing else {}
+            for key, value in made.items():
+                self._keep(key, value)
+            return [made[key] if value is None else value for key, value in zip(keys, found, strict=True)]
+
+    def _keep(self, key: Key, made: Value) -> Value:
+        self.values[key] = made
+        self.bytes += self.size(made) + self.key_size(key)
+        while self.bytes > self.limit and len(self.values) > 1:
+            old, value = self.values.popitem(last=False)
+            self.bytes -= self.size(value) + self.key_size(old)
+        return made
 
 
 class cached_attribute(Generic[Value]):  # noqa: N801 - it is used as a decorator

@@ -68,6 +68,9 @@ ALL = 2**CATEGORY_BITS - 1
 ALPHA_THRESHOLD = 127
 """A pixel of an image belongs to its mask if its alpha is greater: it is more opaque than transparent."""
 
+ANGLE_STEPS_MAX = 65_536
+"""Most steps of `angle_step` in a turn."""
+
 WEIGHT_FULL = 65_535
 """The weight of a sample at full strength; falloff lowers it to 0 at the end of the reach."""
 
@@ -97,6 +100,9 @@ FRAGILE_PX = 1
 
 VARIANT_CACHE_BYTES = 64 * 2**20
 """Size of the cache of turned and scaled masks, bytes."""
+
+MAPPED_PIXELS = 2**14
+"""Pixels of turned and scaled masks that are made at a time: their numbers stay in the cache of the processor."""
 
 VARIANT_BYTES = 1536
 """Overhead of a cached mask beside its pixels, bytes."""

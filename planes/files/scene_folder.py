@@ -13,6 +13,7 @@ import numpy as np
 
 from ..common.checks import Image, InputError, path_of, within
 from ..common.limits import (
+    ANGLE_STEPS_MAX,
     COST_MAX,
     ITEMS_MAX,
     LAYER_MAX,
@@ -49,7 +50,8 @@ from ..common.tables import (
 )
 from ..scene.items import Role
 from ..scene.scene import Scene
-from ..scene.sprite import FLIPS, Sprite, rows_of
+from ..scene.sprite import Sprite, rows_of
+from ..scene.variants import FLIPS
 from .png import possible, read_png, read_text, write_png, write_text
 
 FORMAT = "hitplanes-scene/1"
@@ -67,6 +69,7 @@ COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
 ID = Whole(0, ITEMS_MAX - 1)
 FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
+STEP = Number(360 / ANGLE_STEPS_MAX, 360)
 SOURCES: dict[str, dict[str, Value]] = {
     "image": {
         "image": Text(),
@@ -74,11 +77,12 @@ SOURCES: dict[str, dict[str, Value]] = {
         "color_key": COLOR,
         "frames": Within(FRAMES),
         "pivot_xy": PIVOT,
+        "angle_step": STEP,
     },
-    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR},
-    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR},
-    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR},
-    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR},
+    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR, "angle_step": STEP},
+    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR, "angle_step": STEP},
+    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR, "angle_step": STEP},
+    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, "angle_step": STEP},
 }
 POSE: dict[str, Value] = {
     "angle": Number(),
@@ -253,20 +257,18 @@ def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[s
 
 
 def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
-    options = {key: data[key] for key in ("alpha_threshold", "color_key", "pivot_xy") if key in data}
-    image = read_png(_inside(folder, data["image"]))
-    return Sprite.from_image(image, **options, **data.get("frames", {}), source=source)
+    image, frames = read_png(_inside(folder, data.pop("image"))), data.pop("frames", {})
+    return Sprite.from_image(image, **data, **frames, source=source)
 
 
 READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
     "image": _image_sprite,
-    "polygon": lambda data, *_: Sprite.polygon(data["polygon"], data.get("holes", ()), color=data.get("color")),
-    "circle": lambda data, *_: Sprite.circle(data["circle"], color=data.get("color")),
-    "box_wh": lambda data, *_: Sprite.box(*data["box_wh"], color=data.get("color")),
-    "mask": lambda data, _, source: Sprite.from_mask(
-        data["mask"], pivot_xy=data.get("pivot_xy"), color=data.get("color"), source=source
-    ),
+    "polygon": lambda data, *_: Sprite.polygon(data.pop("polygon"), data.pop("holes", ()), **data),
+    "circle": lambda data, *_: Sprite.circle(data.pop("circle"), **data),
+    "box_wh": lambda data, *_: Sprite.box(*data.pop("box_wh"), **data),
+    "mask": lambda data, _, source: Sprite.from_mask(data.pop("mask"), **data, source=source),
 }
+"""How the sprite of each kind is made of its checked fields, which are used up."""
 
 
 def _inside(folder: Path, text: str) -> Path:
@@ -291,10 +293,10 @@ def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
 def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
     """Source of a sprite as JSON; its image is written to the folder without overwriting another file."""
     color = {} if sprite.color is None else {"color": list(sprite.color)}
+    options: dict[str, Any] = {} if sprite.angle_step is None else {"angle_step": sprite.angle_step}
     if sprite.outline is not None:
-        return {**(sprite.source or {}), **color}
+        return {**(sprite.source or {}), **color, **options}
     masks = [frame.mask for frame in sprite.frames]
-    options: dict[str, Any] = {}
     if sprite.pivot_256 is not None:
         options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
     if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:

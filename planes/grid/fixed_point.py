@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TypeVar
 
@@ -138,6 +139,18 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
         c, s = _exactly(folded - 90 * k)
     more, c, s = quarters(round(c), round(s))
     return (k + more) % 4, c, s
+
+
+def all_quarter_turns(degrees: Sequence[float]) -> list[list[int]]:
+    """`quarter_turns` of angles, as three columns."""
+    if len(degrees) == 1:  # an array costs more than an angle
+        return [[part] for part in quarter_turns(degrees[0])]
+    c, s = unit(degrees)
+    quarter = np.zeros(len(c), np.int64)
+    for _ in range(3):
+        more = (s < -c) | (s >= c)
+        quarter, c, s = quarter + more, np.where(more, s, c), np.where(more, -c, s)
+    return [quarter.tolist(), c.tolist(), s.tolist()]
 
 
 def unit_of(degrees: float) -> tuple[int, int]:

@@ -91,72 +91,57 @@ def pixels(at_256: Ints) -> Ints:
     return whole
 
 
-MASK = types.Array(types.boolean, 2, "C", readonly=True)
+PELLETS = types.Array(types.int64, 2, "A", readonly=True)
+PLANES = types.Array(types.boolean, 3, "A", readonly=True)
+STEPS = types.Array(types.int64, 3, "A", readonly=True)
 WHOLE = types.int64
 
 
-@compiled(types.Tuple((WHOLE, types.boolean))(MASK, WHOLE, WHOLE, types.boolean, types.boolean, WHOLE))
-def _on_border(inside, row, column, up, left, at):
+@compiled(WHOLE(PLANES, *[WHOLE] * 3, types.boolean, types.boolean, WHOLE))
+def _on_border(planes, k, row, column, up, left, at):
     """Place among the squares that meet at a border: the first that is set, else the last in the frame, else `at`."""
+    _, rows, columns = planes.shape
     for j in (row, row - 1) if up else (row, row):
         for i in (column, column - 1) if left else (column, column):
-            if 0 <= j < inside.shape[0] and 0 <= i < inside.shape[1]:
-                at = j * inside.shape[1] + i
-                if inside[j, i]:
-                    return at, True
-    return at, False
+            if 0 < j < rows - 1 and 0 < i < columns - 1:
+                at = (k * rows + j) * columns + i
+                if planes[k, j, i]:
+                    return at
+    return at
 
 
-@compiled(types.void(MASK, *[WHOLE] * 6, types.int64[:, ::1], types.boolean[:, ::1]))
-def _inverse_mapped(inside, first_x, first_y, c, s, unit_x, unit_y, found, held):
-    h, w = np.uint64(inside.shape[0]), np.uint64(inside.shape[1])
-    along_x, over_x, along_y, over_y = c // unit_x, c % unit_x, -s // unit_y, -s % unit_y
-    for y in range(found.shape[0]):
-        column, x_rest = (first_x + y * s) // unit_x, (first_x + y * s) % unit_x
-        row, y_rest = (first_y + y * c) // unit_y, (first_y + y * c) % unit_y
-        for x in range(found.shape[1]):
-            at, is_held = -1, False
-            j, i = np.uint64(row), np.uint64(column)  # negative numbers become very large
-            if j < h and i < w:
-                at, is_held = np.int64(j * w + i), inside[j, i]
-            if not is_held and (x_rest == 0 or y_rest == 0):
-                at, is_held = _on_border(inside, row, column, y_rest == 0, x_rest == 0, at)
-            found[y, x], held[y, x] = at, is_held
-            column, x_rest = column + along_x, x_rest + over_x
-            if x_rest >= unit_x:
-                column, x_rest = column + 1, x_rest - unit_x
-            row, y_rest = row + along_y, y_rest + over_y
-            if y_rest >= unit_y:
-                row, y_rest = row + 1, y_rest - unit_y
+@compiled(types.void(PLANES, INTS, PELLETS, STEPS, WHOLE, WHOLE, types.int64[:, :, ::1]))
+def _resample(planes, which, first, step, unit_x, unit_y, source):
+    count, height, width = source.shape
+    rows, columns = np.uint64(planes.shape[1]), np.uint64(planes.shape[2])
+    for n in range(count):
+        k, (across_x, down_x), (across_y, down_y) = which[n], step[n, 0], step[n, 1]
+        along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
+        outside = np.int64(k * planes.shape[1] * planes.shape[2])
+        for y in range(height):
+            begin_x, begin_y = first[n, 0] + unit_x + y * down_x, first[n, 1] + unit_y + y * down_y
+            column, x_rest, row, y_rest = begin_x // unit_x, begin_x % unit_x, begin_y // unit_y, begin_y % unit_y
+            for x in range(width):
+                j, i = np.uint64(row), np.uint64(column)  # negative numbers become very large
+                at = outside + np.int64(j * columns + i) if j < rows and i < columns else outside
+                if x_rest == 0 or y_rest == 0:
+                    at = _on_border(planes, k, row, column, y_rest == 0, x_rest == 0, outside)
+                source[n, y, x] = at
+                column, x_rest = column + along_x, x_rest + over_x
+                if x_rest >= unit_x:
+                    column, x_rest = column + 1, x_rest - unit_x
+                row, y_rest = row + along_y, y_rest + over_y
+                if y_rest >= unit_y:
+                    row, y_rest = row + 1, y_rest - unit_y
 
 
 def resample(
-    inside: Bools, size_wh: tuple[int, int], first: tuple[int, int], step: tuple[int, int], unit: tuple[int, int]
-) -> tuple[Ints, Bools]:
-    """See `scene.sprite.resample`; it divides once a row, not once a pixel."""
-    width, height = size_wh
-    found, held = np.empty((height, width), np.int64), np.empty((height, width), np.bool_)
-    _inverse_mapped(inside, *first, *step, *unit, found, held)
-    return found, held
-
-
-@compiled(types.UniTuple(WHOLE, 5)(types.Array(types.boolean, 2, "A", readonly=True)))
-def _sides_of(mask):
-    height, width = mask.shape
-    x_min, y_min, x_max, y_max, count = width, height, -1, -1, 0
-    for y in range(height):
-        for x in range(width):
-            if mask[y, x]:
-                count += 1
-                x_min, x_max = min(x_min, x), max(x_max, x)
-                y_min, y_max = min(y_min, y), y
-    return x_min, y_min, x_max, y_max, count
-
-
-def sides_of(mask: Bools) -> tuple[Box, int]:
-    """See `scene.sprite.sides_of`."""
-    *box, count = _sides_of(mask)
-    return (tuple(box) if count else (0, 0, -1, -1)), count
+    planes: Bools, which: Ints, first: Ints, step: Ints, unit: tuple[int, int], size_wh: tuple[int, int]
+) -> Ints:
+    """See `scene.variants.resample`; it divides once a row, not once a pixel."""
+    source = np.empty((len(which), *size_wh[::-1]), np.int64)
+    _resample(planes, which, first, step, *unit, source)
+    return source
 
 
 @compiled()
@@ -257,7 +242,6 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
 
 
 ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)
-PELLETS = types.Array(types.int64, 2, "A", readonly=True)
 SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
 
 AT_ONCE = 256

@@ -24,7 +24,7 @@ from ..grid.spans import Box
 from .derived import NEVER, Derived
 from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items, MaskAtlas
 from .scene import Scene
-from .sprite import variant_of
+from .variants import variant_of
 
 T = TypeVar("T")
 
@@ -106,7 +106,7 @@ class PastItems(Items):
         self.atlas = _full(self.atlas.flat)
         self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
         for item, angle in angles.items():
-            quarter, c, s = quarter_turns(angle)
+            quarter, c, s = quarter_turns(self.sprites[item].stepped(angle))
             form = self.forms[item]._replace(quarter=quarter, c=c, s=s)
             with within(f"object {item} at {angle:.15g} degrees"):
                 variant = variant_of(self.sprites[item], form)

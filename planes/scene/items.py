@@ -24,7 +24,8 @@ from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box
 from .derived import NEVER
-from .sprite import Sprite, Transform, Variant, variant_of
+from .sprite import Sprite
+from .variants import Transform, Variant, variant_of, variants_of
 
 if TYPE_CHECKING:
     from ..bits.tiles import TileAtlas, Tiles
@@ -349,7 +350,7 @@ class Items:
 
     def reform(self, ids: Sequence[int], forms: Sequence[Transform]) -> None:
         """Give items other transforms; all masks are made before any item changes."""
-        variants = [variant_of(self.sprites[item], form) for item, form in zip(ids, forms, strict=True)]
+        variants = variants_of([self.sprites[item] for item in ids], forms)
         for item, form, variant in zip(ids, forms, variants, strict=True):
             self.atlas.drop(self.variants[item])
             self.forms[item], self.variants[item] = form, variant

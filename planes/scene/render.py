@@ -13,7 +13,8 @@ from ..common.limits import ITEMS_MAX, PLANE_AREA_MAX, PLANE_SIDE_MAX, SCALE_BIT
 from ..grid.fixed_point import pixel
 from ..grid.spans import Box
 from .items import ROLES, Items, Role
-from .sprite import Sprite, picture_of
+from .sprite import Sprite
+from .variants import picture_of
 
 BARE = {
     Role.BACKGROUND: (58, 62, 70),

@@ -28,12 +28,13 @@ from ..common.checks import (
 )
 from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from ..common.tables import Text, typed
-from ..grid.fixed_point import quarter_turns, snap
+from ..grid.fixed_point import all_quarter_turns, snap
 from ..grid.spans import Box
 from .derived import Derived
 from .items import ROLES, Items, Role
 from .render import Planes, plane_objects, plane_size
-from .sprite import FLIPS, Transform, as_sprite, transform_of, whole_scale
+from .sprite import as_sprite
+from .variants import FLIPS, Transform, transform_of, whole_scale
 
 if TYPE_CHECKING:
     from ..files.scene_folder import FileObject
@@ -92,7 +93,7 @@ def changed_transforms(
     frames, flips, x, y, *turns = columns
     if angle is not None:
         angles = reals("angle", each("angle", angle, n), (n,)).tolist()
-        turns = list(zip(*map(quarter_turns, angles), strict=True))
+        turns = all_quarter_turns([items.sprites[item].stepped(angle) for item, angle in zip(ids, angles, strict=True)])
     if scale is not None:
         x, y = _scale_rows(scale, n)
     if frame is not None:
@@ -517,9 +518,10 @@ class Scene:
         if len(gone):
             row = int(np.flatnonzero(rows == gone[0])[0])
             raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
-        again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
-        if len(again):
-            raise InputError(f"ids[{again[0]}]: expected each object once, got {rows[again[0]]} again")
+        if len(rows) > 1:
+            again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
+            if len(again):
+                raise InputError(f"ids[{again[0]}]: expected each object once, got {rows[again[0]]} again")
         return rows
 
     def _bits(self, categories: object, default: int) -> int:

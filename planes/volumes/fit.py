@@ -41,7 +41,8 @@ from ..common.limits import (
     TRIG_ERROR,
 )
 from ..grid.spans import Spans
-from ..scene.sprite import Sprite, Transform, Variant, frame_pivot
+from ..scene.sprite import Sprite, frame_pivot
+from ..scene.variants import Transform, Variant
 from .outline import cover, outline
 from .polygons import (
     Extents,

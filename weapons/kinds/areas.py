@@ -19,7 +19,8 @@ from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned
 from hitplanes.planes.grid.rasterize import RowRuns, beams, cones, convex_polygons, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.scene import Scene
-from hitplanes.planes.scene.sprite import Sprite, Transform, rows_of, variant_of
+from hitplanes.planes.scene.sprite import Sprite, rows_of
+from hitplanes.planes.scene.variants import Transform, variant_of
 
 from .rays import Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
 from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
@@ -364,7 +365,7 @@ def _parts_of(weapon: object) -> Parts:
     inner: Weapon = burst.weapon if burst else weapon
     several = inner if isinstance(inner, Spread | Sweep) else None
     plain: Weapon = inner.pellet if isinstance(inner, Spread) else inner.ray if isinstance(inner, Sweep) else inner
-    if KINDS.get(getattr(plain, "kind", "")) is not type(plain):
+    if KINDS.get(plain.kind) is not type(plain):
         return None, None
     if isinstance(plain, AreaWeapon):
         return (burst, several if isinstance(several, Spread) else None, plain), None

@@ -47,7 +47,7 @@ class Part(Ref):
 class Weapon:
     """The base of all weapons; two weapons are equal when their JSON is equal."""
 
-    kind: ClassVar[str]
+    kind: ClassVar[str] = ""
     table: ClassVar[dict[str, Value]]
 
     def __post_init__(self) -> None:

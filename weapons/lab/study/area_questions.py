@@ -14,7 +14,8 @@ from hitplanes.planes.common.limits import SCALE_BITS, SUB, TRIG_BITS
 from hitplanes.planes.files.png import cv2
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.scene.scene import Scene
-from hitplanes.planes.scene.sprite import Sprite, variant_of
+from hitplanes.planes.scene.sprite import Sprite
+from hitplanes.planes.scene.variants import variant_of
 from hitplanes.planes.volumes import fit
 from hitplanes.planes.volumes.fit import shifted
 from hitplanes.planes.volumes.overlap import overlap

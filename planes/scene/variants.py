@@ -1,0 +1,377 @@
+"""Masks of sprites in poses: flipped, scaled and turned in integers, many at a time.
+
+A turn of 90 k + r degrees turns the array exactly k times, and maps it inversely by r before. A pixel of the result is
+set if its centre, mapped back, lies in a closed square of a set pixel. So a mirrored sprite turns into the mirror
+image, unless the rounded direction is an odd multiple of 45 degrees and only one of width and height is odd: there the
+quarter turn decides. Picture and mask go through the same map: what is drawn is what is tested.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.backend import LruCache, kernels_of
+from ..common.checks import Bools, Image, Ints, choice, integer, real
+from ..common.limits import (
+    HALF,
+    MAPPED_PIXELS,
+    SCALE_BITS,
+    SCALE_MAX,
+    SCALE_MIN,
+    SUB,
+    TRIG_BITS,
+    VARIANT_BYTES,
+    VARIANT_CACHE_BYTES,
+)
+from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
+from ..grid.rasterize import ellipse, polygon
+from ..grid.spans import Spans
+from .sprite import UIDS, Known, Outline, Sprite, check_size, fits, frame_pivot, frozen, size_of
+
+FLIPS = ("none", "x", "y", "xy")
+ONE = 1 << SCALE_BITS
+
+FINE_BITS = TRIG_BITS - SCALE_BITS
+"""Bits by which a turned position is finer than a scaled one."""
+
+
+class Transform(NamedTuple):
+    """The part of a pose that changes a mask, in integers: frame, flip, scale in 1/65536, quarter turns and a rest."""
+
+    frame: int = 0
+    flip: str = "none"
+    scale_x: int = ONE
+    scale_y: int = ONE
+    quarter: int = 0
+    c: int = 1 << TRIG_BITS
+    s: int = 0
+
+    @property
+    def plain(self) -> bool:
+        """Whether it has only flips and quarter turns, so that no inverse mapping is needed."""
+        return self.scaled == self.s == 0
+
+    @property
+    def scaled(self) -> bool:
+        """Whether its scale is not 1."""
+        return self.scale_x != ONE or self.scale_y != ONE
+
+
+def transform_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Transform:
+    """Check a pose and reduce it to its Transform."""
+    number = integer("frame", frame, 0, sprite.frame_count - 1)
+    x, y = whole_scale(*scale_xy)
+    return Transform(number, choice("flip", flip, FLIPS), x, y, *quarter_turns(sprite.stepped(angle)))
+
+
+def whole_scale(x: float, y: float) -> tuple[int, int]:
+    """Check a scale and round it to 1/65536."""
+    x, y = real("scale[0]", x, SCALE_MIN, SCALE_MAX), real("scale[1]", y, SCALE_MIN, SCALE_MAX)
+    return round(x * ONE), round(y * ONE)
+
+
+@dataclass(frozen=True, eq=False)
+class Variant(Known):
+    """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0]."""
+
+    form: Transform
+    mask: Bools
+    pivot_x: int
+    pivot_y: int
+    area: int
+    uid: int = field(default_factory=UIDS.__next__, init=False)
+
+
+_kept: LruCache[tuple[int, Transform], Variant] = LruCache(
+    VARIANT_CACHE_BYTES, lambda variant: variant.mask.nbytes + VARIANT_BYTES
+)
+
+
+def variant_of(sprite: Sprite, form: Transform) -> Variant:
+    """Mask of a transformed sprite; the last used masks are cached."""
+    return variants_of([sprite], [form])[0]
+
+
+def variants_of(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
+    """Masks of transformed sprites, a form each; those that are not cached are made together."""
+    keys = [(sprite.uid, form) for sprite, form in zip(sprites, forms, strict=True)]
+    return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [forms[row] for row in rows]))
+
+
+def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:
+    """Image (h, w, 4) of a transformed sprite, and its pivot (x, y) in 1/256 px; a mask is filled with `color`."""
+    frame = sprite.frames[form.frame] if sprite.frames else None
+    if frame is None or frame.image is None:
+        variant = variant_of(sprite, form)
+        image = np.zeros((*variant.mask.shape, 4), np.uint8)
+        image[variant.mask] = (*(sprite.color or color), 255)
+        return image, variant.pivot_x, variant.pivot_y
+    mask, (x, y) = _flipped_frame(sprite, form)
+    image = _flipped(frame.image, form.flip)
+    if not form.plain:
+        grids = _grids_of([mask], [(x, y)], [form])
+        image = _mapped(grids, [mask], np.zeros(1, np.int64), [image])[0]
+        x, y = grids.pivot_256[0].tolist()
+    return _quarter_turned(image, x, y, form.quarter)
+
+
+def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
+    """Make masks; frames that are scaled, or turned by more than quarter turns, are mapped together."""
+    made, mapped = {}, {}
+    for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
+        if sprite.outline is not None:
+            field = next(iter(sprite.source or {}), "sprite")
+            mask, (x, y) = _shape_spans(field, sprite.outline, form).to_mask()
+            made[row] = Variant(form, frozen(mask), -SUB * x, -SUB * y, int(np.count_nonzero(mask)))
+        elif form.plain:
+            mask, pivot = _flipped_frame(sprite, form)
+            made[row] = _cropped(mask[None], [pivot], [form])[0]
+        else:
+            mapped[row] = sprite, form
+    if mapped:
+        made |= zip(mapped, _mapped_frames(*zip(*mapped.values(), strict=True)), strict=True)
+    return [made[row] for row in range(len(forms))]
+
+
+def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
+    """Variants of frames that are mapped inversely, in batches of nearly one size."""
+    keys = [(sprite.uid, form.frame, form.flip) for sprite, form in zip(sprites, forms, strict=True)]
+    firsts = dict(zip(reversed(keys), range(len(keys) - 1, -1, -1), strict=True))
+    frames = {key: _flipped_frame(sprites[row], forms[row]) for key, row in firsts.items()}
+    masks, pivots = zip(*(frames[key] for key in keys), strict=True)
+    grids = _grids_of(masks, pivots, forms)
+    made: dict[int, Variant] = {}
+    for batch in _batches(grids, forms):
+        used = {key: number for number, key in enumerate(dict.fromkeys(keys[row] for row in batch))}
+        which = np.array([used[keys[row]] for row in batch])
+        planes = [frames[key][0] for key in used]
+        part = Grids(*(column[batch] for column in grids))
+        held = _mapped(part, planes, which, planes)
+        made |= zip(batch, _cropped(held, part.pivot_256.tolist(), [forms[row] for row in batch]), strict=True)
+    return [made[row] for row in range(len(forms))]
+
+
+def _batches(grids: Grids, forms: Sequence[Transform]) -> Iterator[list[int]]:
+    """Rows of one scale and of nearly one size, as many as are mapped at a time."""
+    sizes = grids.size_wh.tolist()
+    scales = [(form.scale_x, form.scale_y) for form in forms]
+    batch: list[int] = []
+    wide = high = 0
+    for row in sorted(range(len(forms)), key=lambda row: (scales[row], sizes[row][0] * sizes[row][1])):
+        width, height = sizes[row]
+        if batch:
+            wide, high = max(wide, width), max(high, height)
+            if scales[row] != scales[batch[0]] or (len(batch) + 1) * wide * high > MAPPED_PIXELS:
+                yield batch
+                batch = []
+        if not batch:
+            wide, high = width, height
+        batch.append(row)
+    yield batch
+
+
+class Grids(NamedTuple):
+    """Pixel grids that hold scaled and turned frames, and how their centres are mapped back to the frames.
+
+    Parameters
+    ----------
+    pivot_256 : (n, 2) from the centre of pixel [0, 0], 1/256 px
+    size_wh : (n, 2) px
+    first : (n, 2) column and row of the frame, from the border of its pixel [0, 0], at the first centre; in parts
+    step : (n, 2, 2) by how much column and row grow with a step right, and with a step down, in parts
+    unit : (n, 2) number of parts of a column, and of a row
+    """
+
+    pivot_256: Ints
+    size_wh: Ints
+    first: Ints
+    step: Ints
+    unit: Ints
+
+
+def _grids_of(masks: Sequence[Bools], pivots_256: Sequence[tuple[int, int]], forms: Sequence[Transform]) -> Grids:
+    """Grids of frames.
+
+    The pivot keeps its offset from the pixel grid. If the frame is scaled, its edges decide the offset, to half a
+    pixel: whole scales repeat pixels exactly, and a mirrored frame lies on the mirrored grid. A centre at (dx, dy) from
+    the pivot lies at (dx c + dy s, dy c - dx s) from it on the frame, in 2**-38 px of the result.
+    """
+    rows = [
+        (*mask.shape[::-1], *pivot, form.scale_x, form.scale_y, form.c, form.s, -form.s, form.c)
+        for mask, pivot, form in zip(masks, pivots_256, forms, strict=True)
+    ]
+    table = np.array(rows, np.int64)
+    size, pivot, scale = table[:, :2], table[:, 2:4], table[:, 4:6]
+    back = table[:, 6:].reshape(-1, 2, 2)  # the matrix of the inverse turn
+    edges = np.empty_like(back)
+    edges[:, :, 0] = (-HALF - pivot) * scale // ONE
+    edges[:, :, 1] = (SUB * size - HALF - pivot) * scale // ONE + 1
+    corners = back.transpose(0, 2, 1)[..., None] * edges[:, None]
+    low, high = over_one(corners.min(axis=3).sum(axis=2)) - 1, over_one(corners.max(axis=3).sum(axis=2)) + 1
+    halves = rounded_div((pivot + HALF) * scale - HALF * ONE, HALF * ONE)
+    held = np.where(scale == ONE, pivot, halves * HALF) % SUB
+    held -= SUB * ((held + low) // SUB)
+    size_wh = (high + held) // SUB + 1
+    for form, (width, height) in zip(forms, size_wh.tolist(), strict=True):
+        if not fits(width, height):
+            check_size("scale" if form.scaled else "angle", width, height)
+    fine = scale << FINE_BITS
+    return Grids(held, size_wh, (pivot + HALF) * fine - (back * held[:, None]).sum(axis=2), SUB * back, SUB * fine)
+
+
+def _mapped(grids: Grids, masks: Sequence[Bools], which: Ints, values: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Values (n, height, width, ...) of frames at the centres of grids; 0 outside the frames.
+
+    Parameters
+    ----------
+    grids : (n,) of one scale
+    masks : of the frames, each (h, w)
+    which : (n,) number of the frame of each grid
+    values : of the frames, each (h, w, ...)
+    """
+    planes, picked = _bordered(masks), _bordered(values)
+    cells = picked.reshape(-1, *picked.shape[3:])
+    width, height = grids.size_wh.max(axis=0).tolist()
+    unit_x, unit_y = grids.unit[0].tolist()
+    rows, kernel, strips = max(1, MAPPED_PIXELS // (len(which) * width)), kernels_of(sys.modules[__name__]).resample, []
+    for y in range(0, height, rows):
+        first = grids.first + y * grids.step[:, :, 1]
+        source = kernel(planes, which, first, grids.step, (unit_x, unit_y), (width, min(rows, height - y)))
+        strips.append(cells.take(source, axis=0))
+    return np.concatenate(strips, axis=1)
+
+
+def _bordered(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Arrays (h, w, ...) stacked, each in the upper left of a plane, with a border of zeros one pixel wide."""
+    height, width = (max(array.shape[axis] for array in arrays) for axis in (0, 1))
+    planes = np.zeros((len(arrays), height + 2, width + 2, *arrays[0].shape[2:]), arrays[0].dtype)
+    for plane, array in zip(planes, arrays, strict=True):
+        plane[1 : array.shape[0] + 1, 1 : array.shape[1] + 1] = array
+    return planes
+
+
+def resample(
+    planes: Bools, which: Ints, first: Ints, step: Ints, unit: tuple[int, int], size_wh: tuple[int, int]
+) -> Ints:
+    """Map each pixel centre of grids back to a pixel of a frame whose closed square holds it, a set one if possible.
+
+    Parameters
+    ----------
+    planes : (k, h + 2, w + 2) masks of frames, each with a border that is not set
+    which : (n,) number of the frame of each grid
+    first : (n, 2) column and row of the frame at the first centre of the grid, in parts
+    step : (n, 2, 2) by how much column and row grow with a step right, and with a step down, in parts
+    unit : number of parts of a column, and of a row
+    size_wh : size of the grids
+
+    Returns
+    -------
+    (n, height, width) flat index in `planes`; for a centre outside the frame, of a pixel of the border
+    """
+    (_, rows, columns), (width, height) = planes.shape, size_wh
+    places, squares, border = [], [], np.zeros((), np.bool_)
+    for axis, (parts, limit) in enumerate(zip(unit, (columns - 1, rows - 1), strict=True)):
+        along = (first[:, axis] + parts)[:, None] + step[:, axis, 0, None] * np.arange(width)
+        over = step[:, axis, 1, None] * np.arange(height)
+        place = (over[:, :, None] + along[:, None]).view(np.uint64)
+        square = place // np.uint64(parts)  # negative numbers become very large
+        border = border | (square * np.uint64(parts) == place)
+        places.append(place.view(np.int64))
+        squares.append(np.minimum(square, np.uint64(limit), out=square).view(np.int64))
+    source: Ints = squares[0] + squares[1] * columns
+    source += which[:, None, None] * (rows * columns)
+    on_border = np.flatnonzero(border)
+    if len(on_border):
+        column, row = (place.take(on_border) for place in places)
+        cell = source.reshape(-1)
+        cell[on_border] = _at_borders(planes, which[on_border // (height * width)], column, row, unit)
+    return source
+
+
+def _at_borders(planes: Bools, which: Ints, column: Ints, row: Ints, unit: tuple[int, int]) -> Ints:
+    """Flat index of the first set square of those that meet at places; of the last in the frame if none is set."""
+    (_, rows, columns) = planes.shape
+    found, held = which * (rows * columns), np.zeros(len(which), np.bool_)
+    squares = [(place // parts, -(-place // parts) - 1) for place, parts in zip((row, column), unit[::-1], strict=True)]
+    for j, i in product(*squares):
+        inside = (j > 0) & (j < rows - 1) & (i > 0) & (i < columns - 1) & ~held
+        cell = which[inside] * (rows * columns) + j[inside] * columns + i[inside]
+        found[inside] = cell
+        held[inside] = planes.reshape(-1).take(cell)
+    return np.asarray(found)
+
+
+def _cropped(held: Bools, pivots_256: Sequence[Sequence[int]], forms: Sequence[Transform]) -> list[Variant]:
+    """Variants of mapped masks (n, height, width), cropped and turned by their quarter turns."""
+    rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
+    sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
+    areas = np.count_nonzero(held, axis=(1, 2)).tolist()
+    height, width = held.shape[1:]
+    made = []
+    for mask, side, pivot, form, area in zip(held, sides.tolist(), pivots_256, forms, areas, strict=True):
+        left, top, right, bottom = side
+        if not area:
+            made.append(Variant(form, frozen(np.zeros((0, 0), np.bool_)), 0, 0, 0))
+            continue
+        part = mask[top : height - bottom, left : width - right]
+        part, x, y = _quarter_turned(part, pivot[0] - SUB * left, pivot[1] - SUB * top, form.quarter)
+        made.append(Variant(form, frozen(part), x, y, area))
+    return made
+
+
+def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:
+    """An array (h, w, ...) and its pivot (x, y), turned by quarter turns."""
+    for _ in range(turns):
+        array, x, y = array.swapaxes(0, 1)[:, ::-1], SUB * (array.shape[0] - 1) - y, x
+    return array, x, y
+
+
+def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
+    """A view of an array (h, w, ...), flipped."""
+    return array[:: -1 if flip in ("y", "xy") else 1, :: -1 if "x" in flip else 1]
+
+
+def _flipped_frame(sprite: Sprite, form: Transform) -> tuple[Bools, tuple[int, int]]:
+    """Flipped mask of a frame, and its pivot (x, y) in 1/256 px."""
+    frame = sprite.frames[form.frame]
+    (h, w), (x, y) = frame.mask.shape, frame_pivot(sprite, frame)
+    if "x" in form.flip:
+        x = SUB * (w - 1) - x
+    if form.flip in ("y", "xy"):
+        y = SUB * (h - 1) - y
+    return _flipped(frame.mask, form.flip), (x, y)
+
+
+def _shape_spans(field: str, outline: Outline, form: Transform) -> Spans:
+    """Flip, scale and turn the points of a shape, then fill it; `field` is for errors."""
+    c, s = form.c, form.s
+    for _ in range(form.quarter):
+        c, s = -s, c
+    if outline.radius is not None:
+        a, b = (int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y))
+        half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
+        _check_shape(field, outline, form, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
+        return ellipse(a, b, c, s)
+    sign = np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
+    scale = np.array([form.scale_x, form.scale_y])
+    rings = [turned(rounded_div(r * sign * scale, ONE), c, s) for r in outline.rings]
+    _check_shape(field, outline, form, *size_of(rings))
+    return polygon(rings)
+
+
+def _check_shape(field: str, outline: Outline, form: Transform, width: int, height: int) -> None:
+    """Check the size of a shape's mask; the error names what makes it too large, the scale, the shape or the angle."""
+    if fits(width, height):
+        return
+    if form.scaled:
+        check_size("scale", width, height)
+    check_size(field, *((2 * outline.radius // SUB + 1,) * 2 if outline.radius else size_of(outline.rings)))
+    check_size("angle", width, height)
