@@ -46,16 +46,18 @@ def front_to_back(items: Sequence[Item]) -> list[Item]:
     return [items[i] for i in places]
 
 
-def refused(item: Item, accept: int, exclude: Collection[int]) -> bool:
-    """Tell whether the shot's filter passes over an item, object or occluder."""
-    return item.categories & accept == 0 or item.owner in exclude
+def refused(item: Item, accept: int, blocked_by: int, exclude: Collection[int]) -> bool:
+    """Tell whether the shot's filter passes over an item: `accept` an object, `blocked_by` an occluder."""
+    return item.categories & (blocked_by if item.occluder else accept) == 0 or item.owner in exclude
 
 
-def walk(covering: Iterable[Item], *, accept: int, exclude: Collection[int] = (), pierce: bool = False) -> Walk:
+def walk(
+    covering: Iterable[Item], *, accept: int, blocked_by: int, exclude: Collection[int] = (), pierce: bool = False
+) -> Walk:
     """Walk the items that cover one pixel, front to back."""
     result = Walk()
     for item in covering:
-        if refused(item, accept, exclude):
+        if refused(item, accept, blocked_by, exclude):
             result.skipped.append(item)
             continue
         if not item.occluder:
@@ -77,6 +79,7 @@ def at_pixel(
     pixel: Pixel,
     *,
     accept: int,
+    blocked_by: int,
     exclude: Collection[int] = (),
     pierce: bool = False,
     bounds: tuple[int, int, int, int] | None = None,
@@ -93,7 +96,7 @@ def at_pixel(
         if not (x_min <= pixel[0] <= x_max and y_min <= pixel[1] <= y_max):
             return Walk(verdict="outside")
     covering = front_to_back([item for item in items if pixel in item.pixels])
-    return walk(covering, accept=accept, exclude=exclude, pierce=pierce)
+    return walk(covering, accept=accept, blocked_by=blocked_by, exclude=exclude, pierce=pierce)
 
 
 def fire_one(
@@ -102,6 +105,7 @@ def fire_one(
     *,
     origin_xy: Pixel,
     accept: int,
+    blocked_by: int,
     exclude: Collection[int] = (),
     pierce: bool = False,
     bounds: tuple[int, int, int, int] | None = None,
@@ -123,7 +127,9 @@ def fire_one(
     struck: dict[int, list[tuple[int, Pixel, int]]] = {}  # by id: (pellet, pixel, weight) of each sample that hit
     for number, pellet in enumerate(pellets):
         for pixel, weight in pellet:
-            sample = at_pixel(items, pixel, accept=accept, exclude=exclude, pierce=pierce, bounds=bounds)
+            sample = at_pixel(
+                items, pixel, accept=accept, blocked_by=blocked_by, exclude=exclude, pierce=pierce, bounds=bounds
+            )
             counts[sample.verdict] += 1
             for item in sample.hit:
                 struck.setdefault(item.id, []).append((number, pixel, weight))

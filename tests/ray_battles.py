@@ -100,6 +100,7 @@ class Shot:
     toward: Place | None = None
     aim: float = 0.0
     accept: int = ALL
+    blocked_by: int = ALL
     exclude: tuple[int, ...] = ()
     number: int = 0
 
@@ -135,6 +136,7 @@ class Battle:
         shots = self.shots
         width = max((len(s.exclude) for s in shots), default=0)
         each: dict[str, Any] = {"accept": [s.accept for s in shots], "shot": [s.number for s in shots]}
+        each["blocked_by"] = [s.blocked_by for s in shots]
         if width:
             each["exclude"] = [[*s.exclude, *[-1] * (width - len(s.exclude))] for s in shots]
         if shots[0].toward is not None:
@@ -198,7 +200,8 @@ class Battle:
         return [
             Item(i, self.bodies[i].occluder, self.bodies[i].pixels, self.bodies[i].cost)
             for i in ranked
-            if self.bodies[i].categories & shot.accept and owner[i] not in shot.exclude
+            if self.bodies[i].categories & (shot.blocked_by if self.bodies[i].occluder else shot.accept)
+            and owner[i] not in shot.exclude
         ]
 
     def walks(self) -> list[list[tuple[Ray, Walk]]]:
@@ -386,9 +389,12 @@ def some_battle(rng: random.Random) -> Battle:
         at = some_place(rng, bodies)
         toward = some_target(rng, at, bodies)
         exclude = (rng.randint(0, 9),) if rng.random() < 0.2 else ()
-        shot = Shot(at, toward, 0.0, rng.choice([ALL] * 8 + [1, 3, 6]), exclude, rng.choice([number, 2**40]))
+        accept = rng.choice([ALL] * 8 + [1, 3, 6])
+        shot = Shot(at, toward, 0.0, accept, ALL, exclude, rng.choice([number, 2**40]))
         if aimed:
             shot = replace(shot, toward=None, aim=rng.choice([0, 90, 180, -90, 45, -135, rng.randint(-30, 30) * 12.5]))
         shots.append(shot)
     bounds = rng.choice([None, None, (0, 0, 11, 9), (2, 1, 7, 8)])
-    return Battle(gun, shots, bodies, bounds, rng.choice([0, 7, 2**64 - 1]))
+    seed = rng.choice([0, 7, 2**64 - 1])
+    shots = [replace(shot, blocked_by=rng.choice([ALL] * 8 + [1, 3, 6, 0])) for shot in shots]
+    return Battle(gun, shots, bodies, bounds, seed)

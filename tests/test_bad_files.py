@@ -27,7 +27,7 @@ GALLERY = ROOT / "fixtures" / "gallery"
 pytestmark = pytest.mark.usefixtures("bounded")
 
 PLAIN: dict[str, Any] = {
-    "format": "hitplanes-scene/1",
+    "format": "hitplanes-scene/2",
     "bounds": {"size_wh": [32, 20]},
     "categories": ["target"],
     "objects": {"hittable": [{"name": "duck", "circle": 4, "position_xy": [16, 10]}]},
@@ -107,8 +107,8 @@ SCENES: dict[str, tuple[Any, str]] = {
     "position 900 deep": (spelled(f"{DUCK}.position_xy", "[" * 900 + "]" * 900), r"position_xy: .* array .*got \[\[\["),
     "name 900 deep": (spelled(f"{DUCK}.name", "[" * 900 + "]" * 900), r"hittable\[0\]: name: expected a text"),
     # the scene
-    "format": (changed("format", "hitplanes-scene/9"), "format: expected 'hitplanes-scene/1', got 'hitplanes-scene/9'"),
-    "no format": (changed("format", MISSING), "format: expected 'hitplanes-scene/1', got nothing"),
+    "format": (changed("format", "hitplanes-scene/9"), "format: expected 'hitplanes-scene/2', got 'hitplanes-scene/9'"),
+    "no format": (changed("format", MISSING), "format: expected 'hitplanes-scene/2', got nothing"),
     "key": (changed("shot", []), "key: expected one of .*got 'shot' .did you mean 'shots'"),
     "name, surrogate": (spelled("name", r'"\ud800"'), r"name: expected a text .*got '\\ud800'"),
     "bounds, list": (changed("bounds", [32, 20]), r"bounds: expected an object, got \[32, 20\]"),

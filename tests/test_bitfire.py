@@ -129,6 +129,8 @@ def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[
     if rng.random() < 0.5:
         how["accept"] = int(rng.choice([1, 2, 7, ALL])) if rng.random() < 0.5 else rng.integers(0, 8, count)
     if rng.random() < 0.4:
+        how["blocked_by"] = int(rng.choice([0, 1, 6])) if rng.random() < 0.5 else rng.integers(0, 8, count)
+    if rng.random() < 0.4:
         how["exclude"] = rng.integers(-1, items + 1, (count, 2) if rng.random() < 0.7 else (1, 2))
     low, high = ((-50, -50), (250, 210)) if rng.random() < 0.4 else (40, 130)
     return rng.uniform(low, high, (count, 2)), how
@@ -165,12 +167,13 @@ def test_the_oracle_says_the_same(kernels: str) -> None:
         scene = some_scene(rng, 40, 20)
         weapon = WEAPONS[rng.integers(len(WEAPONS))]
         at = rng.uniform(40, 130, (3, 2))
-        shots = [Shot((x, y), 90.0 * rng.integers(4), accept=int(rng.choice([1, 2, 3, ALL, ALL]))) for x, y in at]
+        bits = rng.choice([1, 2, 3, ALL, ALL], (3, 2)).tolist()
+        shots = [Shot((x, y), 90.0 * rng.integers(4), None, *two) for (x, y), two in zip(at, bits, strict=True)]
         for number, shot in enumerate(shots):
             shot.exclude, shot.number = (() if rng.random() < 0.6 else (int(rng.integers(9)),)), number
         if rng.random() < 0.5:
             for shot in shots:
-                shot.accept, shot.exclude = ALL, ()
+                shot.accept, shot.blocked_by, shot.exclude = ALL, ALL, ()
         volley = Placements(weapon, shots, seed=3)
         truth = expected(scene, volley)
         for strategy in STRATEGIES:

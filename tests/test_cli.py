@@ -282,7 +282,7 @@ def test_a_report_is_never_written_over_the_scene(
 
 def test_an_object_without_a_pixel_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     objects = {"hittable": [{"name": "ghost", "mask": ["..", ".."], "position_xy": [5, 5]}]}
-    (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/1", "objects": objects}))
+    (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/2", "objects": objects}))
     assert main(["report", str(tmp_path), "-o", str(tmp_path / "r.png")]) == 0
     assert "note: ghost has no pixel: nothing hits it" in capsys.readouterr().out
 
@@ -300,7 +300,7 @@ def test_a_value_that_begins_with_a_minus_is_explained(capsys: pytest.CaptureFix
 
 
 def test_weapons_and_shots_of_a_file_are_named_with_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    data = {"format": "hitplanes-scene/1", "weapons": {"gun": {"kind": "disc", "radius": -1}}, "shots": []}
+    data = {"format": "hitplanes-scene/2", "weapons": {"gun": {"kind": "disc", "radius": -1}}, "shots": []}
     (tmp_path / "scene.json").write_text(json.dumps(data))
     for scene in (tmp_path, tmp_path / "scene.json"):
         assert main(["report", str(scene), "-o", str(tmp_path / "r.png")]) == 2
@@ -382,7 +382,7 @@ def test_replay_names_what_is_no_record(match: Path, tmp_path: Path, capsys: pyt
     for scene, path, told in (
         (GALLERY, empty, f"{empty} line 1: expected a whole line of a record, got an empty file"),
         (GALLERY, cut, f"{cut} line 3: expected a whole line of a record, got one that is cut off, as by a crash"),
-        (GALLERY, other, f"{other} line 1: format: expected 'hitplanes-shots/2', got 'hitplanes-hits/1'"),
+        (GALLERY, other, f"{other} line 1: format: expected 'hitplanes-shots/3', got 'hitplanes-hits/1'"),
         (GALLERY, lost, f"{lost} line 3: chain: expected '"),
         (GALLERY, tmp_path, f"{tmp_path}: cannot read it: Is a directory"),
         (GALLERY, tmp_path / "none", f"{tmp_path / 'none'}: cannot read it: No such file"),

@@ -161,7 +161,7 @@ def test_one_without_the_other_is_kept(values: dict[str, Any], tmp_path: Path) -
 )
 def test_bad_values_of_a_file_are_named_with_their_place(values: dict[str, Any], told: str, tmp_path: Path) -> None:
     one = {"box_wh": [3, 3], "position_xy": [5, 5], **values}
-    (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/1", "objects": {"hittable": [one]}}))
+    (tmp_path / "scene.json").write_text(json.dumps({"format": "hitplanes-scene/2", "objects": {"hittable": [one]}}))
     with pytest.raises(InputError, match=told):
         load_scene(tmp_path)
     with pytest.raises(jsonschema.ValidationError):

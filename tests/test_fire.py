@@ -35,6 +35,7 @@ from hitplanes import (
     Stencil,
     Weapon,
     fire,
+    prepare,
 )
 from hitplanes.weapons.kinds.areas import AreaWeapon
 from hitplanes.weapons.kinds.placements import Shots, checked_shots, disc_offsets
@@ -139,6 +140,7 @@ class Shot:
     aim: float | None = None
     toward: tuple[float, float] | None = None
     accept: int = ALL
+    blocked_by: int = ALL
     exclude: tuple[int, ...] = ()
     number: int = 0
 
@@ -165,6 +167,7 @@ class Placements:
         shots = self.shots
         width = max((len(s.exclude) for s in shots), default=0)
         each: dict[str, Any] = {"accept": [s.accept for s in shots], "shot": [s.number for s in shots]}
+        each["blocked_by"] = [s.blocked_by for s in shots]
         if width:
             each["exclude"] = [[*s.exclude, *[-1] * (width - len(s.exclude))] for s in shots]
         if shots and shots[0].toward is not None:
@@ -186,8 +189,8 @@ def expected(
         every = rounds_of(volley.weapon, shot.at, shot.aim, shot.toward, volley.seed, shot.number)
         for number, (origin, pellets) in enumerate(every):
             found, fell = oracle_stack.fire_one(
-                items, pellets, origin_xy=origin, accept=shot.accept, exclude=shot.exclude, pierce=pierce,
-                bounds=scene.bounds,
+                items, pellets, origin_xy=origin, accept=shot.accept, blocked_by=shot.blocked_by, exclude=shot.exclude,
+                pierce=pierce, bounds=scene.bounds,
             )  # fmt: skip
             rows += [(which, number, *row) for row in found]
             counts = {verdict: n + fell[verdict] for verdict, n in counts.items()}
@@ -294,6 +297,10 @@ def some_weapon(rng: random.Random) -> Weapon:
     return weapon
 
 
+BITS = (ALL, ALL, ALL, ALL, ALL, 1, 3, 3, 6, 0)
+"""Filters of random shots."""
+
+
 def some_place(rng: random.Random, origin_xy: Pixel) -> tuple[float, float]:
     """A position in the 24 x 18 px from an origin, or a little beside them."""
     return origin_xy[0] + rng.randint(-512, 256 * 26) / 256, origin_xy[1] + rng.randint(-512, 256 * 20) / 256
@@ -305,7 +312,7 @@ def some_volley(rng: random.Random, weapon: Weapon, places: list[tuple[float, fl
     for number in range(rng.randint(2, 3)):
         x, y = rng.choice(places)
         at = (x + rng.randint(-512, 512) / 256, y + rng.randint(-512, 512) / 256)
-        shot = Shot(at, accept=rng.choice([ALL, ALL, ALL, ALL, ALL, 1, 3, 3, 6, 0]))
+        shot = Shot(at, accept=rng.choice(BITS), blocked_by=rng.choice(BITS))
         shot.number = rng.choice([number, 2**40 + number])
         if rng.random() < 0.3:
             shot.exclude = tuple(rng.randrange(items + 1) for _ in range(rng.randint(1, 2)))
@@ -511,26 +518,29 @@ def strategy(request: pytest.FixtureRequest) -> str:
 
 
 def test_a_refused_teammate_over_a_wall_over_an_enemy(strategy: str) -> None:
-    """OCCLUDED by the wall; with the wall's category refused too, as glass, HIT."""
+    """OCCLUDED by the wall, whatever is accepted; HIT where nothing of its category blocks."""
     team, enemy, glass = 1, 2, 4
     scene = Scene((9, 9))
     foe = scene.add(square(3), (3, 3), layer=0, categories=enemy)
     wall = scene.add(square(3), (3, 3), layer=1, categories=glass, role="occluder")
     friend = scene.add(square(3), (3, 3), layer=2, categories=team)
 
-    def at(accept: int, exclude: int | None = None) -> tuple[str, list[int]]:
-        hits = fire(scene, Point(), (4, 4), accept=accept, exclude=exclude, strategy=strategy)
+    def at(accept: int, blocked_by: int = ALL, exclude: int | None = None) -> tuple[str, list[int]]:
+        how: dict[str, Any] = {"accept": accept, "blocked_by": blocked_by, "exclude": exclude, "strategy": strategy}
+        hits = fire(scene, Point(), (4, 4), **how)
+        ready = prepare(scene, Point(), accept=accept, blocked_by=blocked_by, exclude=exclude).fire((4, 4))
+        assert (verdict(ready), ready.object.tolist()) == (verdict(hits), hits.object.tolist())
         return verdict(hits), hits.object.tolist()
 
-    assert at(ALL) == ("hit", [friend])
-    assert at(enemy | glass) == ("occluded", [])
+    assert at(ALL) == at(team, 0) == ("hit", [friend])
+    assert at(enemy | glass) == at(enemy) == at(enemy, glass) == ("occluded", [])
     assert at(ALL, exclude=friend) == ("occluded", [])
-    assert at(enemy) == ("hit", [foe])
-    assert at(enemy, exclude=foe) == ("filtered", [])
-    assert at(8) == ("filtered", [])
+    assert at(enemy, team | enemy) == at(enemy, 0) == ("hit", [foe])
+    assert at(enemy, 0, exclude=foe) == ("filtered", [])
+    assert at(8, 0) == ("filtered", [])
     assert at(ALL & ~team, exclude=wall) == ("hit", [foe])
     scene.set(wall, layer=-1)
-    assert at(enemy | glass) == ("hit", [foe])
+    assert at(enemy) == ("hit", [foe])
 
 
 def test_two_squares_and_a_row_in_front(strategy: str) -> None:
@@ -681,18 +691,22 @@ def test_what_is_built_needs_no_bounds() -> None:
 
 
 @pytest.mark.parametrize(
-    "one", [{}, {"aim": 30}, {"accept": 5, "seed": 2**64 - 1}, {"exclude": 3}, {"toward": (50, 9)}]
+    "one", [{}, {"aim": 30}, {"accept": 5, "seed": 2**64 - 1}, {"blocked_by": 6}, {"exclude": 3}, {"toward": (50, 9)}]
 )
 def test_a_column_is_what_was_given_for_all(jit: bool, one: dict[str, Any]) -> None:
     """Shots whose arguments are one for all are those that are told one by one, also some of them."""
     weapon, at = Beam(9, 2), np.arange(12.0).reshape(6, 2)
-    default: dict[str, Any] = {"accept": ALL, "seed": 0} if "toward" in one else {"aim": 0, "accept": ALL, "seed": 0}
+    default: dict[str, Any] = {"accept": ALL, "blocked_by": ALL, "seed": 0}
+    if "toward" not in one:
+        default["aim"] = 0
     each = {name: [value] * 6 for name, value in (default | one).items()} | {"shot": range(6)}
     shots = [checked(weapon, at, **how) for how in (one, each)]
     for some in ([slice(0, 6)], [slice(2, 5)], [slice(2, 5), np.array([1, 0])], [np.array([4, 1]), slice(1, 2)]):
         got, expected = (reduce(Shots.pick, some, both) for both in shots)
-        assert len(got) == len(expected) and got.choosy == expected.choosy == ("accept" in one or "exclude" in one)
-        for name in ("at_256", "direction", "accept", "exclude", "number", "seed", "row"):
+        assert len(got) == len(expected) and got.choosy == expected.choosy == bool(
+            {"accept", "blocked_by", "exclude"} & set(one)
+        )
+        for name in ("at_256", "direction", "meets", "accept", "blocked_by", "exclude", "number", "seed", "row"):
             x, y = getattr(got, name), getattr(expected, name)
             assert x.dtype == y.dtype and np.array_equal(x, y), name
     assert shots[0].nbytes <= (3 if "toward" in one else 2) * at.nbytes < shots[1].nbytes
@@ -716,5 +730,13 @@ def test_positions_may_lie_anyhow(jit: bool, laid: str) -> None:
 
 def checked(weapon: Weapon, at: object, **how: Any) -> Shots:
     """Checked shots, as `fire` has them."""
-    how = {"aim": None, "toward": None, "accept": ALL, "exclude": None, "seed": 0, "shot": None} | how
+    how = {
+        "aim": None,
+        "toward": None,
+        "accept": ALL,
+        "blocked_by": ALL,
+        "exclude": None,
+        "seed": 0,
+        "shot": None,
+    } | how
     return checked_shots(weapon, at, **how)

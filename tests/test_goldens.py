@@ -40,7 +40,7 @@ def record_all(scene: Scene, path: Path) -> None:
     with ShotRecord(path) as record:
         for weapon in arsenal_of(scene).values():
             for at, toward in WAYS:
-                record.fire(scene, weapon, at, toward=toward, accept=NOT_GLASS, seed=5)
+                record.fire(scene, weapon, at, toward=toward, accept=NOT_GLASS, blocked_by=NOT_GLASS, seed=5)
 
 
 def test_weapons_of_rays_do_what_they_did(request: pytest.FixtureRequest) -> None:

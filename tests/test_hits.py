@@ -9,6 +9,7 @@ import re
 import tracemalloc
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -75,7 +76,13 @@ def samples_of(volley: Placements, shot: Shot) -> list[tuple[int, int, int, int]
 def walks_of(battle: Battle, scene: Scene, shot: Shot) -> list[oracle_stack.Walk]:
     """The oracle's walk of every sample of one shot."""
     items, pierce = items_of(scene), parts_of(battle.volley.weapon)[2].pierce
-    options = {"accept": shot.accept, "exclude": shot.exclude, "pierce": pierce, "bounds": scene.bounds}
+    options = {
+        "accept": shot.accept,
+        "blocked_by": shot.blocked_by,
+        "exclude": shot.exclude,
+        "pierce": pierce,
+        "bounds": scene.bounds,
+    }
     return [oracle_stack.at_pixel(items, (x, y), **options) for _, _, y, x in samples_of(battle.volley, shot)]  # type: ignore[arg-type]
 
 
@@ -230,7 +237,7 @@ def test_blockers_name_what_is_behind_them(seed: int) -> None:
             if wall is None or not wall.occluder:
                 continue
             for item in items[items.index(wall) + 1 :]:
-                refused = oracle_stack.refused(item, shot.accept, shot.exclude)
+                refused = oracle_stack.refused(item, shot.accept, shot.blocked_by, shot.exclude)
                 if not item.occluder and not refused and (x, y) in item.pixels:
                     behind.setdefault((wall.id, item.id), []).append((x, y))
         found = {(b.occluder, o.object): o for b in hits.blockers(i) for o in b.behind}
@@ -269,8 +276,8 @@ def test_shares(seed: int) -> None:
         visible = 0
         for pixel in item.pixels:
             walk = oracle_stack.at_pixel(
-                list(items.values()), pixel, accept=shot.accept, exclude=shot.exclude, pierce=pierced(battle),
-                bounds=scene.bounds,
+                list(items.values()), pixel, accept=shot.accept, blocked_by=shot.blocked_by, exclude=shot.exclude,
+                pierce=pierced(battle), bounds=scene.bounds,
             )  # fmt: skip
             visible += item in walk.hit
         assert share == (row.samples / in_round, row.pixels / visible, row.pixels / len(item.pixels))
@@ -292,7 +299,7 @@ def why_not(battle: Battle, scene: Scene, which: int, hit: set[int]) -> list[tup
             continue
         on = [walk for walk, xy in zip(walks, samples.tolist(), strict=True) if tuple(xy) in item.pixels]
         ended = Counter(walk.ended_by.id for walk in on if walk.ended_by is not None)
-        if oracle_stack.refused(item, shot.accept, shot.exclude):
+        if oracle_stack.refused(item, shot.accept, shot.blocked_by, shot.exclude):
             reason = "excluded" if item.categories & shot.accept else "category"
         elif not on:
             reason = "missed"
@@ -373,7 +380,7 @@ def hit_at_shifts(volley: Placements, scene: Scene, which: int) -> dict[tuple[in
     moved = []
     for dx, dy in shifts:
         target = None if shot.toward is None else (shot.toward[0] + dx, shot.toward[1] + dy)
-        moved.append(Shot((shot.at[0] + dx, shot.at[1] + dy), shot.aim, target, shot.accept, shot.exclude, shot.number))
+        moved.append(replace(shot, at=(shot.at[0] + dx, shot.at[1] + dy), toward=target))
     hits = Placements(volley.weapon, moved, volley.seed).fired(scene)
     return {shift: {row.object for row in hits.of(i)} for i, shift in enumerate(shifts)}
 
@@ -698,7 +705,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"accept": 2**32}, r"accept\[0\]: expected"),
     ({"accept": 0.5}, r"accept\[0\]: expected a whole number"),
     ({"accept": True}, r"accept: expected numbers, got \[?True"),
-    ({"accept": "default"}, r"accept: expected numbers"),
+    ({"accept": {"default": 1}}, r"accept: expected numbers"),
     ({"accept": None}, r"accept: expected numbers"),
     ({"exclude": [1, 2, 3]}, r"exclude: expected shape \(2, any\)"),
     ({"exclude": [[0], [0.5]]}, r"exclude\[1\]\[0\]: expected a whole number"),

@@ -223,7 +223,7 @@ def test_what_comes_first_at_a_corner(
 def test_a_refused_occluder_does_not_come_first_at_a_corner(kernels: ModuleType) -> None:
     """It lies under an object of the lower side, and makes that side no better than the upper one."""
     sides = [body((1, 0)), body((0, 1), layer=2), body((0, 1), occluder=True, categories=2)]
-    shots = [Shot((-3.0, -3.0), (6.0, 6.0), accept=accept, number=k) for k, accept in enumerate((1, 3, ALL))]
+    shots = [Shot((-3.0, -3.0), (6.0, 6.0), blocked_by=bits, number=k) for k, bits in enumerate((1, 3, ALL))]
     battle = Battle(Gun("pistol"), shots, sides, (-9, -9, 9, 9))
     hits = battle.fired(strategy="march")
     check_columns(hits, battle.walks(), None)

@@ -38,7 +38,11 @@ def said_of(scene: Scene) -> list[Any]:
     masks = {i: scene.mask(i) for i in ids}
     boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for mask, (x, y) in masks.values()]
     occluder = [i in scene.ids("occluder") for i in ids]
-    categories, owner = ([int(column[i]) for i in ids] for column in (items.categories, items.owner))
+    categories = [
+        int(items.categories[i].astype(np.uint64) << np.uint64(32 * block))
+        for i, block in zip(ids, occluder, strict=True)
+    ]
+    categories, owner = [c - (c >> 63 << 64) for c in categories], [int(items.owner[i]) for i in ids]
     ranks = [ids.index(i) if i in ids else -1 for i in range(items.count)]
     layered = len({int(items.layer[i]) for i in ids}) > 1
     return [ids, occluder, categories, owner, boxes, layered, [masks[i][0].tolist() for i in ids], ranks, items.count]

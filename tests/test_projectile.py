@@ -79,7 +79,7 @@ def shots_of(
 
 def fired(scene: Scene, weapon: Projectile, shots: Sequence[tuple[Vector, Vector]], shift: Vector = (0, 0)) -> RayHits:
     at, toward = np.array(shots).reshape(-1, 2, 2).transpose(1, 0, 2) / SUB + shift
-    hits = fire(scene, weapon, at, toward=toward, accept=1)
+    hits = fire(scene, weapon, at, toward=toward, accept=1, blocked_by=1)
     assert isinstance(hits, RayHits)
     return hits
 

@@ -19,6 +19,7 @@ from hitplanes.planes.bits import raycast
 from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
 from hitplanes.planes.common.backend import in_parts, kernels_of
 from hitplanes.planes.scene.items import Stack
+from hitplanes.weapons.kinds.placements import filter_of
 from hitplanes.weapons.rays import ray_call
 
 worlds = st.randoms(use_true_random=False)
@@ -55,7 +56,7 @@ def first_by_the_oracle(
     bounds: Bounds | None,
     at: tuple[int, int],
     by: tuple[int, int],
-    accept: int | None,
+    bits: tuple[int, int] | None,
     exclude: list[int],
 ) -> tuple[int, int, int, int]:
     """Of all cells of a ray the first with an accepted item, one by one."""
@@ -69,8 +70,12 @@ def first_by_the_oracle(
             left, top, right, low = stack.box_xyxy[rank].tolist()
             if left <= x <= right and top <= y <= low and stack.mask(rank)[y - top, x - left]:
                 there.append(rank)
-        if accept is not None:
-            there = [k for k in there if stack.categories[k] & accept and stack.owner[k] not in exclude]
+        if bits is not None:
+            blocks = [bool(stack.categories[k] >> 32 & bits[1]) for k in there]
+            met = [
+                b if stack.occluder[k] else stack.categories[k] & bits[0] for k, b in zip(there, blocks, strict=True)
+            ]
+            there = [k for k, some in zip(there, met, strict=True) if some and stack.owner[k] not in exclude]
         if there:
             found.append((time, not any(stack.occluder[k] for k in there), y, x, there[0]))
     if not found:
@@ -84,17 +89,18 @@ def first_by_the_oracle(
 def test_what_a_ray_touches_first_is_what_the_oracle_meets_first(kernels: ModuleType, rng: random.Random) -> None:
     stack, bounds = some_stack(rng), rng.choice([None, (-4, -3, 5, 6), (2, 2, 2, 2), (-30, -30, 30, 30)])
     rays = [some_ray(rng, 3, 3) for _ in range(rng.choice([1, 6]))]
-    accept = [rng.choice([1, 2, 3]) for _ in rays]
+    bits = [(rng.choice([1, 2, 3]), rng.choice([0, 1, 2, 3])) for _ in rays]
+    meets = [filter_of(*two) for two in bits]
     exclude = [[rng.choice([-1, 1, 2]) for _ in range(2)] for _ in rays]
-    note(f"{bounds} {stack.box_xyxy.tolist()} {rays} {accept} {exclude}")
+    note(f"{bounds} {stack.box_xyxy.tolist()} {rays} {bits} {exclude}")
     start, step = (np.array(column) for column in zip(*rays, strict=True))
-    found = kernels.first_touched(stack, bounds, start, step, np.array(accept), np.array(exclude))
+    found = kernels.first_touched(stack, bounds, start, step, np.array(meets), np.array(exclude))
     every = kernels.first_touched(stack, bounds, start, step, None, np.array(exclude))
     for k, (at, by) in enumerate(rays):
         if by == (0, 0):
             assert found.entry[k] == every.entry[k] == UNDECIDED
             continue
-        expected = first_by_the_oracle(stack, bounds, at, by, accept[k], exclude[k])
+        expected = first_by_the_oracle(stack, bounds, at, by, bits[k], exclude[k])
         assert tuple(int(column[k]) for column in found) == expected
         assert tuple(int(column[k]) for column in every) == first_by_the_oracle(stack, bounds, at, by, None, [])
 

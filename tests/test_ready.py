@@ -109,9 +109,16 @@ def check_random_scene(seed: int) -> None:
     battle, rng = some_battle(seed), random.Random(seed)
     scene, volley = battle.scene(), battle.volley
     filtered = volley.shots[0]
-    ready = prepare(scene, volley.weapon, accept=filtered.accept, exclude=list(filtered.exclude), seed=volley.seed)
+    ready = prepare(
+        scene,
+        volley.weapon,
+        accept=filtered.accept,
+        blocked_by=filtered.blocked_by,
+        exclude=list(filtered.exclude),
+        seed=volley.seed,
+    )
     for one in [*volley.shots, *volley.shots]:
-        shot = replace(one, accept=filtered.accept, exclude=filtered.exclude)
+        shot = replace(one, accept=filtered.accept, blocked_by=filtered.blocked_by, exclude=filtered.exclude)
         aim, toward = (None, shot.toward) if shot.toward is not None else (shot.aim, None)
         rows, verdicts = expected(scene, Placements(volley.weapon, [shot], volley.seed))
         for _ in range(rng.randint(1, 3)):
@@ -121,7 +128,13 @@ def check_random_scene(seed: int) -> None:
             assert count == len(rows)
         straight = [ready.fire(shot.at) for _ in range(4)]
         alone = fire(
-            scene, volley.weapon, shot.at, accept=filtered.accept, exclude=list(filtered.exclude), seed=volley.seed
+            scene,
+            volley.weapon,
+            shot.at,
+            accept=filtered.accept,
+            blocked_by=filtered.blocked_by,
+            exclude=list(filtered.exclude),
+            seed=volley.seed,
         )
         assert all(one == alone for one in straight), f"{seed=}"
         changed(scene, rng)

@@ -67,7 +67,12 @@ def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
     battle = single(rng, 3) if rng.random() < 0.8 else some_battle(rng)
     note(repr(battle))
     scene, weapon, first = battle.scene(), battle.gun.weapon(), battle.shots[0]
-    how: dict[str, Any] = {"accept": first.accept, "exclude": list(first.exclude) or None, "seed": battle.seed}
+    how: dict[str, Any] = {
+        "accept": first.accept,
+        "blocked_by": first.blocked_by,
+        "exclude": list(first.exclude) or None,
+        "seed": battle.seed,
+    }
     ready = prepare(scene, weapon, **how)
     for one in battle.shots * 2:
         aimed = {"toward": one.toward} if one.toward is not None else {"aim": one.aim}

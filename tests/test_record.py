@@ -531,15 +531,15 @@ def test_headers_that_are_none(match: Path) -> None:
     for other, error in {
         b"": "expected a whole line of a record, got an empty file",
         header.rstrip(): "expected a whole line of a record, got one that is cut off",
-        header.replace(b"shots/2", b"shots/3"): "format: expected 'hitplanes-shots/2', got 'hitplanes-shots/3'",
-        header.replace(b"shots/2", b"shots/1"): "key: expected one of 'format', 'version', got 'chain'",
+        header.replace(b"shots/3", b"shots/4"): "format: expected 'hitplanes-shots/3', got 'hitplanes-shots/4'",
+        header.replace(b"shots/3", b"shots/1"): "key: expected one of 'format', 'version', got 'chain'",
         header.replace(b'"0.', b'"1.'): "chain: expected '[0-9a-f]{16}', got '[0-9a-f]{16}': the line was changed",
-        b'{"format":"hitplanes-shots/2","version":"1"}\n': "chain: expected '[0-9a-f]{16}', got nothing",
-        b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/2', got 'hitplanes-hits/1'",
+        b'{"format":"hitplanes-shots/3","version":"1"}\n': "chain: expected '[0-9a-f]{16}', got nothing",
+        b'{"format":"hitplanes-hits/1"}\n': "format: expected 'hitplanes-shots/3', got 'hitplanes-hits/1'",
         first + b"}\n": "version: expected a value, got nothing",
         first + b',"version":"1","rows":1}\n': "key: expected one of 'format', 'version', got 'rows'",
         b"\x89PNG\r\n\x1a\n": "expected JSON in UTF-8",
-        lines[0]: "format: expected 'hitplanes-shots/2', got None",
+        lines[0]: "format: expected 'hitplanes-shots/3', got None",
         b"[]\n": "header: expected an object",
     }.items():
         match.write_bytes(other + b"".join(lines) if other.endswith(b"\n") else other)

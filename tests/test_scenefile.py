@@ -20,7 +20,7 @@ from hitplanes.planes.scene.items import Items, Role
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
-FORMAT = "hitplanes-scene/1"
+FORMAT = "hitplanes-scene/2"
 GALLERY = Path(__file__).parent.parent / "fixtures" / "gallery"
 RNG = np.random.default_rng(23)
 
@@ -499,8 +499,8 @@ BAD_FILES: dict[str, tuple[Any, str]] = {
     "deep duplicate": ('{"weapons": {"w": {"kind": 1, "kind": 2}}}', "expected each key once, got 'kind' again"),
     "NaN": ('{"format": NaN}', "number: expected a finite number, got NaN"),
     "-Infinity": ('{"weapons": {"w": -Infinity}}', "number: expected a finite number, got -Infinity"),
-    "no format": ({}, "format: expected 'hitplanes-scene/1', got nothing"),
-    "wrong format": ({"format": "hitplanes-scene/2"}, "format: expected .*got 'hitplanes-scene/2'"),
+    "no format": ({}, "format: expected 'hitplanes-scene/2', got nothing"),
+    "wrong format": ({"format": "hitplanes-scene/3"}, "format: expected .*got 'hitplanes-scene/3'"),
     "unknown key": ({"format": FORMAT, "object": {}}, "key: .*got 'object' .did you mean 'objects'"),
     "name": ({"format": FORMAT, "name": 5}, "name: expected a text of 1 to 200 characters, got 5"),
     "long name": ({"format": FORMAT, "name": "x" * 201}, "name: expected a text of 1 to 200"),

@@ -386,7 +386,7 @@ def test_without_other_libraries_two_are_asked(few: None, tmp_path: Path, monkey
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": "hitplanes-scene/1"}', '{"format": "hitplanes-stability/1"}']
+    "text", ["", "[]", "{}", '{"format": "hitplanes-scene/2"}', '{"format": "hitplanes-stability/1"}']
 )
 def test_other_files_are_no_runs(text: str, tmp_path: Path) -> None:
     path = tmp_path / "stability.json"

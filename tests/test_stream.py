@@ -76,6 +76,7 @@ usual = st.fixed_dictionaries(
     {"weapon": st.sampled_from(sorted(arsenal)), "at": point},
     optional={
         "accept": st.lists(st.sampled_from(scene.categories), unique=True),
+        "blocked_by": st.lists(st.sampled_from(scene.categories), unique=True),
         "exclude": st.lists(st.sampled_from(["duck 1", "fly", "wall", 0, 3, 17, "clown"]), max_size=3),
         "seed": st.sampled_from([0, 1, 2**53 + 1, 2**63, 2**64 - 1]),
         "shot": st.sampled_from([0, 5, 2**53 + 1, 2**63 - 1]),
@@ -148,7 +149,7 @@ def test_the_first_line_tells_what_was_fired_at_and_names_objects(tmp_path: Path
     log.write_bytes(b"\r\n".join(lines))
     done = run(log, output)
     header, first, second = map(json.loads, output.read_bytes().splitlines())
-    assert header["format"] == "hitplanes-hits/2" and header["scene"] == scene.content_hash()
+    assert header["format"] == "hitplanes-hits/3" and header["scene"] == scene.content_hash()
     assert header["verdicts"] == ["empty", "hit", "occluded", "filtered", "outside"]
     row = dict(zip(header["columns"], first["rows"][0], strict=True))
     assert header["objects"][str(row["object"])] == "bullseye" and (row["x"], row["y"]) == (62, 86)
@@ -373,6 +374,8 @@ BAD = {
     b'{"weapon": "point", "at": [62, 86], "accept": null}': "accept: expected a list, got None",
     b'{"weapon": "point", "at": [62, 86], "accept": ["target", "target"]}': "accept: expected distinct names",
     b'{"weapon": "point", "at": [62, 86], "accept": ["tarket"]}': "did you mean 'target'?",
+    b'{"weapon": "point", "at": [62, 86], "blocked_by": 3}': "blocked_by: expected a list, got 3",
+    b'{"weapon": "point", "at": [62, 86], "blocked_by": ["tarket"]}': "did you mean 'target'?",
     b'{"weapon": "point", "at": [62, 86], "exclude": [true]}': "exclude[0]: expected a whole number",
     b'{"weapon": "point", "at": [62, 86], "exclude": ["dukc 1"]}': "did you mean 'duck 1'?",
     b'{"weapon": "point", "at": [62, 86], "exclude": [99]}': "exclude[0]: owner: expected a whole number from 0 to",
@@ -605,9 +608,9 @@ def test_a_part_of_another_version_is_refused(begun: tuple[Path, Path, Path], mo
 def test_a_part_of_an_older_format_is_refused(begun: tuple[Path, Path, Path]) -> None:
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
-    before = part.read_bytes().replace(b"hitplanes-hits/2", b"hitplanes-hits/1", 1)
+    before = part.read_bytes().replace(b"hitplanes-hits/3", b"hitplanes-hits/1", 1)
     part.write_bytes(before)
-    told = 'hits.jsonl.part: expected format "hitplanes-hits/2", got "hitplanes-hits/1": remove it to start anew'
+    told = 'hits.jsonl.part: expected format "hitplanes-hits/3", got "hitplanes-hits/1": remove it to start anew'
     with pytest.raises(InputError, match=told):
         run(log, output)
     assert part.read_bytes() == before
@@ -618,7 +621,7 @@ def test_a_file_that_is_no_part_is_left_alone(content: bytes, begun: tuple[Path,
     _, log, output = begun
     part = output.with_name("hits.jsonl.part")
     part.write_bytes(content)
-    with pytest.raises(InputError, match="expected a part of hitplanes-hits/2, got something else"):
+    with pytest.raises(InputError, match="expected a part of hitplanes-hits/3, got something else"):
         run(log, output)
     assert part.read_bytes() == content
 

@@ -11,7 +11,7 @@ import pytest
 from hitplanes import Beam, Disc, Scene, fire
 from hitplanes.planes.bits import visible
 from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
-from hitplanes.planes.common.limits import ALL
+from hitplanes.planes.common.limits import EVERYTHING
 from hitplanes.planes.scene.derived import VIEWS_MOST
 
 CORNERS = [(0, 0), (-(10**9), 10**9), (10**12, -(10**12))]
@@ -57,7 +57,7 @@ def test_only_what_decides_hits_makes_a_visible_set_stale(composed: list[View]) 
     scene = crowd()
     mover, hud = scene.add([[True]], role="mover"), scene.add([[True]], role="hud")
     objects = scene.ids("hittable")
-    view = View(False, ALL, ())
+    view = View(False, EVERYTHING, ())
     known = scene.derived.visible(view)
     first = known.read(scene.items)
     changes: list[tuple[Callable[[], object], bool]] = [
@@ -122,7 +122,7 @@ def test_pairs_of_placements_and_tiles_that_are_compared_are_not_too_many(monkey
 
 
 def what(scene: Scene) -> Any:
-    return scene.items.stack(), scene.items.tiles(), scene.bounds, View(False, ALL, ())
+    return scene.items.stack(), scene.items.tiles(), scene.bounds, View(False, EVERYTHING, ())
 
 
 def test_nothing_can_be_seen_of_no_objects(jit: bool) -> None:

@@ -52,7 +52,7 @@ objects = {
     "occluders": [{"box_wh": [9, 9], "position_xy": [60, 30], "layer": 1}],
 }
 weapons = {"a": {"kind": "disc", "radius": 5}}
-told = {"format": "hitplanes-scene/1", "objects": objects, "weapons": weapons}
+told = {"format": "hitplanes-scene/2", "objects": objects, "weapons": weapons}
 Path("plain").mkdir()
 Path("plain/scene.json").write_text(json.dumps(told))
 assert len(fire(load_scene("plain"), arsenal_of(load_scene("plain"))["a"], (30, 30))) == 1
@@ -100,7 +100,7 @@ def test_where_images_need_opencv_one_error_says_what_to_install(code: str, tmp_
     (tmp_path / "pictured").mkdir()
     write_png(tmp_path / "pictured" / "some.png", np.zeros((4, 4, 3), np.uint8))
     (tmp_path / "pictured" / "scene.json").write_text(
-        '{"format": "hitplanes-scene/1", "objects": {"hittable": [{"image": "some.png", "position_xy": [9, 9]}]}}'
+        '{"format": "hitplanes-scene/2", "objects": {"hittable": [{"image": "some.png", "position_xy": [9, 9]}]}}'
     )
     script = f"""
 import numpy as np

@@ -56,13 +56,13 @@ class Rule(NamedTuple):
     ----------
     pierce : whether they go on through objects; they end at occluders
     bounds : box beyond which nothing is hit
-    accept : category bits of all placements, or (P,) of each; None refuses nothing
+    meets : filter of the items that all placements meet, or (P,) of each; None refuses nothing
     exclude : owners whose items are skipped, (1, K) for all placements or (P, K), -1 for none
     """
 
     pierce: bool
     bounds: Box | None = None
-    accept: Ints | int | None = None
+    meets: Ints | int | None = None
     exclude: Ints | None = None
 
 
@@ -167,8 +167,8 @@ def _near(
         placement, tile = listed_at(near, placed.x, placed.y) if isinstance(near, Cells) else near
         placement, tile = _meeting(asked, sides, placement, tile)
     placement, tile = bit_rows.crossing(placed, windows, sides, placement, tile)
-    if rule.accept is not None:
-        rows = _accepted(tiles, rule.accept, rule.exclude, placement, tile).nonzero()[0]
+    if rule.meets is not None:
+        rows = _accepted(tiles, rule.meets, rule.exclude, placement, tile).nonzero()[0]
         placement, tile = placement.take(rows), tile.take(rows)
     high, low = (_eights(int(np.maximum.reduce(box[3] - box[1], initial=0)) + 1) for box in (sides, windows.box_xyxy.T))
     top = sides[1].take(tile) if low >= high else asked[1].take(placement)
@@ -190,9 +190,9 @@ def _meeting(asked: Ints, sides: Ints, placement: Ints, tile: Ints) -> tuple[Int
     return placement, tile
 
 
-def _accepted(tiles: OrderedTiles, accept: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
+def _accepted(tiles: OrderedTiles, meets: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
     """Which tiles of pairs (n,) their placements accept."""
-    bits = accept if isinstance(accept, int) else accept[placement]
+    bits = meets if isinstance(meets, int) else meets[placement]
     accepted = (tiles.categories[tile] & bits) != 0
     if exclude is not None:
         owners = exclude[placement] if len(exclude) > 1 else exclude

@@ -69,7 +69,7 @@ def first_touched(
     bounds: Box | None,
     start_256: Ints,
     step_256: Ints,
-    accept: Ints | None = None,
+    meets: Ints | None = None,
     exclude: Ints | None = None,
 ) -> Touched:
     """Find the first item that each ray touches.
@@ -78,7 +78,7 @@ def first_touched(
     ----------
     bounds : box beyond which nothing is touched, or None
     start_256, step_256 : (R, 2) rays, up to 2**48
-    accept, exclude : (R,) accepted category bits, and (R, K) owners whose items are skipped; or None, both
+    meets, exclude : (R,) filter of items that a ray meets, and (R, K) owners whose items are skipped; or None, both
 
     Returns
     -------
@@ -88,8 +88,8 @@ def first_touched(
     found = []
     for ray, ((x, y), (dx, dy)) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
         accepts = None
-        if accept is not None and exclude is not None:
-            accepts = (stack.categories & accept[ray]) != 0
+        if meets is not None and exclude is not None:
+            accepts = (stack.categories & meets[ray]) != 0
             accepts &= ~(stack.owner[:, None] == exclude[ray]).any(axis=1)
         found.append(caster(stack, bounds, accepts)(x, y, dx, dy))
     return Touched(*np.array(found, np.int64).reshape(-1, 4).T)

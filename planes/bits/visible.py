@@ -13,7 +13,7 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Ints
-from ..common.limits import ALL
+from ..common.limits import EVERYTHING
 from ..grid.spans import Box
 from ..scene.derived import NEVER, Derivative
 from ..scene.items import Items, Stack
@@ -71,17 +71,17 @@ SHOT_BITS = 4
 
 
 class View(NamedTuple):
-    """What shots accept: whether they pierce, the category bits, and the owners whose items they skip."""
+    """What shots see: whether they pierce, the filter of items that they meet, and the owners whose items they skip."""
 
     pierce: bool
-    accept: int
+    meets: int
     exclude: tuple[int, ...]
 
     def accepts(self, stack: Stack) -> Bools:
         """Which items (M,) of a stack such shots accept."""
-        if self.accept == ALL and not (self.exclude or stack.has_unmet):
+        if self.meets == EVERYTHING and not (self.exclude or stack.has_unmet):
             return np.ones(len(stack), np.bool_)
-        there = (stack.categories & self.accept) != 0
+        there = (stack.categories & self.meets) != 0
         for owner in self.exclude:
             there &= stack.owner != owner
         return np.asarray(there)

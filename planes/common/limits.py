@@ -62,8 +62,11 @@ LAYER_MAX = 2**31 - 1
 CATEGORY_BITS = 32
 """Categories are bits of one unsigned 32-bit number."""
 
-ALL = 2**CATEGORY_BITS - 1
+ALL: int = 2**CATEGORY_BITS - 1
 """Every category."""
+
+EVERYTHING = -1
+"""Filter of shots that meet all items: every category of what may be hit, and of what blocks."""
 
 ALPHA_THRESHOLD = 127
 """A pixel of an image belongs to its mask if its alpha is greater: it is more opaque than transparent."""

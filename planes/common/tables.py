@@ -176,19 +176,20 @@ class Word:
 
 @dataclass(frozen=True)
 class Const:
-    """One text and no other."""
+    """One text and no other, or one of those that were written before."""
 
     value: str
+    older: tuple[str, ...] = ()
 
     def check(self, name: str, value: object) -> str:
-        """Check that the value is this text."""
-        if not isinstance(value, str) or value != self.value:
+        """Check that the value is one of these texts."""
+        if not isinstance(value, str) or value not in (self.value, *self.older):
             raise InputError(f"{name}: expected {self.value!r}, got {shown(value)}")
-        return self.value
+        return value
 
     def schema(self) -> dict[str, Any]:
-        """A constant."""
-        return {"const": self.value}
+        """A constant, or a few."""
+        return {"enum": [self.value, *self.older]} if self.older else {"const": self.value}
 
 
 @dataclass(frozen=True)

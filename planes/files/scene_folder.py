@@ -54,7 +54,10 @@ from ..scene.sprite import Sprite, rows_of
 from ..scene.variants import FLIPS
 from .png import possible, read_png, read_text, write_png, write_text
 
-FORMAT = "hitplanes-scene/1"
+FORMAT = "hitplanes-scene/2"
+ONE_FILTER = "hitplanes-scene/1"
+"""Older format, in which `accept` of a shot is the filter of what blocks, too."""
+
 FILE_NAME = "scene.json"
 SECTIONS = {
     "background": Role.BACKGROUND,
@@ -108,7 +111,7 @@ BOUNDS = Keys(
 SCENE = Keys(
     {
         "$schema": Text(),
-        "format": Const(FORMAT),
+        "format": Const(FORMAT, (ONE_FILTER,)),
         "name": Text(),
         "bounds": Optional(Within(BOUNDS)),
         "categories": Names(),
@@ -173,7 +176,7 @@ def read_scene(folder: Path) -> SceneFile:
             size_wh=bounds.get("size_wh"),
             categories=data.get("categories", []),
             weapons=data.get("weapons", {}),
-            shots=list(data.get("shots", [])),
+            shots=[_shot_now(shot, data["format"]) for shot in data.get("shots", [])],
         )
         sprites: dict[str, Sprite] = {}
         for section, role in SECTIONS.items():
@@ -238,6 +241,13 @@ def laid_out(value: Any, depth: int = 0, *, whole: int | None = None) -> str:
         rows = [f"{pad}{json.dumps(key)}: {laid_out(v, depth + 1, whole=whole)}" for key, v in value.items()]
         return "{" + ",".join(rows) + end + "}"
     return "[" + ",".join(pad + laid_out(v, depth + 1, whole=whole) for v in value) + end + "]"
+
+
+def _shot_now(shot: Any, written: str) -> Any:
+    """A shot in today's form. It is checked when it is read, together with the weapons."""
+    if written == ONE_FILTER and isinstance(shot, dict) and "accept" in shot:
+        return {"blocked_by": shot["accept"], **shot}
+    return shot
 
 
 def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[str, Sprite]) -> FileObject:

@@ -171,9 +171,9 @@ def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
 
 
 @njit(inline="always")
-def refuses(tile, categories, owner, accept, exclude, who):
-    """Whether a shot refuses the item of a tile; `accept` and `exclude` have one row for all shots, or one for each."""
-    if categories[tile] & accept[who if len(accept) > 1 else 0] == 0:
+def refuses(tile, categories, owner, meets, exclude, who):
+    """Whether a shot refuses the item of a tile; `meets` and `exclude` have one row for all shots, or one for each."""
+    if categories[tile] & meets[who if len(meets) > 1 else 0] == 0:
         return True
     for k in range(exclude.shape[1]):  # noqa: SIM110 - a generator costs a call of its own
         if owner[tile] == exclude[who if len(exclude) > 1 else 0, k]:
@@ -182,12 +182,12 @@ def refuses(tile, categories, owner, accept, exclude, who):
 
 
 @njit
-def _accepted(near, count, occluder, categories, owner, accept, exclude, who):
+def _accepted(near, count, occluder, categories, owner, meets, exclude, who):
     """Keep the tiles that a shot accepts, up to the last object's; return how many."""
     kept = objects = 0
     for i in range(count):
         tile = near[i]
-        if len(accept) and refuses(tile, categories, owner, accept, exclude, who):
+        if len(meets) and refuses(tile, categories, owner, meets, exclude, who):
             continue
         near[kept] = tile
         kept += 1
@@ -311,7 +311,7 @@ def match(
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
     rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
     begin, listed,
-    pierce, bounds, accept, exclude, each, near, words, row_of, part_of, hit, together,
+    pierce, bounds, meets, exclude, each, near, words, row_of, part_of, hit, together,
 ):  # fmt: skip
     """Write the rows of rounds `turn` .. `end` - 1 to columns `out`, from row `count` on.
 
@@ -355,8 +355,8 @@ def match(
                 close = near_of(box, bins, binned, grid, left, top, right, bottom, near)
             if len(strips):
                 close = _crossing(strips, kind, x[who], y[who], box, near, close)
-            if len(accept) or len(occluder):
-                close = _accepted(near, close, occluder, categories, owner, accept, exclude, who)
+            if len(meets) or len(occluder):
+                close = _accepted(near, close, occluder, categories, owner, meets, exclude, who)
             full = row + 1 + close > room
             if full:
                 break
@@ -443,7 +443,7 @@ def _front_to_back(
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
     rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
     begin, listed,
-    pierce, bounds, accept, exclude, each,
+    pierce, bounds, meets, exclude, each,
 ):  # fmt: skip
     longest = 0
     for kind in range(len(first)):
@@ -457,7 +457,7 @@ def _front_to_back(
         pattern_box, first, following, pattern_words, strips, sums, first_sum,
         rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
         begin, listed,
-        pierce, bounds, accept, exclude, each, near, words, row_of, part_of, hit, together,
+        pierce, bounds, meets, exclude, each, near, words, row_of, part_of, hit, together,
     )  # fmt: skip
 
 
@@ -475,8 +475,8 @@ def front_to_back(
     near: Cells | tuple[Ints, Ints] | None = None,
 ) -> RoundHits:
     """See `bits.front_to_back.front_to_back`."""
-    accept, cells = rule.accept, near if isinstance(near, Cells) else NOWHERE
-    accepted = NONE if accept is None else np.array([accept]) if isinstance(accept, int) else accept
+    meets, cells = rule.meets, near if isinstance(near, Cells) else NOWHERE
+    accepted = NONE if meets is None else np.array([meets]) if isinstance(meets, int) else meets
     found = None
     if near is None or isinstance(near, Cells):
         tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)

@@ -326,12 +326,12 @@ def _front(x, y, near, count, box, offset, masks, occluder, origin_x, origin_y, 
 
 
 @njit
-def _entered(box, categories, owner, accept, exclude, who, origin_x, origin_y, ray, bounds, near, times):
+def _entered(box, categories, owner, meets, exclude, who, origin_x, origin_y, ray, bounds, near, times):
     """Write the accepted items whose boxes a ray enters, and the times of entry; return how many."""
     count = 0
     for i in range(_near(box, origin_x, origin_y, ray, bounds, near)):
         at = near[i]
-        if len(accept) and refuses(at, categories, owner, accept, exclude, who):
+        if len(meets) and refuses(at, categories, owner, meets, exclude, who):
             continue
         left, top, right, low = _part(box, at, origin_x, origin_y, bounds)
         near[count], (times[count], leave) = at, _times(left, top, right, low, ray)
@@ -366,13 +366,13 @@ def _earliest(box, offset, masks, origin_x, origin_y, ray, bounds, near, times, 
 
 # house: hit rule of rays
 @njit
-def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, accept, exclude, who, bounds, near, times):
+def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, meets, exclude, who, bounds, near, times):
     """Time of entry, cell and rank of the first item that a ray touches; `near` and `times` are scratch, (M,) each."""
     if (dx == 0 and dy == 0) or max(abs(dx), abs(dy)) > LONGEST:
         return np.int64(UNDECIDED), np.int64(0), np.int64(0), np.int64(-1)
     origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
     ray = x - SUB * origin_x, y - SUB * origin_y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
-    count = _entered(box, categories, owner, accept, exclude, who, origin_x, origin_y, ray, bounds, near, times)
+    count = _entered(box, categories, owner, meets, exclude, who, origin_x, origin_y, ray, bounds, near, times)
     best, column, row = _earliest(box, offset, masks, origin_x, origin_y, ray, bounds, near, times, count)
     if best == LATE:
         return np.int64(NOTHING), np.int64(0), np.int64(0), np.int64(-1)
@@ -394,12 +394,12 @@ BOUNDS = types.UniTuple(types.int64, 4)
 @compiled(types.void(
     PAIRS, PAIRS, types.Array(types.int64, 2, "A"), BOXES, INTS, FLAGS, FLAGS, INTS, INTS, INTS, OWNERS, BOUNDS,
 ))  # fmt: skip
-def _each(start, step, found, box, offset, masks, occluder, categories, owner, accept, exclude, bounds):
+def _each(start, step, found, box, offset, masks, occluder, categories, owner, meets, exclude, bounds):
     scratch = np.empty((2, len(box) + 1), np.int64)
     for who in range(len(start)):
         found[0, who], found[1, who], found[2, who], found[3, who] = touched(
             start[who, 0], start[who, 1], step[who, 0], step[who, 1], box, offset, masks, occluder, categories, owner,
-            accept, exclude, who, bounds, scratch[0], scratch[1],
+            meets, exclude, who, bounds, scratch[0], scratch[1],
         )  # fmt: skip
 
 
@@ -430,7 +430,7 @@ def first_touched(
     bounds: Box | None,
     start_256: Ints,
     step_256: Ints,
-    accept: Ints | None = None,
+    meets: Ints | None = None,
     exclude: Ints | None = None,
 ) -> Touched:
     """See `bits.raycast.first_touched`."""
@@ -441,7 +441,7 @@ def first_touched(
     def some(first: int, last: int) -> None:
         """Rays first .. last - 1."""
         part = slice(first, last)
-        whose = (NONE, NOBODY) if accept is None or exclude is None else (accept[part], exclude[part])
+        whose = (NONE, NOBODY) if meets is None or exclude is None else (meets[part], exclude[part])
         _each(start_256[part], step_256[part], found[:, part], *given, *whose, within)
 
     in_parts(len(start_256), PART_PAIRS / (RAY_PAIRS + len(stack)), some)

@@ -19,7 +19,17 @@ import numpy.typing as npt
 from .. import late
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, choice
-from ..common.limits import ATLAS_SLACK_BYTES, BOXES_MAX, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
+from ..common.limits import (
+    ATLAS_SLACK_BYTES,
+    BOXES_MAX,
+    CATEGORY_BITS,
+    HALF,
+    ITEMS_MAX,
+    JOURNAL_EACH,
+    JOURNAL_FEW,
+    JOURNAL_ROWS,
+    SUB,
+)
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box
@@ -39,7 +49,8 @@ class Stack:
 
     Parameters
     ----------
-    ids, categories, owner : (M,) int64
+    ids, owner : (M,) int64
+    categories : (M,) category bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
     occluder : (M,) bool
     box_xyxy : (M, 4) int64, inclusive, px
     offset : (M,) start of the item's mask in `masks`, row by row
@@ -486,10 +497,15 @@ class Items:
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         ids = last.ids
-        columns = (column.take(ids) for column in (self.categories, self.owner))
+        columns = self._filtered_by(ids, last.occluder), self.owner.take(ids)
         return last.reformed(
             self.arrangement, self._boxes_in_order(ids), self.offset.take(ids), self.atlas.flat, *columns
         )
+
+    def _filtered_by(self, ids: Ints, occluder: Bools) -> Ints:
+        """Categories of a stack's items."""
+        bits: Ints = self.categories.take(ids) << CATEGORY_BITS * occluder
+        return bits
 
     def _boxes_in_order(self, ids: Ints) -> Ints:
         """Boxes of all items that decide hits."""
@@ -510,8 +526,8 @@ class Items:
         order = np.lexsort(keys)
         ids, occluder = ids[order], occluder[order]
         return Stack(
-            ids, occluder, self.categories[ids], self.owner[ids], self.boxes(ids), self.offset[ids], self.atlas.flat,
-            layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
+            ids, occluder, self._filtered_by(ids, occluder), self.owner[ids], self.boxes(ids), self.offset[ids],
+            self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
         )  # fmt: skip
 
     def imagery(self) -> list[Role]:

@@ -380,11 +380,11 @@ class Scene:
             raise InputError(f"name: expected one object named {name!r}, got {len(named)}")
         return int(named[0])
 
-    def category_bits(self, *names: str) -> int:
-        """Bits of named categories, for `accept`."""
+    def category_bits(self, *names: str, field: str = "category") -> int:
+        """Bits of named categories, for `accept` and `blocked_by`; an error says `field`."""
         bits = 0
         for name in names:
-            bits |= 1 << self.categories.index(choice("category", name, self.categories))
+            bits |= 1 << self.categories.index(choice(field, name, self.categories))
         return bits
 
     def category_names(self, bits: int) -> list[str]:
@@ -436,7 +436,7 @@ class Scene:
 
         stack = self.items.stack()
         digest = hashlib.sha256(repr(self.bounds).encode())
-        for column in (stack.ids, stack.occluder, stack.categories, stack.owner, stack.box_xyxy):
+        for column in (stack.ids, stack.occluder, self.items.categories[stack.ids], stack.owner, stack.box_xyxy):
             digest.update(np.ascontiguousarray(column).tobytes())
         for rank in range(len(stack)):
             digest.update(np.packbits(stack.mask(rank)).tobytes())

@@ -50,7 +50,7 @@ FIRE_HELP = """\
 Fire a log of shots of any length, in little memory. Each line of the log gives one line of hits, in the same order.
 
 A line of SHOTS.jsonl is a shot as in scene.json: {"weapon": "point", "at": [62, 86]}, and aim or toward, accept,
-exclude, seed. Shots are numbered by their line, from 0, unless they have "shot". Empty lines are refused.
+blocked_by, exclude, seed. Shots are numbered by their line, from 0, unless they have "shot". Empty lines are refused.
 
 The first line of HITS.jsonl names the scene, the weapons, the columns of a row and the objects by id. Each line after
 it answers one shot: {"shot": 0, "of": CRC-32 of its line in the log, "rows": [[object, ...], ...],

@@ -119,6 +119,7 @@ BLOCKED = _all({**ITEM, "samples": COUNT, "at_xy": PIXEL})
 SHOT_TOLD: dict[str, Value] = {
     "shot": Whole(0, 2**63 - 1), "weapon": Text(), "at": Numbers((2,), POSITION_MAX), "at_xy": PIXEL,
     "aim": Optional(Number(-180, 180)), "seed": Whole(0, SEED_MAX), "accept": Optional(Names()),
+    "blocked_by": Optional(Names()),
     "exclude": Rows(_all({"owner": COUNT, "name": Text()})), "verdicts": COUNTS, "rows": Rows(ROW),
     "why_not": Rows(_all(WHY_NOT, margin=MARGIN)),
     "blockers": Rows(_all({**ITEM, "samples": COUNT, "blocked": Rows(BLOCKED)})),

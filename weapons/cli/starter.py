@@ -28,7 +28,7 @@ SCHEMA_NAME = "scene.schema.json"
 
 SCENE: dict[str, Any] = {
     "$schema": SCHEMA_NAME,
-    "format": "hitplanes-scene/1",
+    "format": "hitplanes-scene/2",
     "name": "A range to start from",
     "bounds": {"origin_xy": [0, 0], "size_wh": [WIDTH, HEIGHT]},
     "categories": ["target"],

@@ -190,7 +190,7 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
     in_round: dict[int, Ints] = {}
     for row in rows:
         rank = int(stack.rank_of[row.object])
-        key = (rank, int(shots.accept[row.shot]), *shots.exclude[row.shot].tolist())
+        key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
             visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
         if row.shot not in in_round:
@@ -270,7 +270,7 @@ def _why(detail: Detail, rank: int, distance: float) -> WhyNot:
 def unmet(stack: Stack, shot: Shots, rank: int, samples: int) -> str | None:
     """Reason why an item was not hit that does not depend on what lies before it, as in `WhyNot`."""
     if refused(stack, np.array([rank]), shot, np.zeros(1, np.int64))[0]:
-        return "excluded" if int(stack.categories[rank]) & int(shot.accept[0]) else "category"
+        return "excluded" if int(stack.categories[rank]) & int(shot.meets[0]) else "category"
     return None if samples else "missed"
 
 

@@ -26,7 +26,7 @@ from hitplanes.planes.bits.tiles import Ground, hit_by_few
 from hitplanes.planes.bits.visible import SHOT_BITS, View
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
-from hitplanes.planes.common.limits import ALL, CHUNK_PAIRS, CHUNK_SAMPLES
+from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES, EVERYTHING
 from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -45,7 +45,7 @@ PLACEMENTS_AT_ONCE = 2**15
 NEAR_AT_ONCE = 2**12
 """Most placements whose near items are listed at a time, if a pre-filter is named; in a crowd each has a hundred."""
 
-OF_ALL = View(False, ALL, ()), View(True, ALL, ())
+OF_ALL = View(False, EVERYTHING, ()), View(True, EVERYTHING, ())
 """Views of shots that accept everything: without and with pierce."""
 
 
@@ -109,10 +109,10 @@ def view_of(pierce: bool, shots: Shots) -> View | None:
     """View of a batch: what all its shots accept; None if they accept different items."""
     if not shots.choosy or not len(shots):
         return OF_ALL[pierce]
-    accept, exclude = shots.accept, shots.exclude
-    if (accept != accept[0]).any() or (exclude != exclude[0]).any():
+    meets, exclude = shots.meets, shots.exclude
+    if (meets != meets[0]).any() or (exclude != exclude[0]).any():
         return None
-    return View(pierce, int(accept[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
+    return View(pierce, int(meets[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
 
 
 # house: way of areas
@@ -221,8 +221,8 @@ def _rule(request: Request, shots: Shots, placements: Placements) -> Rule:
     """What ends the pixels of a part of the shots, which may refuse items."""
     pierce, bounds, view = request.traits.pierces, request.scene.bounds, request.view
     if view is None:
-        return Rule(pierce, bounds, shots.accept[placements.shot], shots.exclude[placements.shot])
-    return Rule(pierce, bounds, view.accept, np.array([view.exclude], np.int64))
+        return Rule(pierce, bounds, shots.meets[placements.shot], shots.exclude[placements.shot])
+    return Rule(pierce, bounds, view.meets, np.array([view.exclude], np.int64))
 
 
 # house: way of areas

@@ -37,6 +37,7 @@ def fire(
     aim: object = None,
     toward: object = None,
     accept: object = ALL,
+    blocked_by: object = ALL,
     exclude: object = None,
     seed: object = 0,
     shot: object = None,
@@ -54,7 +55,8 @@ def fire(
     at : (2,) position of one shot, or (N, 2) of a batch, px
     aim : angle in degrees, 0 along +x, clockwise on the screen
     toward : (2,) or (N, 2) point that the weapon is aimed at, px; it replaces `aim`
-    accept : category names or bits of the items that may be hit or may block; all by default
+    accept : category names or bits of the objects that may be hit; all by default
+    blocked_by : category names or bits of the occluders that block; all by default, and none for [] or 0
     exclude : owners whose items are skipped, such as the shooter: a number, or for one shot a list (K,); for a batch
         (N,), (N, K), or (1, K) for all shots, padded with -1
     seed : seed of the pellets, 0 .. 2**64 - 1
@@ -73,7 +75,7 @@ def fire(
         - a way by its name: of areas "spans" (the reference), "tiles", "visible", "labels", "integers"; of rays "walk"
           (the reference), "cast", "march"
 
-    Each of aim, toward, accept, exclude, seed, shot and tick is one value for all shots, or one for each.
+    Each of aim, toward, accept, blocked_by, exclude, seed, shot and tick is one value for all shots, or one for each.
 
     Raises
     ------
@@ -83,7 +85,8 @@ def fire(
     plan = Plan()
     _check_words(prefilter, broadphase, strategy)
     present = scene if isinstance(scene, Scene) else _history(scene).scene
-    shots = checked_shots(weapon, at, aim, toward, category_bits(present, accept), exclude, seed, shot)
+    bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
+    shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if not isinstance(scene, Scene):
         return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
@@ -177,8 +180,9 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
     return hits
 
 
-def category_bits(scene: Scene, accept: object) -> object:
-    """Category bits of a list of names; any other value unchanged."""
-    if isinstance(accept, list | tuple) and accept and all(isinstance(name, str) for name in accept):
-        return scene.category_bits(*accept)
-    return accept
+def category_bits(scene: Scene, field: str, value: object) -> object:
+    """Category bits of a name or a list of names; any other value unchanged."""
+    names = (value,) if isinstance(value, str) else value
+    if isinstance(names, list | tuple) and all(isinstance(name, str) for name in names):
+        return scene.category_bits(*names, field=field)
+    return value

@@ -117,8 +117,8 @@ def kinds(stack: Stack, rank: Ints, refuses: Bools | None) -> Kinds:
 
 
 def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
-    """Whether shots refuse items: those without a category in `accept`, and those of an excluded owner."""
-    foreign = (stack.categories[rank] & shots.accept[shot]) == 0
+    """Whether shots refuse items: those of which they meet no category, and those of an excluded owner."""
+    foreign = (stack.categories[rank] & shots.meets[shot]) == 0
     if not shots.exclude.shape[1]:
         return np.asarray(foreign)
     return np.asarray(foreign | (stack.owner[rank][:, None] == shots.exclude[shot]).any(axis=1))

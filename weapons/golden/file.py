@@ -166,10 +166,13 @@ def read_golden(base: Path) -> Golden | None:
     data = _checked(path)
     try:
         planes = _read_planes(_file(base, "npz"), data["planes"]) if data["planes"] else {}
+        report = dict(data["report"])
+        for shot in report["shots"]:
+            shot.setdefault("blocked_by", shot["accept"])  # before there were two filters, one was both
         return Golden(
             data["test"],
             data["name"],
-            dict(data["report"]),
+            report,
             planes,
             (int(data["origin_xy"][0]), int(data["origin_xy"][1])),
             data["left_out"],

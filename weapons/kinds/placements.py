@@ -17,9 +17,18 @@ import numpy.typing as npt
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
-from hitplanes.planes.common.limits import ALL, GOLDEN, POSITION_MAX, REACH_MAX, SEED_MAX, SUB
+from hitplanes.planes.common.limits import (
+    ALL,
+    CATEGORY_BITS,
+    EVERYTHING,
+    GOLDEN,
+    POSITION_MAX,
+    REACH_MAX,
+    SEED_MAX,
+    SUB,
+)
 from hitplanes.planes.grid import fixed_point
-from hitplanes.planes.grid.fixed_point import ONE, pixel, snap, turned, unit, unit_of, unit_toward
+from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.scene import one_place, points
 
@@ -143,7 +152,7 @@ class Shots:
     at_256 : (N, 2) positions in 1/256 px
     direction : (N, 2) cos and sin of the aim times 2**30, or one pair; None if shots are aimed at points
     toward_256 : (N, 2) offsets to the points that shots are aimed at, in 1/256 px; None if they have an angle
-    accept : (N,) category bits, or one value
+    meets : (N,) category bits of what may be hit, and CATEGORY_BITS higher those of what blocks; or one value
     exclude : (N, K) owners, -1 for none, or one row
     number : (N,) shot numbers for the draws, or the first of a range
     seed : (N,) uint64 seeds of the draws, or one value
@@ -155,14 +164,14 @@ class Shots:
         at_256: Ints,
         direction: Ints | tuple[int, int] | None,
         toward_256: Ints | None,
-        accept: Ints | int,
+        meets: Ints | int,
         exclude: Ints | tuple[int, ...],
         number: Ints | int,
         seed: Words | int,
         row: Ints | int,
     ) -> None:
         self.at_256, self.toward_256 = at_256, toward_256
-        self._direction, self._accept, self._exclude = direction, accept, exclude
+        self._direction, self._meets, self._exclude = direction, meets, exclude
         self._number, self._seed, self._row = number, seed, row
 
     def __len__(self) -> int:
@@ -187,9 +196,19 @@ class Shots:
         return _spread(self._direction, len(self))
 
     @cached_attribute
+    def meets(self) -> Ints:
+        """Filters (N,) of the items that the shots meet; the others are passed over."""
+        return _spread(self._meets, len(self))
+
+    @property
     def accept(self) -> Ints:
-        """Category bits (N,)."""
-        return _spread(self._accept, len(self))
+        """Category bits (N,) of what may be hit."""
+        return accepted_of(self.meets)
+
+    @property
+    def blocked_by(self) -> Ints:
+        """Category bits (N,) of what blocks."""
+        return blocking_of(self.meets)
 
     @cached_attribute
     def exclude(self) -> Ints:
@@ -214,19 +233,19 @@ class Shots:
     @property
     def nbytes(self) -> int:
         """Bytes of the columns; values that all shots share do not count."""
-        columns = self.toward_256, self._direction, self._accept, self._exclude, self._number, self._seed, self._row
+        columns = self.toward_256, self._direction, self._meets, self._exclude, self._number, self._seed, self._row
         return self.at_256.nbytes + sum([column.nbytes for column in columns if isinstance(column, np.ndarray)])
 
     @cached_attribute
     def choosy(self) -> bool:
         """Whether any shot may refuse an item."""
-        if isinstance(self._accept, int) and isinstance(self._exclude, tuple):
-            return self._accept != ALL or bool(self._exclude)
-        return bool((self.accept != ALL).any() or self.exclude.shape[1])
+        if isinstance(self._meets, int) and isinstance(self._exclude, tuple):
+            return self._meets != EVERYTHING or bool(self._exclude)
+        return bool((self.meets != EVERYTHING).any() or self.exclude.shape[1])
 
     def aimed(self, direction: Ints) -> Shots:
         """The same shots in other directions (N, 2)."""
-        rest = self._accept, self._exclude, self._number, self._seed, self._row
+        rest = self._meets, self._exclude, self._number, self._seed, self._row
         return Shots(self.at_256, direction, self.toward_256, *rest)
 
     def take(self, first: int, last: int) -> Shots:
@@ -244,7 +263,7 @@ class Shots:
             return column[rows] if isinstance(column, np.ndarray) else column + begin
 
         return Shots(
-            self.at_256[rows], picked(self._direction), picked(self.toward_256), picked(self._accept),
+            self.at_256[rows], picked(self._direction), picked(self.toward_256), picked(self._meets),
             picked(self._exclude), counted(self._number), picked(self._seed), counted(self._row),
         )  # fmt: skip
 
@@ -340,7 +359,15 @@ class Placements:
 
 
 def checked_shots(
-    weapon: Weapon, at: object, aim: object, toward: object, accept: object, exclude: object, seed: object, shot: object
+    weapon: Weapon,
+    at: object,
+    aim: object,
+    toward: object,
+    accept: object,
+    blocked_by: object,
+    exclude: object,
+    seed: object,
+    shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
     at_256, single = _places(at)
@@ -351,7 +378,7 @@ def checked_shots(
         at_256,
         _directions(n, aim) if offset is None else None,
         offset,
-        _accepted(accept, n),
+        filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n)),
         _owners(exclude, n, single),
         0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
@@ -372,11 +399,30 @@ def _places(at: object) -> tuple[Ints, bool]:
     return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 
 
-def _accepted(accept: object, n: int) -> Ints | int:
+def filter_of(accept: Ints | int, blocked_by: Ints | int) -> Ints | int:
+    """Filter of what shots meet, a signed word: `accept` for objects, and CATEGORY_BITS higher `blocked_by`."""
+    top = 1 << CATEGORY_BITS - 1
+    signed = (blocked_by ^ top) - top
+    return accept | signed << CATEGORY_BITS
+
+
+def accepted_of(meets: Whole) -> Whole:
+    """Category bits in a filter of what may be hit."""
+    bits: Whole = meets & ALL
+    return bits
+
+
+def blocking_of(meets: Whole) -> Whole:
+    """Category bits in a filter of what blocks."""
+    bits: Whole = meets >> CATEGORY_BITS & ALL
+    return bits
+
+
+def _bits(name: str, bits: object, n: int) -> Ints | int:
     """Category bits (n,), or one value for all shots."""
-    if type(accept) is int and 0 <= accept <= ALL:
-        return accept
-    return integers("accept", each("accept", accept, n), (n,), 0, ALL)
+    if type(bits) is int and 0 <= bits <= ALL:
+        return bits
+    return integers(name, each(name, bits, n), (n,), 0, ALL)
 
 
 def _spread(column: Ints | int | tuple[int, ...] | None, n: int) -> Ints:

@@ -23,7 +23,7 @@ from ..fire.plan import Plan
 from ..fire.prefilter import Candidates
 from ..fire.spans import QueryContext, SpanHits, direct
 from ..kinds.areas import parts_of, pierces
-from ..kinds.placements import Placements, Shots, checked_shots, placements_for
+from ..kinds.placements import Placements, Shots, accepted_of, blocking_of, checked_shots, placements_for
 from ..kinds.weapon import Weapon
 
 REACH_MOST = 500
@@ -81,18 +81,19 @@ Told = tuple[object, object, object]
 class Filter:
     """Arguments of `fire` that are the same for all shots of a prepared weapon."""
 
-    accept: int
+    meets: int
     exclude: Ints
     seed: int
 
     def view(self, pierce: bool) -> View:
         """View of the items that its shots accept."""
-        return View(pierce, self.accept, tuple(sorted(set(self.exclude[0].tolist()) - {-1})))
+        return View(pierce, self.meets, tuple(sorted(set(self.exclude[0].tolist()) - {-1})))
 
     def shots(self, weapon: Weapon, at: object, told: Told) -> Shots:
         """Batch of one shot."""
         aim, toward, number = told
-        return checked_shots(weapon, at, aim, toward, self.accept, self.exclude, self.seed, number)
+        bits = accepted_of(self.meets), blocking_of(self.meets)
+        return checked_shots(weapon, at, aim, toward, *bits, self.exclude, self.seed, number)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.call import category_bits, fire
 from ..fire.hits import Hits
 from ..kinds.areas import has_no_range, parts_of, ray_parts_of
-from ..kinds.placements import checked_shots
+from ..kinds.placements import accepted_of, blocking_of, checked_shots
 from ..kinds.rays import is_thin_first
 from ..kinds.weapon import Weapon
 from . import position_cache
@@ -74,8 +74,8 @@ class Ready:
         kept = self._filter
         exclude = kept.exclude if kept.exclude.size else None
         return fire(
-            self.scene, self.weapon, at, aim=aim, toward=toward, accept=kept.accept, exclude=exclude, seed=kept.seed,
-            shot=shot,
+            self.scene, self.weapon, at, aim=aim, toward=toward, accept=accepted_of(kept.meets),
+            blocked_by=blocking_of(kept.meets), exclude=exclude, seed=kept.seed, shot=shot,
         )  # fmt: skip
 
 
@@ -235,13 +235,22 @@ def plain_pair(value: object) -> tuple[float, float] | None:
     return x, y
 
 
-def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: object = None, seed: object = 0) -> Ready:
+def prepare(
+    scene: Scene,
+    weapon: Weapon,
+    *,
+    accept: object = ALL,
+    blocked_by: object = ALL,
+    exclude: object = None,
+    seed: object = 0,
+) -> Ready:
     """Make a weapon ready to be fired at a scene one shot a call.
 
     Parameters
     ----------
     scene : the scene that is fired at; it may change at any time, and each shot sees it as it is then
-    weapon, accept, exclude, seed : arguments of `fire`, the same for all shots; `exclude` is a number or a list (K,)
+    weapon, accept, blocked_by, exclude, seed : arguments of `fire`, the same for all shots; `exclude` is a number or a
+        list (K,)
 
     Raises
     ------
@@ -251,8 +260,9 @@ def prepare(scene: Scene, weapon: Weapon, *, accept: object = ALL, exclude: obje
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
     toward = (1, 0) if has_no_range(weapon) else None
-    shots = checked_shots(weapon, (0, 0), None, toward, category_bits(scene, accept), exclude, seed, None)
-    kept = Filter(int(shots.accept[0]), shots.exclude, int(shots.seed[0]))
+    bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
+    shots = checked_shots(weapon, (0, 0), None, toward, *bits, exclude, seed, None)
+    kept = Filter(int(shots.meets[0]), shots.exclude, int(shots.seed[0]))
     parts = ray_parts_of(weapon)
     if parts is not None:
         from .prepared_ray import ReadyRay

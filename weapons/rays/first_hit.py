@@ -126,7 +126,7 @@ def ends_by_cast(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tu
     the ends without `fraction`, and the numbers of the rays that are left to the walk
     """
     stack = through.stack
-    whose = (shots.accept[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
+    whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
     found = kernels_of(raycast).first_touched(stack, through.bounds, rays.start_256, rays.step_256, *whose)
     ends = ends_of_touched(found, rays.origin_xy, stack)
     through.plan.run("cast", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)

@@ -51,16 +51,19 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.call import fire, fired
 from ..fire.hits import Hits
 from ..kinds.areas import weapon_from_json
-from ..kinds.placements import Shots, check_aimed
+from ..kinds.placements import Shots, check_aimed, filter_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
 from ..report.phrases import Entry, by_path, first_of, key_of, pairs
 from ..report.phrases import shown as number_of
 
-FORMAT = "hitplanes-shots/2"
+FORMAT = "hitplanes-shots/3"
 WITHOUT_CHAIN = "hitplanes-shots/1"
-"""Older format, without chain and end."""
+"""Oldest format, without chain and end."""
+
+ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)
+"""Older formats, in which `accept` is the filter of what blocks, too."""
 
 SEAL = b',"chain":"%b"}\n'
 SEAL_BYTES = len(SEAL % bytes(16))
@@ -78,13 +81,14 @@ LINE = Keys(
         "direction": Wholes((2,), -ONE, ONE),
         "toward_256": Optional(AWAY),
         "accept": Whole(0, ALL),
+        "blocked_by": Whole(0, ALL),
         "exclude": Wholes((None,), 0, 2**31),
         "seed": Whole(0, SEED_MAX),
         "shot": Whole(0, 2**63 - 1),
         "result": Ref("result"),
         "hash": Text(),
     },
-    ("scene", "weapon", "at", "direction", "accept", "exclude", "seed", "shot", "result", "hash"),
+    ("scene", "weapon", "at", "direction", "accept", "blocked_by", "exclude", "seed", "shot", "result", "hash"),
 )
 
 AT_ONCE, BYTES_AT_ONCE = 1024, 2**21
@@ -206,6 +210,7 @@ class ShotRecord:
             "direction": shots.direction[row].tolist(),
             **aimed,
             "accept": int(shots.accept[row]),
+            "blocked_by": int(shots.blocked_by[row]),
             "exclude": [owner for owner in shots.exclude[row].tolist() if owner >= 0],
             "seed": int(shots.seed[row]),
             "shot": int(shots.number[row]),
@@ -352,10 +357,11 @@ class Reading:
             line = self._lines.readline(TEXT_BYTES_MAX + 1)
             header = typed("header", self._json_of(line), dict)
             if header.get("format") != WITHOUT_CHAIN:
-                Const(FORMAT).check("format", header.get("format"))
+                Const(FORMAT, ONE_FILTER).check("format", header.get("format"))
                 self._chain = Chain()
                 header = self._json_of(line)
             HEADER.check("header", header)
+            self._one_filter = header["format"] in ONE_FILTER
 
     def __iter__(self) -> Iterator[Recorded]:
         number, ended, written, weapon = 1, False, None, None
@@ -368,6 +374,8 @@ class Reading:
                 ended = self._is_end(data, number - 2)
                 if ended:
                     continue
+                if self._one_filter and isinstance(data, dict):
+                    data = {"blocked_by": data.get("accept"), **data}
                 data = _checked_shot(data)
                 if weapon is None or data["weapon"] != written:
                     written, weapon = data["weapon"], weapon_from_json(data["weapon"])
@@ -497,7 +505,7 @@ def _shots_of(entries: Sequence[Mapping[str, Any]]) -> Shots:
         snap([entry["at"] for entry in entries]).reshape(-1, 2),
         np.array([entry["direction"] for entry in entries], np.int64).reshape(-1, 2),
         toward,
-        np.array([entry["accept"] for entry in entries], np.int64),
+        filter_of(*(np.array([entry[key] for entry in entries]) for key in ("accept", "blocked_by"))),
         owners,
         np.array([entry["shot"] for entry in entries], np.int64),
         np.array([entry["seed"] for entry in entries], np.uint64),

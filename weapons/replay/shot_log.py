@@ -44,6 +44,7 @@ SHOT = Keys(
         "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
         "toward": Optional(Numbers((2,), POSITION_MAX)),
         "accept": Names(),
+        "blocked_by": Names(),
         "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))),
         "seed": Whole(0, SEED_MAX),
         "shot": Whole(0, 2**63 - 1),
@@ -55,18 +56,18 @@ SHOT = Keys(
 
 @dataclass(frozen=True)
 class ShotRequest:
-    """One checked shot. `accept` holds names of categories, `exclude` ids of owners."""
+    """One checked shot. `accept` and `blocked_by` hold category bits, `exclude` ids of owners."""
 
     name: str
     weapon: Weapon
     at: tuple[float, float]
     aim: float | None = None
     toward: tuple[float, float] | None = None
-    accept: tuple[str, ...] | None = None
+    accept: int = ALL
+    blocked_by: int = ALL
     exclude: tuple[int, ...] = ()
     seed: int = 0
     shot: int = 0
-    categories: int = ALL
 
 
 def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[ShotRequest]:
@@ -99,18 +100,20 @@ def order_from_json(
             raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
         if shot.get("toward") is None and has_no_range(arsenal[name]):
             raise InputError("toward: expected a point, as the weapon has no range, got none")
-        accept = shot.get("accept")
+        accept, blocked_by = (
+            scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
+        )
         return ShotRequest(
             name,
             arsenal[name],
             shot["at"],
             shot.get("aim"),
             shot.get("toward"),
-            None if accept is None else tuple(accept),
+            accept,
+            blocked_by,
             tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ()))),
             shot.get("seed", 0),
             shot.get("shot", number),
-            ALL if accept is None else scene.category_bits(*accept),
         )
 
 
@@ -122,7 +125,8 @@ def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadp
         order.at,
         aim=order.aim,
         toward=order.toward,
-        accept=order.categories,
+        accept=order.accept,
+        blocked_by=order.blocked_by,
         exclude=order.exclude or None,
         seed=order.seed,
         shot=[order.shot],
@@ -161,7 +165,7 @@ class Salvo:
     at : (n, 2) px
     aim : (n,) degrees
     toward : (n, 2) px; NaN for a shot that has an aim
-    accept : (n,) category bits
+    accept, blocked_by : (n,) category bits
     exclude : ids of owners, a tuple for each shot
     seed, number : (n,) that select the random draws
     """
@@ -171,6 +175,7 @@ class Salvo:
     aim: Floats
     toward: Floats
     accept: Ints
+    blocked_by: Ints
     exclude: list[tuple[int, ...]]
     seed: Words
     number: Ints
@@ -192,6 +197,7 @@ class Salvo:
             "at": self.at[rows],
             "toward" if toward else "aim": self.toward[rows] if toward else self.aim[rows],
             "accept": self.accept[rows],
+            "blocked_by": self.blocked_by[rows],
             "exclude": np.array([self.exclude[row] for row in rows.tolist()]) if owners else None,
             "seed": self.seed[rows],
             "shot": self.number[rows],
@@ -215,6 +221,7 @@ class Salvo:
             column("aim"),
             column("toward"),
             column("accept"),
+            column("blocked_by"),
             [owners for part in parts for owners in part.exclude],
             column("seed"),
             column("number"),
@@ -228,7 +235,8 @@ class Salvo:
             np.array([order.at for order in orders], np.float64).reshape(-1, 2),
             np.array([order.aim or 0.0 for order in orders], np.float64),
             np.array([order.toward or NOWHERE for order in orders], np.float64).reshape(-1, 2),
-            np.array([order.categories for order in orders], np.int64),
+            np.array([order.accept for order in orders], np.int64),
+            np.array([order.blocked_by for order in orders], np.int64),
             [order.exclude for order in orders],
             np.array([order.seed for order in orders], np.uint64),
             np.array([order.shot for order in orders], np.int64),
@@ -325,15 +333,19 @@ class ShotReader:
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,
-            np.array([self._accepted(shot["accept"]) if "accept" in shot else ALL for shot in shots], np.int64),
+            np.array([self._categories(shot, "accept") for shot in shots], np.int64),
+            np.array([self._categories(shot, "blocked_by") for shot in shots], np.int64),
             [self._passed_over(shot["exclude"]) if "exclude" in shot else () for shot in shots],
             np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
             np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
         )
 
-    def _accepted(self, names: Any) -> int:
+    def _categories(self, shot: dict[str, Any], key: str) -> int:
+        if key not in shot:
+            return ALL
+        names: list[str] = shot[key]
         _usual(type(names) is list and len(set(names)) == len(names))
-        return sum(self._bits[name] for name in names)
+        return sum([self._bits[name] for name in names])
 
     def _passed_over(self, owners: Any) -> tuple[int, ...]:
         _usual(type(owners) is list and {type(owner) for owner in owners} <= {int, str})

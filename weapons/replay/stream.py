@@ -308,7 +308,7 @@ def _short(value: Any) -> str:
     return f"{json.dumps(value):.60}"
 
 
-FORMAT = "hitplanes-hits/2"
+FORMAT = "hitplanes-hits/3"
 COLUMNS = ("object", "round", "samples", "pixels", "weight", "pellets", "x", "y", "distance2")
 """Columns of a row, as in `Hits`, with first_xy as x and y."""
 

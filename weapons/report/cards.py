@@ -257,6 +257,8 @@ def _fired(shot: Mapping[str, Any]) -> str:
         parts.append(f"seed {shot['seed']}")
     if shot["accept"] is not None:
         parts.append("accepts " + (" ".join(shot["accept"]) or "nothing"))
+    if shot["blocked_by"] is not None:
+        parts.append("blocked by " + (" ".join(shot["blocked_by"]) or "nothing"))
     if shot["exclude"]:
         parts.append("excludes " + " ".join(e["name"] for e in shot["exclude"]))
     return ", ".join(parts)

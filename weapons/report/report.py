@@ -373,7 +373,7 @@ def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[st
 
 def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     shots = hits.shots
-    accept = int(shots.accept[row])
+    accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     margins = _margins(hits, row)
     return {
@@ -384,6 +384,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "aim": _degrees(hits, row),
         "seed": int(shots.seed[row]),
         "accept": None if accept == ALL else scene.category_names(accept),
+        "blocked_by": None if blocked_by == ALL else scene.category_names(blocked_by),
         "exclude": [  # the scene need not have an owner, because owners are arbitrary ids
             {"owner": owner, "name": scene.name_of(owner) if owner < scene.items.count else f"id {owner}"}
             for owner in owners
