@@ -33,7 +33,7 @@ from hitplanes.planes.bits import bit_rows, cells, front_to_back, tiles, visible
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.common.checks import Bools
 from hitplanes.planes.common.limits import ALL
-from hitplanes.planes.scene import items as items_module
+from hitplanes.planes.scene import variants as variants_module
 from hitplanes.weapons.fire import areas
 from hitplanes.weapons.fire import strategy as strategy_module
 from hitplanes.weapons.kinds import weapon as weapon_module
@@ -210,7 +210,7 @@ def test_changes_between_shots_are_seen(kernels: str, seed: int) -> None:
 
 def test_masks_come_and_go(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tiles of dropped masks are never those of new ones."""
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     monkeypatch.setattr(tiles, "ATLAS_SLACK", 0)
     rng = np.random.default_rng(3)
     scene, at = Scene((90, 90)), rng.uniform(0, 90, (40, 2))
@@ -246,7 +246,7 @@ def test_verdicts_are_those_of_the_moment_of_the_shot(
     kernels: str, weapon: Weapon, strategy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are counted when they are asked for, of the scene and the shots as they were."""
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     monkeypatch.setattr(tiles, "ATLAS_SLACK", 0)
     rng = np.random.default_rng(6)
     scene = Scene((150, 150))

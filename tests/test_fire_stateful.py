@@ -21,6 +21,7 @@ from hitplanes.planes.bits import bit_rows, cells, front_to_back
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.label_plane import LabelPlane
 from hitplanes.planes.scene import items as items_module
+from hitplanes.planes.scene import variants as variants_module
 from hitplanes.weapons.fire import areas, spans
 from hitplanes.weapons.kinds import weapon
 
@@ -320,7 +321,7 @@ def test_only_what_changed_is_drawn_anew() -> None:
 
 def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows stay right over many compactions of the atlas, and a stack that was handed out keeps its masks."""
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     scene, rng = crowd()
     atlases, largest = {id(scene.items.atlas): scene.items.atlas}, 0
     for _ in range(40):
@@ -341,7 +342,7 @@ def test_masks_no_longer_in_use_are_thrown_out(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     scene = Scene((9, 9))
     for _ in range(20):
         a, b = scene.add(SPRITES[-2], (4, 4)), scene.add(square(4), (3, 3))

@@ -38,6 +38,7 @@ from hitplanes import (
 from hitplanes.planes.grid.fixed_point import snap
 from hitplanes.planes.scene import history as history_module
 from hitplanes.planes.scene import items as items_module
+from hitplanes.planes.scene import variants as variants_module
 from hitplanes.planes.scene.items import COLUMNS
 from hitplanes.planes.scene.render import draw_view
 from hitplanes.planes.volumes.volumes import Circles
@@ -249,6 +250,7 @@ def test_weapons_shots_names_of_the_scene_are_those_of_the_moment() -> None:
         lambda past: past.remove(0),
         lambda past: past.move([0], (5, 5)),
         lambda past: past.set(ids=0, angle=20),
+        lambda past: past.rename(0, "other"),
     ],
 )
 def test_the_past_cannot_be_changed(change: Callable[[Scene], object]) -> None:
@@ -341,7 +343,7 @@ def test_what_was_removed_is_there_as_long_as_a_tick_shows_it() -> None:
 
 @pytest.mark.parametrize("fired", [False, True])
 def test_masks_that_are_laid_out_anew(fired: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     scene, truth = yard(), {}
     history, rng, atlases = History(scene), random.Random(2), {}
     for _ in range(30):
@@ -366,7 +368,7 @@ def test_masks_that_are_laid_out_anew(fired: bool, monkeypatch: pytest.MonkeyPat
 
 def test_a_scene_that_is_only_recorded_does_not_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Firing throws out masks that are no longer in use; a server that fires at the past alone never does that."""
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 0)
     scene = yard()
     history = History(scene, ticks=3)
     for turn in range(50):
@@ -379,12 +381,12 @@ def test_recording_waits_for_a_thread_that_lays_masks_out(monkeypatch: pytest.Mo
     """Another thread fires at the scene, which begins to lay its masks out anew: half of that is not recorded."""
     scene = yard()
     scene.set(range(40), angle=list(range(40)))
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", -scene.items.atlas.used - 1)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", -scene.items.atlas.used - 1)
     half, go_on, lay_out = threading.Event(), threading.Event(), items_module.Items._compact
 
     def slowly(items: items_module.Items) -> None:
         whole = items.atlas
-        items.atlas = items_module.MaskAtlas()
+        items.atlas = variants_module.MaskAtlas()
         half.set()
         go_on.wait(10)
         items.atlas = whole
@@ -396,7 +398,7 @@ def test_recording_waits_for_a_thread_that_lays_masks_out(monkeypatch: pytest.Mo
     second = threading.Thread(target=history.record)
     first.start()
     assert half.wait(10)
-    monkeypatch.setattr(items_module, "ATLAS_SLACK_BYTES", 2**20)
+    monkeypatch.setattr(variants_module, "ATLAS_SLACK_BYTES", 2**20)
     second.start()
     second.join(0.05)
     go_on.set()

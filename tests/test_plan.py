@@ -499,7 +499,8 @@ SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), 
 OF_SCENES = (
     "bits.bit_rows bits.cells bits.front_to_back bits.label_plane bits.span_walk bits.tiles bits.visible"
     " common.backend common.checks common.costs common.limits common.tables grid.fixed_point"
-    " grid.rasterize grid.spans late scene.derived scene.items scene.render scene.scene scene.sprite scene.variants"
+    " grid.rasterize grid.spans late scene.derived scene.items scene.poses scene.render scene.scene"
+    " scene.sprite scene.variants"
 )
 OF_FIRE = (
     "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"

@@ -77,7 +77,7 @@ def test_ids_count_up_and_are_never_used_again() -> None:
 @pytest.fixture
 def lean(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No slack, no caches that scenes share, and no garbage collector: what is held is what must be."""
-    monkeypatch.setattr("hitplanes.planes.scene.items.ATLAS_SLACK_BYTES", 0)
+    monkeypatch.setattr("hitplanes.planes.scene.variants.ATLAS_SLACK_BYTES", 0)
     monkeypatch.setattr("hitplanes.planes.scene.items.JOURNAL_ROWS", 64)
     monkeypatch.setattr("hitplanes.planes.bits.tiles.ATLAS_SLACK", 8)
     monkeypatch.setattr("hitplanes.planes.broadphase.boxes.INDEX_SLACK", 8)

@@ -22,9 +22,9 @@ from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import quarter_turns, rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
-from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items, MaskAtlas
+from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items
 from .scene import Scene
-from .variants import variant_of
+from .variants import MaskAtlas, variant_of
 
 T = TypeVar("T")
 
@@ -110,8 +110,8 @@ class PastItems(Items):
             form = self.forms[item]._replace(quarter=quarter, c=c, s=s)
             with within(f"object {item} at {angle:.15g} degrees"):
                 variant = variant_of(self.sprites[item], form)
-            self.angles[item], self.forms[item], self.variants[item] = angle, form, variant
-            self._use([item], [variant])
+            self.angles[item], self.forms[item] = angle, form
+            self._enter([item], [variant])
         for name in COLUMNS:
             _sealed(getattr(self, name))
 
@@ -162,6 +162,10 @@ class PastScene(Scene):
         self._refuse()
 
     def set(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past is as it was."""
+        self._refuse()
+
+    def rename(self, *_: Any, **__: Any) -> NoReturn:
         """Refuse: the past is as it was."""
         self._refuse()
 

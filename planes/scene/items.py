@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from struct import Struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,23 +19,14 @@ import numpy.typing as npt
 from .. import late
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, choice
-from ..common.limits import (
-    ATLAS_SLACK_BYTES,
-    BOXES_MAX,
-    CATEGORY_BITS,
-    HALF,
-    ITEMS_MAX,
-    JOURNAL_EACH,
-    JOURNAL_FEW,
-    JOURNAL_ROWS,
-    SUB,
-)
+from ..common.limits import BOXES_MAX, CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box
 from .derived import NEVER
+from .poses import Looks
 from .sprite import Sprite
-from .variants import Transform, Variant, variant_of, variants_of
+from .variants import MaskAtlas, Transform, Variant, variant_of, variants_of
 
 if TYPE_CHECKING:
     from ..bits.tiles import TileAtlas, Tiles
@@ -206,47 +197,6 @@ def boxes_in(field: str, name: object) -> int | None:
 
 
 @dataclass
-class MaskAtlas:
-    """All masks in use in one flat array; a mask that several items use is stored once."""
-
-    flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
-    used: int = 0
-    live: int = 0
-    offsets: dict[int, int] = field(default_factory=dict)
-    users: dict[int, int] = field(default_factory=dict)
-
-    def take(self, variant: Variant) -> int:
-        """Count one more user of a mask, store it if it is new, and return its offset."""
-        users = self.users[variant.uid] = self.users.get(variant.uid, 0) + 1
-        if users == 1:
-            self.live += variant.mask.size
-        offset = self.offsets.get(variant.uid)
-        return self._append(variant) if offset is None else offset
-
-    def drop(self, variant: Variant) -> None:
-        """Count one user less of a mask."""
-        users = self.users[variant.uid] = self.users[variant.uid] - 1
-        if not users:
-            del self.users[variant.uid]
-            self.live -= variant.mask.size
-
-    @property
-    def wasteful(self) -> bool:
-        """Whether more than half of the array, beyond some slack, is unused."""
-        return self.used > 2 * self.live + ATLAS_SLACK_BYTES
-
-    def _append(self, variant: Variant) -> int:
-        begin, end = self.used, self.used + variant.mask.size
-        if end > len(self.flat):
-            grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
-            grown[:begin] = self.flat[:begin]
-            self.flat = grown  # a stack that was handed out keeps the old array
-        self.flat[begin:end] = variant.mask.reshape(-1)
-        self.offsets[variant.uid], self.used = begin, end
-        return begin
-
-
-@dataclass
 class ByMask:
     """What is derived from masks alone, by their numbers; the moments of a scene share it."""
 
@@ -321,15 +271,36 @@ class Items:
         self.sprites.append(sprite)
         self.forms.append(form)
         self.angles.append(angle)
-        self.variants.append(variant)
+        self.variants.append(NO_MASK)
         self.names.append(name)
         for column, value in values.items():
             getattr(self, column)[item] = value
         self.alive[item] = 1
         self.living += 1
-        self._use([item], [variant])
+        self._enter([item], [variant])
         self.record(np.array([item]))
         return item
+
+    def state(self) -> dict[str, Any]:
+        """What a copy is made of: views of the columns, and lists of looks and names."""
+        columns = {name: getattr(self, name)[: self.count] for name in COLUMNS}
+        return columns | {name: list(getattr(self, name)) for name in (*Looks._fields, "names")}
+
+    @classmethod
+    def restored(cls, state: dict[str, Any]) -> Items:
+        """Items with the same ids as those of a state; their masks are made anew."""
+        items = cls()
+        items.skip_to(len(state["names"]))
+        for name in COLUMNS:
+            getattr(items, name)[: items.count] = state[name]
+        for name in (*Looks._fields, "names"):
+            setattr(items, name, state[name])
+        alive = np.flatnonzero(items.alive)
+        items.living = len(alive)
+        looks = items.looks(alive.tolist())
+        items._enter(alive.tolist(), variants_of(looks.sprites, looks.forms))
+        items.record(alive)
+        return items
 
     def skip_to(self, item: int) -> None:
         """Skip the ids below `item` as if their objects had been removed; objects of a scene file keep their ids."""
@@ -359,13 +330,18 @@ class Items:
         if self.atlas.wasteful:
             self._compact()
 
-    def reform(self, ids: Sequence[int], forms: Sequence[Transform]) -> None:
-        """Give items other transforms; all masks are made before any item changes."""
-        variants = variants_of([self.sprites[item] for item in ids], forms)
-        for item, form, variant in zip(ids, forms, variants, strict=True):
+    def looks(self, ids: Sequence[int]) -> Looks:
+        """What the masks of items are made of."""
+        sprites, angles, forms = self.sprites, self.angles, self.forms
+        return Looks([sprites[item] for item in ids], [angles[item] for item in ids], [forms[item] for item in ids])
+
+    def reform(self, ids: Sequence[int], looks: Looks) -> None:
+        """Give items other looks; all masks are made before any item changes."""
+        variants = variants_of(looks.sprites, looks.forms)
+        for item, sprite, angle, form in zip(ids, *looks, strict=True):
             self.atlas.drop(self.variants[item])
-            self.forms[item], self.variants[item] = form, variant
-        self._use(ids, variants)
+            self.sprites[item], self.angles[item], self.forms[item] = sprite, angle, form
+        self._enter(ids, variants)
 
     def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
         """Update the boxes, arrangement and journal after some columns of items changed."""
@@ -570,8 +546,10 @@ class Items:
         volumes, row = self.bounding(late.fit.Kind(name) if k is None else late.fit.Kind(late.fit.KINDS[2], k), ids)
         return late.fit.shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
 
-    def _use(self, ids: Sequence[int], variants: Sequence[Variant]) -> None:
-        """Enter the masks of items into their columns."""
+    def _enter(self, ids: Sequence[int], variants: Sequence[Variant]) -> None:
+        """Enter the masks of items into the atlas and the columns."""
+        for item, variant in zip(ids, variants, strict=True):
+            self.variants[item] = variant
         take = self.atlas.take
         rows = [(take(mask), mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
         columns = np.array(rows, np.int64).reshape(-1, 6)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import copy
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,120 +25,24 @@ from ..common.checks import (
     path_of,
     reals,
     rising,
-    within,
 )
 from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from ..common.tables import Text, typed
-from ..grid.fixed_point import all_quarter_turns, snap
+from ..grid.fixed_point import snap
 from ..grid.spans import Box
 from .derived import Derived
 from .items import ROLES, Items, Role
+from .poses import are_rows, one_place, points, scale_pair
 from .render import Planes, plane_objects, plane_size
-from .sprite import as_sprite
-from .variants import FLIPS, Transform, transform_of, whole_scale
+from .sprite import Sprite, as_sprite
+from .variants import transform_of
 
 if TYPE_CHECKING:
     from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
 
 
-NUMBERS = frozenset((int, float, np.float64))
-FLOAT64 = np.dtype(np.float64)
-
-
-def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> Floats:
-    """Positions or velocities (n, 2), or one (2,) for all, px."""
-    if array_of(field, values).shape == (2,):
-        return np.broadcast_to(reals(field, values, (2,), limit), (n, 2))
-    return reals(field, values, (n, 2), limit)
-
-
-def are_rows(ids: object, xy: object) -> bool:
-    """Whether these are contiguous arrays of ids (n,) and of positions (n, 2)."""
-    if type(ids) is not np.ndarray or type(xy) is not np.ndarray or ids.dtype != np.int64 or xy.dtype != np.float64:
-        return False
-    return ids.ndim == 1 and xy.shape == (len(ids), 2) and ids.flags.c_contiguous and xy.flags.c_contiguous
-
-
-def one_place(xy: object) -> tuple[int, int] | None:
-    """Round one position in range as `snap` does; None for any other value, valid or not."""
-    if type(xy) is np.ndarray:
-        if xy.dtype != FLOAT64 or xy.shape != (2,):
-            return None
-        x, y = xy.tolist()
-    elif isinstance(xy, tuple | list) and len(xy) == 2 and type(xy[0]) in NUMBERS and type(xy[1]) in NUMBERS:
-        x, y = xy
-    else:
-        return None
-    if not (-POSITION_MAX <= x <= POSITION_MAX and -POSITION_MAX <= y <= POSITION_MAX):
-        return None
-    return round(x * SUB), round(y * SUB)
-
-
-def scale_pair(scale: object) -> tuple[float, float]:
-    """Check a scale, one number or (sx, sy), and return the pair."""
-    values = array_of("scale", scale)
-    sx, sy = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
-    return sx, sy
-
-
-def changed_transforms(
-    items: Items, rows: Ints, angle: object, scale: object, flip: object, frame: object
-) -> tuple[list[float], list[Transform] | None]:
-    """Angles and transforms of objects after a change; None for the transforms if none changes."""
-    n, ids = len(rows), rows.tolist()
-    angles = [items.angles[item] for item in ids]
-    if angle is None and scale is None and flip is None and frame is None:
-        return angles, None
-    columns: Iterable[Any] = zip(*(items.forms[item] for item in ids), strict=True) if n else ((),) * len(Transform())
-    frames, flips, x, y, *turns = columns
-    if angle is not None:
-        angles = reals("angle", each("angle", angle, n), (n,)).tolist()
-        turns = all_quarter_turns([items.sprites[item].stepped(angle) for item, angle in zip(ids, angles, strict=True)])
-    if scale is not None:
-        x, y = _scale_rows(scale, n)
-    if frame is not None:
-        frames = _frame_rows(frame, [items.sprites[item].frame_count for item in ids])
-    if flip is not None:
-        flips = _flip_rows(flip, n)
-    return angles, list(map(Transform, frames, flips, x, y, *turns))
-
-
-def _frame_rows(frame: object, counts: list[int]) -> list[int]:
-    """Check frame numbers of objects, one for all or (n,); `counts` are the frames of their sprites."""
-    n = len(counts)
-    numbers: list[int] = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
-    for row, (number, count) in enumerate(zip(numbers, counts, strict=True)):
-        if number >= count:
-            with within(f"row {row}"):
-                integer("frame", number, 0, count - 1)
-    return numbers
-
-
-def _flip_rows(flip: object, n: int) -> list[str]:
-    """Check flips, one word for all or (n,)."""
-    words: list[str] = each("flip", flip, n).tolist()
-    if len(words) != n:
-        raise InputError(f"flip: expected one for all or {n}, got {len(words)}")
-    for row, word in enumerate(words):
-        with within(f"row {row}"):
-            choice("flip", word, FLIPS)
-    return words
-
-
-def _scale_rows(scale: object, n: int) -> tuple[list[int], list[int]]:
-    """Scales in x and y, in 1/65536; given are one number for all, (n,), or pairs (n, 2) or (1, 2)."""
-    values = array_of("scale", scale)
-    if values.ndim < 2:
-        values = each("scale", values, n)[:, None]
-    fits = values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2)
-    pairs = reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
-    whole = []
-    for row, (x, y) in enumerate(pairs.tolist()):
-        with within(f"row {row}"):
-            whole.append(whole_scale(x, y))
-    return [x for x, _ in whole], [y for _, y in whole]
-
+Read = TypeVar("Read", bound=np.generic)
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")
@@ -312,6 +217,7 @@ class Scene:
         self,
         ids: int | Sequence[int] | Ints,
         *,
+        sprite: object = None,
         position_xy: object = None,
         angle: object = None,
         scale: object = None,
@@ -326,8 +232,8 @@ class Scene:
     ) -> None:
         """Change objects, all or none; each value is one for all objects, or one per object.
 
-        `ids` is one id or several (n,). `scale` is a number, one per object (n,), or pairs (n, 2) or (1, 2). The other
-        parameters are those of `add`.
+        `ids` is one id or several (n,). `scale` is a number, one per object (n,), or pairs (n, 2) or (1, 2); `sprite`
+        is one for all, or a list (n,). The other parameters are those of `add`.
         """
         rows = self._existing(ids)
         n = len(rows)
@@ -346,14 +252,13 @@ class Scene:
             columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
         if role is not None:
             columns = self._of_role(rows, _role(role)) | columns
-        angles, forms = changed_transforms(self.items, rows, angle, scale, flip, frame)
-        if forms is not None:
-            self.items.reform(rows.tolist(), forms)
-            for item, value in zip(rows.tolist(), angles, strict=True):
-                self.items.angles[item] = value
+        look = sprite, angle, scale, flip, frame
+        if any(part is not None for part in look):
+            self.items.reform(rows.tolist(), self.items.looks(rows.tolist()).changed(*look))
+            columns["mask"] = self.items.mask[rows]
         for name, values in columns.items():
             getattr(self.items, name)[rows] = values
-        self.items.record(rows, columns if forms is None else {*columns, "mask"})
+        self.items.record(rows, columns)
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""
@@ -366,6 +271,95 @@ class Scene:
         n = self.items.count
         alive = self.items.alive[:n] == 1
         return np.flatnonzero(alive if role is None else alive & (self.items.role[:n] == ROLES.index(_role(role))))
+
+    def __iter__(self) -> Iterator[int]:
+        """Ids of the objects in the scene, rising."""
+        return iter(self.ids().tolist())
+
+    def __contains__(self, item: object) -> bool:
+        """Whether an id is of an object in the scene, and not of a removed one."""
+        if not isinstance(item, int | np.integer):
+            return False
+        return 0 <= int(item) < self.items.count and bool(self.items.alive[item])
+
+    def __repr__(self) -> str:
+        told = [f"{len(ids)} {role.value}" for role in ROLES if len(ids := self.ids(role))]
+        return f"<Scene {self.name!r}, bounds {self.bounds}: {', '.join(told) or 'empty'}>"
+
+    def copy(self) -> Scene:
+        """Return a scene of its own with the same objects and ids; a copy of the past can be changed, too."""
+        weapons, shots = copy.deepcopy((self.weapons, self.shots))
+        return _restored(self.name, self.categories, self.bounds, weapons, shots, self.items.state())
+
+    def __copy__(self) -> Scene:
+        return self.copy()
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Scene:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.name, self.categories, self.bounds, self.weapons, self.shots, self.items.state())
+
+    def position(self, ids: int | Sequence[int] | Ints) -> Floats:
+        """Positions (n, 2) of ids, or (2,) of one, px; kept in 1/256 px."""
+        return self._read(ids, lambda rows: self.items.position_256[rows] / SUB)
+
+    def angle(self, ids: int | Sequence[int] | Ints) -> Floats:
+        """Angles (n,) of ids, or the angle of one, degrees, as they were given."""
+        return self._read(ids, lambda rows: np.array(self.items.looks(rows.tolist()).angles, np.float64))
+
+    def scale(self, ids: int | Sequence[int] | Ints) -> Floats:
+        """Scales (n, 2) of ids in x and y, or (2,) of one; they are kept in 1/65536."""
+        return self._read(ids, lambda rows: self._forms(rows, "scale_x", "scale_y") / (1 << SCALE_BITS))
+
+    def flip(self, ids: int | Sequence[int] | Ints) -> npt.NDArray[np.str_]:
+        """Flips (n,) of ids, or that of one: "none", "x", "y" or "xy"."""
+        return self._read(ids, lambda rows: self._forms(rows, "flip")[:, 0])
+
+    def frame(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Numbers (n,) of the frames of ids, or that of one."""
+        return self._read(ids, lambda rows: self._forms(rows, "frame")[:, 0])
+
+    def layer(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Layers (n,) of ids, or that of one; greater is nearer the viewer."""
+        return self._read(ids, lambda rows: self.items.layer[rows])
+
+    def role(self, ids: int | Sequence[int] | Ints) -> npt.NDArray[np.str_]:
+        """Roles (n,) of ids, or that of one: "background", "hittable", "mover", "occluder" or "hud"."""
+        return self._read(ids, lambda rows: np.array(ROLE_NAMES)[self.items.role[rows]])
+
+    def categories_of(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Category bits (n,) of ids, or those of one; `category_names` tells their names."""
+        return self._read(ids, lambda rows: self.items.categories[rows])
+
+    def owner(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Owners (n,) of ids, or that of one: the object that it is a part of, or itself."""
+        return self._read(ids, lambda rows: self.items.owner[rows])
+
+    def cost(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Costs (n,) of a px of ids, or that of one."""
+        return self._read(ids, lambda rows: self.items.cost[rows])
+
+    def velocity(self, ids: int | Sequence[int] | Ints) -> Floats:
+        """Velocities (n, 2) of ids, or (2,) of one, px a frame; they are kept in 1/256 px."""
+        return self._read(ids, lambda rows: self.items.velocity_256[rows] / SUB)
+
+    def box(self, ids: int | Sequence[int] | Ints) -> Ints:
+        """Inclusive boxes (n, 4) of the masks of ids as x_min, y_min, x_max, y_max, or (4,) of one, px.
+
+        That of an empty mask is (0, 0, -1, -1).
+        """
+        return self._read(ids, self.items.boxes)
+
+    def sprite(self, item: int) -> Sprite:
+        """Sprite of an object."""
+        return self.items.sprites[int(self._existing(integer("item", item, 0, self.items.count - 1))[0])]
+
+    def rename(self, item: int, name: str) -> None:
+        """Give an object another name."""
+        rows = self._existing(integer("item", item, 0, self.items.count - 1))
+        self.items.names[int(rows[0])] = Text().check("name", name)
+        self.items.record(rows, ("name",))
 
     def name_of(self, item: int) -> str:
         """Name of an object, even if it was removed."""
@@ -507,17 +501,32 @@ class Scene:
         rows = ids.copy()
         return rows if self.items.alive.take(rows).all() else None
 
-    def _existing(self, ids: object) -> Ints:
-        """Check that ids are in the scene, each once."""
-        risen = self._risen(ids)
-        if risen is not None:
-            return risen
+    def _read(self, ids: object, values: Callable[[Ints], npt.NDArray[Read]]) -> npt.NDArray[Read]:
+        """Values of objects, a row each; for one id without the rows. An id may be there several times."""
+        read = values(self._living(ids))
+        return read if np.ndim(ids) else read[0]  # type: ignore[arg-type]
+
+    def _forms(self, rows: Ints, *names: str) -> npt.NDArray[Any]:
+        """Columns of the transforms of objects."""
+        forms = self.items.looks(rows.tolist()).forms
+        return np.array([[getattr(form, name) for name in names] for form in forms]).reshape(-1, len(names))
+
+    def _living(self, ids: object) -> Ints:
+        """Check that ids are in the scene."""
         given = np.atleast_1d(array_of("ids", ids))
         rows = integers("ids", given, (None,), 0, self.items.count - 1)
         gone = rows[self.items.alive[rows] == 0]
         if len(gone):
             row = int(np.flatnonzero(rows == gone[0])[0])
             raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
+        return rows
+
+    def _existing(self, ids: object) -> Ints:
+        """Check that ids are in the scene, each once."""
+        risen = self._risen(ids)
+        if risen is not None:
+            return risen
+        rows = self._living(ids)
         if len(rows) > 1:
             again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
             if len(again):
@@ -546,3 +555,14 @@ def _role(role: object) -> Role:
 
 def _default_bits(role: Role) -> int:
     return ALL if role is Role.OCCLUDER else 1
+
+
+def _restored(
+    name: str, categories: tuple[str, ...], bounds: Box | None, weapons: dict[str, Any], shots: list[Any],
+    state: dict[str, Any],
+) -> Scene:  # fmt: skip
+    """A scene of the parts that `Scene.copy` and pickle take."""
+    scene = Scene(categories=categories[1:], name=name)
+    scene._bounds, scene.derived = bounds, Derived(bounds)
+    scene.weapons, scene.shots, scene.items = weapons, shots, Items.restored(state)
+    return scene

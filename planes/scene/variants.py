@@ -21,6 +21,7 @@ import numpy.typing as npt
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Image, Ints, choice, integer, real
 from ..common.limits import (
+    ATLAS_SLACK_BYTES,
     HALF,
     MAPPED_PIXELS,
     SCALE_BITS,
@@ -104,6 +105,47 @@ def variants_of(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[V
     """Masks of transformed sprites, a form each; those that are not cached are made together."""
     keys = [(sprite.uid, form) for sprite, form in zip(sprites, forms, strict=True)]
     return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [forms[row] for row in rows]))
+
+
+@dataclass
+class MaskAtlas:
+    """All masks in use in one flat array; a mask that several items use is stored once."""
+
+    flat: Bools = field(default_factory=lambda: np.zeros(1 << 12, np.bool_))
+    used: int = 0
+    live: int = 0
+    offsets: dict[int, int] = field(default_factory=dict)
+    users: dict[int, int] = field(default_factory=dict)
+
+    def take(self, variant: Variant) -> int:
+        """Count one more user of a mask, store it if it is new, and return its offset."""
+        users = self.users[variant.uid] = self.users.get(variant.uid, 0) + 1
+        if users == 1:
+            self.live += variant.mask.size
+        offset = self.offsets.get(variant.uid)
+        return self._append(variant) if offset is None else offset
+
+    def drop(self, variant: Variant) -> None:
+        """Count one user less of a mask."""
+        users = self.users[variant.uid] = self.users[variant.uid] - 1
+        if not users:
+            del self.users[variant.uid]
+            self.live -= variant.mask.size
+
+    @property
+    def wasteful(self) -> bool:
+        """Whether more than half of the array, beyond some slack, is unused."""
+        return self.used > 2 * self.live + ATLAS_SLACK_BYTES
+
+    def _append(self, variant: Variant) -> int:
+        begin, end = self.used, self.used + variant.mask.size
+        if end > len(self.flat):
+            grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
+            grown[:begin] = self.flat[:begin]
+            self.flat = grown  # a stack that was handed out keeps the old array
+        self.flat[begin:end] = variant.mask.reshape(-1)
+        self.offsets[variant.uid], self.used = begin, end
+        return begin
 
 
 def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:

@@ -30,7 +30,7 @@ from hitplanes.planes.common.limits import (
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
-from hitplanes.planes.scene.scene import one_place, points
+from hitplanes.planes.scene.poses import one_place, points
 
 from .areas import AreaWeapon, has_no_range, parts_of, pattern_of, patterns_of
 from .weapon import PatternTable, Weapon

@@ -1,0 +1,130 @@
+"""What callers say of poses: places, scales, flips and frames, checked and rounded, and the looks that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..common.checks import Floats, InputError, array_of, choice, each, integer, integers, reals, within
+from ..common.limits import POSITION_MAX, SUB
+from ..grid.fixed_point import all_quarter_turns
+from .sprite import Sprite, as_sprite
+from .variants import FLIPS, Transform, whole_scale
+
+NUMBERS = frozenset((int, float, np.float64))
+FLOAT64 = np.dtype(np.float64)
+
+
+def points(field: str, values: object, n: int, limit: float = POSITION_MAX) -> Floats:
+    """Positions or velocities (n, 2), or one (2,) for all, px."""
+    if array_of(field, values).shape == (2,):
+        return np.broadcast_to(reals(field, values, (2,), limit), (n, 2))
+    return reals(field, values, (n, 2), limit)
+
+
+def are_rows(ids: object, xy: object) -> bool:
+    """Whether these are contiguous arrays of ids (n,) and of positions (n, 2)."""
+    if type(ids) is not np.ndarray or type(xy) is not np.ndarray or ids.dtype != np.int64 or xy.dtype != np.float64:
+        return False
+    return ids.ndim == 1 and xy.shape == (len(ids), 2) and ids.flags.c_contiguous and xy.flags.c_contiguous
+
+
+def one_place(xy: object) -> tuple[int, int] | None:
+    """Round one position in range as `snap` does; None for any other value, valid or not."""
+    if type(xy) is np.ndarray:
+        if xy.dtype != FLOAT64 or xy.shape != (2,):
+            return None
+        x, y = xy.tolist()
+    elif isinstance(xy, tuple | list) and len(xy) == 2 and type(xy[0]) in NUMBERS and type(xy[1]) in NUMBERS:
+        x, y = xy
+    else:
+        return None
+    if not (-POSITION_MAX <= x <= POSITION_MAX and -POSITION_MAX <= y <= POSITION_MAX):
+        return None
+    return round(x * SUB), round(y * SUB)
+
+
+def scale_pair(scale: object) -> tuple[float, float]:
+    """Check a scale, one number or (sx, sy), and return the pair."""
+    values = array_of("scale", scale)
+    sx, sy = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
+    return sx, sy
+
+
+class Looks(NamedTuple):
+    """What the masks of n objects are made of: a sprite, an angle in degrees, and a transform of each."""
+
+    sprites: list[Sprite]
+    angles: list[float]
+    forms: list[Transform]
+
+    def changed(self, sprite: object, angle: object, scale: object, flip: object, frame: object) -> Looks:
+        """Looks after a change, of which each part is one for all, one per object, or None for no change."""
+        n = len(self.sprites)
+        sprites, angles = self.sprites, self.angles
+        columns: Iterable[Any] = zip(*self.forms, strict=True) if n else ((),) * len(Transform())
+        frames, flips, x, y, *turns = columns
+        if sprite is not None:
+            sprites = _sprite_rows(sprite, n)
+        if angle is not None:
+            angles = reals("angle", each("angle", angle, n), (n,)).tolist()
+        if angle is not None or sprite is not None:
+            turns = all_quarter_turns([one.stepped(angle) for one, angle in zip(sprites, angles, strict=True)])
+        if scale is not None:
+            x, y = _scale_rows(scale, n)
+        if frame is not None or sprite is not None:
+            frames = _frame_rows(list(frames) if frame is None else frame, [one.frame_count for one in sprites])
+        if flip is not None:
+            flips = _flip_rows(flip, n)
+        return Looks(sprites, angles, list(map(Transform, frames, flips, x, y, *turns)))
+
+
+def _sprite_rows(sprite: object, n: int) -> list[Sprite]:
+    """Check sprites, one for all or a list (n,); each may be a mask or an image."""
+    if not isinstance(sprite, list | tuple) or not any(isinstance(one, Sprite | np.ndarray) for one in sprite):
+        return [as_sprite(sprite)] * n
+    if len(sprite) != n:
+        raise InputError(f"sprite: expected one for all or {n}, got {len(sprite)}")
+    made = []
+    for row, one in enumerate(sprite):
+        with within(f"row {row}"):
+            made.append(as_sprite(one))
+    return made
+
+
+def _frame_rows(frame: object, counts: list[int]) -> list[int]:
+    """Check frame numbers of objects, one for all or (n,); `counts` are the frames of their sprites."""
+    n = len(counts)
+    numbers: list[int] = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
+    for row, (number, count) in enumerate(zip(numbers, counts, strict=True)):
+        if number >= count:
+            with within(f"row {row}"):
+                integer("frame", number, 0, count - 1)
+    return numbers
+
+
+def _flip_rows(flip: object, n: int) -> list[str]:
+    """Check flips, one word for all or (n,)."""
+    words: list[str] = each("flip", flip, n).tolist()
+    if len(words) != n:
+        raise InputError(f"flip: expected one for all or {n}, got {len(words)}")
+    for row, word in enumerate(words):
+        with within(f"row {row}"):
+            choice("flip", word, FLIPS)
+    return words
+
+
+def _scale_rows(scale: object, n: int) -> tuple[list[int], list[int]]:
+    """Scales in x and y, in 1/65536; given are one number for all, (n,), or pairs (n, 2) or (1, 2)."""
+    values = array_of("scale", scale)
+    if values.ndim < 2:
+        values = each("scale", values, n)[:, None]
+    fits = values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2)
+    pairs = reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
+    whole = []
+    for row, (x, y) in enumerate(pairs.tolist()):
+        with within(f"row {row}"):
+            whole.append(whole_scale(x, y))
+    return [x for x, _ in whole], [y for _, y in whole]
