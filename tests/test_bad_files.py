@@ -285,7 +285,7 @@ WORDS: dict[str, tuple[list[str], str]] = {
     "at, empty": (words_of("--weapon", "laser", "--at", ""), "--at: expected two numbers X,Y, got ''"),
     "at, hole": (words_of("--weapon", "laser", "--at", "1,,2"), "--at: expected two numbers X,Y, got '1,,2'"),
     "at, words": (words_of("--weapon", "laser", "--at", "a,b"), "--at: expected two numbers X,Y, got 'a,b'"),
-    "at, three": (words_of("--weapon", "laser", "--at", "1,2,3"), r"at: expected shape \(2,\), got \(3,\)"),
+    "at, three": (words_of("--weapon", "laser", "--at", "1,2,3"), "--at: expected two numbers X,Y, got '1,2,3'"),
     "at, NaN": (words_of("--weapon", "laser", "--at", "nan,2"), r"at\[0\]: expected a finite number, got nan"),
     "at, 1e999": (words_of("--weapon", "laser", "--at", "1,1e999"), r"at\[1\]: expected a finite number, got inf"),
     "at, 1e13": (words_of("--weapon", "laser", "--at", "1e13,2"), r"at\[0\]: expected a number within ±1099511627776"),

@@ -37,6 +37,21 @@ def test_report_writes_picture_and_facts(tmp_path: Path, capsys: pytest.CaptureF
     assert sorted(p.name for p in tmp_path.iterdir()) == ["r.json", "r.png"]
 
 
+def test_facts_go_to_standard_output_and_what_is_said_goes_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", str(GALLERY), "--json", "facts.json"]) == 0
+    said = capsys.readouterr().out
+    assert main(["report", str(GALLERY), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    facts = json.loads(out), json.loads((tmp_path / "facts.json").read_text())
+    assert [[shot["rows"] for shot in one["shots"]] for one in facts] == [
+        [shot["rows"] for shot in facts[0]["shots"]]
+    ] * 2
+    assert err == said and sorted(path.name for path in tmp_path.iterdir()) == ["facts.json", "report.png"]
+
+
 def test_one_shot_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     png, facts = tmp_path / "r.png", tmp_path / "r.json"
     words = ["report", str(GALLERY), "--weapon", "beam", "--at", "126,167", "--aim", "1", "--seed", "4"]
@@ -74,9 +89,10 @@ def test_a_negative_position_is_written_with_an_equals_sign(tmp_path: Path) -> N
             ["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--toward", "a,b"],
             "--toward: expected two numbers",
         ),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "5"], "--at: expected two numbers X,Y, got '5'"),
+        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2,3"], "--at: expected two numbers X,Y, got '1,2,3'"),
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1;2"], "--at: expected two numbers X,Y, got '1;2'"),
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1,nan"], "at[1]: expected a finite number"),
-        (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2,3"], "at: expected shape (2,), got (3,)"),
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--aim", "inf"], "aim: expected a finite number"),
         (["report", str(GALLERY), "--weapon", "beam", "--at", "1,2", "--seed", "-1"], "seed: expected a whole number"),
         (["report", str(GALLERY), "--at", "1,2"], "--at: expected only together with --weapon"),

@@ -437,6 +437,8 @@ def test_categories_are_bits() -> None:
     assert scene.category_bits("glass", "default") == 5
     assert scene.category_bits("target", "target") == 2
     assert scene.items.categories[scene.add(DOT, categories=["target", "target"])] == 2
+    with pytest.raises(InputError, match="name: there is none to choose from, got 'duck'"):
+        Scene().find("duck")
     with pytest.raises(InputError, match="category: expected one of 'default', 'target', 'glass', got 'wood'"):
         scene.category_bits("wood")
 

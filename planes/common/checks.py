@@ -162,7 +162,9 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
 
     near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    listed = ", ".join(map(repr, names[:NAMES_SHOWN])) or "none"
+    if not names:
+        raise InputError(f"{field}: there is none to choose from, got {shown(value)}")
+    listed = ", ".join(map(repr, names[:NAMES_SHOWN]))
     if len(names) > NAMES_SHOWN:
         listed += f" and {len(names) - NAMES_SHOWN} more"
     raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")

@@ -8,7 +8,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
@@ -42,6 +42,7 @@ REPORT_EXAMPLES = """\
 examples:
   hitplanes report fixtures/gallery
   hitplanes report fixtures/gallery -o report.png --json report.json
+  hitplanes report fixtures/gallery --json - | python -m json.tool
   hitplanes report fixtures/gallery --weapon shotgun --at 138,91 --seed 7
   hitplanes report fixtures/gallery --weapon beam --at 100,167 --aim -4.5
 """
@@ -158,6 +159,7 @@ examples:
 """
 
 
+STANDARD_OUTPUT = Path("-")
 NAMED = 8  # most objects that a line of output names
 USAGE_MAX = 300  # characters of a usage error
 SHOWN = ("quadtree", "grid", "bvh")  # structures that the demo can show
@@ -313,7 +315,9 @@ def _add_report(commands: Any) -> None:
     sub.add_argument("--seed", type=int, metavar="N", help="random seed of the pellets")
     text = "file of the picture (default: report.png)"
     sub.add_argument("-o", "--output", type=Path, default=Path("report.png"), metavar="PNG", help=text)
-    sub.add_argument("--json", type=Path, metavar="JSON", help="also write the facts to this file")
+    sub.add_argument(
+        "--json", type=Path, metavar="JSON", help="also write the facts to this file; - is the standard output"
+    )
     text = (
         "test bounding volumes first, and draw them: none, box, circle, 'oriented box', '4 boxes' (1 to 64), polygon"
         " or swept"
@@ -341,19 +345,26 @@ def _command(
 
 def report(arguments: argparse.Namespace) -> None:
     """Fire the shots of the scene, or the one of the command line, and write the picture and the facts."""
-    _check_outputs(arguments.output, arguments.json)
+    piped = arguments.json == STANDARD_OUTPUT
+    file = None if piped else arguments.json
+    _check_outputs(arguments.output, file)
     scene = load_scene(arguments.scene)
-    _check_not_of_scene(scene, arguments.scene, arguments.output, arguments.json)
-    _note_empty(scene)
+    _check_not_of_scene(scene, arguments.scene, arguments.output, file)
     orders = _orders(arguments, scene)
     how = {"prefilter": arguments.prefilter, "broadphase": arguments.broadphase}
     asked = {name: value for name, value in how.items() if value is not None}
     fired = [fire_order(scene, order, **asked) for order in orders]
     facts = report_of(scene, fired, [order.name for order in orders], **asked)
     write_png(arguments.output, picture_of_report(facts, scene))
-    if arguments.json is not None:
-        write_text(arguments.json, json.dumps(facts, indent=1) + "\n")
-    _print_hits(facts, fired if arguments.plan else [])
+    text = json.dumps(facts, indent=1) + "\n"
+    if file is not None:
+        write_text(file, text)
+    if piped:
+        with _printing():
+            sys.stdout.write(text)
+    with redirect_stdout(sys.stderr) if piped else nullcontext():
+        _note_empty(scene)
+        _print_hits(facts, fired if arguments.plan else [])
 
 
 def _orders(arguments: argparse.Namespace, scene: Scene) -> list[ShotRequest]:
@@ -478,7 +489,8 @@ def _shot(arguments: argparse.Namespace) -> dict[str, Any]:
 def _point(name: str, text: str) -> list[float]:
     """Parse two numbers of the command line."""
     try:
-        return [float(part) for part in text.split(",")]
+        x, y = text.split(",")
+        return [float(x), float(y)]
     except ValueError as error:
         raise InputError(f"--{name}: expected two numbers X,Y, got {text!r}") from error
 
