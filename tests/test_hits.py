@@ -27,8 +27,10 @@ from hitplanes import (
     Hits,
     InputError,
     Laser,
+    Pistol,
     Point,
     Polygon,
+    Rifle,
     Ring,
     Rounds,
     Scene,
@@ -36,8 +38,11 @@ from hitplanes import (
     Sprite,
     Stencil,
     Verdict,
+    Weapon,
     fire,
+    prepare,
 )
+from hitplanes.weapons.fire.hits import HitRow
 from hitplanes.weapons.kinds.areas import AreaWeapon
 
 SEEDS = range(0, 600, 6)
@@ -847,3 +852,33 @@ def test_threads_that_fire_at_once_agree(strategy: str) -> None:
             asked = [pool.submit(fire, scene, Disc(9), at, strategy=strategy) for _ in range(4)]
             truth = fire(scene, Disc(9), at, strategy="direct")
             assert all(answer.result() == truth for answer in asked)
+
+
+# Rows as sequences and arrays
+
+
+@pytest.mark.parametrize("prepared", [False, True])
+@pytest.mark.parametrize("weapon", [Disc(30), Disc(30, pierce=True), Pistol(90), Spread(Rifle(90), 5, 9)])
+def test_rows_by_number_and_as_an_array(weapon: Weapon, prepared: bool) -> None:
+    scene = Scene((99, 99))
+    for k in range(5):
+        scene.add(np.ones((9, 9), np.bool_), (30 + 11 * k, 40))
+    hits = prepare(scene, weapon).fire((25, 40)) if prepared else fire(scene, weapon, [(25, 40), (60, 41)])
+    rows = list(hits)
+    assert rows and [hits[k] for k in range(len(rows))] == rows == hits[:] and hits[np.int64(0)] == rows[0]
+    assert hits[-1] == rows[-1] and hits[1:] == rows[1:] and hits[::-1] == rows[::-1] and hits[5:2] == []
+    assert all(type(value) in (int, tuple) for value in hits[0])
+    for wrong, error in ((len(rows), IndexError), (-len(rows) - 1, IndexError), (0.5, TypeError), ("0", TypeError)):
+        with pytest.raises(error):
+            hits[wrong]
+
+    table = hits.to_numpy()
+    assert table.dtype.names == HitRow._fields and table.shape == (len(rows),)
+    assert [(*row[:7], tuple(row[7]), row[8]) for row in table.tolist()] == rows
+    table["object"] = 99
+    assert [row.object for row in hits] == [row.object for row in rows]
+
+
+def test_no_rows_are_an_empty_array() -> None:
+    hits = fire(Scene(), Disc(3), (5, 5))
+    assert len(hits.to_numpy()) == 0 and hits[:] == []

@@ -64,6 +64,16 @@ def test_aim_and_filter_are_told_as_they_were_given() -> None:
     assert (plain["aim"], plain["accept"], plain["exclude"]) == (None, None, [])
 
 
+@pytest.mark.parametrize(
+    ("at", "told"),
+    [((5, -7.5), "5, -7.5"), ((10 / 3, 1e6 + 0.99609375), "3.33, 1000001"), ((-1 / 256, 0.25), "0, 0.25")],
+)
+def test_places_are_told_to_a_hundredth_of_a_px(at: tuple[float, float], told: str) -> None:
+    scene = street()
+    (shot,) = report_of(scene, [fire(scene, Point(), at)])["shots"]
+    assert shot_card(shot, 0, scene).told == f"at {told}"
+
+
 def test_up_to_so_many_shots_are_told_one_by_one() -> None:
     scene = street()
     few, many = ([(i, 20) for i in range(n)] for n in (SHOTS_MAX, SHOTS_MAX + 1))

@@ -63,6 +63,13 @@ GIVEN = {"Hits", "RayHits", "Ready", "PastScene", "Planes", "Cells", "Work"}
 """Classes whose objects calls give: nobody makes one."""
 
 PROPERTIES = property, cached_property, cached_attribute
+SPELLED = {
+    "Pellet": "AreaWeapon | RayWeapon", "Repeated": "AreaWeapon | RayWeapon | Spread | Sweep", "AnyHits": "Hits",
+    "Ready[Any]": "Ready", "Places": "ArrayLike", "Angles": "ArrayLike", "Wholes": "ArrayLike",
+    "Unpack[Fired]": "Any",
+}  # fmt: skip
+"""Types that only a type checker tells apart, as a reader knows them."""
+
 UNDERLINE = re.compile(r"^(\w+)\n-+$", re.MULTILINE)
 WIDEST = 100
 
@@ -136,6 +143,8 @@ def _starred(signature: inspect.Signature) -> Iterator[object]:
 def plain(told: str) -> str:
     """A parameter without the quotes of annotations, and with names for what has one."""
     told = re.sub(r"(: |-> )'([^']*)'", r"\1\2", told).replace(str(hitplanes.ALL), "ALL")
+    for name, spelled in SPELLED.items():
+        told = re.sub(rf"(?<![\w\[]){re.escape(name)}(?!\w)", spelled, told)
     return re.sub(r"<class '(?:\w+\.)*(\w+)'>|<([\w.]+): [^>]*>", lambda found: found[1] or found[2], told)
 
 

@@ -5,7 +5,7 @@ scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack, overload
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
-from ..kinds.areas import ray_parts_of
-from ..kinds.placements import Shots, checked_shots
+from ..kinds.areas import Rays, ray_parts_of
+from ..kinds.placements import Fired, Places, Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import request_of, verdicts_by_spans, verdicts_by_tiles
 from .hits import Hits, Rows
@@ -28,7 +28,13 @@ from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
+    from ..rays.ray_hits import RayHits
 
+
+@overload
+def fire(scene: Scene | History, weapon: Rays, at: Places, **how: Unpack[Fired]) -> RayHits: ...
+@overload
+def fire(scene: Scene | History, weapon: Weapon, at: Places, **how: Unpack[Fired]) -> Hits: ...
 def fire(
     scene: Scene | History,
     weapon: Weapon,

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from operator import index
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.bits.span_walk import Verdict
@@ -164,7 +166,8 @@ class Hits:
 
     Its columns (`shot`, `round`, `object`, `samples`, `pixels`, `weight`, `pellets`, `first_xy`, `distance2`) are
     arrays with one entry a row, in a total order. It has a length (rows), is true if anything was hit, and yields named
-    rows. Two are equal when their rows and verdict counts are equal; plan and version are not compared.
+    rows; `hits[k]` is one of them, and a slice a list. Two are equal when their rows and verdict counts are equal; plan
+    and version are not compared.
 
     Parameters
     ----------
@@ -235,6 +238,17 @@ class Hits:
         for row in zip(*columns, strict=True):
             yield _named(row)
 
+    @overload
+    def __getitem__(self, row: SupportsIndex) -> HitRow: ...
+    @overload
+    def __getitem__(self, row: slice) -> list[HitRow]: ...
+    def __getitem__(self, row: SupportsIndex | slice) -> HitRow | list[HitRow]:
+        if isinstance(row, slice):
+            columns = [getattr(self, name)[row].tolist() for name in HitRow._fields]
+            return [_named(values) for values in zip(*columns, strict=True)]
+        number = index(row)
+        return _named(tuple(getattr(self, name)[number].tolist() for name in HitRow._fields))
+
     def __eq__(self, other: Any) -> bool:
         if not isinstance(other, Hits):
             return NotImplemented
@@ -249,9 +263,7 @@ class Hits:
     def of(self, shot: int) -> list[HitRow]:
         """Rows of one shot."""
         row = self._checked(shot)
-        first, last = self.starts[row], self.starts[row + 1]
-        columns = [getattr(self, name)[first:last].tolist() for name in HitRow._fields]
-        return [_named(row) for row in zip(*columns, strict=True)]
+        return self[self.starts[row] : self.starts[row + 1]]
 
     def verdict_counts(self, shot: int | None = None) -> dict[str, int]:
         """Samples by verdict, of one shot or of all; they add up to the samples fired."""
@@ -282,6 +294,14 @@ class Hits:
             "verdicts": [self.verdict_counts(shot) for shot in range(len(self.shots))],
             "plan": self.plan.to_dict(),
         }
+
+    def to_numpy(self) -> npt.NDArray[np.void]:
+        """Rows as a structured array (n,) of their own, with the columns as fields; `first_xy` is (n, 2)."""
+        columns = {name: getattr(self, name) for name in HitRow._fields}
+        table = np.empty(len(self), [(name, column.dtype, column.shape[1:]) for name, column in columns.items()])
+        for name, column in columns.items():
+            table[name] = column
+        return table
 
     def samples_at(self, shot: int = 0) -> Samples:
         """All samples of one shot: pixel, pellet, verdict, and the item that decided it."""

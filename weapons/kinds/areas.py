@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 from weakref import ref
 
 import numpy as np
@@ -281,8 +281,11 @@ class Stencil(AreaWeapon):
         return Spans.from_mask(variant.mask, (x, y))
 
 
+Pellet = TypeVar("Pellet", bound=AreaWeapon | RayWeapon, covariant=True)
+
+
 @dataclass(frozen=True, eq=False)
-class Spread(Weapon):
+class Spread(Weapon, Generic[Pellet]):
     """A shotgun: `count` pellets of a weapon, with offsets uniform over a disc of `radius` px.
 
     If the pellet is a ray, its far end is offset: all pellets start at the muzzle.
@@ -294,13 +297,16 @@ class Spread(Weapon):
         "count": Whole(1, PELLETS_MAX),
         "radius": LENGTH,
     }
-    pellet: AreaWeapon | RayWeapon
+    pellet: Pellet
     count: int
     radius: float
 
 
+Repeated = TypeVar("Repeated", bound=AreaWeapon | RayWeapon | Spread[Any] | Sweep, covariant=True)
+
+
 @dataclass(frozen=True, eq=False)
-class Rounds(Weapon):
+class Rounds(Weapon, Generic[Repeated]):
     """A burst: `count` rounds of a weapon, each shifted and turned by the recoil of those before it.
 
     Parameters
@@ -316,7 +322,7 @@ class Rounds(Weapon):
         "recoil_xy": Numbers((2,), REACH_MAX),
         "recoil_deg": Number(-360, 360),
     }
-    weapon: AreaWeapon | RayWeapon | Spread | Sweep
+    weapon: Repeated
     count: int
     recoil_xy: Sequence[float] = (0.0, 0.0)
     recoil_deg: float = 0.0
@@ -328,9 +334,12 @@ class Rounds(Weapon):
             integer("count", self.count, 1, PELLETS_MAX // self.weapon.count)
 
 
+Rays = RayWeapon | Sweep | Spread[RayWeapon] | Rounds[RayWeapon | Sweep | Spread[RayWeapon]]
+"""Weapons of rays, for type checkers: `fire` answers them with `RayHits`."""
+
 Parts = tuple[
-    tuple[Rounds | None, Spread | None, AreaWeapon] | None,
-    tuple[Rounds | None, Spread | Sweep | None, RayWeapon] | None,
+    tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon] | None,
+    tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon] | None,
 ]
 """Burst, spread and pattern of an area weapon, or None; burst, spread or sweep, and ray of a ray weapon, or None."""
 
@@ -342,7 +351,7 @@ KINDS: dict[str, type[Weapon]] = {
 }  # fmt: skip
 
 
-def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, AreaWeapon]:
+def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, AreaWeapon]:
     """Burst, spread and pattern of an area weapon."""
     parts = _parts_of(weapon)[0]
     if parts is None:
@@ -350,7 +359,7 @@ def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, AreaWeapon]:
     return parts
 
 
-def ray_parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | Sweep | None, RayWeapon] | None:
+def ray_parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon] | None:
     """Burst, spread or sweep, and ray of a ray weapon; None for other weapons."""
     return _parts_of(weapon)[1]
 

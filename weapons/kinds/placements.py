@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import Any, SupportsFloat, SupportsIndex, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -356,6 +356,35 @@ class Placements:
     def scattered(self) -> bool:
         """Whether pellets are placed off the pixel of their round."""
         return self.xy is not self.turn_xy
+
+
+Angles = SupportsFloat | Sequence[SupportsFloat] | npt.NDArray[Any]
+Places = Sequence[SupportsFloat] | Sequence[Sequence[SupportsFloat]] | Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
+Wholes = SupportsIndex | Sequence[SupportsIndex] | npt.NDArray[Any]
+Categories = str | Sequence[str] | Wholes
+Owners = Wholes | Sequence[Sequence[SupportsIndex]]
+"""What a type checker takes for numbers (N,), points (N, 2), whole numbers (N,), names or bits, and owners (N, K)."""
+
+
+class Filtered(TypedDict, total=False):
+    """What shots pass over, and the seed of their pellets, for type checkers; see `fire`."""
+
+    accept: Categories
+    blocked_by: Categories
+    exclude: Owners | None
+    seed: Wholes
+
+
+class Fired(Filtered, total=False):
+    """All named arguments of `fire`, for type checkers."""
+
+    aim: Angles | None
+    toward: Places | None
+    shot: Wholes | None
+    tick: Angles | None
+    prefilter: str
+    broadphase: str
+    strategy: str
 
 
 def checked_shots(

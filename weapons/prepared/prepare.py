@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from math import floor
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
 
 import numpy as np
 
@@ -19,13 +19,18 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import category_bits, fire
 from ..fire.hits import Hits
-from ..kinds.areas import has_no_range, parts_of, ray_parts_of
-from ..kinds.placements import accepted_of, blocking_of, checked_shots
+from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
+from ..kinds.placements import Angles, Filtered, Places, Wholes, accepted_of, blocking_of, checked_shots
 from ..kinds.rays import is_thin_first
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Answer, Filter, Present, Told, answer_of, reach_of, rounds_of
 from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
+
+if TYPE_CHECKING:
+    from ..rays.ray_hits import RayHits
+
+AnyHits = TypeVar("AnyHits", bound=Hits, covariant=True)
 
 AIMS_BYTES = 32 * 2**20
 """Most memory of the patterns of aims and shot numbers, as integer rows, bytes."""
@@ -40,7 +45,7 @@ PLAIN = float, int
 NUMPY_NUMBERS = frozenset((np.float64, np.float32, np.float16, *(np.dtype(k).type for k in "bBhHiIlLqQ")))
 
 
-class Ready:
+class Ready(Generic[AnyHits]):
     """A weapon that `prepare` made ready for a scene: `ready.fire(at)` equals `fire(scene, weapon, at)` at less cost.
 
     A shot looks up data that is made once, when a shot first needs it:
@@ -69,17 +74,20 @@ class Ready:
         self.scene, self.weapon = scene, weapon
         self._filter = kept
 
-    def fire(self, at: object, aim: object = None, toward: object = None, shot: object = None) -> Hits:
+    def fire(
+        self, at: Places, aim: Angles | None = None, toward: Places | None = None, shot: Wholes | None = None
+    ) -> AnyHits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         kept = self._filter
         exclude = kept.exclude if kept.exclude.size else None
-        return fire(
+        hits = fire(
             self.scene, self.weapon, at, aim=aim, toward=toward, accept=accepted_of(kept.meets),
             blocked_by=blocking_of(kept.meets), exclude=exclude, seed=kept.seed, shot=shot,
         )  # fmt: skip
+        return cast("AnyHits", hits)
 
 
-class ReadyPattern(Ready):
+class ReadyPattern(Ready[Hits]):
     """Prepared weapon whose pattern is looked up."""
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, reach: int) -> None:
@@ -126,7 +134,7 @@ class ReadyPattern(Ready):
             pass
         return self._looked_up(at, aim, toward, shot)
 
-    def _looked_up(self, at: object, aim: object, toward: object, shot: object) -> Hits:
+    def _looked_up(self, at: Any, aim: Any, toward: Any, shot: Any) -> Hits:
         """Fire with arguments that are not in the cache yet, or of unusual types."""
         place = plain_pair(at)
         looks = None if place is None else self._looks(place, aim, toward, shot)
@@ -235,6 +243,10 @@ def plain_pair(value: object) -> tuple[float, float] | None:
     return x, y
 
 
+@overload
+def prepare(scene: Scene, weapon: Rays, **how: Unpack[Filtered]) -> Ready[RayHits]: ...
+@overload
+def prepare(scene: Scene, weapon: Weapon, **how: Unpack[Filtered]) -> Ready[Hits]: ...
 def prepare(
     scene: Scene,
     weapon: Weapon,
@@ -243,7 +255,7 @@ def prepare(
     blocked_by: object = ALL,
     exclude: object = None,
     seed: object = 0,
-) -> Ready:
+) -> Ready[Any]:
     """Make a weapon ready to be fired at a scene one shot a call.
 
     Parameters

@@ -24,7 +24,7 @@ from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, towa
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.hits import HitRow, Hits
+from ..fire.hits import HitRow
 from ..fire.strategy import chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
@@ -60,7 +60,7 @@ class OneRay(OneShot, RayHits):
         return lambda: self._first.passes, lambda: self._first.stops
 
 
-class ReadyRay(Ready):
+class ReadyRay(Ready[RayHits]):
     """Prepared weapon of one thin ray that ends at its first hit.
 
     Bad input is left to `fire`, and so is a ray that starts inside an item if its weapon does not hit that item.
@@ -77,7 +77,7 @@ class ReadyRay(Ready):
         self._present: Present
         self._objects: memoryview
 
-    def fire(self, at: Any, aim: Any = None, toward: Any = None, shot: Any = None) -> Hits:
+    def fire(self, at: Any, aim: Any = None, toward: Any = None, shot: Any = None) -> RayHits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         if self._items.version != self._version:
             self._follow()

@@ -54,7 +54,7 @@ class Rays(Columns):
     pellet: Ints
 
 
-Parts = tuple[Rounds | None, Spread | Sweep | None, RayWeapon]
+Parts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
 
 
 def rays_of(parts: Parts, shots: Shots) -> Rays:

@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, Unpack, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -50,8 +50,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire, fired
 from ..fire.hits import Hits
-from ..kinds.areas import weapon_from_json
-from ..kinds.placements import Shots, check_aimed, filter_of
+from ..kinds.areas import Rays, weapon_from_json
+from ..kinds.placements import Fired, Places, Shots, check_aimed, filter_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
@@ -161,7 +161,11 @@ class ShotRecord:
         finally:
             self._file.close()
 
-    def fire(self, scene: Scene | History, weapon: Weapon, at: object, **arguments: Any) -> Hits:
+    @overload
+    def fire(self, scene: Scene | History, weapon: Rays, at: Places, **arguments: Unpack[Fired]) -> RayHits: ...
+    @overload
+    def fire(self, scene: Scene | History, weapon: Weapon, at: Places, **arguments: Unpack[Fired]) -> Hits: ...
+    def fire(self, scene: Scene | History, weapon: Weapon, at: Places, **arguments: Unpack[Fired]) -> Hits:
         """Fire like `hitplanes.fire`, write the shots, and return the hits.
 
         Parameters

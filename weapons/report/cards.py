@@ -249,8 +249,13 @@ def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:
     return [[f"and {len(entries) - shown} more{what}"]] if len(entries) > shown else []
 
 
+def place_told(at: Sequence[float]) -> str:
+    """A position to 1/100 px: enough to find it; the facts have all of it."""
+    return ", ".join(f"{round(value, 2) + 0.0:.15g}" for value in at)
+
+
 def _fired(shot: Mapping[str, Any]) -> str:
-    parts = [f"at {shot['at'][0]:.15g}, {shot['at'][1]:.15g}"]
+    parts = [f"at {place_told(shot['at'])}"]
     if shot["aim"] is not None:
         parts.append(f"aim {shot['aim']:g} deg")
     if shot["seed"]:
