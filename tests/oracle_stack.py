@@ -6,7 +6,7 @@ Pixels are whole world pixels (x, y). Nothing is indexed, cached or cut short.
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["Item", "Walk", "at_pixel", "fire_one", "front_to_back", "refused", "walk"]
+__all__ = ["Item", "Walk", "at_pixel", "fire_one", "front_to_back", "refused", "tally", "walk"]
 
 Pixel = tuple[int, int]
 Row = tuple[int, int, int, int, int, Pixel, int]
@@ -123,16 +123,32 @@ def fire_one(
         Ordered by (squared distance, y, x, place in the stack).
     counts : samples by verdict
     """
-    counts = dict.fromkeys(VERDICTS, 0)
-    struck: dict[int, list[tuple[int, Pixel, int]]] = {}  # by id: (pellet, pixel, weight) of each sample that hit
+    samples = []
     for number, pellet in enumerate(pellets):
         for pixel, weight in pellet:
             sample = at_pixel(
                 items, pixel, accept=accept, blocked_by=blocked_by, exclude=exclude, pierce=pierce, bounds=bounds
             )
-            counts[sample.verdict] += 1
-            for item in sample.hit:
-                struck.setdefault(item.id, []).append((number, pixel, weight))
+            samples.append((number, pixel, weight, sample))
+    return tally(items, samples, origin_xy)
+
+
+def tally(
+    items: Sequence[Item], samples: Iterable[tuple[int, Pixel, int, Walk]], origin_xy: Pixel
+) -> tuple[list[Row], Mapping[str, int]]:
+    """Make the rows and the counts of one round of one shot, as `fire_one` returns them.
+
+    Parameters
+    ----------
+    items : in the order they were added
+    samples : (number of the pellet, pixel, weight, what the sample met)
+    """
+    counts = dict.fromkeys(VERDICTS, 0)
+    struck: dict[int, list[tuple[int, Pixel, int]]] = {}  # by id: (pellet, pixel, weight) of each sample that hit
+    for number, pixel, weight, sample in samples:
+        counts[sample.verdict] += 1
+        for item in sample.hit:
+            struck.setdefault(item.id, []).append((number, pixel, weight))
 
     def distance2(pixel: Pixel) -> int:
         return (pixel[0] - origin_xy[0]) ** 2 + (pixel[1] - origin_xy[1]) ** 2
