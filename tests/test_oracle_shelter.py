@@ -339,11 +339,11 @@ def test_to_start_inside_may_be_an_error() -> None:
 
 
 def test_a_shot_is_refused_for_any_of_its_pellets() -> None:
-    items = [row(5, "#..#"), row(6, "...#")]
+    items = [row(5, "#..#"), row(6, "...#"), row(7, "#...")]
     how = {"origin_xy": (1, 0), "line_of_sight": "occluders", "inside": "error", **EVERY}
     with pytest.raises(StartsInside) as raised:
         fire_sheltered(items, [((0, 0), []), ((3, 0), [((2, 0), 1)])], **how)  # type: ignore[arg-type]
-    assert raised.value.args == (6, 5)
+    assert raised.value.args == (7, 6, 5)
     fire_sheltered(items, [((1, 0), [((9, 0), 1)])], **how)  # type: ignore[arg-type]
 
 
@@ -382,6 +382,15 @@ def test_each_pellet_looks_from_its_own_pixel() -> None:
     rows, counts = fire_sheltered([wall, target], pellets, origin_xy=(5, 0), line_of_sight=None, **EVERY)
     assert rows == [(1, 5, 2, 2 * (13 + 14) + 1, 3, (4, 0), 1)]
     assert counts == {"empty": 6, "hit": 5, "occluded": 2, "filtered": 0, "outside": 0}
+
+
+def test_a_shot_leaves_what_its_pellets_start_in() -> None:
+    items, line = [row(5, "##..#."), row(1, "..ttt", layer=1)], [((x, 0), 1) for x in range(6)]
+    for inside, expected in (("hit", []), ("ignore_until_exit", [(1, 3, 3, 3, 1, (2, 0), 4)])):
+        rows, _ = fire_sheltered(
+            items, [((0, 0), line)], origin_xy=(0, 0), line_of_sight="occluders", inside=inside, **EVERY
+        )
+        assert rows == expected
 
 
 # Laws
