@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from .bits import distance_field as distance_field
     from .bits import label_plane as label_plane
+    from .bits import shadows as shadows
     from .bits import tiles as tiles
     from .bits import visible as visible
     from .broadphase import boxes as boxes
@@ -25,6 +26,7 @@ _PLACES = {
     "label_plane": "bits.label_plane",
     "overlap": "volumes.overlap",
     "scene_folder": "files.scene_folder",
+    "shadows": "bits.shadows",
     "tiles": "bits.tiles",
     "visible": "bits.visible",
     "volumes": "volumes.volumes",

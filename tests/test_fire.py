@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import oracle_raster
+import oracle_shelter
 import oracle_stack
 import pytest
 from hypothesis import given, settings
@@ -107,8 +108,8 @@ def parts_of(weapon: Weapon) -> tuple[Rounds | None, Spread | None, AreaWeapon]:
 
 def rounds_of(
     weapon: Weapon, at: Sequence[float], aim: float | None, toward: Sequence[float] | None, seed: int, number: int
-) -> Iterator[tuple[Pixel, list[list[tuple[Pixel, int]]]]]:
-    """For each round of one shot its pixel, and for each of its pellets the samples."""
+) -> Iterator[tuple[Pixel, list[tuple[Pixel, list[tuple[Pixel, int]]]]]]:
+    """For each round of one shot its pixel, and for each of its pellets its own pixel and the samples."""
     burst, spread, plain = parts_of(weapon)
     x, y = (snapped(v) for v in at)
     c, s = direction_of(aim or 0.0)
@@ -128,7 +129,7 @@ def rounds_of(
                 numbers = (np.array([v], np.int64) for v in (number, n, pellet))
                 offset = disc_offsets(snapped(spread.radius), seed, *numbers)[0].tolist()
                 dx, dy = dx + offset[0], dy + offset[1]
-            pellets.append([((px + dx, py + dy), weight) for (px, py), weight in pattern])
+            pellets.append(((dx, dy), [((px + dx, py + dy), weight) for (px, py), weight in pattern]))
         yield origin, pellets
 
 
@@ -181,17 +182,20 @@ def expected(
     scene: Scene, volley: Placements, items: Sequence[oracle_stack.Item] | None = None
 ) -> tuple[list[Row], list[dict[str, int]]]:
     """All rows of a batch and the verdict counts of each shot, by the oracle; `items` instead of the scene's own."""
-    items, pierce = items_of(scene) if items is None else items, parts_of(volley.weapon)[2].pierce
+    items, plain = items_of(scene) if items is None else items, parts_of(volley.weapon)[2]
     rows: list[Row] = []
     verdicts = []
     for which, shot in enumerate(volley.shots):
         counts = dict.fromkeys(oracle_stack.VERDICTS, 0)
         every = rounds_of(volley.weapon, shot.at, shot.aim, shot.toward, volley.seed, shot.number)
         for number, (origin, pellets) in enumerate(every):
-            found, fell = oracle_stack.fire_one(
-                items, pellets, origin_xy=origin, accept=shot.accept, blocked_by=shot.blocked_by, exclude=shot.exclude,
-                pierce=pierce, bounds=scene.bounds,
-            )  # fmt: skip
+            how: dict[str, Any] = {"accept": shot.accept, "blocked_by": shot.blocked_by, "exclude": shot.exclude}
+            how |= {"pierce": plain.pierce, "bounds": scene.bounds, "origin_xy": origin}
+            if plain.line_of_sight is None:
+                found, fell = oracle_stack.fire_one(items, [samples for _, samples in pellets], **how)
+            else:
+                how |= {"line_of_sight": plain.line_of_sight, "inside": plain.inside}
+                found, fell = oracle_shelter.fire_sheltered(items, pellets, **how)
             rows += [(which, number, *row) for row in found]
             counts = {verdict: n + fell[verdict] for verdict, n in counts.items()}
         verdicts.append(counts)
@@ -262,6 +266,9 @@ def some_pose(rng: random.Random, frames: int) -> dict[str, Any]:
 
 def some_plain(rng: random.Random) -> AreaWeapon:
     common: dict[str, Any] = {"pierce": rng.random() < 0.4, "falloff": rng.choice([None, "linear", "smooth"])}
+    if rng.random() < 0.3:
+        common["line_of_sight"] = rng.choice(["occluders", "all"])
+        common["inside"] = rng.choice(["hit", "hit", "ignore_until_exit"])
 
     def length(high: int) -> float:
         return rng.randint(0, 8 * high) / 8

@@ -73,7 +73,7 @@ def samples_of(volley: Placements, shot: Shot) -> list[tuple[int, int, int, int]
     return sorted(
         (number, pellet, y, x)
         for number, (_, pellets) in enumerate(every)
-        for pellet, samples in enumerate(pellets)
+        for pellet, (_, samples) in enumerate(pellets)
         for (x, y), _ in samples
     )
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
     from .explain import samples as samples
+    from .fire import shelter as shelter
     from .rays import ray_call as ray_call
 
 _PLACES = {
@@ -18,6 +19,7 @@ _PLACES = {
     "ray_margins": "explain.ray_margins",
     "ray_samples": "explain.ray_samples",
     "samples": "explain.samples",
+    "shelter": "fire.shelter",
 }
 
 

@@ -8,15 +8,20 @@ compiled form of the loop. The rule is that of `span_walk.walk`, the reference, 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .. import late
+from ..common.backend import kernels_of
 from ..common.checks import Bools, Ints
 from ..grid.spans import Box, begins, ragged
 from . import bit_rows
 from .bit_rows import PatternBits, Placed, Words, nearest, row_order, rows_of, sums_of, weights_of
 from .cells import Cells, listed_at, met_boxes
+
+if TYPE_CHECKING:
+    from .shadows import Blockers
 
 WORDS_AT_ONCE = 2**16
 """Words of pairs worked on at a time: 512 KB; with fewer, the calls of numpy take longer."""
@@ -58,12 +63,14 @@ class Rule(NamedTuple):
     bounds : box beyond which nothing is hit
     meets : filter of the items that all placements meet, or (P,) of each; None refuses nothing
     exclude : owners whose items are skipped, (1, K) for all placements or (P, K), -1 for none
+    blockers : items that shelter what lies behind them from the pixel of the placement; None if no way is looked at
     """
 
     pierce: bool
     bounds: Box | None = None
     meets: Ints | int | None = None
     exclude: Ints | None = None
+    blockers: Blockers | None = None
 
 
 class RoundHits(NamedTuple):
@@ -152,6 +159,8 @@ def front_to_back(
             _hide(rows, tiles, part, rule.pierce)
         if rule.bounds is not None:
             bit_rows.cut_off(rows, part.left, part.top, rule.bounds)
+        if rule.blockers is not None:
+            _shelter(rows, placed, windows, tiles, part, rule, rule.blockers)
         parts.append(_counted(placed, each, windows, tiles, part, rows))
     return hits_of_rounds(_joined(parts), each)
 
@@ -190,8 +199,10 @@ def _meeting(asked: Ints, sides: Ints, placement: Ints, tile: Ints) -> tuple[Int
     return placement, tile
 
 
-def _accepted(tiles: OrderedTiles, meets: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints) -> Bools:
-    """Which tiles of pairs (n,) their placements accept."""
+def _accepted(
+    tiles: OrderedTiles | Blockers, meets: Ints | int, exclude: Ints | None, placement: Ints, tile: Ints
+) -> Bools:
+    """Which tiles, or blockers, of pairs (n,) their placements accept."""
     bits = meets if isinstance(meets, int) else meets[placement]
     accepted = (tiles.categories[tile] & bits) != 0
     if exclude is not None:
@@ -247,6 +258,22 @@ def _hide(rows: Words, tiles: OrderedTiles, near: Near, pierce: bool) -> None:
         if len(new) < len(own):
             own, cover = own[new], np.bitwise_and.reduceat(cover, new, axis=0)
         rows[own] &= cover
+
+
+def _shelter(
+    rows: Words, placed: Placed, windows: PatternBits, tiles: OrderedTiles, near: Near, rule: Rule, blockers: Blockers
+) -> None:
+    """Clear the pixels (n, height) that other items shelter from the pixel of their placement."""
+    who, shadows = near.placement, late.shadows
+    asked, boxes = bit_rows.placed_boxes(placed, windows)[:, who].T, tiles.box_xyxy[near.tile]
+    boxes = np.concatenate([np.maximum(boxes[:, :2], asked[:, :2]), np.minimum(boxes[:, 2:], asked[:, 2:])], axis=1)
+    origin_xy = np.stack([placed.x.take(who), placed.y.take(who)], axis=1)
+    pair, blocker = shadows.ways_met(boxes, origin_xy, blockers)
+    other = blockers.rank[blocker] != tiles.rank[near.tile[pair]]
+    if rule.meets is not None and len(blockers.categories):
+        other &= _accepted(blockers, rule.meets, rule.exclude, who[pair], blocker)
+    corner_xy = np.stack([near.left, near.top], axis=1)
+    kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, pair[other], blocker[other])
 
 
 def _fronts(tiles: OrderedTiles, near: Near, height: int) -> tuple[Ints, Ints, Ints]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +18,15 @@ from ..common.checks import Ints
 from ..grid.spans import Columns, each_pixel, ragged
 from ..scene.items import Stack
 
+if TYPE_CHECKING:
+    from .shadows import Shelter
+
 Kinds = npt.NDArray[np.uint8]
 
-HIT, BLOCK, SKIP, LIVE = 1, 2, 4, 8
-"""State bits of a sample: it hit an object, an occluder ended its walk, it skipped an item, it still walks."""
+HIT, BLOCK, SKIP, SHELTERED, LIVE = 1, 2, 4, 8, 16
+"""State bits of a sample: it hit an object, an occluder ended its walk, it skipped an item, an item on the way from its
+origin shelters it, it still walks.
+"""
 
 
 class Verdict(IntEnum):
@@ -38,12 +43,16 @@ class Verdict(IntEnum):
 OF_PATTERNS = tuple(Verdict)[: Verdict.BEYOND]
 """Verdicts of the samples of patterns; rays also have BEYOND, for cells after their end."""
 
-VERDICT_OF = np.array(
-    [
-        Verdict.HIT if state & HIT else Verdict.OCCLUDED if state & BLOCK else Verdict.FILTERED if state & SKIP else 0
-        for state in range(16)
-    ]
-)
+
+def _verdict(state: int) -> Verdict:
+    if state & HIT:
+        return Verdict.HIT
+    if state & (BLOCK | SHELTERED):
+        return Verdict.OCCLUDED
+    return Verdict.FILTERED if state & SKIP else Verdict.EMPTY
+
+
+VERDICT_OF = np.array([_verdict(state) for state in range(2 * LIVE)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +104,19 @@ class Events(Columns):
 
 
 # house: hit rule of areas
-def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tuple[Events, Kinds]:
+def walk(
+    runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int, shelter: Shelter | None = None
+) -> tuple[Events, Kinds]:
     """Walk each sample through the items that cover it, front to back.
 
     A refused item is skipped. An accepted occluder ends the walk. An accepted object is hit, and ends the walk unless
-    the weapon pierces. All placements meet their first item in one step, their second in the next.
+    the weapon pierces; an object that others shelter from the sample's origin ends it likewise, but is not hit. All
+    placements meet their first item in one step, their second in the next.
 
     Parameters
     ----------
-    emit : kinds of events to return, as bits HIT, BLOCK, SKIP
+    emit : kinds of events to return, as bits HIT, BLOCK, SKIP, and SHELTERED of objects that are not hit for it
+    shelter : what shelters the samples, if the weapon needs a line of sight
 
     Returns
     -------
@@ -113,7 +126,7 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
     kind = pairs.kind
     ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
-    keep = np.where(ends, ~LIVE & 15, 15).astype(np.uint8)
+    keep = np.where(ends, ~LIVE & 31, 31).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
     depth = np.arange(len(pairs.placement)) - np.searchsorted(pairs.placement, pairs.placement)
     order = np.argsort(depth[pair], kind="stable")
@@ -121,7 +134,7 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
     box, item = stack.box_xyxy, pairs.rank[pair]
     sample = start[run] - runs.x_first[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
-    emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64), kind[:0])]
     for begin, end in pairwise(steps):
         now = order[begin:end]
         piece, x = each_pixel(x_first[now], x_last[now])
@@ -129,13 +142,18 @@ def walk(runs: Runs, pairs: Pairs, stack: Stack, pierce: bool, emit: int) -> tup
         index = sample[meeting] + x
         on = stack.masks[texel[meeting] + x] & (state[index] >= LIVE)
         meeting, x, index = meeting[on], x[on], index[on]
-        state[index] = (state[index] | kind[pair[meeting]]) & keep[pair[meeting]]
-        wanted = (kind[pair[meeting]] & emit) != 0
-        emitted.append((meeting[wanted], x[wanted]))
-    meeting, x = (np.concatenate(column) for column in zip(*emitted, strict=True))
-    first, last = _stretches(meeting, x)
+        does = kind[pair[meeting]]
+        if shelter is not None:
+            does = np.where((does == HIT) & shelter.hides(index, item[meeting]), np.uint8(SHELTERED), does)
+        state[index] = (state[index] | does) & keep[pair[meeting]]
+        wanted = (does & emit) != 0
+        emitted.append((meeting[wanted], x[wanted], does[wanted]))
+    if shelter is not None:
+        state[shelter.items > 0] |= SHELTERED
+    meeting, x, does = (np.concatenate(column) for column in zip(*emitted, strict=True))
+    first, last = _stretches(meeting, x, does)
     met = meeting[first]
-    return Events(kind[pair[met]], pairs.rank[pair[met]], run[met], x[first], x[last]), state
+    return Events(does[first], pairs.rank[pair[met]], run[met], x[first], x[last]), state
 
 
 def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:

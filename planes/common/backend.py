@@ -54,6 +54,7 @@ COMPILED = {
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.scene",
     "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
+    "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.cells": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
     "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.rays",

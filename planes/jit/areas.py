@@ -478,7 +478,7 @@ def front_to_back(
     meets, cells = rule.meets, near if isinstance(near, Cells) else NOWHERE
     accepted = NONE if meets is None else np.array([meets]) if isinstance(meets, int) else meets
     found = None
-    if near is None or isinstance(near, Cells):
+    if rule.blockers is None and (near is None or isinstance(near, Cells)):
         tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
         least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
         found = rows_by(

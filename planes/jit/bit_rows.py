@@ -10,7 +10,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-from ..bits import bit_rows, cells
+from ..bits import bit_rows, cells, shadows
 from ..bits.bit_rows import Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
@@ -206,6 +206,82 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     seen = np.empty((len(begin), height), np.uint64)
     _visible(words, begin, of, front, right, seen)
     return seen
+
+
+BEYOND = 2**40
+"""Farther than any column."""
+
+
+@njit(inline="always")
+def _columns(first, last, left):
+    """Word whose bits are the columns first .. last; bit 0 is column `left`."""
+    low, high = max(first - left, 0), min(last - left, 63)
+    return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high)) if low <= high else np.uint64(0)
+
+
+@njit(inline="always")
+def _shadow(x_min, y_min, x_max, y_max, y, left):
+    """Word of the columns of a row that a rectangle hides; see `bits.shadows.shadow`."""
+    away, near, far = abs(y), y_min if y >= 0 else -y_max, y_max if y >= 0 else -y_min
+    if far < 0 or away < near:
+        return np.uint64(0)
+    ahead, first, last = near > 0, -BEYOND, BEYOND
+    if x_min > 0:
+        first = max(x_min, np.int64(np.ceil((2 * x_min - 1) * away / (2 * far + 1))))
+    elif ahead:
+        first = np.int64(np.ceil((2 * x_min - 1) * away / (2 * near - 1)))
+    if x_max < 0:
+        last = min(x_max, np.int64(np.floor((2 * x_max + 1) * away / (2 * far + 1))))
+    elif ahead:
+        last = np.int64(np.floor((2 * x_max + 1) * away / (2 * near - 1)))
+    hidden = _columns(first, last, left)
+    if away > far or hidden == 0:
+        return hidden
+    nearest, side = ahead and away == near, x_min if x_min > 0 else -x_max
+    if side > 0 and (side > away or (nearest and side == away)):
+        column = x_min if x_min > 0 else x_max
+        return hidden & ~_columns(column, column, left)
+    if nearest:
+        return hidden & ~_columns(max(x_min, 1 - away), min(x_max, away - 1), left)
+    if side <= 0 and not ahead and away == 0:  # the origin itself
+        return hidden & ~_columns(0, 0, left)
+    return hidden
+
+
+# house: hit rule of areas
+@compiled(
+    types.void(types.uint64[:, ::1], BOXES, BOXES, BOXES, INTS, BOXES, types.UniTuple(types.int64, 4), INTS, INTS)
+)
+def _hide_behind(rows, corner, origin, box, begin, rects, bounds, pair, blocker):
+    height = rows.shape[1]
+    for k in range(len(pair)):
+        own, b = pair[k], blocker[k]
+        x, y = origin[own, 0], origin[own, 1]
+        left, top = corner[own, 0] - x, corner[own, 1] - y
+        for r in range(begin[b], begin[b + 1]):
+            x_min = max(rects[r, 0] + box[b, 0], bounds[0]) - x
+            y_min = max(rects[r, 1] + box[b, 1], bounds[1]) - y
+            x_max = min(rects[r, 2] + box[b, 0], bounds[2]) - x
+            y_max = min(rects[r, 3] + box[b, 1], bounds[3]) - y
+            if x_min > min(x_max, max(left + 63, 0)) or x_max < min(left, 0):
+                continue
+            if y_min > min(y_max, max(top + height - 1, 0)) or y_max < min(top, 0):
+                continue
+            for row in range(height):
+                if rows[own, row]:
+                    rows[own, row] &= ~_shadow(x_min, y_min, x_max, y_max, top + row, left)
+
+
+def hide_behind(
+    rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: shadows.Blockers, pair: Ints, blocker: Ints
+) -> None:
+    """See `bits.shadows.hide_behind`."""
+    if blockers.until_exit:
+        return shadows.hide_behind(rows, corner_xy, origin_xy, blockers, pair, blocker)
+    bounds = EVERYWHERE if blockers.bounds is None else blockers.bounds
+    boxes = np.ascontiguousarray(blockers.box_xyxy)
+    _hide_behind(rows, corner_xy, origin_xy, boxes, blockers.begin, blockers.rects, bounds, pair, blocker)
+    return None
 
 
 BRUTE_PAIRS = 2**21

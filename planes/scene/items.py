@@ -29,6 +29,7 @@ from .sprite import Sprite
 from .variants import MaskAtlas, Transform, Variant, variant_of, variants_of
 
 if TYPE_CHECKING:
+    from ..bits.shadows import Covers
     from ..bits.tiles import TileAtlas, Tiles
     from ..volumes.fit import Bounds, Kind
     from ..volumes.volumes import Volumes
@@ -201,6 +202,7 @@ class ByMask:
     """What is derived from masks alone, by their numbers; the moments of a scene share it."""
 
     tiles: TileAtlas | None = None
+    covers: Covers | None = None
     bounds: dict[Kind, Bounds] = field(default_factory=dict)
 
 
@@ -526,6 +528,11 @@ class Items:
             return known
         variants, ids = self.variants, stack.ids
         return atlas.tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
+
+    def covers(self, ids: Ints) -> tuple[Ints, Ints]:
+        """Rectangles that cover the masks of items (B,): begin (B + 1,) of each item's, and all of them (R, 4)."""
+        covers = self.by_mask.covers = self.by_mask.covers or late.shadows.Covers()
+        return covers.of(self.mask.take(ids), lambda row: self.variants[ids[row]].mask)
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, px from the mask's pixel [0, 0], and the row for each item; no mask may be empty."""

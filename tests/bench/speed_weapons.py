@@ -73,6 +73,8 @@ def questions(weapon: Weapon) -> dict[str, dict[str, Any]]:
     if isinstance(weapon, AreaWeapon):
         found |= {"falloff": {"weapon": replace(weapon, falloff="linear")}}
         found |= {"pierce": {"weapon": replace(weapon, pierce=True)}}
+        sights = {"in sight of occluders": "occluders", "in sight of all": "all"}
+        found |= {told: {"weapon": replace(weapon, line_of_sight=sight)} for told, sight in sights.items()}
     if getattr(weapon, "directed", not isinstance(weapon, AreaWeapon | Spread)):
         found |= {"new aims": {"weapon": weapon, "fresh": True}}
     return found

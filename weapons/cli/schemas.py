@@ -88,7 +88,7 @@ ROW_TOLD: dict[str, Value] = {
     **ITEM, "round": COUNT, "samples": COUNT, "pixels": COUNT, "weight": COUNT, "pellets": COUNT, "first_xy": PIXEL,
     "distance2": COUNT, "runs": RUNS,
 }  # fmt: skip
-SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE})
+SHARES = _all({"of_pattern": SHARE, "of_visible": SHARE, "of_mask": SHARE}, exposed=SHARE)
 MARGIN = _all({"distance": Number(0, MARGIN_PX), "shift_xy": Numbers((2,), MARGIN_PX)})
 ROW = _all(ROW_TOLD, shares=SHARES, margin=MARGIN)
 WHY_NOT: dict[str, Value] = {
@@ -125,7 +125,7 @@ SHOT_TOLD: dict[str, Value] = {
     "blockers": Rows(_all({**ITEM, "samples": COUNT, "blocked": Rows(BLOCKED)})),
     "samples": Within(Keys(dict.fromkeys(VERDICTS, RUNS))), "plan": PLAN,
 }  # fmt: skip
-TOLD = _all(SHOT_TOLD, **RAYS, tested=TESTED)
+TOLD = _all(SHOT_TOLD, **RAYS, tested=TESTED, sheltered=RUNS)
 CELL = _all({"box_xyxy": Numbers((4,), FARTHEST), "opened": Flag()})
 FILTER = _all({"prefilter": Text(), "broadphase": Word(tuple(STRUCTURES)), "cells": Rows(CELL)})
 HEAT = _all({

@@ -7,30 +7,37 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
+from hitplanes.planes import late
+from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, each_pixel
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from ..fire.areas import request_of
 from ..fire.plan import Plan
 from ..fire.prefilter import Candidates, pairs_of, refused
+from ..fire.shelter import shelter_ranks, sheltered
 from ..fire.spans import QueryContext, direct
-from ..kinds.areas import pierces
+from ..kinds.areas import parts_of, pierces
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
+
+if TYPE_CHECKING:
+    from hitplanes.planes.bits.shadows import Blockers
 
 
 class Samples(NamedTuple):
     """Every sample of a shot, ordered by (round, pellet, y, x).
 
-    `item` is the object that was hit first, the occluder that ended the walk, or the first item that was skipped;
-    -1 where there is none.
+    `item` is the object that was hit first, the first item on the way that shelters the sample, the occluder that ended
+    the walk, or the first item that was skipped; -1 where there is none. `sheltered` says whether it was an item on
+    the way; None if no line of sight is needed.
     """
 
     xy: Ints
@@ -38,18 +45,24 @@ class Samples(NamedTuple):
     pellet: Ints
     verdict: Ints
     item: Ints
+    sheltered: Bools | None = None
 
 
 class Share(NamedTuple):
-    """Fraction of the round's samples that hit, and fractions of the object's visible and of all its pixels."""
+    """Fraction of the round's samples that hit, and fractions of the object's visible and of all its pixels.
+
+    `exposed` is the fraction of its visible pixels that are in the line of sight of a pellet of the round, also beyond
+    the pattern; None if the weapon needs no line of sight.
+    """
 
     of_pattern: float
     of_visible: float
     of_mask: float
+    exposed: float | None = None
 
 
 class Behind(NamedTuple):
-    """An object behind an occluder: number of its samples that the occluder ended, and the one nearest their mean."""
+    """An object behind a blocker: number of its samples that the blocker ended, and the one nearest their mean."""
 
     object: int
     samples: int
@@ -57,7 +70,10 @@ class Behind(NamedTuple):
 
 
 class Blocked(NamedTuple):
-    """An occluder, the samples whose walk it ended, and the accepted objects behind it on those samples."""
+    """An occluder, the samples that it ended or sheltered, and the accepted objects behind it on those samples.
+
+    With `line_of_sight="all"` it may be an object.
+    """
 
     occluder: int
     samples: int
@@ -101,6 +117,8 @@ class Detail:
     hit : runs that hit an object; all of them if the weapon pierces
     verdict : verdict of each sample
     rank, ended : ranks of the items that decided the verdict and that ended the walk of each sample, -1 for none
+    sheltered : whether an item on the way to a sample decided
+    sighted : whether the weapon needs a line of sight
     """
 
     stack: Stack
@@ -113,6 +131,8 @@ class Detail:
     verdict: Ints
     rank: Ints
     ended: Ints
+    sheltered: Bools
+    sighted: bool
 
     @cached_property
     def start(self) -> Ints:
@@ -136,7 +156,10 @@ def samples_of(detail: Detail) -> Samples:
     placement = detail.runs.placement[detail.run]
     ids = np.append(detail.stack.ids, -1)
     xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
-    return Samples(xy, placements.round[placement], placements.pellet[placement], detail.verdict, ids[detail.rank])
+    return Samples(
+        xy, placements.round[placement], placements.pellet[placement], detail.verdict, ids[detail.rank],
+        detail.sheltered if detail.sighted else None,
+    )  # fmt: skip
 
 
 def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
@@ -154,9 +177,9 @@ def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
 
 
 def blockers_of(detail: Detail) -> list[Blocked]:
-    """Occluders that ended samples, by falling number of samples, then by id, with the objects behind them."""
+    """Items that ended or sheltered samples, by falling number of samples, then by id, with the objects behind them."""
     stack, ended = detail.stack, detail.ended
-    blocked = np.where((ended >= 0) & stack.occluder[ended], ended, -1) if len(stack) else ended
+    blocked = np.where((ended >= 0) & (detail.sheltered | stack.occluder[ended]), ended, -1) if len(stack) else ended
     ranks, counts = np.unique(blocked[blocked >= 0], return_counts=True)
     if not len(ranks):
         return []
@@ -165,7 +188,7 @@ def blockers_of(detail: Detail) -> list[Blocked]:
     refuses = refused(stack, every, detail.shots, np.zeros(len(every), np.int64))
     for rank in every[~refuses & ~stack.occluder[every]].tolist():
         on = detail.on(rank)
-        on = on[(blocked[on] >= 0) & (blocked[on] < rank)]
+        on = on[(blocked[on] >= 0) & (detail.sheltered[on] & (blocked[on] != rank) | (blocked[on] < rank))]
         for front in np.unique(blocked[on]).tolist():
             behind[front].append(_behind(detail, rank, on[blocked[on] == front]))
     found = [
@@ -185,22 +208,41 @@ def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
 def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; the visible pixels of an object are counted once for each filter."""
     stack = scene.items.stack()
-    visible: dict[tuple[object, ...], int] = {}
+    visible: dict[tuple[object, ...], Runs] = {}
     shares = []
-    in_round: dict[int, Ints] = {}
+    placed: dict[int, Placements] = {}
     for row in rows:
+        shot = shots.take(row.shot, row.shot + 1)
         rank = int(stack.rank_of[row.object])
         key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
-            visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
-        if row.shot not in in_round:
-            placements = placements_for(weapon, shots.take(row.shot, row.shot + 1))
-            in_round[row.shot] = np.bincount(placements.round, placements.count).astype(np.int64)
-        fired = int(in_round[row.shot][row.round])
+            visible[key] = _visible(scene, rank, pierces(weapon), shot)
+        if row.shot not in placed:
+            placed[row.shot] = placements_for(weapon, shot)
+        placements, seen = placed[row.shot], int(visible[key].lengths.sum())
+        own = placements.round == row.round
+        blockers = request_of(scene, weapon, shot, stack, False).blockers
+        exposed = seen if blockers is None else _exposed(visible[key], rank, placements.xy[own], blockers)
         shares.append(
-            Share(row.samples / fired, row.pixels / visible[key], row.pixels / scene.items.variants[row.object].area)
-        )
+            Share(
+                row.samples / int(placements.count[own].sum()), row.pixels / seen,
+                row.pixels / scene.items.variants[row.object].area,
+                exposed / seen if parts_of(weapon)[2].line_of_sight else None,
+            )
+        )  # fmt: skip
     return shares
+
+
+def _exposed(visible: Runs, rank: int, origin_xy: Ints, blockers: Blockers) -> int:
+    """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2)."""
+    pellets, n = len(origin_xy), len(visible)
+    each = visible.take(np.tile(np.arange(n), pellets))
+    runs = Runs(np.arange(pellets).repeat(n), each.y, each.x_first, each.x_last, each.ordinal)
+    box = visible.x_first.min(), visible.y.min(), visible.x_last.max(), visible.y.max()
+    pairs = late.shadows.ways_met(np.tile(np.array(box), (pellets, 1)), origin_xy, blockers)
+    shelter = late.shadows.shelter_of(runs, origin_xy, blockers, *pairs)
+    hidden = shelter.hides(np.arange(len(shelter.items)), np.array(rank)).reshape(pellets, -1)
+    return int((~hidden.all(axis=0)).sum())
 
 
 def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
@@ -218,14 +260,15 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
 def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
     stack, bounds = scene.items.stack(), scene.bounds
-    placements = placements_for(weapon, shots)
+    placements, request = placements_for(weapon, shots), request_of(scene, weapon, shots, stack, False)
     if int(placements.count.sum()) > DETAIL_SAMPLES_MAX:
         got = int(placements.count.sum())
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
     runs = placements.table.laid(placements.pattern, placements.xy[:, 0], placements.xy[:, 1], placements.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
     pairs = pairs_of(placements.boxes, placements.shot, shots, stack)
-    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
+    shelter = None if request.blockers is None else sheltered(runs, placements, shots, stack, request.blockers)
+    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP | SHELTERED, shelter)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
     ended = rank.copy()
@@ -235,14 +278,32 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
         rank[start[told.run][event] + column] = told.rank[event]
         if kind == BLOCK or (kind == HIT and not pierces(weapon)):
             ended[start[told.run][event] + column] = told.rank[event]
-    verdict = VERDICT_OF[state]
+    verdict, y = VERDICT_OF[state], runs.y[run]
+    hidden = (state & SHELTERED != 0) & (verdict != Verdict.HIT)
+    if request.blockers is not None and hidden.any():
+        own = _refused_first(events, start, len(x))
+        which = np.flatnonzero(hidden)
+        rank[which] = ended[which] = shelter_ranks(
+            placements, shots, stack, request.blockers, runs.placement[run[which]],
+            np.stack([x, y], axis=1)[which], own[which],
+        )  # fmt: skip
     if bounds is not None:
-        y = runs.y[run]
         outside = (x < bounds[0]) | (y < bounds[1]) | (x > bounds[2]) | (y > bounds[3])
         verdict = np.where(outside, Verdict.OUTSIDE, verdict)
         rank[outside] = ended[outside] = -1
+        hidden &= ~outside
     hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
-    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended)
+    sighted = parts_of(weapon)[2].line_of_sight is not None
+    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended, hidden, sighted)
+
+
+def _refused_first(events: Events, start: Ints, samples: int) -> Ints:
+    """Rank of the first object that each sample would have hit, had nothing sheltered it; -1 for none."""
+    own = np.full(samples, -1)
+    told = events.take(np.flatnonzero(events.kind == SHELTERED)[::-1])
+    event, x = each_pixel(told.x_first, told.x_last)
+    own[start[told.run][event] + x] = told.rank[event]
+    return own
 
 
 def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
@@ -291,8 +352,8 @@ def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     return least
 
 
-def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
-    """Number of pixels of an object that a pattern covering everything would hit."""
+def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> Runs:
+    """Pixels of an object that a pattern covering everything would hit, without a line of sight."""
     stack = scene.items.stack()
     spans = spans_of(stack, rank)
     zero = np.zeros(len(spans), np.int64)
@@ -300,7 +361,8 @@ def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
     pairs = pairs_of(stack.box_xyxy[rank][None], zero[:1], shot, stack)
     events, _ = walk(runs, pairs, stack, pierce, HIT)
     own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, scene.bounds)
-    return int((own.x_last - own.x_first + 1).sum())
+    zero = np.zeros(len(own), np.int64)
+    return Runs(zero, runs.y[own.run], own.x_first, own.x_last, zero)
 
 
 def spans_of(stack: Stack, rank: int) -> Spans:
@@ -340,7 +402,8 @@ def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) 
     margins, sorted by (shot, object)
     """
     stack = scene.items.stack()
-    context = QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
+    blockers = request_of(scene, weapon, shots, stack, False).blockers
+    context = QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan(), blockers)
     found = []
     for row in range(len(shots) if len(stack) else 0):
         still, flips = _flips(placements_for(weapon, shots.take(row, row + 1)), shots.take(row, row + 1), context)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from .. import late
 from ..kinds.areas import parts_of, pattern_of
 from ..kinds.placements import Placements, Shots, placements_for, placements_of
 from ..kinds.weapon import Weapon, fits, fits_at_reach
@@ -38,6 +39,9 @@ from .hits import Rows, rows_of_span_hits
 from .plan import Plan
 from .prefilter import Candidates, may_refuse, refused
 from .spans import QueryContext, direct, inside, near_pairs
+
+if TYPE_CHECKING:
+    from hitplanes.planes.bits.shadows import Blockers
 
 PLACEMENTS_AT_ONCE = 2**15
 """Most placements of a part of a batch: 256 KB for each of their columns."""
@@ -59,6 +63,8 @@ class Traits(NamedTuple):
     pierces: bool  # its samples go on through objects
     is_point: bool  # its shot is one pixel
     reach: int  # px
+    sight: str | None  # its line of sight; None of one pixel, to which there is no way
+    inside: str  # what an item that a way begins in does
 
 
 def traits_of(weapon: Weapon) -> Traits:
@@ -70,7 +76,9 @@ def traits_of(weapon: Weapon) -> Traits:
         small = fits_at_reach(reach, weighted) or (not plain.directed and fits([pattern_of(plain, ONE, 0)]))
         point = small and not (weighted or plain.directed or burst or spread) and plain.reach_256 < 2**9
         point = point and pattern_of(plain, ONE, 0).spans.box_xyxy == (0, 0, 0, 0)
-        kept = Traits(small, placements_of(weapon), spread is not None, weighted, plain.pierce, point, reach)
+        sight = None if point and plain.inside != "error" else plain.line_of_sight
+        count, scattered = placements_of(weapon), spread is not None
+        kept = Traits(small, count, scattered, weighted, plain.pierce, point, reach, sight, plain.inside)
         weapon._keep("_traits", kept)
     return kept
 
@@ -83,6 +91,7 @@ class Request:
     ----------
     view : what all shots accept; None if they accept different items
     filtered : whether the call names a pre-filter or a broad phase
+    blockers : items that may shelter pixels; None if there is none, or the weapon needs no line of sight
     """
 
     scene: Scene
@@ -92,6 +101,7 @@ class Request:
     traits: Traits
     view: View | None
     filtered: bool
+    blockers: Blockers | None
 
     @property
     def placements(self) -> int:
@@ -102,7 +112,9 @@ class Request:
 def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtered: bool) -> Request:
     """What a call asks."""
     traits = traits_of(weapon)
-    return Request(scene, weapon, shots, stack, traits, view_of(traits.pierces, shots), filtered)
+    view = view_of(traits.pierces, shots)
+    blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view) if traits.sight else None
+    return Request(scene, weapon, shots, stack, traits, view, filtered, blockers)
 
 
 def view_of(pierce: bool, shots: Shots) -> View | None:
@@ -125,6 +137,7 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
         plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
         if placements.table.prefix is not None:
             plan.run("weights", "falloff of the hit pixels, by prefix sums", placements.table.prefix.nbytes)
+        _refuse_starts(request, part, placements)
         rows.append(rows_of_span_hits(direct(placements, part, context), placements, request.stack.ids, begin))
         plan.run("rows", "", rows[-1].nbytes)
     return rows
@@ -133,7 +146,7 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
 def verdicts_by_spans(request: Request, context: QueryContext) -> Ints:
     """Samples (N, 5) of shots by verdict, by the reference; the stack is the one that they were fired at."""
     boxes, weapon, shots = Candidates(context.candidates.items, context.stack), request.weapon, request.shots
-    then = QueryContext(context.stack, context.bounds, context.pierce, boxes, Plan())
+    then = QueryContext(context.stack, context.bounds, context.pierce, boxes, Plan(), context.blockers)
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
     for _, part in _chunks(shots, placements_for(weapon, shots.take(0, 1)), boxes):
         counts = direct(placements_for(weapon, part), part, then).counts
@@ -149,7 +162,7 @@ def verdicts_by_tiles(request: Request, context: QueryContext) -> Ints:
     unless items only moved; then the reference counts.
     """
     stack, items = request.stack, request.scene.items
-    if items.stack().forms != stack.forms or not request.traits.fits:
+    if items.stack().forms != stack.forms or request.blockers is not None or not request.traits.fits:
         return verdicts_by_spans(request, context)
     choosy, free = may_refuse(stack, request.shots), Rule(False, context.bounds)
     tiles = items.tiles().ordered(stack, choosy)._replace(occluder=NO_FLAGS)
@@ -196,7 +209,8 @@ def _chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator
 def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
     """Rows by the tiles of the stack, front to back: each takes its pixels from the rest of each placed pattern."""
     stack, tiles, plan, parts = request.stack, request.scene.items.tiles(), context.plan, []
-    choosy, free = may_refuse(stack, request.shots), Rule(request.traits.pierces, request.scene.bounds)
+    choosy = may_refuse(stack, request.shots)
+    free = Rule(request.traits.pierces, request.scene.bounds, blockers=request.blockers)
     ordered = tiles.ordered(stack, choosy)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ordered.box_xyxy.nbytes)
     most = NEAR_AT_ONCE if request.filtered else PLACEMENTS_AT_ONCE
@@ -221,8 +235,9 @@ def _rule(request: Request, shots: Shots, placements: Placements) -> Rule:
     """What ends the pixels of a part of the shots, which may refuse items."""
     pierce, bounds, view = request.traits.pierces, request.scene.bounds, request.view
     if view is None:
-        return Rule(pierce, bounds, shots.meets[placements.shot], shots.exclude[placements.shot])
-    return Rule(pierce, bounds, view.meets, np.array([view.exclude], np.int64))
+        meets, exclude = shots.meets[placements.shot], shots.exclude[placements.shot]
+        return Rule(pierce, bounds, meets, exclude, request.blockers)
+    return Rule(pierce, bounds, view.meets, np.array([view.exclude], np.int64), request.blockers)
 
 
 # house: way of areas
@@ -233,6 +248,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     visible = scene.derived.visible(request.view)
     kept = visible.made(scene.items)
     visible_set = kept or visible.read(scene.items)
+    rule = Rule(True, blockers=request.blockers)
     plan.run("visible set", "what can be seen of all objects", 0 if kept else visible_set.nbytes)
     for begin, _, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
         windows = _windows(placements, plan)
@@ -240,7 +256,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
         text = "all tiles" if listed is None else f"cells of {1 << listed.bits} px"
         plan.run("pre-filter", text + ", strips" * bool(len(windows.strips)), made)
         found = kernels_of(front_to_back).front_to_back(
-            placed_of(placements), placements.pellets, windows, visible_set.seen, Rule(True), listed
+            placed_of(placements), placements.pellets, windows, visible_set.seen, rule, listed
         )
         parts.append(_rows_of(placements, found, request.stack.ids).later(begin))
         plan.run("samples", "counted by bit rows", parts[-1].nbytes)
@@ -270,9 +286,16 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
         if len(part) > 1 < len(placements.table) and not placements.table.fits:
             step = len(part) // 2
             continue
+        _refuse_starts(request, part, placements)
         yield begin, part, placements
         begin += len(part)
         step = min(2 * step, most, CHUNK_PAIRS * begin // max(candidates.met, 1))
+
+
+def _refuse_starts(request: Request, shots: Shots, placements: Placements) -> None:
+    """Refuse shots that begin inside a blocker, if their weapon does."""
+    if request.blockers is not None and request.traits.inside == "error":
+        late.shelter.refuse_starts_inside(placements, shots, request.stack, request.blockers)
 
 
 def _windows(placements: Placements, plan: Plan) -> PatternBits:

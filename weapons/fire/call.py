@@ -175,7 +175,7 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
     way, why = chosen_way(how[2], request)
     asked = request.placements if request.filtered or way.name == "spans" else 0
     candidates = chosen_candidates(*how[:2], scene, stack, asked)
-    context = QueryContext(stack, scene.bounds, request.traits.pierces, candidates, plan)
+    context = QueryContext(stack, scene.bounds, request.traits.pierces, candidates, plan, request.blockers)
     plan.run("plan", f"{way.name}: {why}")
     parts = way.engine(request, context)
     rows = Rows.joined(parts)

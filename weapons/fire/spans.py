@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +25,13 @@ from hitplanes.planes.common.limits import CHUNK_SAMPLES
 from hitplanes.planes.grid.spans import Box, merged_runs, pieces
 from hitplanes.planes.scene.items import Stack, clipped
 
+from .. import late
 from ..kinds.placements import Placements, Shots
 from .plan import Plan
 from .prefilter import Candidates, kinds, may_refuse, refused
+
+if TYPE_CHECKING:
+    from hitplanes.planes.bits.shadows import Blockers
 
 SPARSE = 4
 """If items fill less than 1 / SPARSE of the box around them, spans are cut to each item's box, not to that one."""
@@ -34,13 +39,17 @@ SPARSE = 4
 
 @dataclass(eq=False, slots=True)
 class QueryContext:
-    """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan."""
+    """What placements are tested against: the stack, its bounds, whether they pierce, the pre-filter, and the plan.
+
+    `blockers` are the items that may shelter pixels, if the weapon needs a line of sight.
+    """
 
     stack: Stack
     bounds: Box | None
     pierce: bool
     candidates: Candidates
     plan: Plan
+    blockers: Blockers | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +79,13 @@ def direct(placements: Placements, shots: Shots, context: QueryContext) -> SpanH
         return _met(placements, Runs.joined([]), [], counts, context.plan)
     placement, rank = near_pairs(placements, np.arange(len(boxes)), boxes, context)
     pairs = Pairs(placement, rank, _kinds(rank, placements.shot[placement], shots, context))
-    runs = _under_items(placements, pairs, context)
+    if context.blockers is not None and len(boxes):  # what lies on no item may be sheltered, too
+        every = np.arange(len(boxes))
+        runs = _laid(placements, every, boxes if context.bounds is None else clipped(boxes, context.bounds))
+    else:
+        runs = _under_items(placements, pairs, context)
     context.plan.run("samples", "runs where items may be", runs.nbytes)
-    return _met(placements, runs, _walked(runs, pairs, context, counts), counts, context.plan)
+    return _met(placements, runs, _walked(placements, shots, runs, pairs, context, counts), counts, context.plan)
 
 
 def _under_items(placements: Placements, pairs: Pairs, context: QueryContext) -> Runs:
@@ -124,14 +137,20 @@ def _kinds(rank: Ints, shot: Ints, shots: Shots, context: QueryContext) -> Kinds
     return kind
 
 
-def _walked(runs: Runs, pairs: Pairs, context: QueryContext, counts: Ints) -> list[Events]:
+def _walked(
+    placements: Placements, shots: Shots, runs: Runs, pairs: Pairs, context: QueryContext, counts: Ints
+) -> list[Events]:
     """Walk runs strip by strip, and add to the counts."""
     found, plan = [], context.plan
     for strip in pieces(runs.lengths, CHUNK_SAMPLES) if len(runs) else ():
         part = runs.take(strip)
         near = slice(*np.searchsorted(pairs.placement, [part.placement[0], part.placement[-1] + 1]).tolist())
         here = Pairs(pairs.placement[near], pairs.rank[near], pairs.kind[near])
-        events, state = walk(part, here, context.stack, context.pierce, HIT)
+        shelter = None
+        if context.blockers is not None:
+            shelter = late.shelter.sheltered(part, placements, shots, context.stack, context.blockers)
+            plan.run("line of sight", "what lies on the way to each sample", shelter.nbytes)
+        events, state = walk(part, here, context.stack, context.pierce, HIT, shelter)
         found.append(Events(events.kind, events.rank, events.run + strip.start, events.x_first, events.x_last))
         plan.run("walk", "samples through the stack, front to back", state.nbytes + events.nbytes)
         met = state != LIVE

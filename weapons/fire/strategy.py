@@ -85,9 +85,14 @@ def _visible_cost(request: Request) -> tuple[float, float]:
     return now.visible_call + request.placements * now.visible_placement, made
 
 
+SIGHTED = "the weapon needs a line of sight"
+
+
 def _labels_refuse(request: Request) -> str:
     if not request.traits.is_point:
         return "shots are not one pixel"
+    if request.blockers is not None:
+        return SIGHTED
     if request.view != OF_ALL[False] or request.stack.has_unmet:
         return "shots refuse items, or pierce"
     if request.filtered:
@@ -111,6 +116,8 @@ def _integers_refuse(request: Request) -> str:
         return "there are pellets or weights"
     if request.traits.reach > INTEGERS_REACH:
         return f"patterns reach farther than {INTEGERS_REACH} px"
+    if request.blockers is not None:
+        return SIGHTED
     few = 0 < request.placements <= INTEGERS_PLACEMENTS
     return "" if few and request.placements * len(request.stack) <= INTEGERS_PAIRS else "there are too many shots"
 

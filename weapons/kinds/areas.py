@@ -22,9 +22,10 @@ from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, rows_of
 from hitplanes.planes.scene.variants import Transform, variant_of
 
-from .rays import Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
+from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
 from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
 
+SIGHTS = ("occluders", "all")
 ORIGIN = np.zeros(2, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 
@@ -37,12 +38,30 @@ class AreaWeapon(Weapon):
     ----------
     pierce : whether samples go on through the objects that they hit, up to an occluder
     falloff : None (full weight everywhere), "linear" or "smooth", from the shot's pixel to the end of the reach
+    line_of_sight : what shelters a pixel of the pattern if it lies on the way there from the shot's pixel, or from the
+        pellet's: None (nothing: only what lies in front, at the pixel itself), "occluders", or "all" (objects, too, but
+        for the one that is hit at the pixel)
+    inside : what an item that the way begins in does, as for rays: "hit" (it shelters all but the shot's pixel),
+        "ignore_until_exit", or "error"
     """
 
-    table: ClassVar[dict[str, Value]] = {"pierce": Flag(), "falloff": Optional(Word(FALLOFFS))}
+    table: ClassVar[dict[str, Value]] = {
+        "pierce": Flag(),
+        "falloff": Optional(Word(FALLOFFS)),
+        "line_of_sight": Optional(Word(SIGHTS)),
+        "inside": Word(INSIDE),
+    }
     directed: ClassVar[bool] = False
     pierce: bool = field(default=False, kw_only=True)
     falloff: str | None = field(default=None, kw_only=True)
+    line_of_sight: str | None = field(default=None, kw_only=True)
+    inside: str = field(default="hit", kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check that `inside` has ways to speak of."""
+        super().__post_init__()
+        if self.inside != "hit" and self.line_of_sight is None:
+            raise InputError(f"inside: expected 'hit' of a weapon without line_of_sight, got {self.inside!r}")
 
     @property
     def reach_256(self) -> int:

@@ -45,10 +45,10 @@ class Round(NamedTuple):
 def reach_of(weapon: Weapon) -> int | None:
     """Greatest distance of a pixel of an area weapon from that of its round, px.
 
-    None if it is too large, or if the pixels depend on the fraction of the position.
+    None if it is too large, if the pixels depend on the fraction of the position, or if a line of sight is needed.
     """
     burst, spread, plain = parts_of(weapon)
-    if burst and (snap(burst.recoil_xy) % SUB).any():
+    if plain.line_of_sight or (burst and (snap(burst.recoil_xy) % SUB).any()):
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
     reach += int(snap(spread.radius)) // SUB if spread else 0

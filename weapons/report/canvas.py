@@ -34,11 +34,12 @@ OUTLINES = {
     "blocked": ((86, 180, 233), 255),
     "other": ((240, 240, 240), 130),
     "now": ((206, 156, 255), 255),
+    "shadow": ((255, 255, 255), 200),
 }
-"""Colour and opacity of the outline of an object that was hit, of one that was only blocked, of any other, and of the
-present place of an object that has moved."""
+"""Colour and opacity of the outline of an object that was hit, of one that was only blocked, of any other, of the
+present place of an object that has moved, and of what a shot does not see."""
 
-DASHED = ("blocked", "now")
+THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 
 DASH = 5
 """Length of the dashes of an outline, px."""
@@ -135,6 +136,13 @@ class World:
         """Draw the border of an object's mask inside its pixels: thick for "hit", thick and dashed for "blocked"."""
         if self.scene is not None:
             self.border(*self.scene.mask(item), kind)
+
+    def outline_shadows(self, shots: Sequence[Mapping[str, Any]]) -> None:
+        """Draw the edges of what items on the way shelter from each shot, as people draw light."""
+        for shot in shots:
+            runs = np.array(shot.get("sheltered", ()), np.int64).reshape(-1, 3)
+            if len(runs):
+                self.border(*Spans(*runs.T).to_mask(), "shadow")
 
     def outline_seen(self, items: Sequence[int]) -> None:
         """Draw the borders of the visible parts of at most OUTLINES_MAX objects."""
@@ -398,6 +406,7 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
         entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{per}", np.repeat(scale, 5, axis=1)))
     told = "other target" if painted & {"object hit", "object blocked"} else "target"
     words = {"hit": "object hit", "blocked": "object blocked", "other": told, "now": "where it is now"}
+    words["shadow"] = "edge of a shadow"
     entries += [Entry(word, _outlined(kind)) for kind, word in words.items() if f"object {kind}" in painted]
     entries += [Entry(name, _sketched(color, name)) for name, color in SKETCH.items() if name in painted]
     entries += sign_entries(painted)
@@ -422,7 +431,7 @@ def verdict_mark(verdict: str, size: int = 14) -> Image:
 
 
 def _outlined(kind: str) -> Image:
-    thick = 1 if kind == "other" else 2
+    thick = 1 if kind in THIN else 2
     border = _stripes((14, 14), 6, 3 if kind in DASHED else 6)
     border[thick:-thick, thick:-thick] = False
     return mark_of(border, OUTLINES[kind][0])

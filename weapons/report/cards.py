@@ -197,7 +197,11 @@ def _why(entry: Mapping[str, Any], of_ray: bool) -> str:
 def _hits(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Table of the hits of a pattern."""
     weighted = any(row["weight"] != WEIGHT_FULL * row["samples"] for row in shot["rows"])
-    lines: list[tuple[str, ...]] = [WEIGHT_HEADER if weighted else HEADER] if shot["rows"] else []
+    lines: list[tuple[str, ...]] = []
+    if shot["rows"]:
+        exposed = ["exposed"] if "exposed" in shot["rows"][0]["shares"] else []
+        header = WEIGHT_HEADER if weighted else HEADER
+        lines.append((*header[:-1], *exposed, header[-1]))
     rounds = len({row["round"] for row in shot["rows"]}) > 1
     for row in shot["rows"]:
         name = f"{row['name']}, round {row['round']}" if rounds else row["name"]

@@ -115,7 +115,7 @@ ABOUT = {
 """Keys that say how a report was made; equality leaves them out."""
 
 SHOT_DERIVED, ROW_DERIVED, BATCH_DERIVED = (
-    ("at_xy", "samples", "nearest_miss"),
+    ("at_xy", "samples", "sheltered", "nearest_miss"),
     ("distance2", "shares", "margin"),
     ("shots_that_hit", "objects", "heat"),
 )

@@ -100,6 +100,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     world.outline_seen([item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked])
     for verdict in MARKS:
         world.mark_samples(marked(shots, verdict), verdict)
+    world.outline_shadows(shots)
     for kind, items in (("blocked", blocked), ("hit", hit)):
         for item in sorted(items):
             world.outline(item, kind)

@@ -20,7 +20,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import detail_of
+from ..explain.samples import Samples, Share, detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import HitRow, Hits
 from ..kinds.areas import parts_of, ray_parts_of
@@ -375,7 +375,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     shots = hits.shots
     accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
-    margins = _margins(hits, row)
+    margins, samples = _margins(hits, row), hits.samples_at(row)
     return {
         "shot": int(shots.number[row]),
         "weapon": weapon,
@@ -402,7 +402,8 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             }
             for entry in hits.blockers(row)
         ],
-        "samples": _sample_runs(hits, row),
+        "samples": _sample_runs(samples),
+        **({} if samples.sheltered is None else {"sheltered": _runs_of(samples.xy[samples.sheltered])}),
         "plan": hits.plan.to_dict(),
         **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
@@ -447,7 +448,7 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
             "pellets": row.pellets,
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
-            **({} if share is None else {"shares": {k: round(value, 6) for k, value in share._asdict().items()}}),
+            **({} if share is None else {"shares": _shares(share)}),
             **margins.get(row.object, {}),
             "runs": pixels[row.round, row.object].runs().tolist(),
         }
@@ -455,11 +456,22 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
     ]
 
 
-def _sample_runs(hits: Hits, row: int) -> dict[str, list[list[int]]]:
-    """Runs of the pixels of each verdict that occurs; the verdict of a pixel is the same for every pellet."""
-    samples = hits.samples_at(row)
-    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict].T for verdict in Verdict}
-    return {name: Spans.from_runs(y, x, x).runs().tolist() for name, (x, y) in of.items() if len(x)}
+def _shares(share: Share) -> dict[str, float]:
+    """Shares of a row as JSON; without `exposed` if the weapon needs no line of sight."""
+    return {name: round(value, 6) for name, value in share._asdict().items() if value is not None}
+
+
+def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:
+    """Runs of the pixels of each verdict that occurs, each pixel once under its strongest verdict."""
+    of = {verdict.name.lower(): samples.xy[samples.verdict == verdict] for verdict in Verdict}
+    return {name: _runs_of(xy) for name, xy in of.items() if len(xy)}
+
+
+def _runs_of(xy: Ints) -> list[list[int]]:
+    """Runs [y, x_first, x_last] of pixels (n, 2), each once."""
+    x, y = xy.T
+    runs: list[list[int]] = Spans.from_runs(y, x, x).runs().tolist()
+    return runs
 
 
 def _batch(scene: Scene, fired: Sequence[Hits], view: Box) -> dict[str, Any]:

@@ -1,0 +1,383 @@
+"""Shadows: which pixels an item hides from an origin, because it lies on the way to them.
+
+The way from pixel o to pixel p is every pixel but p whose closed square meets the segment between their centres. An
+item shelters p if one of its pixels lies on the way:
+
+    o . # - - -        o sees the wall, but not what is behind it
+    . . # - - -
+
+A mask is covered by rectangles. The pixels of a row behind a rectangle form one interval, whose ends are quotients of
+whole numbers: the segment from (0, 0) to (x, y) meets a box if it is not separated from it by a side of the box or by
+its own line. The item's own pixels hide those behind them; the bare ones, which nothing of the rectangle lies before,
+are told apart. `jit.bit_rows` has the compiled form of `hide_behind`.
+
+References
+----------
+Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ..common.backend import LruCache, kernels_of
+from ..common.checks import Bools, Floats, Ints
+from ..grid.spans import Box, begins, each_pixel, merged_runs, ragged
+from ..scene.items import clipped
+from . import cells
+from .bit_rows import WORD, Words
+from .span_walk import Runs
+
+NEVER = np.iinfo(np.int64).max
+
+COVERS_BYTES, MASK_BYTES = 2**25, 200
+"""Size of the caches of rectangles, and memory of a mask's beside its numbers, bytes."""
+
+ROWS_AT_ONCE = 2**15
+"""Rows of rectangles worked on at a time: 256 KB for each of their columns."""
+
+FULL = np.uint64(2**64 - 1)
+
+
+class Blockers(NamedTuple):
+    """Items that hide what lies behind them, front to back, with the rectangles that cover their masks.
+
+    Parameters
+    ----------
+    rank : (B,) places in the stack
+    box_xyxy : (B, 4) inclusive, px
+    begin : (B + 1,) first rectangle of each
+    rects : (R, 4) inclusive x_min, y_min, x_max, y_max, px, from the corner of the item's mask
+    categories, owner : (B,) category bits and owner; (0,) if all shots are blocked by all of them
+    bounds : box beyond which no item has pixels; None if there is none
+    until_exit : whether an item that the way begins in is ignored up to where the way leaves it
+    """
+
+    rank: Ints
+    box_xyxy: Ints
+    begin: Ints
+    rects: Ints
+    categories: Ints
+    owner: Ints
+    bounds: Box | None
+    until_exit: bool
+
+    def rects_of(self, blocker: Ints, origin_xy: Ints) -> tuple[Ints, Ints]:
+        """Rectangles of blockers (k,), seen from origins (k, 2), as (place in `blocker`, (m, 4)); none is empty."""
+        place, number = ragged((self.begin[1:] - self.begin[:-1])[blocker])
+        seen = self.rects[self.begin[blocker][place] + number]
+        seen += np.tile(self.box_xyxy[blocker, :2], 2)[place]
+        if self.bounds is not None:
+            seen = clipped(seen, self.bounds)
+            some = ((seen[:, 0] <= seen[:, 2]) & (seen[:, 1] <= seen[:, 3])).nonzero()[0]
+            place, seen = place[some], seen[some]
+        seen -= np.tile(origin_xy, 2)[place]
+        return place, seen
+
+
+class Covers:
+    """Rectangles that cover masks, by the number of the mask; the last ones asked for are kept."""
+
+    def __init__(self) -> None:
+        self._of_mask: LruCache[int, Ints] = LruCache(COVERS_BYTES, lambda rects: rects.nbytes + MASK_BYTES)
+        self._of_masks: LruCache[bytes, tuple[Ints, Ints]] = LruCache(
+            COVERS_BYTES, lambda made: made[0].nbytes + made[1].nbytes, len
+        )
+
+    def of(self, number: Ints, mask_of: Callable[[int], Bools]) -> tuple[Ints, Ints]:
+        """Begin (B + 1,) of the rectangles of each mask, and all rectangles (R, 4).
+
+        Parameters
+        ----------
+        number : (B,) numbers of masks
+        mask_of : returns the mask (h, w) of a place in `number`
+        """
+
+        def made() -> tuple[Ints, Ints]:
+            numbers = enumerate(number.tolist())
+            rects = [self._of_mask.get(mask, partial(_rectangles_of, mask_of, row)) for row, mask in numbers]
+            begin = np.cumsum([0, *(len(part) for part in rects)])
+            return begin, np.concatenate([np.zeros((0, 4), np.int64), *rects])
+
+        return self._of_masks.get(number.tobytes(), made)
+
+
+def _rectangles_of(mask_of: Callable[[int], Bools], row: int) -> Ints:
+    return rectangles(mask_of(row))
+
+
+def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
+    """Sorted pairs (row, blocker) of which the box may meet the way from an origin (n, 2) to pixels of a box (n, 4)."""
+    low, high = np.minimum(boxes_xyxy[:, :2], origin_xy), np.maximum(boxes_xyxy[:, 2:], origin_xy)
+    found: tuple[Ints, Ints] = kernels_of(cells).met_boxes(np.concatenate([low, high], axis=1), blockers.box_xyxy)
+    return found
+
+
+def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
+    """Sorted pairs (row, blocker) of origins (n, 2) that lie on a blocker."""
+    row, blocker = ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
+    place, rects = blockers.rects_of(blocker, origin_xy[row])
+    begun = np.unique(place[_holds_origin(rects)])
+    return row[begun], blocker[begun]
+
+
+def rectangles(mask: Bools) -> Ints:
+    """Rectangles (k, 4) that cover a mask (h, w): each run of a row, as far up and down as all of it goes on."""
+    edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    (y, x_first), x_end = np.nonzero(edges == 1), np.nonzero(edges == -1)[1]
+    if not len(y):
+        return np.zeros((0, 4), np.int64)
+    reach = [_reach(mask, y, x_first, x_end), _reach(mask[::-1], len(mask) - 1 - y, x_first, x_end)]
+    return np.unique(np.stack([x_first, y - reach[1], x_end - 1, y + reach[0]], axis=1), axis=0)
+
+
+def _reach(mask: Bools, y: Ints, x_first: Ints, x_end: Ints) -> Ints:
+    """How many rows below row y all pixels of a run (n,) go on."""
+    high, wide = mask.shape
+    row = np.arange(high)[:, None]
+    ends = np.where(mask, high, row)  # the first row at or below that is not set
+    ends = np.minimum.accumulate(ends[::-1], axis=0)[::-1]
+    flat = np.append(ends.reshape(-1), high)
+    cuts = np.stack([y * wide + x_first, y * wide + x_end], axis=1).reshape(-1)
+    order = np.argsort(cuts[::2], kind="stable")
+    least = np.empty(len(y), np.int64)
+    least[order] = np.minimum.reduceat(flat, np.stack([cuts[::2][order], cuts[1::2][order]], axis=1).reshape(-1))[::2]
+    return np.asarray(least - y - 1)
+
+
+# house: hit rule of areas
+def shadow(rects: Ints, y: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+    """Columns of rows that rectangles hide from pixel (0, 0), and the columns of the rectangles that they leave bare.
+
+    The quotients are exact: their terms stay below 2**43, so no rounding reaches a whole number.
+
+    Parameters
+    ----------
+    rects : (m, 4) inclusive sides x_min, y_min, x_max, y_max, px
+    y : (m, h) rows
+
+    Returns
+    -------
+    first, last, bare_first, bare_last : (m, h); an interval is empty if its first column is the greater one
+    """
+    x_min, y_min, x_max, y_max = rects.T.astype(np.float64)[..., None]
+    down, away = y >= 0, np.abs(y)
+    near, far = np.where(down, y_min, -y_max), np.where(down, y_max, -y_min)  # rows, counted away from the origin
+    left, right, top, bottom = 2 * x_min - 1, 2 * x_max + 1, 2 * near - 1, 2 * far + 1  # sides, in halves of a pixel
+    ahead, aside = near > 0, (left > 0) | (right < 0)
+    first = np.where(ahead, np.ceil(left * away / top), -np.inf)
+    first = np.where(left > 0, np.maximum(x_min, np.ceil(left * away / bottom)), first)
+    last = np.where(ahead, np.floor(right * away / top), np.inf)
+    last = np.where(right < 0, np.minimum(x_max, np.floor(right * away / bottom)), last)
+    first = np.where((far < 0) | (away < near), np.inf, first)
+    side = np.where(left > 0, x_min, x_max)
+    nearest = ahead & (away == near)
+    alone = aside & (away >= near) & (away <= far)
+    alone &= (np.abs(side) > away) | (nearest & (np.abs(side) == away))
+    here = ~aside & ~ahead & (far >= 0) & (away == 0)  # the origin itself
+    bare_first = np.where(nearest, np.maximum(x_min, 1 - away), np.where(here, 0, np.inf))
+    bare_last = np.where(nearest, np.minimum(x_max, away - 1), np.where(here, 0, -np.inf))
+    return first, last, np.where(alone, side, bare_first), np.where(alone, side, bare_last)
+
+
+def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blockers, pair: Ints, blocker: Ints) -> None:
+    """Clear the pixels (n, height) that blockers shelter from their origins.
+
+    Parameters
+    ----------
+    corner_xy : (n, 2) pixel of bit 0 of the first row
+    origin_xy : (n, 2) pixels from which the ways begin
+    pair, blocker : (k,) sorted pairs of a row of `rows` and a blocker
+    """
+    height, corner = rows.shape[1], corner_xy - origin_xy
+    place, rects = blockers.rects_of(blocker, origin_xy[pair])
+    if blockers.until_exit:
+        place, rects, begun = _begun_apart(place, rects)
+        for k, inside in begun:
+            _clear_after_exit(rows[pair[k]], corner[pair[k]], inside)
+    own = pair[place]
+    low = corner[own]
+    met = (rects[:, :2] <= np.maximum(low + np.array([WORD - 1, height - 1]), 0)) & (rects[:, 2:] >= np.minimum(low, 0))
+    kept = met.all(axis=1).nonzero()[0]
+    own, rects, (left, top) = own[kept], rects[kept], low[kept].T
+    step = max(ROWS_AT_ONCE // height, 1)
+    for begin in range(0, len(own), step):
+        now = slice(begin, begin + step)
+        first, last, bare_first, bare_last = shadow(rects[now], top[now, None] + np.arange(height))
+        hidden = _columns(first, last, left[now]) & ~_columns(bare_first, bare_last, left[now])
+        new = begins(own[now]).nonzero()[0]
+        rows[own[now][new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
+
+
+def _columns(first: Floats, last: Floats, left: Ints) -> Words:
+    """Words (m, h) whose bits are the columns of intervals (m, h); bit 0 is column `left`."""
+    low = np.clip(first - left[:, None], 0, WORD)
+    high = np.clip(last - left[:, None], -1, WORD - 1)
+    filled = low <= high
+    low, high = low * filled, np.where(filled, high, 0)
+    words: Words = FULL << low.astype(np.uint64)
+    words &= FULL >> (WORD - 1 - high).astype(np.uint64)
+    words *= filled
+    return words
+
+
+class Shelter(NamedTuple):
+    """What shelters samples from the origins of their placements, as columns.
+
+    Parameters
+    ----------
+    items : number of items that shelter each sample
+    ranks : sum of their ranks
+    """
+
+    items: Ints
+    ranks: Ints
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return self.items.nbytes + self.ranks.nbytes
+
+    def hides(self, sample: Ints, rank: Ints) -> Bools:
+        """Whether an item other than that of a rank (n,), or of one for all, shelters a sample (n,)."""
+        count = self.items[sample]
+        return np.asarray((count > 1) | ((count == 1) & (self.ranks[sample] != rank)))
+
+
+def shelter_of(runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints) -> Shelter:
+    """Items that shelter the samples of runs.
+
+    Parameters
+    ----------
+    runs : samples, sorted by placement
+    origin_xy : (P, 2) pixels from which the ways of placements begin
+    placement, blocker : (k,) pairs whose blocker may shelter a sample
+    """
+    pair, run, first, last = _hidden(runs, origin_xy, blockers, placement, blocker)
+    which, first, last = merged_runs(pair * len(runs) + run, first, last)
+    pair, run = pair[which], run[which]
+    start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
+    count = np.zeros((2, int(runs.lengths.sum()) + 1), np.int64)
+    rank = blockers.rank[blocker[pair]]
+    for row, weight in enumerate((np.ones_like(rank), rank)):
+        np.add.at(count[row], start[run] + first, weight)
+        np.subtract.at(count[row], start[run] + last + 1, weight)
+    items, ranks = np.cumsum(count, axis=1)[:, :-1]
+    return Shelter(items, ranks)
+
+
+def _hidden(
+    runs: Runs, origin_xy: Ints, blockers: Blockers, placement: Ints, blocker: Ints
+) -> tuple[Ints, Ints, Ints, Ints]:
+    """Stretches of runs that blockers shelter, as (pair, run, x_first, x_last); those of a pair may overlap."""
+    x, y = origin_xy[placement].T
+    pair, rects = blockers.rects_of(blocker, origin_xy[placement])
+    found = []
+    if blockers.until_exit:
+        pair, rects, begun = _begun_apart(pair, rects)
+        found = [_hidden_after_exit(runs, placement[k], k, x[k], y[k], inside) for k, inside in begun]
+    begin, end = (runs.placement.searchsorted(placement, side=side) for side in ("left", "right"))
+    rect, place = ragged((end - begin)[pair])
+    own = pair[rect]
+    run = begin[own] + place
+    first, last, bare_first, bare_last = (part[:, 0] for part in shadow(rects[rect], (runs.y[run] - y[own])[:, None]))
+    bare = bare_first <= bare_last
+    before = first, np.where(bare, bare_first - 1, last)
+    for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
+        low = np.maximum(part[0], runs.x_first[run] - x[own])
+        high = np.minimum(part[1], runs.x_last[run] - x[own])
+        some = (low <= high).nonzero()[0]
+        shift = x[own[some]]
+        found.append((own[some], run[some], low[some].astype(np.int64) + shift, high[some].astype(np.int64) + shift))
+    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+    return columns[0], columns[1], columns[2], columns[3]
+
+
+def _begun_apart(pair: Ints, rects: Ints) -> tuple[Ints, Ints, list[tuple[int, Ints]]]:
+    """Rectangles (m, 4) of pairs, without those of blockers that the way begins in, which follow as (pair, rects)."""
+    begun = np.unique(pair[_holds_origin(rects)])
+    apart = np.isin(pair, begun)
+    return pair[~apart], rects[~apart], [(k, rects[pair == k]) for k in begun.tolist()]
+
+
+def _holds_origin(rects: Ints) -> Bools:
+    return np.asarray(((rects[:, :2] <= 0) & (rects[:, 2:] >= 0)).all(axis=1))
+
+
+def _clear_after_exit(row: Words, corner_xy: Ints, rects: Ints) -> None:
+    """Clear the pixels of words (height,) that a blocker shelters once the way has left it."""
+    y, x = np.nonzero(np.unpackbits(row.astype("<u8").view(np.uint8), bitorder="little").reshape(len(row), WORD))
+    hidden = _times(rects, x + corner_xy[0], y + corner_xy[1], True)[0].any(axis=0)
+    np.bitwise_and.at(row, y[hidden], ~(np.uint64(1) << x[hidden].astype(np.uint64)))
+
+
+def _hidden_after_exit(runs: Runs, placement: int, pair: int, x: int, y: int, rects: Ints) -> tuple[Ints, ...]:
+    """Pixels of runs of a placement that a blocker shelters once the way has left it: (pair, run, x_first, x_last)."""
+    own = (runs.placement == placement).nonzero()[0]
+    run, column = each_pixel(runs.x_first[own], runs.x_last[own])
+    hidden = _times(rects, column - x, runs.y[own][run] - y, True)[0].any(axis=0)
+    return np.full(int(hidden.sum()), pair), own[run[hidden]], column[hidden], column[hidden]
+
+
+def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints]:
+    """Which rectangles (m, 4) of an item lie on the way from pixel (0, 0) to pixels (s,), and when the way enters them.
+
+    Parameters
+    ----------
+    until_exit : whether what the way enters before it has left the item for the first time does not count
+
+    Returns
+    -------
+    hidden, entry : (m, s); times in units of 1 / (2 max(1, abs(x)) max(1, abs(y))) of the segment
+    """
+    first, last, bare_first, bare_last = shadow(rects, np.broadcast_to(y, (len(rects), len(y))))
+    met = (first <= x) & (x <= last)
+    hidden = met & ~((bare_first <= x) & (x <= bare_last))
+    across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
+    entry, leave = np.zeros_like(met, np.int64), np.broadcast_to(2 * across * down, met.shape)
+    for axis, (step, scale) in enumerate(((x, down), (y, across))):
+        low, high = 2 * rects[:, axis, None] - 1, 2 * rects[:, axis + 2, None] + 1
+        near, far = np.where(step > 0, low, -high) * scale, np.where(step > 0, high, -low) * scale
+        entry = np.where(step == 0, entry, np.maximum(entry, near))
+        leave = np.where(step == 0, leave, np.minimum(leave, far))
+    if until_exit and len(x):
+        hidden &= entry > _exit_of(np.where(met, entry, NEVER), np.where(met, leave, -1))
+    return hidden, entry
+
+
+def _exit_of(entry: Ints, leave: Ints) -> Ints:
+    """When ways (s,) leave an item that they begin in, by the times (m, s) at which they enter and leave its parts."""
+    order = np.argsort(entry, axis=0)
+    reach = np.maximum.accumulate(np.take_along_axis(leave, order, axis=0), axis=0)
+    later = np.concatenate([np.take_along_axis(entry, order, axis=0)[1:], np.full((1, entry.shape[1]), NEVER)])
+    return np.asarray(np.take_along_axis(reach, (later > reach).argmax(axis=0)[None], axis=0)[0])
+
+
+def sheltered_by(
+    blockers: Blockers, placement: Ints, blocker: Ints, of: Ints, xy: Ints, origin_xy: Ints, own: Ints
+) -> Ints:
+    """Rank of the item that the way to each sample (s,) enters first, in front of others; -1 if it enters none.
+
+    Parameters
+    ----------
+    placement, blocker : (k,) sorted pairs whose blocker may shelter samples
+    of, xy : (s,) placement, rising, and (s, 2) pixel of each sample
+    origin_xy : (P, 2) pixels from which the ways of placements begin
+    own : (s,) rank of an item that does not shelter the sample, or -1
+    """
+    soonest, who = np.full(len(of), NEVER), np.full(len(of), -1)
+    for p, b in zip(placement.tolist(), blocker.tolist(), strict=True):
+        rank = int(blockers.rank[b])
+        these = np.arange(*of.searchsorted((p, p + 1)))
+        these = these[own[these] != rank]
+        rects = blockers.rects_of(np.array([b]), origin_xy[p][None])[1]
+        x, y = (xy[these] - origin_xy[p]).T
+        hidden, entry = _times(rects, x, y, blockers.until_exit and bool(_holds_origin(rects).any()))
+        time = np.where(hidden, entry, NEVER).min(axis=0, initial=NEVER)
+        sooner = time < soonest[these]
+        soonest[these[sooner]], who[these[sooner]] = time[sooner], rank
+    return who
