@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import oracle_shelter
 import oracle_stack
 import pytest
 from test_fire import Battle, Placements, Shot, expected, items_of, parts_of, rounds_of, some_battle, square, told
@@ -78,17 +79,25 @@ def samples_of(volley: Placements, shot: Shot) -> list[tuple[int, int, int, int]
     )
 
 
-def walks_of(battle: Battle, scene: Scene, shot: Shot) -> list[oracle_stack.Walk]:
-    """The oracle's walk of every sample of one shot."""
-    items, pierce = items_of(scene), parts_of(battle.volley.weapon)[2].pierce
-    options = {
-        "accept": shot.accept,
-        "blocked_by": shot.blocked_by,
-        "exclude": shot.exclude,
-        "pierce": pierce,
-        "bounds": scene.bounds,
-    }
-    return [oracle_stack.at_pixel(items, (x, y), **options) for _, _, y, x in samples_of(battle.volley, shot)]  # type: ignore[arg-type]
+def walks_of(battle: Battle, scene: Scene, shot: Shot) -> list[oracle_shelter.ShelteredWalk]:
+    """The oracle's walk of every sample of one shot; what shelters a sample has ended it."""
+    items, plain, owns = items_of(scene), parts_of(battle.volley.weapon)[2], pellets_of(battle.volley, shot)
+    walks = []
+    for number, pellet, y, x in samples_of(battle.volley, shot):
+        walk = oracle_shelter.judge(
+            items, owns[number, pellet], (x, y), line_of_sight=plain.line_of_sight, inside=plain.inside,
+            accept=shot.accept, blocked_by=shot.blocked_by, exclude=shot.exclude, pierce=plain.pierce,
+            bounds=scene.bounds,
+        )  # fmt: skip
+        walk.ended_by = walk.sheltered_by or walk.ended_by
+        walks.append(walk)
+    return walks
+
+
+def pellets_of(volley: Placements, shot: Shot) -> dict[tuple[int, int], tuple[int, int]]:
+    """The own pixel of each (round, pellet) of one shot."""
+    every = rounds_of(volley.weapon, shot.at, shot.aim, shot.toward, volley.seed, shot.number)
+    return {(n, k): own for n, (_, pellets) in enumerate(every) for k, (own, _) in enumerate(pellets)}
 
 
 def pierced(battle: Battle) -> bool:
@@ -225,8 +234,8 @@ def test_samples_at(seed: int) -> None:
 def test_blockers(seed: int) -> None:
     battle, scene, hits = fired(seed)
     for i, shot in enumerate(battle.volley.shots):
-        ends = [walk.ended_by for walk in walks_of(battle, scene, shot)]
-        counts = Counter(item.id for item in ends if item is not None and item.occluder)
+        walks = walks_of(battle, scene, shot)
+        counts = Counter(w.ended_by.id for w in walks if w.ended_by and (w.ended_by.occluder or w.sheltered_by))
         found = hits.blockers(i)
         assert [entry[:2] for entry in found] == sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
 
@@ -239,9 +248,10 @@ def test_blockers_name_what_is_behind_them(seed: int) -> None:
         behind: dict[tuple[int, int], list[tuple[int, int]]] = {}
         for walk, (*_, y, x) in zip(walks_of(battle, scene, shot), samples_of(battle.volley, shot), strict=True):
             wall = walk.ended_by
-            if wall is None or not wall.occluder:
+            if wall is None or not (wall.occluder or walk.sheltered_by):
                 continue
-            for item in items[items.index(wall) + 1 :]:
+            behind_it = items[items.index(wall) + 1 :] if walk.sheltered_by is None else set(items) - {wall}
+            for item in behind_it:
                 refused = oracle_stack.refused(item, shot.accept, shot.blocked_by, shot.exclude)
                 if not item.occluder and not refused and (x, y) in item.pixels:
                     behind.setdefault((wall.id, item.id), []).append((x, y))
@@ -278,15 +288,26 @@ def test_shares(seed: int) -> None:
     for row, share in zip(hits, shares, strict=True):
         shot, item = battle.volley.shots[row.shot], items[row.object]
         in_round = sum(number == row.round for number, *_ in samples_of(battle.volley, shot))
-        visible = 0
+        visible = exposed = 0
+        plain = parts_of(battle.volley.weapon)[2]
+        how: dict[str, Any] = {"accept": shot.accept, "blocked_by": shot.blocked_by, "exclude": shot.exclude}
+        blocking = oracle_shelter.blockers(list(items.values()), plain.line_of_sight, **how)
+        owns = {own for (n, _), own in pellets_of(battle.volley, shot).items() if n == row.round}
         for pixel in item.pixels:
             walk = oracle_stack.at_pixel(
                 list(items.values()), pixel, accept=shot.accept, blocked_by=shot.blocked_by, exclude=shot.exclude,
                 pierce=pierced(battle), bounds=scene.bounds,
             )  # fmt: skip
             visible += item in walk.hit
-        assert share == (row.samples / in_round, row.pixels / visible, row.pixels / len(item.pixels))
-        assert max(share) <= 1
+            if item in walk.hit and plain.line_of_sight:
+                shelters = (
+                    oracle_shelter.shelters(blocking, own, pixel, inside=plain.inside, bounds=scene.bounds)
+                    for own in owns
+                )
+                exposed += any({by.id for by in every} <= {item.id} for every in shelters)
+        assert share[:3] == (row.samples / in_round, row.pixels / visible, row.pixels / len(item.pixels))
+        assert share.exposed == (exposed / visible if plain.line_of_sight else None)
+        assert max(share[:3]) <= 1
 
 
 def why_not(battle: Battle, scene: Scene, which: int, hit: set[int]) -> list[tuple[Any, ...]]:
