@@ -31,6 +31,7 @@ from ..scene.items import clipped
 from . import cells
 from .bit_rows import WORD, Words
 from .span_walk import Runs
+from .visible import sides_of
 
 NEVER = np.iinfo(np.int64).max
 
@@ -157,14 +158,14 @@ def shadow(rects: Ints, y: Ints) -> tuple[Floats, Floats, Floats, Floats]:
 
     Parameters
     ----------
-    rects : (m, 4) inclusive sides x_min, y_min, x_max, y_max, px
-    y : (m, h) rows
+    rects : (..., 4) inclusive sides x_min, y_min, x_max, y_max, px
+    y : (...) rows; both broadcast
 
     Returns
     -------
-    first, last, bare_first, bare_last : (m, h); an interval is empty if its first column is the greater one
+    first, last, bare_first, bare_last : (...); an interval is empty if its first column is the greater one
     """
-    x_min, y_min, x_max, y_max = rects.T.astype(np.float64)[..., None]
+    x_min, y_min, x_max, y_max = np.moveaxis(rects.astype(np.float64), -1, 0)
     down, away = y >= 0, np.abs(y)
     near, far = np.where(down, y_min, -y_max), np.where(down, y_max, -y_min)  # rows, counted away from the origin
     left, right, top, bottom = 2 * x_min - 1, 2 * x_max + 1, 2 * near - 1, 2 * far + 1  # sides, in halves of a pixel
@@ -200,23 +201,48 @@ def hide_behind(rows: Words, corner_xy: Ints, origin_xy: Ints, blockers: Blocker
         for k, inside in begun:
             _clear_after_exit(rows[pair[k]], corner[pair[k]], inside)
     own = pair[place]
-    low = corner[own]
-    met = (rects[:, :2] <= np.maximum(low + np.array([WORD - 1, height - 1]), 0)) & (rects[:, 2:] >= np.minimum(low, 0))
-    kept = met.all(axis=1).nonzero()[0]
-    own, rects, (left, top) = own[kept], rects[kept], low[kept].T
+    kept = _between(rects, (sides_of(rows) + np.tile(corner, 2))[own]).nonzero()[0]
+    own, rects, (left, top) = own[kept], rects[kept], corner[own[kept]].T
     step = max(ROWS_AT_ONCE // height, 1)
     for begin in range(0, len(own), step):
         now = slice(begin, begin + step)
-        first, last, bare_first, bare_last = shadow(rects[now], top[now, None] + np.arange(height))
-        hidden = _columns(first, last, left[now]) & ~_columns(bare_first, bare_last, left[now])
+        rect, row = rows[own[now]].nonzero()
+        first, last, bare_first, bare_last = shadow(rects[now][rect], top[now][rect] + row)
+        hidden = np.zeros((len(own[now]), height), np.uint64)
+        columns = left[now][rect]
+        hidden[rect, row] = _columns(first, last, columns) & ~_columns(bare_first, bare_last, columns)
         new = begins(own[now]).nonzero()[0]
         rows[own[now][new]] &= ~np.bitwise_or.reduceat(hidden, new, axis=0)
 
 
+def _between(rects: Ints, boxes_xyxy: Ints) -> Bools:
+    """Whether rectangles (m, 4) may meet a segment from pixel (0, 0) to a pixel of a box (m, 4).
+
+    All segments lie between the two lines through (0, 0) that touch the box. They touch it at corners: at the near one
+    of each side that the origin lies beyond, at the far one of the others.
+    """
+    x_min, y_min, x_max, y_max = boxes_xyxy.T
+    met = (rects[:, 0] <= np.maximum(x_max, 0)) & (rects[:, 2] >= np.minimum(x_min, 0))
+    met &= (rects[:, 1] <= np.maximum(y_max, 0)) & (rects[:, 3] >= np.minimum(y_min, 0))
+    beside, around = (y_min <= 0) & (y_max >= 0), (x_min <= 0) & (x_max >= 0)
+    side, near = np.where(x_min > 0, x_min, x_max), np.where(y_min > 0, y_min, y_max)
+    far = y_min + y_max - near
+    right = np.where(beside, side, x_max), np.where(beside, y_min, np.where(x_max > 0, near, far))
+    left = np.where(beside, side, x_min), np.where(beside, y_max, np.where(x_min < 0, near, far))
+    corners = 2 * rects + np.array([-1, -1, 1, 1])
+    turn = np.sign(right[0] * left[1] - right[1] * left[0])
+    for (x, y), inward in ((right, turn), (left, -turn)):
+        across, down = inward * x, -inward * y
+        most = np.maximum(across * corners[:, 1], across * corners[:, 3])
+        most += np.maximum(down * corners[:, 0], down * corners[:, 2])
+        met &= (most >= 0) | (beside & around)
+    return np.asarray(met)
+
+
 def _columns(first: Floats, last: Floats, left: Ints) -> Words:
-    """Words (m, h) whose bits are the columns of intervals (m, h); bit 0 is column `left`."""
-    low = np.clip(first - left[:, None], 0, WORD)
-    high = np.clip(last - left[:, None], -1, WORD - 1)
+    """Words (n,) whose bits are the columns of intervals (n,); bit 0 is column `left`."""
+    low = np.clip(first - left, 0, WORD)
+    high = np.clip(last - left, -1, WORD - 1)
     filled = low <= high
     low, high = low * filled, np.where(filled, high, 0)
     words: Words = FULL << low.astype(np.uint64)
@@ -284,7 +310,7 @@ def _hidden(
     rect, place = ragged((end - begin)[pair])
     own = pair[rect]
     run = begin[own] + place
-    first, last, bare_first, bare_last = (part[:, 0] for part in shadow(rects[rect], (runs.y[run] - y[own])[:, None]))
+    first, last, bare_first, bare_last = shadow(rects[rect], runs.y[run] - y[own])
     bare = bare_first <= bare_last
     before = first, np.where(bare, bare_first - 1, last)
     for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
@@ -334,7 +360,7 @@ def _times(rects: Ints, x: Ints, y: Ints, until_exit: bool) -> tuple[Bools, Ints
     -------
     hidden, entry : (m, s); times in units of 1 / (2 max(1, abs(x)) max(1, abs(y))) of the segment
     """
-    first, last, bare_first, bare_last = shadow(rects, np.broadcast_to(y, (len(rects), len(y))))
+    first, last, bare_first, bare_last = shadow(rects[:, None], y)
     met = (first <= x) & (x <= last)
     hidden = met & ~((bare_first <= x) & (x <= bare_last))
     across, down = np.maximum(np.abs(x), 1), np.maximum(np.abs(y), 1)
