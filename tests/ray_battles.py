@@ -389,6 +389,7 @@ def some_battle(rng: random.Random) -> Battle:
         at = some_place(rng, bodies)
         toward = some_target(rng, at, bodies)
         exclude = (rng.randint(0, 9),) if rng.random() < 0.2 else ()
+        exclude = tuple(owner if owner < len(bodies) else -1 for owner in exclude)
         accept = rng.choice([ALL] * 8 + [1, 3, 6])
         shot = Shot(at, toward, 0.0, accept, ALL, exclude, rng.choice([number, 2**40]))
         if aimed:

@@ -125,6 +125,18 @@ SCENES: dict[str, tuple[Any, str]] = {
     # an object
     "object, text": (changed(DUCK, "duck"), r"objects\.hittable\[0\]: object: expected an object, got 'duck'"),
     "no source": (changed(f"{DUCK}.circle", MISSING), r"objects\.hittable\[0\]: source: expected one of image"),
+    "source, misspelled": (
+        object_of(circel=4), r"hittable\[0\]: source: .*got circel .did you mean 'circle'\?"),
+    "source, capital": (
+        object_of(Circle=4), r"hittable\[0\]: source: .*got Circle .did you mean 'circle'\?"),
+    "source, strange": (object_of(blob=4), r"hittable\[0\]: source: .* mask, got blob$"),
+    "capitals": (changed(f"{DUCK}.LAYER", 2), r"hittable\[0\]: key: .*got 'LAYER' .did you mean 'layer'"),
+    "frames, key": (
+        object_of(image="a.png", frames={"grid": [2, 2]}),
+        r"hittable\[0\]: frames: key: .*got 'grid' .did you mean 'grid_wh'"),
+    "part's key": (
+        changed(GUN, {"kind": "spread", "pellet": {"kind": "disc", "raduis": 1}, "count": 2, "radius": 3}),
+        r"weapons\.gun: pellet: key: .*got 'raduis' .did you mean 'radius'"),
     "two sources": (changed(f"{DUCK}.mask", ["#"]), r"objects\.hittable\[0\]: source: .*got circle and mask"),
     "object's key": (changed(f"{DUCK}.scal", 2), r"objects\.hittable\[0\]: key: .*got 'scal' .did you mean 'scale'"),
     "position with true": (changed(f"{DUCK}.position_xy", [True, 2]), r"hittable\[0\]: position_xy\[0\]: .*got True"),

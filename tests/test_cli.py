@@ -13,10 +13,11 @@ from pathlib import Path
 
 import cv2
 import jsonschema
+import numpy as np
 import pytest
 from test_record import lines_of, write_record
 
-from hitplanes import Disc, Rifle, ShotRecord, Spread, load_scene
+from hitplanes import Disc, Rifle, ShotRecord, Spread, load_scene, read_png, write_png
 from hitplanes.weapons.cli import starter
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.replay.record import hash_of
@@ -227,6 +228,113 @@ def test_new_makes_a_scene_that_reports_hits_occluded_and_missed(
     Path("shots.jsonl").write_text('{"weapon": "point", "at": [88, 60]}\n')
     assert main(["fire", "my range", "shots.jsonl"]) == 0
     assert capsys.readouterr().out.endswith("1 shots, 1 hit something, in hits.jsonl\n")
+
+
+def sprite_png(path: Path, rows: list[str], alpha: dict[str, int]) -> Path:
+    """A PNG of one colour with these alphas."""
+    pixels = np.array([[(200, 90, 40, alpha[letter]) for letter in row] for row in rows], np.uint8)
+    write_png(path, pixels)
+    return path
+
+
+def test_new_makes_a_scene_of_a_sprite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its opaque pixels are an object; the shot is at the one that is nearest to the middle."""
+    monkeypatch.chdir(tmp_path)
+    rows = ["..#####...", ".#.....#..", ".#..o..#..", "..#####..."]
+    given = sprite_png(tmp_path / "my tank.png", rows, {".": 0, "o": 127, "#": 128})
+    assert main(["new", "tank", "--from-image", str(given)]) == 0
+    assert capsys.readouterr().out == "a scene is in tank; now try: hitplanes report tank\n"
+    assert sorted(path.name for path in Path("tank").iterdir()) == ["my tank.png", "scene.json", "scene.schema.json"]
+    schema = json.loads(Path("tank/scene.schema.json").read_text())
+    jsonschema.validate(json.loads(Path("tank/scene.json").read_text()), schema)
+    scene = load_scene("tank")
+    assert (scene.name, scene.bounds, scene.ids().tolist()) == ("my tank", (0, 0, 9, 3), [0])
+    mask, corner = scene.mask(scene.find("my tank"))
+    assert corner == (1, 0) and ["".join(".#"[v] for v in row) for row in mask.tolist()] == [
+        row.replace("o", ".")[1:8] for row in rows
+    ]
+    assert (read_png("tank/my tank.png") == read_png(given)).all()
+    assert main(["report", "tank", "--json", "r.json"]) == 0
+    (shot,) = json.loads(Path("r.json").read_text())["shots"]
+    assert shot["at"] == [4, 0], "of the nearest to the middle at (4.5, 1.5) the first"
+    assert [(row["name"], row["pixels"]) for row in shot["rows"]] == [("my tank", 3)]
+
+
+def test_new_makes_a_scene_of_a_screenshot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the background, and a target stands in its middle."""
+    monkeypatch.chdir(tmp_path)
+    given = sprite_png(tmp_path / "level.png", ["#" * 40] * 32, {"#": 128})
+    assert main(["new", "level", "--from-image", "level.png"]) == 0
+    scene = load_scene("level")
+    assert scene.bounds == (0, 0, 39, 31) and scene.role([0, 1]).tolist() == ["background", "hittable"]
+    assert (read_png("level/level.png") == read_png(given)).all() and scene.position(1).tolist() == [19.5, 15.5]
+    assert scene.box(0).tolist() == [0, 0, 39, 31] and scene.name_of(1) == "target"
+    assert main(["report", "level", "--json", "r.json"]) == 0
+    (shot,) = json.loads(Path("r.json").read_text())["shots"]
+    assert [row["name"] for row in shot["rows"]] == ["target"] and shot["verdicts"]["empty"] > 20
+
+
+@pytest.mark.parametrize("rows", [["#"], ["#."], [".", "#"]], ids=repr)
+def test_the_smallest_pictures(tmp_path: Path, rows: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sprite_png(Path("a.png"), rows, {".": 0, "#": 255})
+    assert main(["new", "a", "--from-image", "a.png"]) == 0
+    assert main(["report", "a", "--json", "r.json"]) == 0
+    (shot,) = json.loads(Path("r.json").read_text())["shots"]
+    assert len(shot["rows"]) == 1
+
+
+@pytest.mark.parametrize("name", ["con.png", "a\\b.png", "scene.json", "x" * 197 + ".png", "\u202e.png", "noending"])
+def test_any_name_of_a_picture_makes_a_scene(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    sprite_png(Path("a.png"), ["#."], {".": 0, "#": 255}).rename(name)
+    assert main(["new", "a", "--from-image", name]) == 0
+    (image,) = Path("a").glob("*.png")
+    odd = name in ("con.png", "a\\b.png") or len(name) > 200
+    assert image.stem == load_scene("a").name == ("picture" if odd else Path(name).stem)
+
+
+def test_a_bad_picture_makes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("text.png").write_text("no picture")
+    sprite_png(Path("cut.png"), ["#." * 40] * 9, {".": 0, "#": 255})
+    Path("cut.png").write_bytes(Path("cut.png").read_bytes()[:-30])
+    sprite_png(Path("clear.png"), ["o."], {".": 0, "o": 127})
+    sprite_png(Path("good.png"), ["#."], {".": 0, "#": 255})
+    Path("full").mkdir()
+    Path("full/mine.txt").write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    for folder, picture, told in (
+        ("new", "none.png", "--from-image: "),
+        ("new", "full", "--from-image: "),
+        ("new", "text.png", "--from-image: 'text.png': "),
+        ("new", "cut.png", "--from-image: 'cut.png': "),
+        ("new", "clear.png", "--from-image: expected a picture with a pixel of alpha over 127, got alpha up to 127"),
+        ("full", "good.png", "folder: expected a new or empty folder"),
+    ):
+        assert main(["new", folder, "--from-image", picture]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"hitplanes: {told}") and error.count("\n") == 1, error
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("where", ["write_png", "write_text"])
+def test_an_interrupted_new_of_a_picture_leaves_nothing(
+    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given, write = sprite_png(tmp_path / "good.png", ["#."], {".": 0, "#": 255}), getattr(starter, where)
+
+    def interrupted(path: Path, data: object) -> None:
+        write(path, data)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(starter, where, interrupted)
+    assert main(["new", str(tmp_path / "new"), "--from-image", str(given)]) == 130
+    assert list(tmp_path.rglob("*")) == [given]
 
 
 def test_new_writes_into_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

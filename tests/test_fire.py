@@ -322,7 +322,8 @@ def some_volley(rng: random.Random, weapon: Weapon, places: list[tuple[float, fl
         shot = Shot(at, accept=rng.choice(BITS), blocked_by=rng.choice(BITS))
         shot.number = rng.choice([number, 2**40 + number])
         if rng.random() < 0.3:
-            shot.exclude = tuple(rng.randrange(items + 1) for _ in range(rng.randint(1, 2)))
+            drawn = (rng.randrange(items + 1) for _ in range(rng.randint(1, 2)))
+            shot.exclude = tuple(owner if owner < items else -1 for owner in drawn)
         if aimed:
             shot.aim = rng.randint(-30, 30) * 12.5
         else:

@@ -25,6 +25,7 @@ from hitplanes import (
     Box,
     Cone,
     Disc,
+    History,
     Hits,
     InputError,
     Laser,
@@ -42,6 +43,7 @@ from hitplanes import (
     Weapon,
     fire,
     prepare,
+    report_of,
 )
 from hitplanes.weapons.fire.hits import HitRow
 from hitplanes.weapons.kinds.areas import AreaWeapon
@@ -755,6 +757,47 @@ def test_bad_arguments(bad: dict[str, Any], message: str) -> None:
     arguments = {"weapon": Spread(Disc(1), 2, 1), "at": AT, **bad}
     with pytest.raises(InputError, match=message):
         fire(scene, arguments.pop("weapon"), arguments.pop("at"), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("exclude", "place"),
+    [(4, "[0][0]"), ([-1, 3, 9], "[2][0]"), ([[3, -1], [-1, -1], [0, 2**31]], "[2][1]"), ([[1, 4]], "[0][1]")],
+)
+def test_an_owner_that_never_was_is_an_error(exclude: object, place: str) -> None:
+    """The text names the first one, and the owners of the greatest ids."""
+    scene = Scene()
+    for name in ("duck", "can", "arm", "crow"):
+        scene.add(square(3), name=name, owner=0 if name == "arm" else None)
+    first = next(owner for owner in np.ravel(exclude).tolist() if owner > 3)  # type: ignore[call-overload]
+    told = f"exclude{place}: expected an owner that the scene has or had, got {first}; the nearest are "
+    with pytest.raises(InputError, match=re.escape(told + "0 'duck', 1 'can', 3 'crow'") + "$"):
+        fire(scene, Disc(1), [(0, 0)] * 3, exclude=exclude)
+    if place == "[0][0]":
+        with pytest.raises(InputError, match=re.escape(told)):
+            prepare(scene, Disc(1), exclude=exclude)
+        with pytest.raises(InputError, match=r"got 0; it never had any$"):
+            fire(Scene(), Disc(1), (0, 0), exclude=0)
+
+
+def test_an_owner_of_any_time_may_be_excluded() -> None:
+    """One that was removed, and in the past one that came later."""
+    scene = Scene()
+    scene.add(square(3))
+    history = History(scene)
+    history.record(0)
+    late = scene.add(square(3))
+    scene.remove(late)
+    past = history.at(0)
+    for at in (scene, past, scene.copy()):
+        assert fire(at, Disc(1), (0, 0), exclude=late).object.tolist() == [0]
+        assert not fire(at, Disc(1), (0, 0), exclude=[0, late, -1])
+    assert fire(history, Disc(1), (0, 0), exclude=late, tick=0).object.tolist() == [0]
+    assert report_of(past, [fire(past, Disc(1), (0, 0), exclude=late)])["shots"][0]["exclude"] == [
+        {"owner": 1, "name": "hittable 1"}
+    ]
+    for at in (past, history):
+        with pytest.raises(InputError, match=r"exclude\[0\]\[0\]: .* got 2; the nearest are 0 .*, 1 'hittable 1'"):
+            fire(at, Disc(1), (0, 0), exclude=2, tick=None if at is past else 0)
 
 
 @pytest.mark.parametrize("name", ["at", "aim", "toward", "accept", "exclude", "shot"])

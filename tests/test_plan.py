@@ -17,14 +17,36 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Box, Disc, History, Laser, Pistol, Point, Rifle, Scene, Spread, Sprite, Weapon, fire, report_of
+from hitplanes import (
+    Beam,
+    Box,
+    Cone,
+    Disc,
+    History,
+    Laser,
+    Pistol,
+    Point,
+    Polygon,
+    Rifle,
+    Ring,
+    Rounds,
+    Scene,
+    Spread,
+    Sprite,
+    Stencil,
+    Sweep,
+    Weapon,
+    fire,
+    prepare,
+    report_of,
+)
 from hitplanes.planes.bits import bit_rows, distance_field, front_to_back, label_plane, visible
 from hitplanes.planes.broadphase import boxes
 from hitplanes.planes.scene import items, render
 from hitplanes.weapons.fire import areas, call, prefilter, spans
 from hitplanes.weapons.fire import plan as plan_module
 from hitplanes.weapons.fire.hits import Hits
-from hitplanes.weapons.fire.plan import Plan, PlanSum, plan_lines
+from hitplanes.weapons.fire.plan import Plan, PlanSum, Stage, plan_lines
 from hitplanes.weapons.fire.prefilter import Candidates
 from hitplanes.weapons.kinds import weapon as weapon_module
 from hitplanes.weapons.kinds.weapon import PatternTable
@@ -411,6 +433,34 @@ def test_occluders_layers_and_filters_are_looked_up_only_where_there_are_any(mon
     unmet = yard()
     unmet.set(3, categories=0)
     assert "filter" not in names(fire(unmet, Disc(9), SHOTS))[1]
+
+
+AIMED: list[Weapon] = [
+    Pistol(40), Laser(40), Sweep(Pistol(40), 30, 3), Spread(Rifle(40), 3, 2), Cone(20, 40), Beam(20, 2), Box(4, 2),
+    Polygon([(0, 0), (9, 0), (0, 4)]), Stencil(["##", "#."]), Spread(Beam(9, 1), 2, 3), Rounds(Cone(9, 30), 2),
+]  # fmt: skip
+ROUND: list[Weapon] = [Point(), Disc(4), Ring(2, 4), Spread(Disc(2), 3, 5), Rounds(Spread(Point(), 2, 3), 2)]
+
+
+@pytest.mark.parametrize("weapon", [*AIMED, *ROUND], ids=repr)
+def test_a_weapon_that_is_not_aimed_says_once_where_it_fires(weapon: Weapon) -> None:
+    told = [Stage("aim", "none given, so to the right (0 degrees)")] if weapon in AIMED else []
+    scene = yard()
+    history = History(scene)
+    history.record(0)
+    history.record(1)
+    ready = prepare(scene, weapon)
+    unaimed = [
+        fire(scene, weapon, SHOTS), fire(scene, weapon, SHOTS[0]), ready.fire(SHOTS[0]), ready.fire(SHOTS[0], shot=3),
+        fire(history, weapon, SHOTS[:3], tick=[0, 1, 0]),
+    ]  # fmt: skip
+    for hits in unaimed:
+        assert [stage for stage in hits.plan.left_out if stage.name == "aim"] == told
+        assert sum("to the right" in line for line in plan_lines(hits.plan.timed())) == len(told)
+    straight = fire(scene, weapon, SHOTS, aim=0)
+    assert straight == unaimed[0]
+    for hits in (straight, fire(scene, weapon, SHOTS, toward=(9, 9)), ready.fire(SHOTS[0], 0)):
+        assert not hits.plan.has_left_out("aim")
 
 
 def test_what_was_left_out_is_told_of_the_scene_as_it_was() -> None:

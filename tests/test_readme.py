@@ -174,6 +174,28 @@ def test_golden_example_is_written_accepted_and_says_what_changed(
     assert code_ == 1 and "test_blast_behind_the_counter.json" in printed
 
 
+def test_golden_of_hits_alone_says_what_exceeds_its_tolerance(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A can that moves by 3 px exceeds 2, and a bullseye that moves elsewhere fails nothing."""
+    monkeypatch.setenv("COLUMNS", "200")
+    text = section(SHOT, "A golden of hits alone")
+    (code,), (told,) = blocks(text, "python"), blocks(text, "text")
+    (pytester.path / "test_cans.py").write_text(code)
+    shutil.copytree(ROOT / "fixtures" / "gallery", pytester.path / "level1")
+    scene = pytester.path / "level1" / "scene.json"
+    plain = scene.read_text()
+    assert pytester.runpytest_inprocess("-q", "-p", "no:cacheprovider", "--hits-update").ret == 0
+    for moved, ret in (
+        (plain.replace("[405.5, 212.5]", "[402.5, 212.5]"), 1),
+        (plain.replace("[58.5, 90.5]", "[49.5, 90.5]"), 0),
+    ):
+        assert moved != plain
+        scene.write_text(moved)
+        done = pytester.runpytest_inprocess("-q", "-p", "no:cacheprovider")
+        assert done.ret == ret and (told in done.stdout.str()) == bool(ret), done.stdout.str()
+
+
 def test_every_fixture_is_named() -> None:
     told = section(README, "Where things are")
     for path in (ROOT / "fixtures").glob("*/scene.json"):

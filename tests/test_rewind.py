@@ -379,6 +379,7 @@ def test_the_rate_at_which_it_is_recorded_changes_no_row() -> None:
         for weapon in (*PATTERNS, *RAYS):
             shots = volley(weapon, len(ticks), random.Random(every))
             shots["accept"] = [1] * len(ticks)
+            shots["exclude"] = [[owner if owner < 6 else -1 for owner in owners] for owners in shots["exclude"]]
             found, truth = (fire(history, weapon, tick=ticks, **shots) for history in (sparse, dense))
             assert found == truth
             alone = [

@@ -374,6 +374,8 @@ BAD = {
     b'{"weapon": "point", "at": [62, 86], "accept": null}': "accept: expected a list, got None",
     b'{"weapon": "point", "at": [62, 86], "accept": ["target", "target"]}': "accept: expected distinct names",
     b'{"weapon": "point", "at": [62, 86], "accept": ["tarket"]}': "did you mean 'target'?",
+    b'{"weapon": "point", "at": [62, 86], "Seeds": 3}': "did you mean 'seed'?",
+    b'{"wepon": "point", "at": [62, 86]}': "did you mean 'weapon'?",
     b'{"weapon": "point", "at": [62, 86], "blocked_by": 3}': "blocked_by: expected a list, got 3",
     b'{"weapon": "point", "at": [62, 86], "blocked_by": ["tarket"]}': "did you mean 'target'?",
     b'{"weapon": "point", "at": [62, 86], "exclude": [true]}': "exclude[0]: expected a whole number",

@@ -158,16 +158,22 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
     names = options if isinstance(options, tuple) else list(options)
     if isinstance(value, str) and value in names:
         return value
-    import difflib  # only an error needs it
-
-    near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else []
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    hint = suggestion(value, names)
     if not names:
         raise InputError(f"{field}: there is none to choose from, got {shown(value)}")
     listed = ", ".join(map(repr, names[:NAMES_SHOWN]))
     if len(names) > NAMES_SHOWN:
         listed += f" and {len(names) - NAMES_SHOWN} more"
     raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")
+
+
+def suggestion(value: object, names: Iterable[str]) -> str:
+    """Text that suggests the nearest name, in whatever case it was written; empty if none is near."""
+    import difflib  # only an error needs it
+
+    folded = {name.casefold(): name for name in names}
+    near = difflib.get_close_matches(value.casefold(), folded, n=1) if isinstance(value, str) else []
+    return f" (did you mean {folded[near[0]]!r}?)" if near else ""
 
 
 def path_of(field: str, value: object) -> Path:

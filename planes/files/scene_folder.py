@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.checks import Image, InputError, path_of, within
+from ..common.checks import Image, InputError, path_of, suggestion, within
 from ..common.limits import (
     ANGLE_STEPS_MAX,
     COST_MAX,
@@ -254,7 +254,10 @@ def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[s
     given = typed("object", entry, dict)
     kinds = [key for key in SOURCES if key in given]
     if len(kinds) != 1:
-        raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {' and '.join(kinds) or 'none'}")
+        unknown = [key for key in given if not kinds and not any(key in keys.forms for keys in OBJECT.values())]
+        hint = next(filter(None, (suggestion(key, SOURCES) for key in unknown)), "")
+        got = " and ".join(kinds or unknown) or "none"
+        raise InputError(f"source: expected one of {', '.join(SOURCES)}, got {got}{hint}")
     kind = kinds[0]
     data = OBJECT[kind].check("object", given)
     source = {key: given[key] for key in SOURCES[kind] if key in given}

@@ -133,21 +133,27 @@ class PastScene(Scene):
     ----------
     moment : the recorded or interpolated moment
     tick : its tick; between two recorded ticks a multiple of 1/256
+    latest : the scene that was recorded, as it is now
 
     Attributes
     ----------
     tick : as given
     """
 
-    def __init__(self, moment: Moment, tick: float) -> None:
+    def __init__(self, moment: Moment, tick: float, latest: Scene) -> None:
         super().__init__()
-        self.tick = tick
+        self.tick, self._latest = tick, latest
         self.name, self.categories, self._bounds, pickled, self.items = moment
         self.derived = Derived(self._bounds)
         try:
             self.weapons, self.shots = pickle.loads(pickled)
         except Exception as error:
             raise _not_plain(error) from error
+
+    @property
+    def latest(self) -> Scene:
+        """The scene that was recorded, as it is now."""
+        return self._latest
 
     def add(self, *_: Any, **__: Any) -> NoReturn:
         """Refuse: the past has what it had."""
@@ -259,7 +265,7 @@ class History:
             at = self._checked(tick)
             scene = self._views.get(at)
             if scene is None:
-                scene = self._views[at] = PastScene(self._moment(at), int(at) if at.is_integer() else at)
+                scene = self._views[at] = PastScene(self._moment(at), int(at) if at.is_integer() else at, self.scene)
             self._read = scene
             return scene
 

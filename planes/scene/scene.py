@@ -137,6 +137,11 @@ class Scene:
         """Number of the last change; an answer from another version is stale."""
         return self.items.version
 
+    @property
+    def latest(self) -> Scene:
+        """The scene that may still change: itself, or for a scene of the past the one that was recorded."""
+        return self
+
     def __len__(self) -> int:
         return int(self.items.alive[: self.items.count].sum())
 

@@ -30,7 +30,7 @@ from ..report.differences import differences
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
 from .schemas import read_report
-from .starter import write_starter
+from .starter import FROM_IMAGE, write_from_picture, write_starter
 
 DESCRIPTION = "Find out what a shot hits in a 2-D scene, pixel by pixel and exactly, and see why."
 
@@ -71,12 +71,17 @@ examples:
 
 NEW_HELP = """\
 Write a small example scene: scene.json and the images that it names. FOLDER must be new or empty.
+
+With --from-image the scene is made of a PNG of your own, and is as large as it. If it has transparent pixels, as a
+sprite has, its opaque pixels (alpha over 127) are one object that can be hit. Else, as a screenshot, it is the
+background, and a round target stands in its middle: put what can be hit in its place. A first shot is there.
 """
 
 NEW_EXAMPLES = """\
 examples:
   hitplanes new range
   hitplanes report range
+  hitplanes new tank --from-image sprites/tank.png
 """
 
 COMPARE_HELP = """\
@@ -272,6 +277,7 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument("--plan", action="store_true", help=text)
     sub = _command(commands, new, "write a small scene to start from", NEW_HELP, NEW_EXAMPLES)
     sub.add_argument("folder", type=Path, metavar="FOLDER", help="folder to create; its parent must exist")
+    sub.add_argument(FROM_IMAGE, type=Path, metavar="PICTURE", help="make the scene of this PNG")
     sub = _command(commands, compare, "print and draw how two reports differ", COMPARE_HELP, COMPARE_EXAMPLES)
     sub.add_argument("expected", type=Path, metavar="A.json", help="first report, written by report --json")
     sub.add_argument("got", type=Path, metavar="B.json", help="second report")
@@ -433,7 +439,10 @@ def study(arguments: argparse.Namespace) -> None:
 
 def new(arguments: argparse.Namespace) -> None:
     """Write a scene to start from, and print the next command to try."""
-    write_starter(arguments.folder)
+    if arguments.from_image is None:
+        write_starter(arguments.folder)
+    else:
+        write_from_picture(arguments.folder, arguments.from_image)
     _say(f"a scene is in {arguments.folder}; now try: hitplanes report {shlex.quote(str(arguments.folder))}")
 
 

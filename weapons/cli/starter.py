@@ -1,4 +1,7 @@
-"""The example scene that `hitplanes new` writes, with images drawn by code and a hit, a hidden and a missed target."""
+"""The scenes that `hitplanes new` writes.
+
+One is an example, with images drawn by code and a hit, a hidden and a missed target. The other is made of a picture.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.common.checks import Bools, Floats, Image, path_of
-from hitplanes.planes.common.tables import Mask
-from hitplanes.planes.files.png import write_png, write_text
+from hitplanes.planes.common.checks import Bools, Floats, Image, InputError, path_of
+from hitplanes.planes.common.limits import ALPHA_THRESHOLD
+from hitplanes.planes.common.tables import Mask, inside
+from hitplanes.planes.files.png import read_png, write_png, write_text
 from hitplanes.planes.files.scene_folder import FILE_NAME, laid_out, new_folder
 
 SCHEMAS = Path(__file__).parent.parent / "schemas"
+
+FROM_IMAGE = "--from-image"
+"""Option of the command that names a picture."""
 
 WIDTH, HEIGHT = 320, 180
 Color = tuple[int, int, int]
@@ -67,19 +74,64 @@ SCORE = (
 
 
 def write_starter(folder: Path) -> None:
-    """Write the scene into a new or empty folder.
+    """Write the example scene into a new or empty folder."""
+    draw = {"meadow": _meadow, "balloon": _balloon, "bullseye": _bullseye, "crate": _crate, "ground": _ground}
+    _write(folder, SCENE, {f"{name}.png": image() for name, image in {**draw, "score": _score}.items()})
+
+
+def write_from_picture(folder: Path, picture: Path) -> None:
+    """Write a scene of a picture, with a first shot, into a new or empty folder.
+
+    A picture with transparent pixels becomes one object that can be hit: its opaque pixels. Any other becomes the
+    background of a round target. The bounds of the scene are those of the picture.
+
+    Raises
+    ------
+    InputError
+        If the picture is not a PNG, or has no opaque pixel; or if the folder is not new or empty.
+    """
+    image = read_png(picture, FROM_IMAGE)
+    height, width = image.shape[:2]
+    opaque = image[:, :, 3] > ALPHA_THRESHOLD
+    if not opaque.any():
+        got = f"alpha up to {image[:, :, 3].max()} of 255"
+        raise InputError(f"{FROM_IMAGE}: expected a picture with a pixel of alpha over {ALPHA_THRESHOLD}, got {got}")
+    name, middle, radius = _name_of(picture), [(width - 1) / 2, (height - 1) / 2], max(min(width, height) // 8, 1)
+    placed = {"name": name, "image": f"{name}.png", "position_xy": middle}
+    if opaque.all():
+        target = {"name": "target", "circle": radius, "color": list(RED), "position_xy": middle}
+        objects, at = {"background": [placed], "hittable": [target]}, [middle[0] + radius, middle[1]]
+    else:
+        x, y = (np.arange(side, dtype=np.float32) - at for side, at in zip((width, height), middle, strict=True))
+        far2 = np.where(opaque, y[:, None] ** 2 + x**2, np.float32(np.inf))
+        at = [*divmod(int(far2.argmin()), width)][::-1]
+        objects = {"hittable": [placed]}
+    scene = {key: SCENE[key] for key in ("$schema", "format")}
+    scene |= {"name": name, "bounds": {"origin_xy": [0, 0], "size_wh": [width, height]}, "objects": objects}
+    scene |= {"weapons": {"blast": {"kind": "disc", "radius": radius}}, "shots": [{"weapon": "blast", "at": at}]}
+    _write(folder, scene, {f"{name}.png": image})
+
+
+def _name_of(picture: Path) -> str:
+    """Name of a picture's file without its ending, or "picture" if that is no file name on every system."""
+    try:
+        return inside("name", f"{picture.stem}.png").removesuffix(".png")
+    except InputError:
+        return "picture"
+
+
+def _write(folder: Path, scene: dict[str, Any], images: dict[str, Image]) -> None:
+    """Write a scene and its images into a new or empty folder.
 
     scene.json is written last, so an incomplete scene cannot be loaded. An error or an interrupt removes all files.
     """
-    draw = {"meadow": _meadow, "balloon": _balloon, "bullseye": _bullseye, "crate": _crate, "ground": _ground}
-    images = {f"{name}.png": image() for name, image in {**draw, "score": _score}.items()}
     folder = path_of("folder", folder)
     with new_folder(folder) as files:
         files += [folder / name for name in (FILE_NAME, SCHEMA_NAME, *images)]
         for name, image in images.items():
             write_png(folder / name, image)
         write_text(folder / SCHEMA_NAME, (SCHEMAS / "scene.json").read_text(encoding="utf-8"))
-        write_text(folder / FILE_NAME, laid_out(SCENE) + "\n")
+        write_text(folder / FILE_NAME, laid_out(scene) + "\n")
 
 
 def _clear(width: int, height: int) -> tuple[Image, Floats, Floats]:

@@ -20,7 +20,7 @@ from ..kinds.placements import Fired, Places, Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import request_of, verdicts_by_spans, verdicts_by_tiles
 from .hits import Hits, Rows
-from .plan import Plan, leave_out_unused, read_stack
+from .plan import Plan, leave_out_unused, read_stack, unaimed
 from .prefilter import may_refuse, prefilter_of
 from .spans import QueryContext
 from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
     from ..rays.ray_hits import RayHits
+
+OWNERS_NAMED = 3
+"""Most owners that an error names: those of the greatest ids, which are nearest to one that is too great."""
 
 
 @overload
@@ -64,7 +67,7 @@ def fire(
     accept : category names or bits of the objects that may be hit; all by default
     blocked_by : category names or bits of the occluders that block; all by default, and none for [] or 0
     exclude : owners whose items are skipped, such as the shooter: a number, or for one shot a list (K,); for a batch
-        (N,), (N, K), or (1, K) for all shots, padded with -1
+        (N,), (N, K), or (1, K) for all shots, padded with -1. They are ids of objects that the scene has or had.
     seed : seed of the pellets, 0 .. 2**64 - 1
     shot : numbers of the shots, 0 .. N-1 by default; a shot fired again alone under its number has the same pellets
     tick : time of each shot, if `scene` is a History
@@ -93,7 +96,11 @@ def fire(
     present = scene if isinstance(scene, Scene) else _history(scene).scene
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
+    if exclude is not None:
+        check_owners(present, shots)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
+    if aim is None and toward is None:
+        plan.leave_out_all(unaimed, weapon)
     if not isinstance(scene, Scene):
         return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
     if tick is not None:
@@ -192,3 +199,16 @@ def category_bits(scene: Scene, field: str, value: object) -> object:
     if isinstance(names, list | tuple) and all(isinstance(name, str) for name in names):
         return scene.category_bits(*names, field=field)
     return value
+
+
+def check_owners(scene: Scene, shots: Shots) -> None:
+    """Check that each excluded owner is the id of an object that a scene has or had, or -1."""
+    items = scene.latest.items
+    if shots.last_owner < items.count:
+        return
+    row, column = np.argwhere(shots.exclude >= items.count)[0].tolist()
+    owners = [owner for owner in np.unique(items.owner[: items.count]).tolist() if items.names[owner]]
+    near = ", ".join(f"{owner} {items.names[owner]!r}" for owner in owners[-OWNERS_NAMED:])
+    known = f"the nearest are {near}" if near else "it never had any"
+    got = shots.exclude[row, column]
+    raise InputError(f"exclude[{row}][{column}]: expected an owner that the scene has or had, got {got}; {known}")

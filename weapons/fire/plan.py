@@ -11,6 +11,8 @@ from typing import Any
 from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
 
+from ..kinds.areas import is_directed
+from ..kinds.weapon import Weapon
 from .prefilter import BOX, Candidates
 
 READING = threading.RLock()
@@ -245,6 +247,12 @@ def _unused(
     if way != "labels":
         yield "label plane", f"{way} needs none"
     yield from _undrawn(imagery)
+
+
+def unaimed(weapon: Weapon) -> Iterator[tuple[str, str]]:
+    """The direction of a call that has neither aim nor toward, if its weapon has one."""
+    if is_directed(weapon):
+        yield "aim", "none given, so to the right (0 degrees)"
 
 
 def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, choosy: bool) -> None:

@@ -76,7 +76,16 @@ class HitsGolden:
     def __repr__(self) -> str:
         return f"<hits_golden of {self._item.name}>"
 
-    def __call__(self, hits: Hits, *, name: str | None = None, planes: Mapping[str, object] | None = None) -> None:
+    def __call__(
+        self,
+        hits: Hits,
+        *,
+        name: str | None = None,
+        planes: Mapping[str, object] | None = None,
+        only: str | None = None,
+        tolerance_pixels: int = 0,
+        tolerance_px: int = 0,
+    ) -> None:
         """Fail unless the hits, the planes of their scene and their picture equal the accepted ones.
 
         Parameters
@@ -84,21 +93,31 @@ class HitsGolden:
         hits : returned by `fire`; the scene must not have changed since
         name : needed if a test has several goldens
         planes : further arrays (h, w) or (h, w, channels) to compare exactly, by name
+        only : "hits" keeps and compares nothing but the rows of hits: which objects each shot hit, and which pixels
+        tolerance_pixels : of hits alone, most pixels by which the number of hit pixels of an object may differ
+        tolerance_px : of hits alone, farthest that the first hit pixel of an object may move, px
 
         Raises
         ------
         InputError
-            If an argument is wrong, or the test has used the name before.
+            If the scene has changed since the shots; then if an argument is wrong, or the test has used the name
+            before.
         """
         __tracebackhide__ = True
         from .check import Call, safe_name, settle
+        from .file import check_present
+        from .hits_alone import tolerance_of
 
+        check_present(hits)
+        tolerance = tolerance_of(only, tolerance_pixels, tolerance_px)
         self._take(name)
         item, config = self._item, self._item.config
         inside = item.nodeid.partition("::")[2]
         base = item.path.parent / GOLDENS / item.path.stem / safe_name(inside, name)
         here, update = config.invocation_params.dir, bool(config.getoption("hits_update"))
-        call = Call(item.nodeid, f"{item.path.name}::{inside}", name, base, config.rootpath, here, update)
+        call = Call(
+            item.nodeid, f"{item.path.name}::{inside}", name, base, config.rootpath, here, update, only, tolerance
+        )
         outcome = settle(call, hits, {} if planes is None else planes)
         record = {"golden": str(base), "outcome": outcome.kind, "failure": outcome.failure}
         item.stash.setdefault(RECORDS, []).append(record)

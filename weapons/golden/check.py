@@ -26,7 +26,7 @@ from hitplanes.planes.scene.render import plane_objects
 from hitplanes.planes.scene.scene import Scene
 
 from ..report.canvas import enlarged
-from ..report.picture import picture_of_difference
+from ..report.picture import picture_of_difference, picture_of_report
 from .file import (
     SCENE_PLANES,
     DamagedGoldenError,
@@ -39,6 +39,7 @@ from .file import (
     read_golden,
     unlike,
 )
+from .hits_alone import EXACT, Tolerance, reports_of_hits
 
 RED = (255, 40, 40)
 """Colour of pixels that differ."""
@@ -89,9 +90,16 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
     -------
     rows of pictures for the page
     """
-    write_png(folder / "got.png", got.picture)
-    if expected is None:
-        return [[("got", "got.png")]]
+    picture = got.picture
+    if picture is None:
+        assert got.whole is not None and got.scene is not None  # golden_of has made it
+        picture = picture_of_report(got.whole, got.scene, text=False)
+    write_png(folder / "got.png", picture)
+    if expected is None or expected.picture is None or got.picture is None:
+        told = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
+        if told and changed.hits:
+            write_png(folder / COMPARED, picture_of_difference(told[0], told[1], (got.scene, got.scene)))
+        return [[("hits: expected, got, difference", COMPARED)]] * bool(told and changed.hits) + [[("got", "got.png")]]
     write_png(folder / "expected.png", expected.picture)
     rows: list[Row] = []
     if changed.hits:
@@ -365,6 +373,8 @@ class Call:
     root : folder to which the paths of tests are relative
     here : folder to which printed paths are relative
     update : whether to write a golden that is missing or differs
+    only : "hits" for hits alone, None for the whole answer
+    tolerance : how much the rows of hits alone may differ
     """
 
     node: str
@@ -374,6 +384,8 @@ class Call:
     root: Path
     here: Path
     update: bool
+    only: str | None = None
+    tolerance: Tolerance = EXACT
 
     def shown(self, path: Path) -> str:
         """Return a path as it is printed."""
@@ -413,11 +425,11 @@ def settle(call: Call, hits: object, planes: Mapping[str, object]) -> Outcome:
     InputError
         If the hits or the planes are of a wrong type.
     """
-    got = golden_of(hits, planes, call.test, call.name)
+    got = golden_of(hits, planes, call.test, call.name, call.only)
     expected, changed, ours = None, None, True
     try:
         expected = read_golden(call.base)
-        changed = unlike(expected, got) if expected else None
+        changed = unlike(expected, got, call.tolerance) if expected else None
         lines = ["there is no golden of these hits yet"] if changed is None else changed.lines
     except DamagedGoldenError as error:
         lines = [str(error)]

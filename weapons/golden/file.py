@@ -1,6 +1,7 @@
 """Read, compare and write goldens: the hits that a test accepted.
 
-A golden is `<name>.json` (the report), `<name>.npz` (whole planes) and `<name>.png` (the picture without text).
+A golden is `<name>.json` (the report), `<name>.npz` (whole planes) and `<name>.png` (the picture without text). One of
+hits alone is a `<name>.json` without the parts of the report that what lies near may change.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from ..fire.hits import Hits
 from ..report.differences import decisive, differences
 from ..report.picture import picture_of_report
 from ..report.report import report_of
+from .hits_alone import EXACT, HITS, Tolerance, hits_alone, hits_unlike
 
 FORMAT = "hitplanes-golden/1"
 
@@ -74,8 +76,10 @@ class Golden:
     planes : planes (h, w) or (h, w, channels) by name: those of the scene, then the user's
     origin_xy : pixel of the world at [0, 0] of the scene's planes
     left_out : why the scene's planes are not stored, or None
-    picture : (h, w, 3 or 4) bytes, without text
+    picture : (h, w, 3 or 4) bytes, without text; None for hits alone
+    only : "hits" if there is nothing but the rows of hits, else None
     scene : scene that was fired at, for texts and pictures; not stored
+    whole : the whole report, for pictures; not stored
     """
 
     test: str
@@ -84,8 +88,10 @@ class Golden:
     planes: dict[str, Plane]
     origin_xy: tuple[int, int]
     left_out: str | None
-    picture: Image
+    picture: Image | None
+    only: str | None = None
     scene: Scene | None = None
+    whole: dict[str, Any] | None = None
 
     def text(self) -> str:
         """Return the JSON, laid out so that texts compare well."""
@@ -94,6 +100,7 @@ class Golden:
             "format": FORMAT,
             "test": self.test,
             "name": self.name,
+            **({} if self.only is None else {"only": self.only}),
             "planes": arrays,
             "origin_xy": list(self.origin_xy),
             "left_out": self.left_out,
@@ -103,9 +110,11 @@ class Golden:
 
     def write(self, base: Path, changed: Unlike | None = None) -> None:
         """Write the files whose parts have changed, by default all; the JSON is written last."""
-        if changed is None or changed.planes:
+        if changed is None or changed.kept or changed.planes:
             _write_planes(_file(base, "npz"), self.planes)
-        if changed is None or changed.picture:
+        if self.picture is None:
+            _file(base, "png").unlink(missing_ok=True)
+        elif changed is None or changed.kept or changed.picture:
             write_png(_file(base, "png"), self.picture)
         text, path = self.text(), _file(base, "json")
         if changed is None or not path.is_file() or path.read_text(encoding="utf-8") != text:
@@ -114,31 +123,57 @@ class Golden:
 
 @dataclass(frozen=True)
 class Unlike:
-    """Differences between a golden and the hits got, as lines about the hits, each plane and the picture."""
+    """Differences between a golden and the hits got, as lines about the hits, what is kept, each plane, the picture."""
 
     hits: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
     planes: dict[str, list[str]] = field(default_factory=dict)
     picture: list[str] = field(default_factory=list)
 
     @property
     def lines(self) -> list[str]:
         """All lines in printable form, hits first."""
-        every = [*self.hits, *(line for lines in self.planes.values() for line in lines), *self.picture]
+        every = [*self.hits, *self.kept, *(line for lines in self.planes.values() for line in lines), *self.picture]
         return list(map(printable, every))
 
 
-def golden_of(hits: object, planes: object, test: str, name: str | None) -> Golden:
-    """Make a golden of hits and the user's planes.
+def check_present(hits: object) -> Hits:
+    """Check that hits are Hits, and that their scene is as it was when they were fired.
+
+    Raises
+    ------
+    InputError
+        Naming what has changed.
+    """
+    if not isinstance(hits, Hits):
+        raise InputError(f"hits: expected Hits, as fire returns them, got {type(hits).__name__}")
+    scene = hits.scene
+    if hits.version == scene.version:
+        return hits
+    ids = scene.items.changed_ids(hits.version)
+    names = [] if ids is None else [f"{item} {json.dumps(scene.name_of(item))}" for item in ids[:CHANGED_MAX].tolist()]
+    more = f" and {len(ids) - CHANGED_MAX} more" if ids is not None and len(ids) > CHANGED_MAX else ""
+    changed = f": changed since: object {', '.join(names)}{more}" if names else ""
+    versions = f"at version {hits.version}, as it was fired at, got {scene.version}"
+    raise InputError(f"hits: expected the scene {versions}{changed}: fire again, or compare before it changes")
+
+
+def golden_of(hits: object, planes: object, test: str, name: str | None, only: str | None = None) -> Golden:
+    """Make a golden of hits and the user's planes, or of hits alone.
 
     Raises
     ------
     InputError
         If `hits` or a plane is of a wrong type, or the scene has changed since the shots.
     """
-    if not isinstance(hits, Hits):
-        raise InputError(f"hits: expected Hits, as fire returns them, got {type(hits).__name__}")
+    hits = check_present(hits)
     scene = hits.scene
     report = report_of(scene, [hits])
+    if only is not None:
+        if planes:
+            raise InputError(f"planes: expected none with only={only!r}, got {len(_own_planes(planes))}")
+        part = json.loads(json.dumps(hits_alone(report)))
+        return Golden(test, name, part, {}, (0, 0), None, None, only, scene, report)
     kept, origin_xy, left_out = _scene_planes(scene)
     return Golden(
         test,
@@ -148,7 +183,7 @@ def golden_of(hits: object, planes: object, test: str, name: str | None) -> Gold
         origin_xy,
         left_out,
         picture_of_report(report, scene, text=False),
-        scene,
+        scene=scene,
     )
 
 
@@ -169,6 +204,9 @@ def read_golden(base: Path) -> Golden | None:
         report = dict(data["report"])
         for shot in report["shots"]:
             shot.setdefault("blocked_by", shot["accept"])  # before there were two filters, one was both
+        only = data.get("only")
+        part = hits_alone(report)
+        hits_unlike(part, part, Tolerance(1))  # a damaged part fails here, and not when it is compared
         return Golden(
             data["test"],
             data["name"],
@@ -176,16 +214,23 @@ def read_golden(base: Path) -> Golden | None:
             planes,
             (int(data["origin_xy"][0]), int(data["origin_xy"][1])),
             data["left_out"],
-            _read_picture(_file(base, "png")),
+            None if only == HITS else _read_picture(_file(base, "png")),
+            only,
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
         if isinstance(error, DamagedGoldenError):
             raise
         raise DamagedGoldenError(f"{path}: expected a golden, got one that is damaged: {error!r:.80}") from error
 
 
-def unlike(expected: Golden, got: Golden) -> Unlike:
-    """Compare two goldens exactly."""
+def unlike(expected: Golden, got: Golden, tolerance: Tolerance = EXACT) -> Unlike:
+    """Compare two goldens, of hits alone with a tolerance, and else exactly."""
+    if expected.only is not None or got.only is not None:
+        lines = hits_unlike(hits_alone(expected.report), hits_alone(got.report), tolerance)
+        kept = [
+            "the whole answer" if side.only is None else f"hits alone (only={side.only!r})" for side in (expected, got)
+        ]
+        return Unlike(lines, [] if kept[0] == kept[1] else [f"the golden keeps {kept[0]}, the test asks for {kept[1]}"])
     planes: dict[str, list[str]] = {}
     if expected.left_out != got.left_out:
         planes["scene"] = [f"planes of the scene: {got.left_out or 'kept'}, was {expected.left_out or 'kept'}"]
@@ -195,7 +240,9 @@ def unlike(expected: Golden, got: Golden) -> Unlike:
         lines = _plane_lines(name, expected.planes.get(name), got)
         if lines:
             planes[name] = lines
-    return Unlike(differences(expected.report, got.report), planes, _picture_lines(expected.picture, got.picture))
+    assert expected.picture is not None and got.picture is not None  # only hits alone have none
+    picture = _picture_lines(expected.picture, got.picture)
+    return Unlike(differences(expected.report, got.report), planes=planes, picture=picture)
 
 
 def pixels_unlike(was: Plane, now: Plane) -> Bools:

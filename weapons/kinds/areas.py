@@ -406,6 +406,12 @@ def has_no_range(weapon: Weapon) -> bool:
     return parts is not None and parts[2].length_256 is None
 
 
+def is_directed(weapon: Weapon) -> bool:
+    """Whether what a weapon hits depends on its aim."""
+    area, ray = _parts_of(weapon)
+    return ray is not None or (area is not None and area[2].directed)
+
+
 def pierces(weapon: Weapon) -> bool:
     """Whether the samples of a weapon go on through objects."""
     return parts_of(weapon)[2].pierce

@@ -215,6 +215,12 @@ class Shots:
         """Owners (N, K) that are passed over, -1 for none."""
         return _spread(self._exclude, len(self))
 
+    @property
+    def last_owner(self) -> int:
+        """Greatest number of an owner that is passed over; -1 if there is none."""
+        given = self._exclude
+        return max(given, default=-1) if isinstance(given, tuple) else int(given.max(initial=-1))
+
     @cached_attribute
     def number(self) -> Ints:
         """Shot numbers (N,), for the draws."""

@@ -19,7 +19,7 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow, Hits, Rows, rows_of_span_hits
-from ..fire.plan import Plan
+from ..fire.plan import Plan, unaimed
 from ..fire.prefilter import Candidates
 from ..fire.spans import QueryContext, SpanHits, direct
 from ..kinds.areas import parts_of, pierces
@@ -155,6 +155,8 @@ class Answer(Hits):
         """Plan of the shot."""
         plan = Plan()
         plan.run("prepared", "looked up; the stages after it ran when they were asked for")
+        if self._told[:2] == (None, None):
+            plan.leave_out_all(unaimed, self.weapon)
         return plan
 
 

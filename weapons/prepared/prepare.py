@@ -17,7 +17,7 @@ from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.call import category_bits, fire
+from ..fire.call import category_bits, check_owners, fire
 from ..fire.hits import Hits
 from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
 from ..kinds.placements import Angles, Filtered, Places, Wholes, accepted_of, blocking_of, checked_shots
@@ -274,6 +274,8 @@ def prepare(
     toward = (1, 0) if has_no_range(weapon) else None
     bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
     shots = checked_shots(weapon, (0, 0), None, toward, *bits, exclude, seed, None)
+    if exclude is not None:
+        check_owners(scene, shots)
     kept = Filter(int(shots.meets[0]), shots.exclude, int(shots.seed[0]))
     parts = ray_parts_of(weapon)
     if parts is not None:

@@ -23,7 +23,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..explain.samples import Samples, Share, detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import HitRow, Hits
-from ..kinds.areas import parts_of, ray_parts_of
+from ..kinds.areas import is_directed, parts_of, ray_parts_of
 from ..kinds.placements import placements_for
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
@@ -385,9 +385,8 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "seed": int(shots.seed[row]),
         "accept": None if accept == ALL else scene.category_names(accept),
         "blocked_by": None if blocked_by == ALL else scene.category_names(blocked_by),
-        "exclude": [  # the scene need not have an owner, because owners are arbitrary ids
-            {"owner": owner, "name": scene.name_of(owner) if owner < scene.items.count else f"id {owner}"}
-            for owner in owners
+        "exclude": [  # a scene of the past need not have an owner yet; an id of a file may have no name
+            {"owner": owner, "name": scene.latest.name_of(owner) or f"id {owner}"} for owner in owners
         ],
         "verdicts": hits.verdict_counts(row),
         "rows": _rows(scene, hits, row, margins),
@@ -517,7 +516,7 @@ def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
 
 def _degrees(hits: Hits, row: int) -> float | None:
     """Aim of a shot, rounded to a millionth of a degree; None if its weapon has no direction."""
-    if not isinstance(hits, RayHits) and not parts_of(hits.weapon)[2].directed:
+    if not is_directed(hits.weapon):
         return None
     c, s = hits.shots.direction[row].tolist()
     return round(math.degrees(math.atan2(s, c)), 6) + 0.0
