@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from .explain import owners as owners
     from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
     from .explain import samples as samples
     from .rays import ray_call as ray_call
 
 _PLACES = {
+    "owners": "explain.owners",
     "ray_call": "rays.ray_call",
     "ray_margins": "explain.ray_margins",
     "ray_samples": "explain.ray_samples",

@@ -51,7 +51,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 VALUES = {"ALL": "All categories: the default of `accept`.", "__version__": "The installed version, a text."}
 RESULTS = {
-    "hitplanes.weapons.fire.hits": ("HitRow", "OwnerRow"),
+    "hitplanes.weapons.explain.owners": ("OwnerRow",),
+    "hitplanes.weapons.fire.hits": ("HitRow",),
     "hitplanes.weapons.explain.samples": ("Samples", "Share", "Blocked", "Behind", "WhyNot", "Margin"),
     "hitplanes.weapons.explain.ray_samples": ("Miss",),
     "hitplanes.weapons.rays.ray_hits": ("Passes", "Stops"),

@@ -16,12 +16,9 @@ from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, each_pixel
 from hitplanes.planes.scene.items import Stack
-from hitplanes.planes.scene.scene import Scene
 
-from ..fire.plan import Plan
-from ..fire.prefilter import Candidates, pairs_of, refused
+from ..fire.prefilter import pairs_of, refused
 from ..fire.spans import QueryContext, direct
-from ..kinds.areas import pierces
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
 
@@ -182,9 +179,9 @@ def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
     return Behind(int(detail.stack.ids[rank]), len(samples), (int(x[nearest]), int(y[nearest])))
 
 
-def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
+def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; the visible pixels of an object are counted once for each filter."""
-    stack = scene.items.stack()
+    stack = context.stack
     visible: dict[tuple[object, ...], int] = {}
     shares = []
     in_round: dict[int, Ints] = {}
@@ -192,14 +189,13 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
         rank = int(stack.rank_of[row.object])
         key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
-            visible[key] = _visible(scene, rank, pierces(weapon), shots.take(row.shot, row.shot + 1))
+            visible[key] = _visible(context, rank, shots.take(row.shot, row.shot + 1))
         if row.shot not in in_round:
             placements = placements_for(weapon, shots.take(row.shot, row.shot + 1))
             in_round[row.shot] = np.bincount(placements.round, placements.count).astype(np.int64)
         fired = int(in_round[row.shot][row.round])
-        shares.append(
-            Share(row.samples / fired, row.pixels / visible[key], row.pixels / scene.items.variants[row.object].area)
-        )
+        area = int(np.count_nonzero(stack.mask(rank)))
+        shares.append(Share(row.samples / fired, row.pixels / visible[key], row.pixels / area))
     return shares
 
 
@@ -215,9 +211,9 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
 
 
 # house: hit rule of areas
-def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
+def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
-    stack, bounds = scene.items.stack(), scene.bounds
+    stack, bounds = context.stack, context.bounds
     placements = placements_for(weapon, shots)
     if int(placements.count.sum()) > DETAIL_SAMPLES_MAX:
         got = int(placements.count.sum())
@@ -225,7 +221,7 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
     runs = placements.table.laid(placements.pattern, placements.xy[:, 0], placements.xy[:, 1], placements.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
     pairs = pairs_of(placements.boxes, placements.shot, shots, stack)
-    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP)
+    events, state = walk(runs, pairs, stack, context.pierce, HIT | BLOCK | SKIP)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
     ended = rank.copy()
@@ -233,7 +229,7 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
         told = events.take(np.flatnonzero(events.kind == kind)[::-1])
         event, column = each_pixel(told.x_first, told.x_last)
         rank[start[told.run][event] + column] = told.rank[event]
-        if kind == BLOCK or (kind == HIT and not pierces(weapon)):
+        if kind == BLOCK or (kind == HIT and not context.pierce):
             ended[start[told.run][event] + column] = told.rank[event]
     verdict = VERDICT_OF[state]
     if bounds is not None:
@@ -291,15 +287,15 @@ def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     return least
 
 
-def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> int:
+def _visible(context: QueryContext, rank: int, shot: Shots) -> int:
     """Number of pixels of an object that a pattern covering everything would hit."""
-    stack = scene.items.stack()
+    stack = context.stack
     spans = spans_of(stack, rank)
     zero = np.zeros(len(spans), np.int64)
     runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
     pairs = pairs_of(stack.box_xyxy[rank][None], zero[:1], shot, stack)
-    events, _ = walk(runs, pairs, stack, pierce, HIT)
-    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, scene.bounds)
+    events, _ = walk(runs, pairs, stack, context.pierce, HIT)
+    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, context.bounds)
     return int((own.x_last - own.x_first + 1).sum())
 
 
@@ -328,7 +324,7 @@ class Margin(NamedTuple):
         return self.distance <= FRAGILE_PX
 
 
-def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
+def margins_of(context: QueryContext, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
     """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
 
     Parameters
@@ -339,9 +335,7 @@ def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) 
     -------
     margins, sorted by (shot, object)
     """
-    stack = scene.items.stack()
-    context = QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
-    found = []
+    stack, found = context.stack, []
     for row in range(len(shots) if len(stack) else 0):
         still, flips = _flips(placements_for(weapon, shots.take(row, row + 1)), shots.take(row, row + 1), context)
         for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):

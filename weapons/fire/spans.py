@@ -23,8 +23,11 @@ from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES
 from hitplanes.planes.grid.spans import Box, merged_runs, pieces
 from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.scene.scene import Scene
 
+from ..kinds.areas import pierces
 from ..kinds.placements import Placements, Shots
+from ..kinds.weapon import Weapon
 from .plan import Plan
 from .prefilter import Candidates, kinds, may_refuse, refused
 
@@ -41,6 +44,11 @@ class QueryContext:
     pierce: bool
     candidates: Candidates
     plan: Plan
+
+
+def context_of(scene: Scene, stack: Stack, weapon: Weapon) -> QueryContext:
+    """What shots of a weapon were tested against: a stack of the scene, which may have changed since."""
+    return QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan())
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..explain.samples import detail_of
 from ..fire.call import fired as fire_checked
-from ..fire.hits import HitRow, Hits
+from ..fire.hits import BEFORE, HitRow, Hits
+from ..fire.spans import context_of
 from ..kinds.areas import parts_of, ray_parts_of
 from ..kinds.placements import placements_for
 from ..rays.contacts import Reason, rays_of
@@ -72,8 +73,9 @@ def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
                 yield cells.xy[walked], cells.verdict[walked]
             continue
         step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
+        context = context_of(hits.scene, hits.scene.items.stack(), hits.weapon)
         for first in range(0, len(hits.shots), step):
-            detail = detail_of(hits.scene, hits.weapon, hits.shots.take(first, first + step))
+            detail = detail_of(context, hits.weapon, hits.shots.take(first, first + step))
             yield np.stack([detail.x, detail.runs.y[detail.run]], axis=1), detail.verdict
 
 
@@ -346,9 +348,11 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
             raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
         if not hits.one_scene:
             raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
-        if hits.scene is not scene or hits.version != scene.version:
-            got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
-            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")
+        if hits.scene is not scene:
+            raise InputError(f"fired[{row}]: expected hits of the scene {scene.name!r}, got those of another")
+        if hits.version != scene.version:
+            got = f"version {hits.version}: {BEFORE}"
+            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}")
     return told
 
 
