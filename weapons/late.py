@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .explain import ray_samples as ray_samples
     from .explain import samples as samples
     from .rays import ray_call as ray_call
+    from .replay import shot_log as shot_log
 
 _PLACES = {
     "owners": "explain.owners",
@@ -20,6 +21,7 @@ _PLACES = {
     "ray_margins": "explain.ray_margins",
     "ray_samples": "explain.ray_samples",
     "samples": "explain.samples",
+    "shot_log": "replay.shot_log",
 }
 
 

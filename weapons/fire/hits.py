@@ -309,6 +309,16 @@ class Hits:
             table[name] = column
         return table
 
+    def to_shot(self, shot: int = 0) -> dict[str, Any]:
+        """One shot as a scene file has it, for `scene.shots`: fired from there it hits the same.
+
+        Its weapon is the name of an equal one in `scene.weapons`, or the weapon as JSON. Positions are in 1/256 px, and
+        an `aim` is as it was given. Excluded owners of nothing that could be hit or block are left out. A shot of the
+        past is one of `hits.scene_of(shot).copy()`.
+        """
+        row = self._checked(shot)
+        return late.shot_log.shot_json(self.weapon, self._one(row), *self._then(row))
+
     def samples_at(self, shot: int = 0) -> Samples:
         """All samples of one shot: pixel, pellet, verdict, and the item that decided it."""
         return late.samples.samples_of(self._detail(shot))
