@@ -150,8 +150,8 @@ def test_verdicts_add_up_to_the_samples_fired(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_bodies_add_up(seed: int) -> None:
-    """`samples`, `pixels` and `weight` of a body are those of its rows added up: over parts and rounds."""
-    _, scene, hits = fired(seed)
+    """A body has the sums of its rows, the nearest of its pixels, and each of its pellets once."""
+    battle, scene, hits = fired(seed)
     keys = list(dict.fromkeys((row.shot, int(scene.items.owner[row.object])) for row in hits))
     bodies = hits.by_owner()
     assert [(body.shot, body.owner) for body in bodies] == keys
@@ -160,6 +160,26 @@ def test_bodies_add_up(seed: int) -> None:
         for name in ("samples", "pixels", "weight"):
             assert getattr(body, name) == sum(getattr(row, name) for row in rows)
         assert body.objects == tuple(dict.fromkeys(row.object for row in rows))
+        nearest = sorted((row.distance2, row.first_xy[1], row.first_xy[0]) for row in rows)[0]
+        assert (body.distance2, *body.first_xy[::-1]) == nearest
+    for shot, one in enumerate(battle.volley.shots):
+        pairs = zip(samples_of(battle.volley, one), walks_of(battle, scene, one), strict=True)
+        struck = {(item.owner, *sample[:2]) for sample, walk in pairs for item in walk.hit}
+        truth = Counter(owner for owner, _, _ in struck)
+        assert {body.owner: body.pellets for body in bodies if body.shot == shot} == truth
+
+
+def test_a_pellet_that_hits_two_parts_of_a_body_is_one_pellet() -> None:
+    scene = Scene()
+    body = scene.add(square(4), (0, 0))
+    scene.add(square(4), (4, 0), owner=body)
+    for pellet in (Disc(6), Pistol(9), Laser(9)):
+        hits = fire(scene, Rounds(Spread(pellet, 3, 0), 2), (-1, 1), aim=0)
+        (one,) = hits.by_owner()
+        parts = 1 if isinstance(pellet, Pistol) and not isinstance(pellet, Laser) else len(one.objects)
+        assert hits.pellets.tolist() == [3] * 2 * parts and one.pellets == 6
+        (one,) = fire(scene, Rounds(pellet, 2), (-1, 1), aim=0).by_owner()
+        assert one.pellets == 2
 
 
 def test_owners_are_one_level_deep() -> None:
@@ -180,6 +200,9 @@ def test_owners_are_one_level_deep() -> None:
 def test_json(seed: int) -> None:
     _, _, hits = fired(seed)
     data = json.loads(json.dumps(hits.to_dict(), allow_nan=False))
+    assert data["rows"] == hits.to_rows() and hits.to_rows() == [
+        row._asdict() | {"first_xy": list(row.first_xy)} for row in hits
+    ]
     rows = [tuple({**row, "first_xy": tuple(row["first_xy"])}.values()) for row in data["rows"]]
     assert rows == [tuple(row) for row in hits]
     assert all(tuple(row) == type(one)._fields for row, one in zip(data["rows"], hits, strict=True))
@@ -515,7 +538,8 @@ def test_the_ends_of_the_world(x: int, y: int, bounded: bool) -> None:
         rows = [(*row[:7], (row.first_xy[0] - left, row.first_xy[1] - top), row.distance2) for row in hits]
         behind = [[(*o[:2], o.at_xy[0] - left, o.at_xy[1] - top) for o in b.behind] for b in hits.blockers()]
         blocked = [b[:2] for b in hits.blockers()], behind
-        derived = (hits.shares(), hits.why_not(), blocked, hits.margins(), hits.by_owner())
+        bodies = [(*b[:6], (b.first_xy[0] - left, b.first_xy[1] - top), *b[7:]) for b in hits.by_owner()]
+        derived = (hits.shares(), hits.why_not(), blocked, hits.margins(), bodies)
         answers.append((rows, hits.verdict_counts(), derived, hits.samples_at().xy - (left, top)))
     assert answers[0][:3] == answers[1][:3]
     np.testing.assert_array_equal(answers[0][3], answers[1][3])

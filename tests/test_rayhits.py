@@ -152,6 +152,14 @@ def test_rows_are_added_up_by_body(rng: random.Random) -> None:
     for one, rows in zip(found, truth.values(), strict=True):
         assert one[2:5] == tuple(sum(getattr(row, n) for row in rows) for n in ("samples", "pixels", "weight"))
         assert one.objects == tuple(dict.fromkeys(row.object for row in rows))
+        nearest = sorted((row.distance2, row.first_xy[1], row.first_xy[0]) for row in rows)[0]
+        assert (one.distance2, *one.first_xy[::-1]) == nearest
+        struck = {
+            (p["round"], p["pellet"])
+            for p in hits.passes.to_rows()
+            if (p["shot"], owner[p["object"]]) == (one.shot, one.owner)
+        }
+        assert one.pellets == len(struck)
 
 
 @settings(max_examples=40, deadline=None)

@@ -294,7 +294,7 @@ def test_margins_of_an_old_answer_are_refused() -> None:
     hits = fire(scene, Laser(30), np.zeros((0, 2)), aim=[])
     assert hits.margins() == []
     scene.add(Sprite.box(1, 1), (3, 3))
-    with pytest.raises(InputError, match="fire again"):
+    with pytest.raises(InputError, match="read this before the scene changes"):
         hits.margins()
 
 

@@ -169,14 +169,15 @@ def test_a_ray_of_the_past_is_still_what_it_was(kernels: ModuleType) -> None:
     ready = prepare(scene, Pistol(120))
     places = [tuple(at) for at in rng.uniform((0, 0), (220, 160), (20, 2)).tolist()]
     truths = [fire(scene, Pistol(120), at, aim=30) for at in places]
-    told = [(list(one), one.passes, one.stop) for one in truths if isinstance(one, RayHits)]
+    told = [(list(one), one.passes, one.stop, one.by_owner()) for one in truths if isinstance(one, RayHits)]
     shots = [ready.fire(at, aim=30) for at in places]
     scene.move(scene.ids(), rng.uniform((0, 0), (220, 160), (len(scene), 2)))
     scene.remove(scene.ids()[::2])
-    for got, (rows, passes, stop) in zip(shots, told, strict=True):
+    scene.set(scene.ids(), owner=scene.ids()[0])
+    for got, (rows, passes, stop, bodies) in zip(shots, told, strict=True):
         assert isinstance(got, RayHits)
-        assert list(got) == rows and got.passes == passes and got.stop == stop
-        with pytest.raises(InputError, match="fire again"):
+        assert list(got) == rows and got.passes == passes and got.stop == stop and got.by_owner() == bodies
+        with pytest.raises(InputError, match=r"read this before the scene changes, or fire at scene\.copy\(\)"):
             got.why_not()
 
 

@@ -155,7 +155,7 @@ def test_heat_rises_in_lightness_and_spans_the_scale() -> None:
 def test_hits_of_another_scene_or_version_are_refused() -> None:
     scene, other = street(), street()
     hits = fire(scene, Point(), (1, 1))
-    with pytest.raises(InputError, match=r"fired\[0\]: expected 'street' at version 3, got hits of 'street'"):
+    with pytest.raises(InputError, match=r"fired\[0\]: expected hits of the scene 'street', got those of another"):
         report_of(other, [hits])
     with pytest.raises(InputError, match=r"fired\[1\]: expected Hits, got int"):
         report_of(scene, [hits, 5])  # type: ignore[list-item]
@@ -164,7 +164,7 @@ def test_hits_of_another_scene_or_version_are_refused() -> None:
     with pytest.raises(InputError, match="names: expected one weapon for each name, got two for 'gun'"):
         report_of(scene, [hits, fire(scene, Disc(2), (1, 1))], ["gun", "gun"])
     scene.move(0, (1, 1))
-    with pytest.raises(InputError, match="expected 'street' at version 4, got version 3: fire again"):
+    with pytest.raises(InputError, match="expected 'street' at version 4, got version 3: read this before"):
         report_of(scene, [hits])
 
 

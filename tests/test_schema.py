@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hitplanes import InputError, arsenal_of, fire, load_scene, report_of, weapon_from_json
+from hitplanes import Disc, InputError, Rounds, Spread, arsenal_of, fire, load_scene, report_of, weapon_from_json
 from hitplanes.planes.common.tables import (
     Const,
     Either,
@@ -254,8 +254,10 @@ def test_what_the_schema_of_a_weapon_refuses_is_refused(kind: str) -> None:
 def test_what_the_schema_of_a_shot_refuses_is_refused() -> None:
     shot = {"weapon": "gun", "at": [1, 2], "aim": 3, "accept": ["a"], "exclude": ["b", 2], "seed": 5, "shot": 3}
     rng = random.Random(3)
-    for _ in range(400):
-        agree(SCHEMAS["shot"], changed(shot, rng), lambda value: SHOT.check("shot", value))
+    for weapon in ("gun", Rounds(Spread(Disc(3), 4, 9), 2).to_json()):
+        assert valid(SCHEMAS["shot"], {**shot, "weapon": weapon})
+        for _ in range(400):
+            agree(SCHEMAS["shot"], changed({**shot, "weapon": weapon}, rng), lambda value: SHOT.check("shot", value))
 
 
 def test_what_the_schema_of_a_report_refuses_is_refused() -> None:

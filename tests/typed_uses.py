@@ -26,6 +26,7 @@ from hitplanes import (
     Weapon,
     arsenal_of,
     fire,
+    fire_shots,
     prepare,
 )
 
@@ -50,6 +51,9 @@ assert_type(prepare(scene, Disc(4), blocked_by=[]).fire((5, 5), aim=3), Hits)
 assert_type(ShotRecord(Path("match.jsonl")).fire(scene, Pistol(80), (5, 5), exclude=tank), RayHits)
 assert_type(fire(scene, Disc(3), (5, 5))[0].first_xy, tuple[int, int])
 assert_type(fire(scene, Disc(3), (5, 5))[1:][0].pixels, int)
+assert_type(fire(scene, Disc(3), (5, 5)).by_owner()[0].first_xy, tuple[int, int])
+scene.shots.append(fire(scene, Disc(3), (5, 5)).to_shot())
+assert_type(fire_shots(scene), list[Hits])
 fire(scene, Pistol(80), (5, 5)).stop.distance.tolist()
 print(fire(scene, Disc(3), (5, 5)).stop)  # type: ignore[attr-defined]
 

@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from types import ModuleType
 
+    from .explain import owners as owners
     from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
     from .explain import samples as samples
     from .fire import shelter as shelter
     from .rays import ray_call as ray_call
+    from .replay import shot_log as shot_log
 
 _PLACES = {
+    "owners": "explain.owners",
     "ray_call": "rays.ray_call",
     "ray_margins": "explain.ray_margins",
     "ray_samples": "explain.ray_samples",
     "samples": "explain.samples",
     "shelter": "fire.shelter",
+    "shot_log": "replay.shot_log",
 }
 
 

@@ -18,7 +18,7 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -100,11 +100,14 @@ class Covers:
 
         def made() -> tuple[Ints, Ints]:
             numbers = enumerate(number.tolist())
-            rects = [self._of_mask.get(mask, partial(_rectangles_of, mask_of, row)) for row, mask in numbers]
-            begin = np.cumsum([0, *(len(part) for part in rects)])
-            return begin, np.concatenate([np.zeros((0, 4), np.int64), *rects])
+            return joined([self._of_mask.get(mask, partial(_rectangles_of, mask_of, row)) for row, mask in numbers])
 
         return self._of_masks.get(number.tobytes(), made)
+
+
+def joined(rects: Sequence[Ints]) -> tuple[Ints, Ints]:
+    """Begin (B + 1,) of the rectangles (k, 4) of each of B masks, and all of them (R, 4)."""
+    return np.cumsum([0, *(len(part) for part in rects)]), np.concatenate([np.zeros((0, 4), np.int64), *rects])
 
 
 def _rectangles_of(mask_of: Callable[[int], Bools], row: int) -> Ints:

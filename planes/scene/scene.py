@@ -380,10 +380,14 @@ class Scene:
         return int(named[0])
 
     def category_bits(self, *names: str, field: str = "category") -> int:
-        """Bits of named categories, for `accept` and `blocked_by`; an error says `field`."""
-        bits = 0
+        """Bits of categories by the names that `category_names` tells; an error says `field`."""
+        known, bits = self.categories, 0
+        if not all(name in known for name in names):
+            known = tuple(self._bit_names())
         for name in names:
-            bits |= 1 << self.categories.index(choice(field, name, self.categories))
+            if name not in known:
+                choice(field, name, self.categories)
+            bits |= 1 << known.index(name)
         return bits
 
     def category_names(self, bits: int) -> list[str]:

@@ -39,7 +39,19 @@ MODULES: dict[str, tuple[str, ...]] = {
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "The scene": ("Scene", "Sprite", "Role", "Planes", "load_scene", "read_png", "write_png"),
-    "Fire": ("fire", "prepare", "Ready", "Hits", "RayHits", "Verdict", "Reason", "Spans", "ALL", "InputError"),
+    "Fire": (
+        "fire",
+        "fire_shots",
+        "prepare",
+        "Ready",
+        "Hits",
+        "RayHits",
+        "Verdict",
+        "Reason",
+        "Spans",
+        "ALL",
+        "InputError",
+    ),
     "Weapons of patterns": ("Point", "Disc", "Ring", "Box", "Polygon", "Cone", "Beam", "Stencil"),
     "Weapons of rays": ("Pistol", "Rifle", "Laser", "Projectile", "Sweep"),
     "Weapons of other weapons, and their JSON": ("Spread", "Rounds", "Weapon", "arsenal_of", "weapon_from_json"),
@@ -51,7 +63,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 
 VALUES = {"ALL": "All categories: the default of `accept`.", "__version__": "The installed version, a text."}
 RESULTS = {
-    "hitplanes.weapons.fire.hits": ("HitRow", "OwnerRow"),
+    "hitplanes.weapons.explain.owners": ("OwnerRow",),
+    "hitplanes.weapons.fire.hits": ("HitRow",),
     "hitplanes.weapons.explain.samples": ("Samples", "Share", "Blocked", "Behind", "WhyNot", "Margin"),
     "hitplanes.weapons.explain.ray_samples": ("Miss",),
     "hitplanes.weapons.rays.ray_hits": ("Passes", "Stops"),

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from hitplanes.weapons.rays.ray_hits import RayHits as RayHits
     from hitplanes.weapons.replay.record import ShotRecord as ShotRecord
     from hitplanes.weapons.replay.record import replay as replay
+    from hitplanes.weapons.replay.shot_log import fire_shots as fire_shots
     from hitplanes.weapons.report.picture import picture_of_report as picture_of_report
     from hitplanes.weapons.report.report import report_of as report_of
 
@@ -99,6 +100,7 @@ _HOME = {
     **dict.fromkeys(("report_of",), "weapons.report.report"),
     **dict.fromkeys(("picture_of_report",), "weapons.report.picture"),
     **dict.fromkeys(("ShotRecord", "replay"), "weapons.replay.record"),
+    **dict.fromkeys(("fire_shots",), "weapons.replay.shot_log"),
 }
 """Of each name the module that has it."""
 

@@ -45,11 +45,11 @@ from hitplanes.planes.files.png import read_text, write_text
 from hitplanes.planes.files.scene_folder import OBJECT, SCENE
 
 from ..explain.samples import REASONS
-from ..kinds.areas import KINDS, AreaWeapon, weapon_from_json
+from ..kinds.areas import KINDS, AreaWeapon
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
-from ..replay.shot_log import SHOT
+from ..replay.shot_log import SHOT, WeaponJson
 from ..report.report import FORMAT
 
 FOLDER = Path(__file__).parent.parent / "schemas"
@@ -66,15 +66,6 @@ ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
 VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
 COUNTS = Within(Keys(dict(VERDICTS), tuple(verdict.name.lower() for verdict in OF_PATTERNS)))
 STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
-
-
-class WeaponJson(Ref):
-    """A weapon as JSON, validated by the table of its kind."""
-
-    def check(self, name: str, value: object) -> object:
-        """Check that the value describes a weapon, and return it."""
-        weapon_from_json(value, name)
-        return value
 
 
 def _all(keys: dict[str, Value], **more: Value) -> Within:
@@ -187,7 +178,7 @@ def schemas() -> dict[str, dict[str, Any]]:
     shot, objects = SHOT.schema(), {"anyOf": [keys.schema() for keys in OBJECT.values()]}
     return {
         "scene": _document("A scene of hitplanes", SCENE, {"object": objects, "shot": shot, **weapons}),
-        "shot": _document("A shot, a line of a log of shots", SHOT, {}),
+        "shot": _document("A shot, a line of a log of shots", SHOT, weapons),
         "report": _document("What shots hit, and why", REPORT, weapons),
     }
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,19 +17,13 @@ from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, each_pixel
 from hitplanes.planes.scene.items import Stack
-from hitplanes.planes.scene.scene import Scene
 
-from ..fire.areas import request_of
-from ..fire.plan import Plan
-from ..fire.prefilter import Candidates, pairs_of, refused
+from ..fire.prefilter import pairs_of, refused
 from ..fire.shelter import shelter_ranks, sheltered
 from ..fire.spans import QueryContext, direct
-from ..kinds.areas import parts_of, pierces
+from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
-
-if TYPE_CHECKING:
-    from hitplanes.planes.bits.shadows import Blockers
 
 
 class Samples(NamedTuple):
@@ -205,9 +199,9 @@ def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
     return Behind(int(detail.stack.ids[rank]), len(samples), (int(x[nearest]), int(y[nearest])))
 
 
-def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
+def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; the visible pixels of an object are counted once for each filter."""
-    stack = scene.items.stack()
+    stack = context.stack
     visible: dict[tuple[object, ...], Runs] = {}
     shares = []
     placed: dict[int, Placements] = {}
@@ -216,31 +210,30 @@ def shares_of(scene: Scene, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -
         rank = int(stack.rank_of[row.object])
         key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
-            visible[key] = _visible(scene, rank, pierces(weapon), shot)
+            visible[key] = _visible(context, rank, shot)
         if row.shot not in placed:
             placed[row.shot] = placements_for(weapon, shot)
         placements, seen = placed[row.shot], int(visible[key].lengths.sum())
-        own = placements.round == row.round
-        blockers = request_of(scene, weapon, shot, stack, False).blockers
-        exposed = seen if blockers is None else _exposed(visible[key], rank, placements.xy[own], blockers)
-        shares.append(
-            Share(
-                row.samples / int(placements.count[own].sum()), row.pixels / seen,
-                row.pixels / scene.items.variants[row.object].area,
-                exposed / seen if parts_of(weapon)[2].line_of_sight else None,
-            )
-        )  # fmt: skip
+        own, exposed = placements.round == row.round, None
+        if parts_of(weapon)[2].line_of_sight:
+            exposed = _exposed(visible[key], rank, placements.xy[own], shot, context) / seen
+        fired, area = int(placements.count[own].sum()), int(np.count_nonzero(stack.mask(rank)))
+        shares.append(Share(row.samples / fired, row.pixels / seen, row.pixels / area, exposed))
     return shares
 
 
-def _exposed(visible: Runs, rank: int, origin_xy: Ints, blockers: Blockers) -> int:
-    """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2)."""
+def _exposed(visible: Runs, rank: int, origin_xy: Ints, shot: Shots, context: QueryContext) -> int:
+    """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2) of one shot."""
+    blockers = context.blockers
+    if blockers is None:
+        return int(visible.lengths.sum())
     pellets, n = len(origin_xy), len(visible)
     each = visible.take(np.tile(np.arange(n), pellets))
     runs = Runs(np.arange(pellets).repeat(n), each.y, each.x_first, each.x_last, each.ordinal)
     box = visible.x_first.min(), visible.y.min(), visible.x_last.max(), visible.y.max()
-    pairs = late.shadows.ways_met(np.tile(np.array(box), (pellets, 1)), origin_xy, blockers)
-    shelter = late.shadows.shelter_of(runs, origin_xy, blockers, *pairs)
+    pellet, blocker = late.shadows.ways_met(np.tile(np.array(box), (pellets, 1)), origin_xy, blockers)
+    met = ~refused(context.stack, blockers.rank[blocker], shot, np.zeros(len(blocker), np.int64))
+    shelter = late.shadows.shelter_of(runs, origin_xy, blockers, pellet[met], blocker[met])
     hidden = shelter.hides(np.arange(len(shelter.items)), np.array(rank)).reshape(pellets, -1)
     return int((~hidden.all(axis=0)).sum())
 
@@ -257,18 +250,18 @@ def why_not_of(detail: Detail, hit: Set[int]) -> list[WhyNot]:
 
 
 # house: hit rule of areas
-def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
+def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     """Walk every sample of shots and record its verdict and the items that decided it."""
-    stack, bounds = scene.items.stack(), scene.bounds
-    placements, request = placements_for(weapon, shots), request_of(scene, weapon, shots, stack, False)
+    stack, bounds, blockers = context.stack, context.bounds, context.blockers
+    placements = placements_for(weapon, shots)
     if int(placements.count.sum()) > DETAIL_SAMPLES_MAX:
         got = int(placements.count.sum())
         raise InputError(f"samples: expected a shot of at most {DETAIL_SAMPLES_MAX} to tell one by one, got {got}")
     runs = placements.table.laid(placements.pattern, placements.xy[:, 0], placements.xy[:, 1], placements.boxes)
     run, x = each_pixel(runs.x_first, runs.x_last)
     pairs = pairs_of(placements.boxes, placements.shot, shots, stack)
-    shelter = None if request.blockers is None else sheltered(runs, placements, shots, stack, request.blockers)
-    events, state = walk(runs, pairs, stack, pierces(weapon), HIT | BLOCK | SKIP | SHELTERED, shelter)
+    shelter = None if blockers is None else sheltered(runs, placements, shots, stack, blockers)
+    events, state = walk(runs, pairs, stack, context.pierce, HIT | BLOCK | SKIP | SHELTERED, shelter)
     rank = np.full(len(x), -1, np.int64)
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
     ended = rank.copy()
@@ -276,15 +269,15 @@ def detail_of(scene: Scene, weapon: Weapon, shots: Shots) -> Detail:
         told = events.take(np.flatnonzero(events.kind == kind)[::-1])
         event, column = each_pixel(told.x_first, told.x_last)
         rank[start[told.run][event] + column] = told.rank[event]
-        if kind == BLOCK or (kind == HIT and not pierces(weapon)):
+        if kind == BLOCK or (kind == HIT and not context.pierce):
             ended[start[told.run][event] + column] = told.rank[event]
     verdict, y = VERDICT_OF[state], runs.y[run]
     hidden = (state & SHELTERED != 0) & (verdict != Verdict.HIT)
-    if request.blockers is not None and hidden.any():
+    if blockers is not None and hidden.any():
         own = _refused_first(events, start, len(x))
         which = np.flatnonzero(hidden)
         rank[which] = ended[which] = shelter_ranks(
-            placements, shots, stack, request.blockers, runs.placement[run[which]],
+            placements, shots, stack, blockers, runs.placement[run[which]],
             np.stack([x, y], axis=1)[which], own[which],
         )  # fmt: skip
     if bounds is not None:
@@ -352,15 +345,15 @@ def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     return least
 
 
-def _visible(scene: Scene, rank: int, pierce: bool, shot: Shots) -> Runs:
+def _visible(context: QueryContext, rank: int, shot: Shots) -> Runs:
     """Pixels of an object that a pattern covering everything would hit, without a line of sight."""
-    stack = scene.items.stack()
+    stack = context.stack
     spans = spans_of(stack, rank)
     zero = np.zeros(len(spans), np.int64)
     runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
     pairs = pairs_of(stack.box_xyxy[rank][None], zero[:1], shot, stack)
-    events, _ = walk(runs, pairs, stack, pierce, HIT)
-    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, scene.bounds)
+    events, _ = walk(runs, pairs, stack, context.pierce, HIT)
+    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, context.bounds)
     zero = np.zeros(len(own), np.int64)
     return Runs(zero, runs.y[own.run], own.x_first, own.x_last, zero)
 
@@ -390,7 +383,7 @@ class Margin(NamedTuple):
         return self.distance <= FRAGILE_PX
 
 
-def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
+def margins_of(context: QueryContext, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
     """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
 
     Parameters
@@ -401,10 +394,7 @@ def margins_of(scene: Scene, weapon: Weapon, shots: Shots, first_shot: int = 0) 
     -------
     margins, sorted by (shot, object)
     """
-    stack = scene.items.stack()
-    blockers = request_of(scene, weapon, shots, stack, False).blockers
-    context = QueryContext(stack, scene.bounds, pierces(weapon), Candidates(scene.items, stack), Plan(), blockers)
-    found = []
+    stack, found = context.stack, []
     for row in range(len(shots) if len(stack) else 0):
         still, flips = _flips(placements_for(weapon, shots.take(row, row + 1)), shots.take(row, row + 1), context)
         for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):

@@ -132,7 +132,7 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
     """Rows by the reference: spans of placed patterns walk the stack."""
     shots, plan, rows = request.shots, context.plan, []
     first = placements_for(request.weapon, shots.take(0, 1))
-    for begin, part in _chunks(shots, first, context.candidates):
+    for begin, part in chunks(shots, first, context.candidates):
         placements = first if len(shots) == 1 else placements_for(request.weapon, part)
         plan.run("patterns", f"{len(placements.table)} distinct", placements.nbytes)
         if placements.table.prefix is not None:
@@ -148,7 +148,7 @@ def verdicts_by_spans(request: Request, context: QueryContext) -> Ints:
     boxes, weapon, shots = Candidates(context.candidates.items, context.stack), request.weapon, request.shots
     then = QueryContext(context.stack, context.bounds, context.pierce, boxes, Plan(), context.blockers)
     verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for _, part in _chunks(shots, placements_for(weapon, shots.take(0, 1)), boxes):
+    for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), boxes):
         counts = direct(placements_for(weapon, part), part, then).counts
         verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
     return np.concatenate(verdicts)
@@ -189,7 +189,7 @@ def _first_met(placements: Placements, tiles: OrderedTiles, rule: Rule, stack: S
     return np.bincount(column, found.samples, 2 * shots).astype(np.int64).reshape(-1, 2)
 
 
-def _chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
+def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
     """Cut a batch into parts that stay within CHUNK_SAMPLES and CHUNK_PAIRS; patterns are as large as the first shot's.
 
     With a broad phase, parts grow as long as placements meet few items.

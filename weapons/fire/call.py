@@ -187,7 +187,7 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
     parts = way.engine(request, context)
     rows = Rows.joined(parts)
     count = verdicts_by_spans if way.name == "spans" else verdicts_by_tiles
-    hits = Hits(rows, lambda: count(request, context), scene, weapon, shots, plan)
+    hits = Hits(rows, lambda: count(request, context), scene, stack, weapon, shots, plan)
     leave_out_unused(plan, scene, candidates, request.traits.weighted, may_refuse(stack, shots), way.name)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits

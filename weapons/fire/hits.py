@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from operator import index
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
@@ -16,15 +17,18 @@ from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.grid.spans import Spans, merged_runs
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
+from ..kinds.areas import parts_of, ray_parts_of
 from ..kinds.placements import ONES, ZEROS, Placements, ShotColumns, Shots
 from ..kinds.weapon import Weapon
 from .plan import Plan
-from .spans import SpanHits
+from .spans import QueryContext, SpanHits, context_of
 
 if TYPE_CHECKING:
+    from ..explain.owners import OwnerRow, Pellet
     from ..explain.samples import Blocked, Detail, Margin, Samples, Share, WhyNot
 
 
@@ -45,17 +49,6 @@ class HitRow(NamedTuple):
     pellets: int
     first_xy: tuple[int, int]
     distance2: int
-
-
-class OwnerRow(NamedTuple):
-    """One owner hit by one shot: the sum of the rows of all its objects and all rounds."""
-
-    shot: int
-    owner: int
-    samples: int
-    pixels: int
-    weight: int
-    objects: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -161,6 +154,10 @@ def _column(name: str, told: str) -> cached_attribute[Ints]:
     return cached_attribute(made)
 
 
+BEFORE = "read this before the scene changes, or fire at scene.copy() or at a History, which stay as they are"
+"""How to keep what an answer still needs of a scene."""
+
+
 class Hits:
     """What a call of `fire` hit.
 
@@ -192,14 +189,21 @@ class Hits:
     _walked: tuple[int, Any] | None = None
 
     def __init__(
-        self, rows: Rows, counted: Callable[[], Ints], scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+        self,
+        rows: Rows,
+        counted: Callable[[], Ints],
+        scene: Scene,
+        stack: Stack,
+        weapon: Weapon,
+        shots: Shots,
+        plan: Plan,
     ) -> None:
-        self._keep(rows, scene, weapon, shots, plan)
+        self._keep(rows, scene, stack, weapon, shots, plan)
         self._counted = counted
 
-    def _keep(self, rows: Rows, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan) -> None:
+    def _keep(self, rows: Rows, scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self._rows, self.weapon, self.shots, self.plan = rows, weapon, shots, plan
-        self.scene, self.version = scene, scene.items.version
+        self.scene, self.version, self._stack = scene, scene.items.version, stack
 
     @property
     def nbytes(self) -> int:
@@ -271,26 +275,28 @@ class Hits:
         return {verdict.name.lower(): n for verdict, n in zip(Verdict, counts.tolist(), strict=False)}
 
     def by_owner(self) -> list[OwnerRow]:
-        """Sum of the rows of each shot and owner, ordered by (shot, first row of the owner)."""
-        bodies: dict[tuple[int, int], list[HitRow]] = {}
-        if self._scenes is None:
-            self.scene_of(0)  # raises if the scene has changed, also if there are no rows
-        for row in self:
-            owner = int(self.scene_of(row.shot).items.owner[row.object])
-            bodies.setdefault((row.shot, owner), []).append(row)
-        return [
-            OwnerRow(
-                shot, owner, sum(r.samples for r in rows), sum(r.pixels for r in rows), sum(r.weight for r in rows),
-                tuple(dict.fromkeys(r.object for r in rows)),
-            )
-            for (shot, owner), rows in bodies.items()
-        ]  # fmt: skip
+        """Rows of each shot and owner added up, ordered by (shot, first row of the owner).
+
+        Owners are those that the objects had when they were fired at.
+        """
+        several = (ray_parts_of(self.weapon) or parts_of(self.weapon))[1] is not None
+        return late.owners.owner_rows(self, lambda shot: self._then(shot)[1], self._pellets if several else None)
+
+    def _pellets(self, shots: Sequence[int]) -> Iterator[Pellet]:
+        """Pellets of some shots that hit, each with each of its objects."""
+        for _, same in groupby(shots, lambda shot: id(self._then(shot)[0])):
+            own = list(same)
+            found = late.owners.area_pellets(self._context(own[0]), self.weapon, self.shots.pick(np.array(own)))
+            yield from ((own[shot], round_, pellet, item) for shot, round_, pellet, item in found)
+
+    def to_rows(self) -> list[dict[str, Any]]:
+        """Rows as JSON."""
+        return self._rows.to_rows()
 
     def to_dict(self) -> dict[str, Any]:
         """Rows and verdict counts as JSON."""
-        rows = [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]
         return {
-            "rows": rows,
+            "rows": self.to_rows(),
             "verdicts": [self.verdict_counts(shot) for shot in range(len(self.shots))],
             "plan": self.plan.to_dict(),
         }
@@ -303,6 +309,16 @@ class Hits:
             table[name] = column
         return table
 
+    def to_shot(self, shot: int = 0) -> dict[str, Any]:
+        """One shot as a scene file has it, for `scene.shots`: fired from there it hits the same.
+
+        Its weapon is the name of an equal one in `scene.weapons`, or the weapon as JSON. Positions are in 1/256 px, and
+        an `aim` is as it was given. Excluded owners of nothing that could be hit or block are left out. A shot of the
+        past is one of `hits.scene_of(shot).copy()`.
+        """
+        row = self._checked(shot)
+        return late.shot_log.shot_json(self.weapon, self._one(row), *self._then(row))
+
     def samples_at(self, shot: int = 0) -> Samples:
         """All samples of one shot: pixel, pellet, verdict, and the item that decided it."""
         return late.samples.samples_of(self._detail(shot))
@@ -314,14 +330,13 @@ class Hits:
     def shares(self, shot: int | None = None) -> list[Share]:
         """Samples of each row as shares of the pattern, of the visible object and of its mask; for a shot, or all."""
         if self._scenes is None:
-            return late.samples.shares_of(
-                self.scene_of(0), self.weapon, self.shots, list(self) if shot is None else self.of(shot)
-            )
+            rows = list(self) if shot is None else self.of(shot)
+            return late.samples.shares_of(self._context(0), self.weapon, self.shots, rows)
         numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
         return [
             share
             for i in numbers
-            for share in late.samples.shares_of(self.scene_of(i), self.weapon, self.shots, self.of(i))
+            for share in late.samples.shares_of(self._context(i), self.weapon, self.shots, self.of(i))
         ]
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
@@ -340,12 +355,12 @@ class Hits:
         hit or back. A margin of 1 px is fragile.
         """
         if self._scenes is None and shot is None:
-            return late.samples.margins_of(self.scene_of(0), self.weapon, self.shots)
+            return late.samples.margins_of(self._context(0), self.weapon, self.shots)
         numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
         return [
             margin
             for i in numbers
-            for margin in late.samples.margins_of(self.scene_of(i), self.weapon, self._one(i), i)
+            for margin in late.samples.margins_of(self._context(i), self.weapon, self._one(i), i)
         ]
 
     @property
@@ -355,9 +370,9 @@ class Hits:
 
     def _detail(self, shot: int) -> Detail:
         """One shot, sample by sample; the last one asked for is kept."""
-        scene, row = self.scene_of(shot), self._checked(shot)
+        row = self._checked(shot)
         if self._walked is None or self._walked[0] != row:
-            self._walked = row, late.samples.detail_of(scene, self.weapon, self.shots.take(row, row + 1))
+            self._walked = row, late.samples.detail_of(self._context(row), self.weapon, self.shots.take(row, row + 1))
         return self._walked[1]
 
     def _one(self, shot: int) -> Shots:
@@ -373,8 +388,19 @@ class Hits:
             return self._scenes[self._checked(shot)]  # of the past, which does not change
         if self.scene.version != self.version:
             now = self.scene.version
-            raise InputError(f"hits: expected the scene at version {self.version}, got {now}: fire again")
+            raise InputError(f"hits: expected the scene at version {self.version}, got version {now}: {BEFORE}")
         return self.scene
+
+    def _then(self, shot: int) -> tuple[Scene, Stack]:
+        """The scene that a shot was fired at, which may have changed since, and its stack of then, which stays."""
+        if self._scenes is None:
+            return self.scene, self._stack
+        scene = self._scenes[shot]
+        return scene, scene.items.stack()
+
+    def _context(self, shot: int) -> QueryContext:
+        """What a shot of an area weapon was tested against."""
+        return context_of(*self._then(shot), self.weapon)
 
     @property
     def one_scene(self) -> bool:
@@ -393,7 +419,7 @@ class Hits:
         found = cls(
             cls._gathered_rows(parts, rows),
             lambda: np.concatenate([part.verdicts for part in parts])[order],
-            parts[0].scene,
+            *parts[0]._then(0),
             parts[0].weapon,
             shots,
             Plan.joined([part.plan for part in parts]),

@@ -33,7 +33,10 @@ def blockers_of(scene: Scene, stack: Stack, sight: str, inside: str, view: View 
     if not len(rank):
         return None
     whose = (stack.categories[rank], stack.owner[rank]) if view is None else (rank[:0], rank[:0])
-    rects = scene.items.covers(stack.ids[rank])
+    if stack.forms == scene.items.arrangement:
+        rects = scene.items.covers(stack.ids[rank])
+    else:  # the masks of then may be gone from the scene
+        rects = late.shadows.joined([late.shadows.rectangles(stack.mask(r)) for r in rank.tolist()])
     return late.shadows.Blockers(
         rank, stack.box_xyxy[rank], *rects, *whose, scene.bounds, inside == "ignore_until_exit"
     )

@@ -24,9 +24,12 @@ from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES
 from hitplanes.planes.grid.spans import Box, merged_runs, pieces
 from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.scene.scene import Scene
 
 from .. import late
+from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots
+from ..kinds.weapon import Weapon
 from .plan import Plan
 from .prefilter import Candidates, kinds, may_refuse, refused
 
@@ -50,6 +53,14 @@ class QueryContext:
     candidates: Candidates
     plan: Plan
     blockers: Blockers | None = None
+
+
+def context_of(scene: Scene, stack: Stack, weapon: Weapon) -> QueryContext:
+    """What shots of a weapon were tested against: a stack of the scene, which may have changed since."""
+    plain, blockers = parts_of(weapon)[2], None
+    if plain.line_of_sight:
+        blockers = late.shelter.blockers_of(scene, stack, plain.line_of_sight, plain.inside, None)
+    return QueryContext(stack, scene.bounds, plain.pierce, Candidates(scene.items, stack), Plan(), blockers)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
-from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
+from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, integer, integers, reals
 from hitplanes.planes.common.limits import (
     ALL,
     CATEGORY_BITS,
@@ -157,6 +157,7 @@ class Shots:
     number : (N,) shot numbers for the draws, or the first of a range
     seed : (N,) uint64 seeds of the draws, or one value
     row : (N,) places in the call, for error texts, or the first of a range
+    aim : (N,) angles as they were given, degrees, or one value; None if none was given
     """
 
     def __init__(
@@ -169,8 +170,9 @@ class Shots:
         number: Ints | int,
         seed: Words | int,
         row: Ints | int,
+        aim: Floats | float | None = None,
     ) -> None:
-        self.at_256, self.toward_256 = at_256, toward_256
+        self.at_256, self.toward_256, self._aim = at_256, toward_256, aim
         self._direction, self._meets, self._exclude = direction, meets, exclude
         self._number, self._seed, self._row = number, seed, row
 
@@ -194,6 +196,11 @@ class Shots:
         if self._direction is None and self.toward_256 is not None:
             return np.stack(unit_toward(self.toward_256[:, 0], self.toward_256[:, 1]), axis=1)
         return _spread(self._direction, len(self))
+
+    @property
+    def aim(self) -> Floats | None:
+        """Angles (N,) of the aims as they were given, degrees; None if none was given."""
+        return self._aim if self._aim is None else np.broadcast_to(np.asarray(self._aim), len(self))
 
     @cached_attribute
     def meets(self) -> Ints:
@@ -239,7 +246,8 @@ class Shots:
     @property
     def nbytes(self) -> int:
         """Bytes of the columns; values that all shots share do not count."""
-        columns = self.toward_256, self._direction, self._meets, self._exclude, self._number, self._seed, self._row
+        rest = self._meets, self._exclude, self._number, self._seed, self._row
+        columns = self.toward_256, self._direction, self._aim, *rest
         return self.at_256.nbytes + sum([column.nbytes for column in columns if isinstance(column, np.ndarray)])
 
     @cached_attribute
@@ -270,7 +278,7 @@ class Shots:
 
         return Shots(
             self.at_256[rows], picked(self._direction), picked(self.toward_256), picked(self._meets),
-            picked(self._exclude), counted(self._number), picked(self._seed), counted(self._row),
+            picked(self._exclude), counted(self._number), picked(self._seed), counted(self._row), picked(self._aim),
         )  # fmt: skip
 
 
@@ -409,15 +417,17 @@ def checked_shots(
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
+    angles = None if aim is None else _angles(n, aim)
     return Shots(
         at_256,
-        _directions(n, aim) if offset is None else None,
+        _directions(angles) if offset is None else None,
         offset,
         filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n)),
         _owners(exclude, n, single),
         0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
         _seeds(seed, n),
         0,
+        angles,
     )
 
 
@@ -511,13 +521,18 @@ def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[Pat
     return PatternTable(patterns_of(plain, np.stack([c, number - c * (4 * ONE)], axis=1))), which
 
 
-def _directions(n: int, aim: object) -> Ints | tuple[int, int]:
-    """Directions (n, 2) of aims, or one for all shots."""
-    if aim is None:
-        return STRAIGHT
+def _angles(n: int, aim: object) -> Floats | float:
+    """Angles (n,) of aims, degrees, or one for all shots."""
     if isinstance(aim, int | float):
-        return unit_of(aim if type(aim) is float and math.isfinite(aim) else float(reals("aim", aim, ())))
-    return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
+        return aim if type(aim) is float and math.isfinite(aim) else float(reals("aim", aim, ()))
+    return reals("aim", each("aim", aim, n), (n,))
+
+
+def _directions(angles: Floats | float | None) -> Ints | tuple[int, int]:
+    """Directions (n, 2) of angles, or one for all shots."""
+    if angles is None:
+        return STRAIGHT
+    return unit_of(angles) if isinstance(angles, float) else np.stack(unit(angles), axis=1)
 
 
 def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:

@@ -121,6 +121,7 @@ class Answer(Hits):
 
     scene: cached_attribute[Scene] = cached_attribute(lambda one: one._present.scene)
     version: cached_attribute[int] = cached_attribute(lambda one: one._present.version)
+    _stack: cached_attribute[Stack] = cached_attribute(lambda one: one._present.stack)
     weapon: cached_attribute[Weapon] = cached_attribute(lambda one: one._present.weapon)
     shots: cached_attribute[Shots] = cached_attribute(
         lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told)

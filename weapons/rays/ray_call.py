@@ -85,7 +85,7 @@ def fired_rays(
             found += [(begin, walk) for walk in followed]
         if begin:
             rows[-1].shot[:] += begin
-    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, weapon, shots, plan)
+    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, stack, weapon, shots, plan)
     plan.run("rows", "")
     _leave_out_unused(plan, scene, through, shots, ray, (strategy, chosen))
     plan.run("plan", "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -27,6 +27,7 @@ from ..kinds.weapon import Weapon, smoothed
 from .contacts import Contacts, Parts, Rays, Reason, Terminations, last_of_each, stretches
 
 if TYPE_CHECKING:
+    from ..explain.owners import Pellet
     from ..explain.ray_samples import Miss, RayDetail
     from ..explain.samples import Blocked, Margin, Samples, Share, WhyNot
 
@@ -264,9 +265,9 @@ class RayHits(Hits):
     rays: int = 1
 
     def __init__(
-        self, rows: Rows, told: Told, rays: int, scene: Scene, weapon: Weapon, shots: Shots, plan: Plan
+        self, rows: Rows, told: Told, rays: int, scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
-        self._keep(rows, scene, weapon, shots, plan)
+        self._keep(rows, scene, stack, weapon, shots, plan)
         self.rays, self._later = rays, told
 
     @cached_property
@@ -301,10 +302,19 @@ class RayHits(Hits):
         """Stops of the rays of one shot."""
         return self.stop.of_shot(self._checked(shot))
 
+    def _pellets(self, shots: Sequence[int]) -> Iterator[Pellet]:
+        of = self.passes.take(np.isin(self.passes.shot, shots))
+        columns = of.shot, of.round, of.pellet, of.object
+        return zip(*(column.tolist() for column in columns), strict=True)
+
     def to_dict(self) -> dict[str, Any]:
         """Rows, passes, stops and the plan as JSON."""
-        rows = {"rows": [{**row._asdict(), "first_xy": list(row.first_xy)} for row in self]}
-        return {**rows, "passes": self.passes.to_rows(), "stops": self.stop.to_rows(), "plan": self.plan.to_dict()}
+        return {
+            "rows": self.to_rows(),
+            "passes": self.passes.to_rows(),
+            "stops": self.stop.to_rows(),
+            "plan": self.plan.to_dict(),
+        }
 
     def samples_at(self, shot: int = 0) -> Samples:
         """Cells of the rays of one shot in the order of the walk, with their verdicts and the items that decided."""
@@ -380,7 +390,7 @@ class RayHits(Hits):
                 lambda: Stops.gathered([part.stop for part in rays], rows),
             ),
             sum(part.rays for part in rays),
-            parts[0].scene,
+            *parts[0]._then(0),
             parts[0].weapon,
             shots,
             Plan.joined([part.plan for part in parts]),

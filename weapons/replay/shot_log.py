@@ -1,8 +1,9 @@
-"""Read shots from JSON, and logs with one shot a line into checked columns."""
+"""Shots as JSON, read and written, and logs with one shot a line, read into checked columns."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -12,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
-from hitplanes.planes.common.limits import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX
+from hitplanes.planes.common.limits import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.common.tables import (
     Either,
     Keys,
@@ -20,26 +21,37 @@ from hitplanes.planes.common.tables import (
     Number,
     Numbers,
     Optional,
+    Ref,
     Rows,
     Text,
     Whole,
     distinct_keys,
 )
 from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire
 from ..fire.hits import Hits
-from ..kinds.areas import has_no_range
-from ..kinds.placements import Words
+from ..kinds.areas import arsenal_of, has_no_range, weapon_from_json
+from ..kinds.placements import Shots, Words
 from ..kinds.weapon import Weapon
 
 AIM_MAX = 10**9
 """Largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle."""
 
+
+class WeaponJson(Ref):
+    """A weapon as JSON, validated by the table of its kind."""
+
+    def check(self, name: str, value: object) -> Weapon:
+        """Make the weapon."""
+        return weapon_from_json(value, name)
+
+
 SHOT = Keys(
     {
-        "weapon": Text(),
+        "weapon": Either(dict, WeaponJson("weapon"), Text()),
         "at": Numbers((2,), POSITION_MAX),
         "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
         "toward": Optional(Numbers((2,), POSITION_MAX)),
@@ -56,9 +68,12 @@ SHOT = Keys(
 
 @dataclass(frozen=True)
 class ShotRequest:
-    """One checked shot. `accept` and `blocked_by` hold category bits, `exclude` ids of owners."""
+    """One checked shot. `accept` and `blocked_by` hold category bits, `exclude` ids of owners.
 
-    name: str
+    `name` is that of the weapon, or None for a weapon that the shot itself describes.
+    """
+
+    name: str | None
     weapon: Weapon
     at: tuple[float, float]
     aim: float | None = None
@@ -93,19 +108,20 @@ def order_from_json(
     """
     with within(place):
         shot = SHOT.check("shot", data)
-        name = choice("weapon", shot["weapon"], arsenal)
+        name = None if isinstance(shot["weapon"], Weapon) else choice("weapon", shot["weapon"], arsenal)
+        weapon: Weapon = shot["weapon"] if name is None else arsenal[name]
         if shot.get("aim") is not None and shot.get("toward") is not None:
             raise InputError("aim: expected aim or toward, got both")
         if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
             raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
-        if shot.get("toward") is None and has_no_range(arsenal[name]):
+        if shot.get("toward") is None and has_no_range(weapon):
             raise InputError("toward: expected a point, as the weapon has no range, got none")
         accept, blocked_by = (
             scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
         )
         return ShotRequest(
             name,
-            arsenal[name],
+            weapon,
             shot["at"],
             shot.get("aim"),
             shot.get("toward"),
@@ -135,6 +151,46 @@ def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadp
     )
 
 
+def fire_shots(scene: Scene) -> list[Hits]:
+    """Fire the shots of a scene's file, `scene.shots`, each for itself.
+
+    Raises
+    ------
+    InputError
+        If a weapon or a shot is invalid; the text names its place and the field.
+    """
+    return [fire_order(scene, order) for order in orders_of(scene, arsenal_of(scene))]
+
+
+def shot_json(weapon: Weapon, shot: Shots, scene: Scene, stack: Stack) -> dict[str, Any]:
+    """One shot as a scene file has it, the inverse of `order_from_json`; defaults are left out, but for the number.
+
+    Parameters
+    ----------
+    shot : a batch of one
+    scene, stack : the scene, for its weapons and names, and the stack that was fired at. Excluded owners that own
+        nothing of it are left out, as a file need not have their ids
+    """
+    name = next((name for name, other in arsenal_of(scene).items() if other == weapon), None)
+    aimed: dict[str, Any] = {}
+    if shot.aim is not None:
+        (aim,) = shot.aim.tolist()
+        aimed["aim"] = aim if abs(aim) <= AIM_MAX else math.fmod(aim, 360)
+    elif shot.toward_256 is not None:
+        aimed["toward"] = ((shot.at_256[0] + shot.toward_256[0]) / SUB).tolist()
+    bits = {"accept": int(shot.accept[0]), "blocked_by": int(shot.blocked_by[0])}
+    owners = [owner for owner in dict.fromkeys(shot.exclude[0].tolist()) if owner in stack.owner]
+    return {
+        "weapon": weapon.to_json() if name is None else name,
+        "at": (shot.at_256[0] / SUB).tolist(),
+        **aimed,
+        **{key: scene.category_names(value) for key, value in bits.items() if value != ALL},
+        **({"exclude": owners} if owners else {}),
+        **({"seed": int(shot.seed[0])} if shot.seed[0] else {}),
+        "shot": int(shot.number[0]),
+    }
+
+
 def _owner(scene: Scene, value: object, row: int) -> int:
     """Return the owner of a named object, or check the id of an owner."""
     with within(f"exclude[{row}]"):
@@ -161,7 +217,7 @@ class Salvo:
 
     Parameters
     ----------
-    name : names of the weapons
+    weapon : the weapon of each
     at : (n, 2) px
     aim : (n,) degrees
     toward : (n, 2) px; NaN for a shot that has an aim
@@ -170,7 +226,7 @@ class Salvo:
     seed, number : (n,) that select the random draws
     """
 
-    name: list[str]
+    weapon: list[Weapon]
     at: Floats
     aim: Floats
     toward: Floats
@@ -181,13 +237,13 @@ class Salvo:
     number: Ints
 
     def __len__(self) -> int:
-        return len(self.name)
+        return len(self.weapon)
 
-    def groups(self) -> dict[tuple[str, bool, int], Ints]:
+    def groups(self) -> dict[tuple[Weapon, bool, int], Ints]:
         """Group shots that one call can fire: by weapon, kind of aim (angle or point) and number of excluded owners."""
-        found: dict[tuple[str, bool, int], list[int]] = {}
+        found: dict[tuple[Weapon, bool, int], list[int]] = {}
         aimed = (~np.isnan(self.toward[:, 0])).tolist()
-        for row, key in enumerate(zip(self.name, aimed, map(len, self.exclude), strict=True)):
+        for row, key in enumerate(zip(self.weapon, aimed, map(len, self.exclude), strict=True)):
             found.setdefault(key, []).append(row)
         return {key: np.array(rows) for key, rows in found.items()}
 
@@ -216,7 +272,7 @@ class Salvo:
             return np.concatenate([getattr(part, name) for part in parts])
 
         return cls(
-            [name for part in parts for name in part.name],
+            [weapon for part in parts for weapon in part.weapon],
             column("at"),
             column("aim"),
             column("toward"),
@@ -231,7 +287,7 @@ class Salvo:
     def of_orders(cls, orders: Sequence[ShotRequest]) -> Salvo:
         """Return the columns of checked shots."""
         return cls(
-            [order.name for order in orders],
+            [order.weapon for order in orders],
             np.array([order.at for order in orders], np.float64).reshape(-1, 2),
             np.array([order.aim or 0.0 for order in orders], np.float64),
             np.array([order.toward or NOWHERE for order in orders], np.float64).reshape(-1, 2),
@@ -321,15 +377,13 @@ class ShotReader:
     def _together(self, bodies: list[bytes], first: int) -> Salvo:
         """Check the types and ranges of whole columns at once; raise any error if a line is unusual."""
         shots = _objects(bodies)
-        names = [shot["weapon"] for shot in shots]
-        _usual(set(names) <= self.arsenal.keys())
         toward, aim = [shot.get("toward") for shot in shots], [shot.get("aim") for shot in shots]
         _usual(all(t is None or a is None for t, a in zip(toward, aim, strict=True)))
         aimed = np.array([point is not None for point in toward])
         points = np.full((len(shots), 2), np.nan)
         points[aimed] = _points([point for point in toward if point is not None])
         return Salvo(
-            names,
+            [self._weapon(shot["weapon"]) for shot in shots],
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,
@@ -339,6 +393,9 @@ class ShotReader:
             np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
             np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
         )
+
+    def _weapon(self, told: Any) -> Weapon:
+        return self.arsenal[told] if type(told) is str else weapon_from_json(told)
 
     def _categories(self, shot: dict[str, Any], key: str) -> int:
         if key not in shot:

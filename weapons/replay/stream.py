@@ -485,8 +485,8 @@ def _fired(salvo: Salvo, bodies: list[bytes], reader: ShotReader, plan: PlanSum)
     sums = [zlib.crc32(body) for body in bodies]
     numbers = salvo.number.tolist()
     answers = [b""] * len(salvo)
-    for (name, toward, owners), rows in salvo.groups().items():
-        hits = fire(reader.scene, reader.arsenal[name], **salvo.arguments(rows, toward, owners))
+    for (weapon, toward, owners), rows in salvo.groups().items():
+        hits = fire(reader.scene, weapon, **salvo.arguments(rows, toward, owners))
         plan.add(hits.plan)
         for row, answer in zip(rows.tolist(), _answers(hits), strict=True):
             answers[row] = b'{"shot":%d,"of":"%08x",%b' % (numbers[row], sums[row], answer)

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,11 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..explain.samples import Samples, Share, detail_of
 from ..fire.call import fired as fire_checked
-from ..fire.hits import HitRow, Hits
+from ..fire.hits import BEFORE, HitRow, Hits
+from ..fire.spans import context_of
 from ..kinds.areas import is_directed, parts_of, ray_parts_of
 from ..kinds.placements import placements_for
+from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
 
@@ -72,8 +75,9 @@ def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
                 yield cells.xy[walked], cells.verdict[walked]
             continue
         step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
+        context = context_of(hits.scene, hits.scene.items.stack(), hits.weapon)
         for first in range(0, len(hits.shots), step):
-            detail = detail_of(hits.scene, hits.weapon, hits.shots.take(first, first + step))
+            detail = detail_of(context, hits.weapon, hits.shots.take(first, first + step))
             yield np.stack([detail.x, detail.runs.y[detail.run]], axis=1), detail.verdict
 
 
@@ -225,7 +229,7 @@ NEAR_OUTSIDE = 48
 def report_of(
     scene: Scene,
     fired: Sequence[Hits],
-    names: Sequence[str] | None = None,
+    names: Sequence[str | None] | None = None,
     *,
     now: Scene | None = None,
     prefilter: str | None = None,
@@ -240,7 +244,7 @@ def report_of(
     ----------
     scene : the scene that was fired at
     fired : answers of `fire` on it, each of one shot or of many
-    names : names of the weapons; by default their kinds
+    names : names of the weapons; by default, and where they are None, their kinds
     now : the present scene, to show what has moved since the shots, and what they would hit now
     prefilter, broadphase : the pre-filter ("circle", "4 boxes", ...) whose volumes, and the broad phase ("grid",
         "quadtree", "bvh") whose cells the picture shows, with the number of objects tested
@@ -346,29 +350,31 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
             raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
         if not hits.one_scene:
             raise InputError(f"fired[{row}]: expected shots at one tick, got several: fire them at history.at(tick)")
-        if hits.scene is not scene or hits.version != scene.version:
-            got = f"version {hits.version}" if hits.scene is scene else f"hits of {hits.scene.name!r}"
-            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}: fire again")
+        if hits.scene is not scene:
+            raise InputError(f"fired[{row}]: expected hits of the scene {scene.name!r}, got those of another")
+        if hits.version != scene.version:
+            got = f"version {hits.version}: {BEFORE}"
+            raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}")
     return told
 
 
-def _weapon_names(fired: Sequence[Hits], names: Sequence[str] | None) -> list[str]:
-    """Name of each weapon; equal weapons share one, others of the same kind are numbered."""
-    if names is not None:
-        names = listed("names", names, "a list of names")
-        if len(names) != len(fired):
-            raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(names)}")
-        names = [Text().check(f"names[{i}]", name) for i, name in enumerate(names)]
-        known: dict[str, Any] = {}
-        for name, hits in zip(names, fired, strict=True):
-            if known.setdefault(name, hits.weapon) != hits.weapon:
-                raise InputError(f"names: expected one weapon for each name, got two for {name!r}")
-        return list(names)
-    given: dict[Any, str] = {}
+def _weapon_names(fired: Sequence[Hits], names: Sequence[str | None] | None) -> list[str]:
+    """Name of each weapon; equal weapons without a name share one, others of the same kind are numbered."""
+    told = [None] * len(fired) if names is None else listed("names", names, "a list of names")
+    if len(told) != len(fired):
+        raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(told)}")
+    known: dict[str, Weapon] = {}
+    for i, (name, hits) in enumerate(zip(told, fired, strict=True)):
+        if name is not None and known.setdefault(Text().check(f"names[{i}]", name), hits.weapon) != hits.weapon:
+            raise InputError(f"names: expected one weapon for each name, got two for {name!r}")
+    called = {weapon: name for name, weapon in reversed(known.items())}  # the first of several names
     for hits in fired:
-        same = sum(weapon.kind == hits.weapon.kind for weapon in given)
-        given.setdefault(hits.weapon, f"{hits.weapon.kind} {same + 1}" if same else hits.weapon.kind)
-    return [given[hits.weapon] for hits in fired]
+        if hits.weapon not in called:
+            kind = hits.weapon.kind
+            numbered = chain([kind], (f"{kind} {number}" for number in count(2)))
+            called[hits.weapon] = next(name for name in numbered if name not in known)
+            known[called[hits.weapon]] = hits.weapon
+    return [called[hits.weapon] if name is None else name for name, hits in zip(told, fired, strict=True)]
 
 
 def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
