@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -234,6 +234,15 @@ def pixels_of_rays(detail: RayDetail) -> dict[tuple[int, int], Spans]:
         x, y = xy[((round_ == key[0]) & (item == key[1]))[met.pair]].T
         found[key] = Spans.from_runs(y, x, x)
     return found
+
+
+def object_cells(scene: Scene, parts: Parts, shots: Shots) -> Iterator[tuple[int, Spans]]:
+    """Pixels that shots hit, as (object, pixels); many shots are walked at a time."""
+    rays = rays_of(parts, shots)
+    each = np.bincount(rays.shot, _cells_most(rays, parts[2].radius_256), len(shots)).astype(np.int64)
+    for part in pieces(each, CELLS_AT_ONCE):
+        found = pixels_of_rays(ray_detail(scene, parts, shots.take(part.start, part.stop)))
+        yield from ((item, spans) for (_, item), spans in found.items())
 
 
 def blocked_rays(detail: RayDetail) -> list[Blocked]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -14,7 +14,7 @@ import numpy as np
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
-from hitplanes.planes.grid.spans import Box, Spans, each_pixel
+from hitplanes.planes.grid.spans import Box, Spans, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -63,6 +63,8 @@ class Blocked(NamedTuple):
     samples: int
     behind: tuple[Behind, ...]
 
+
+RUN = ("y", "x_first", "x_last")
 
 REASONS = ("missed", "category", "excluded", "behind", "outside", "inside", "tunnelled", "budget")
 
@@ -151,6 +153,26 @@ def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
         round_, item = keys[own[0]].tolist()
         found[round_, item] = Spans.from_runs(under.y[own], detail.hit.x_first[own], detail.hit.x_last[own])
     return found
+
+
+def object_spans(scene: Scene, weapon: Weapon, shots: Shots) -> Iterator[tuple[int, Spans]]:
+    """Pixels that shots hit, as (object, pixels); many shots are walked at a time."""
+    placements = placements_for(weapon, shots)
+    each = np.bincount(placements.shot, placements.count, len(shots)).astype(np.int64)
+    for part in pieces(each, CHUNK_SAMPLES):
+        detail = detail_of(scene, weapon, shots.take(part.start, part.stop))
+        yield from ((item, spans) for (_, item), spans in hit_spans(detail).items())
+
+
+def united(parts: Iterable[tuple[int, Spans]]) -> dict[int, Spans]:
+    """Union of the pixels of each object, by rising id."""
+    found: dict[int, list[Spans]] = {}
+    for item, spans in parts:
+        found.setdefault(item, []).append(spans)
+    return {
+        item: Spans.from_runs(*(np.concatenate([getattr(one, name) for one in own]) for name in RUN))
+        for item, own in sorted(found.items())
+    }
 
 
 def blockers_of(detail: Detail) -> list[Blocked]:
