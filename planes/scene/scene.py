@@ -31,7 +31,6 @@ from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MA
 from ..common.tables import Text, typed
 from ..grid.fixed_point import snap
 from ..grid.spans import Box
-from .carving import HitPixels, carved, hole_of, pixels_to_carve
 from .derived import Derived
 from .items import ROLES, Items, Role
 from .poses import are_rows, one_place, points, scale_pair
@@ -42,6 +41,7 @@ from .variants import transform_of
 if TYPE_CHECKING:
     from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
+    from .carving import HitPixels
 
 
 Read = TypeVar("Read", bound=np.generic)
@@ -278,13 +278,13 @@ class Scene:
             If the scene has changed since the shot, or is another one; or naming the id.
         """
         rows, sprites, lost = [], [], {}
-        for item, xy in pixels_to_carve(self, pixels).items():
+        for item, xy in late.carving.pixels_to_carve(self, pixels).items():
             row = int(self._existing(integer("pixels", item, 0, self.items.count - 1))[0])
             variant, place = self.items.variants[row], f"pixels[{row}]"
-            hole = hole_of(place, xy, variant.mask, self.items.corner(row))
+            hole = late.carving.hole_of(place, xy, variant.mask, self.items.corner(row))
             if count := int(np.count_nonzero(hole.hit)):
                 with within(place):
-                    sprites.append(carved(self.items.sprites[row], variant, hole))
+                    sprites.append(late.carving.carved(self.items.sprites[row], variant, hole))
                 rows.append(row)
                 lost[row] = count
         if rows:
