@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from .bits import visible as visible
     from .broadphase import boxes as boxes
     from .files import scene_folder as scene_folder
+    from .scene import carving as carving
     from .volumes import fit as fit
     from .volumes import overlap as overlap
     from .volumes import volumes as volumes
 
 _PLACES = {
     "boxes": "broadphase.boxes",
+    "carving": "scene.carving",
     "distance_field": "bits.distance_field",
     "fit": "volumes.fit",
     "label_plane": "bits.label_plane",

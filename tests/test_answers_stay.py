@@ -70,7 +70,7 @@ def all_of_an_area(hits: Hits) -> list[Any]:
     """All that can be read of areas."""
     told = [list(hits), hits.by_owner(), hits.to_rows(), told_of(hits), hits.shares(), hits.margins()]
     for shot in range(len(hits.shots)):
-        samples = [None if column is None else column.tolist() for column in hits.samples_at(shot)]
+        samples = [column.tolist() for column in hits.samples_at(shot)]
         pixels = {key: spans.pixels().tolist() for key, spans in hits.pixels_at(shot).items()}
         told += [samples, pixels, hits.why_not(shot), hits.blockers(shot)]
     return told

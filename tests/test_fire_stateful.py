@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import random
 import tempfile
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from test_fire import Placements, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
 
-from hitplanes import ALL, Disc, Hits, InputError, Point, Role, Scene, Sprite, fire, load_scene
+from hitplanes import ALL, Disc, Hits, InputError, Point, Role, Scene, Spans, Sprite, fire, load_scene
 from hitplanes.planes.bits import bit_rows, cells, front_to_back
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.label_plane import LabelPlane
@@ -65,6 +66,17 @@ class Model:
         mask, (x, y) = (fresh := Scene()).mask(fresh.add(self.sprite, self.position, **pose))
         pixels = frozenset((x + i, y + j) for j, i in np.argwhere(mask).tolist())
         return oracle_stack.Item(number, role == "occluder", pose["layer"], pose["categories"], owner, pixels)
+
+
+def placed(scene: Scene, number: int) -> set[tuple[int, int]]:
+    """World pixels of an object."""
+    mask, (x, y) = scene.mask(number)
+    return {(x + int(i), y + int(j)) for j, i in np.argwhere(mask)}
+
+
+def set_pixels(found: dict[int, Spans]) -> dict[int, set[tuple[int, int]]]:
+    """Pixels of objects, one by one."""
+    return {number: set(map(tuple, spans.pixels().tolist())) for number, spans in found.items()}
 
 
 def codes_of(items: Sequence[oracle_stack.Item]) -> np.ndarray:
@@ -156,6 +168,23 @@ class ChangingScene(RuleBasedStateMachine):
         self.scene.set(np.array(ids), frame=frames, owner=owners)
         for number, frame, owner in zip(ids, frames, owners, strict=True):
             self.models[number].pose |= {"frame": frame, "owner": owner}
+
+    @precondition(lambda self: self.models)
+    @rule(data=st.data(), center=places, seed=st.integers(0, 99))
+    def carve(self, data: st.DataObject, center: tuple[float, float], seed: int) -> None:
+        """Carve what a shot hits, or a square out of some objects; the model takes sprites without cached masks."""
+        x, y = map(round, center)
+        pixels = {(x + i, y + j) for i in range(-3, 4) for j in range(-3, 4)}
+        hits = fire(self.scene, Disc(4, pierce=seed % 2 == 0), center)
+        asked = dict.fromkeys(self._some(data), pixels) if seed % 3 else set_pixels(hits.object_pixels())
+        before = {number: placed(self.scene, number) for number in self.models}
+        lost = self.scene.carve({n: sorted(own) for n, own in asked.items()} if seed % 3 else hits)
+        for number, model in self.models.items():
+            expected = before[number] - asked.get(number, set())
+            assert placed(self.scene, number) == expected
+            assert lost.get(number, 0) == len(before[number]) - len(expected)
+            if number in lost:
+                model.sprite = pickle.loads(pickle.dumps(self.scene.sprite(number)))
 
     @precondition(lambda self: self.models)
     @rule(data=st.data())

@@ -20,7 +20,8 @@ from hitplanes import load_scene
 
 ROOT = Path(__file__).parents[1]
 RECIPES = ROOT / "weapons" / "RECIPES.md"
-GUIDES = [RECIPES, ROOT / "tests" / "README.md", ROOT / "fixtures" / "README.md"]
+OF_SCENES = ROOT / "planes" / "RECIPES.md"
+GUIDES = [RECIPES, OF_SCENES, ROOT / "tests" / "README.md", ROOT / "fixtures" / "README.md"]
 INSIDE = r"((?:(?!```).)*?)"
 GOLDEN = "A golden test in CI"
 
@@ -44,10 +45,10 @@ def test_every_example_shows_what_it_prints(guide: Path) -> None:
 
 
 def test_a_recipe_is_short() -> None:
-    headings = re.findall(r"^## (.*)$", text_of(RECIPES), flags=re.MULTILINE)
-    assert len(headings) >= 11
-    for heading in headings:
-        (code,) = blocks(section(RECIPES, heading), "python")
+    recipes = [(g, h) for g in (RECIPES, OF_SCENES) for h in re.findall(r"^## (.*)$", text_of(g), flags=re.MULTILINE)]
+    assert len(recipes) >= 13
+    for guide, heading in recipes:
+        (code,) = blocks(section(guide, heading), "python")
         assert len([line for line in code.splitlines() if line]) <= 20, heading
 
 

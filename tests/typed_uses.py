@@ -63,8 +63,12 @@ fire(scene, Disc(3), np.zeros((2, 2)), aim=np.array([3, 4]), accept=np.array([1,
 fire(scene, Disc(3), (np.float32(1), np.int64(2)), toward=[5, 6.5], accept=5, exclude=np.int64(2), blocked_by=0)
 fire(scene, Disc(3), scene.position(tank), toward=scene.position([tank])[0], exclude=[[1, 2], [3, -1]])
 scene.set(tank, position_xy=(1, 2), angle=3)
+scene.carve(fire(scene, Disc(3), (5, 5)))
+scene.carve(fire(scene, Pistol(80), (5, 5)))
+scene.carve({tank: [(5, 5)], int(scene.ids()[0]): np.zeros((3, 2), np.int64)})
 
 # And as it does not.
+scene.carve([tank])  # type: ignore[arg-type]
 fire(scene, Disc(3), "banana")  # type: ignore[arg-type]
 fire(scene, Disc(3), (1, 2), accept=3.5)  # type: ignore[call-overload]
 fire(scene, Disc(3), (1, 2), blocked_by=[2.5])  # type: ignore[arg-type]

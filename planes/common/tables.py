@@ -261,6 +261,23 @@ class Either:
 
 
 @dataclass(frozen=True)
+class OneOrEach:
+    """An array of one form for all, or an array of such arrays."""
+
+    one: Value
+    each: Value
+
+    def check(self, name: str, value: object) -> Any:
+        """Check the value by the form that its first row selects."""
+        several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
+        return (self.each if several else self.one).check(name, value)
+
+    def schema(self) -> dict[str, Any]:
+        """Either of them."""
+        return {"anyOf": [self.one.schema(), self.each.schema()]}
+
+
+@dataclass(frozen=True)
 class Rows:
     """A list whose rows all have one form."""
 

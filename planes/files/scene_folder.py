@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
-from ..common.checks import Image, InputError, path_of, suggestion, within
+from ..common.checks import Image, InputError, integer, path_of, suggestion, within
 from ..common.limits import (
+    ALPHA_THRESHOLD,
     ANGLE_STEPS_MAX,
     COST_MAX,
     ITEMS_MAX,
@@ -35,6 +36,7 @@ from ..common.tables import (
     Names,
     Number,
     Numbers,
+    OneOrEach,
     Optional,
     Ref,
     Rows,
@@ -50,7 +52,7 @@ from ..common.tables import (
 )
 from ..scene.items import Role
 from ..scene.scene import Scene
-from ..scene.sprite import Sprite, rows_of
+from ..scene.sprite import Carving, Sprite, frame_pivot, frozen, local_grid, rows_of
 from ..scene.variants import FLIPS
 from .png import possible, read_png, read_text, write_png, write_text
 
@@ -71,27 +73,32 @@ PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
 ID = Whole(0, ITEMS_MAX - 1)
+CELLS_MOST = 512
+"""Most cells along a pixel of a carved sprite: what the largest scale needs, turned."""
+
+CARVED = Keys({"image": Text(), "frame": Whole(0, 2**31 - 1), "cells_per_px": Whole(1, CELLS_MOST)}, ("image",))
 FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
-STEP = Number(360 / ANGLE_STEPS_MAX, 360)
+COMMON: dict[str, Value] = {"angle_step": Number(360 / ANGLE_STEPS_MAX, 360), "carved": Rows(Within(CARVED))}
+OF_IMAGES: dict[str, Value] = {
+    "alpha_threshold": Whole(0, 255),
+    "color_key": COLOR,
+    "pivot_xy": OneOrEach(PIVOT, Numbers((None, 2), MASK_SIDE_MAX)),
+    "frame_names": Names(),
+    **COMMON,
+}
 SOURCES: dict[str, dict[str, Value]] = {
-    "image": {
-        "image": Text(),
-        "alpha_threshold": Whole(0, 255),
-        "color_key": COLOR,
-        "frames": Within(FRAMES),
-        "pivot_xy": PIVOT,
-        "angle_step": STEP,
-    },
-    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR, "angle_step": STEP},
-    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR, "angle_step": STEP},
-    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR, "angle_step": STEP},
-    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, "angle_step": STEP},
+    "image": {"image": Text(), "frames": Within(FRAMES), **OF_IMAGES},
+    "images": {"images": Rows(Text()), **OF_IMAGES},
+    "polygon": {"polygon": RING, "holes": Rows(RING), "color": COLOR, **COMMON},
+    "circle": {"circle": Number(0, MASK_SIDE_MAX), "color": COLOR, **COMMON},
+    "box_wh": {"box_wh": Numbers((2,), MASK_SIDE_MAX, low=0), "color": COLOR, **COMMON},
+    "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, **COMMON},
 }
 POSE: dict[str, Value] = {
     "angle": Number(),
     "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
     "flip": Word(FLIPS),
-    "frame": Whole(0, 2**31 - 1),
+    "frame": Either(str, Text(), Whole(0, 2**31 - 1)),
     "layer": Whole(-LAYER_MAX, LAYER_MAX),
     "cost": Whole(0, COST_MAX),
     "velocity_xy": Numbers((2,), REACH_MAX),
@@ -263,7 +270,9 @@ def _object(entry: object, role: Role, place: str, folder: Path, sprites: dict[s
     source = {key: given[key] for key in SOURCES[kind] if key in given}
     shared = json.dumps(source, sort_keys=True)
     if shared not in sprites:
-        sprites[shared] = READERS[kind]({key: data[key] for key in source}, folder, source)
+        carvings = data.pop("carved", ())
+        sprite = READERS[kind]({key: data[key] for key in source if key in data}, folder, source)
+        sprites[shared] = _carved_sprite(sprite, carvings, folder)
     pose = {key: data[key] for key in POSE if key in data}
     options = {key: data.get(key) for key in ("name", "categories", "owner", "id")}
     return FileObject(role, sprites[shared], data["position_xy"], pose, place=place, **options)
@@ -274,8 +283,35 @@ def _image_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) ->
     return Sprite.from_image(image, **data, **frames, source=source)
 
 
+def _images_sprite(data: dict[str, Any], folder: Path, source: dict[str, Any]) -> Sprite:
+    images = [read_png(_inside(folder, name)) for name in data.pop("images")]
+    return Sprite.from_images(images, **data, source=source)
+
+
+def _carved_sprite(sprite: Sprite, entries: Sequence[dict[str, Any]], folder: Path) -> Sprite:
+    """A sprite with what is carved out of its frames: the set pixels of images of cells."""
+    carvings: dict[int, Carving] = {}
+    for row, entry in enumerate(entries):
+        with within(f"carved[{row}]"):
+            frame = integer("frame", entry.get("frame", 0), 0, sprite.frame_count - 1)
+            per_px = entry.get("cells_per_px", 1)
+            if frame in carvings:
+                raise InputError(f"frame: expected each once, got {frame} again")
+            if per_px & (per_px - 1):
+                raise InputError(f"cells_per_px: expected a power of two, got {per_px}")
+            gone = read_png(_inside(folder, entry["image"]))[:, :, 3] > ALPHA_THRESHOLD
+            (w, h), got = local_grid(sprite, frame)[0], gone.shape[::-1]
+            if got != (w * per_px, h * per_px):
+                raise InputError(f"image: expected {w * per_px} x {h * per_px} cells, got {got[0]} x {got[1]}")
+            carvings[frame] = Carving(frozen(gone), per_px)
+    if not carvings:
+        return sprite
+    return replace(sprite, carvings=carvings, source={**(sprite.source or {}), "carved": list(entries)})
+
+
 READERS: dict[str, Callable[[dict[str, Any], Path, dict[str, Any]], Sprite]] = {
     "image": _image_sprite,
+    "images": _images_sprite,
     "polygon": lambda data, *_: Sprite.polygon(data.pop("polygon"), data.pop("holes", ()), **data),
     "circle": lambda data, *_: Sprite.circle(data.pop("circle"), **data),
     "box_wh": lambda data, *_: Sprite.box(*data.pop("box_wh"), **data),
@@ -304,14 +340,22 @@ def _object_json(entry: FileObject, source: dict[str, Any]) -> dict[str, Any]:
 
 
 def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -> dict[str, Any]:
-    """Source of a sprite as JSON; its image is written to the folder without overwriting another file."""
+    """Source of a sprite as JSON; its images are written to the folder without overwriting another file."""
     color = {} if sprite.color is None else {"color": list(sprite.color)}
     options: dict[str, Any] = {} if sprite.angle_step is None else {"angle_step": sprite.angle_step}
+    if sprite.carvings:
+        options["carved"] = [
+            {"image": _write_apart(folder, _carved_name(sprite), _cells(one), images), "frame": frame,
+             "cells_per_px": one.per_px}
+            for frame, one in sorted(sprite.carvings.items())
+        ]  # fmt: skip
     if sprite.outline is not None:
         return {**(sprite.source or {}), **color, **options}
     masks = [frame.mask for frame in sprite.frames]
     if sprite.pivot_256 is not None:
         options["pivot_xy"] = [v / SUB for v in sprite.pivot_256]
+    elif sprite.frames[0].pivot_256 is not None:
+        options["pivot_xy"] = [[v / SUB for v in frame_pivot(sprite, frame)] for frame in sprite.frames]
     if sprite.frames[0].image is None and masks[0].size <= MASK_ROWS_AREA:
         return {"mask": rows_of(masks[0]), **options, **color}
     known = sprite.source or {}
@@ -320,12 +364,33 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     sheet, rects = _sheet(sprite)
     if len(rects) > 1:
         options["frames"] = {"rects_xywh": rects}
+    if sprite.frame_names:
+        options["frame_names"] = list(sprite.frame_names)
     return {"image": _write_apart(folder, _image_name(sprite), sheet, images), **options}
+
+
+def _carved_name(sprite: Sprite) -> str:
+    return f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
+
+
+def _cells(carving: Carving) -> Image:
+    """Cells that are gone as an image: black and opaque, on nothing."""
+    cells = np.zeros((*carving.gone.shape, 4), np.uint8)
+    cells[:, :, 3] = np.where(carving.gone, 255, 0)
+    return cells
 
 
 def _image_name(sprite: Sprite) -> str:
     """Path from which the image of a sprite was read, or a new name for it."""
-    return inside("source.image", (sprite.source or {}).get("image", "sprite.png"))
+    source = sprite.source or {}
+    return inside("source.image", source.get("image", (*source.get("images", ()), "sprite.png")[0]))
+
+
+def images_of(sprite: Sprite) -> set[str]:
+    """Paths of the images in a scene's folder from which a sprite was read."""
+    source = sprite.source or {}
+    one = {source["image"]} if "image" in source else set()
+    return one | {*source.get("images", ())} | {entry["image"] for entry in source.get("carved", ())}
 
 
 def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:

@@ -6,6 +6,7 @@ changes, so neither does a scene made of it.
 
 from __future__ import annotations
 
+import copy
 import math
 import pickle
 import threading
@@ -171,6 +172,10 @@ class PastScene(Scene):
         """Refuse: the past is as it was."""
         self._refuse()
 
+    def carve(self, *_: Any, **__: Any) -> NoReturn:
+        """Refuse: the past is as it was."""
+        self._refuse()
+
     def rename(self, *_: Any, **__: Any) -> NoReturn:
         """Refuse: the past is as it was."""
         self._refuse()
@@ -213,6 +218,17 @@ class History:
         self._views: WeakValueDictionary[float, PastScene] = WeakValueDictionary()
         self._read: PastScene | None = None
         self._lock = threading.Lock()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the recorded moments with the scene; equal columns of moments are stored once."""
+        with self._lock:
+            states: dict[int, Any] = {id(moment.items): moment.items.state() for moment in self._moments.values()}
+            moments = {tick: moment._replace(items=states[id(moment.items)]) for tick, moment in self._moments.items()}
+        return _restored_history, (self.scene, self._most, self._interpolate, moments)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> History:
+        _, (scene, *rest) = self.__reduce__()
+        return _restored_history(copy.deepcopy(scene, memo), *rest)
 
     @property
     def ticks(self) -> list[int]:
@@ -309,6 +325,18 @@ class History:
         part, parts = int(SUB * (at - first)), SUB * (last - first)
         spare = max(parts.bit_length() - PART_BITS, 0)
         return before._replace(items=before.items.between(after.items, part >> spare, parts >> spare))
+
+
+def _restored_history(scene: Scene, most: int, interpolate: bool, moments: dict[int, Any]) -> History:
+    """A history of the parts that copies and pickles take; its moments share masks and columns again."""
+    history, atlas, made = History(scene, most, interpolate), MaskAtlas(), dict[int, PastItems]()
+    last: PastItems | None = None
+    for tick, moment in moments.items():
+        if id(moment.items) not in made:
+            last = made[id(moment.items)] = PastItems(Items.restored(moment.items, atlas), last)
+            last.version = last._forgotten = 0  # of no present scene, which has changed at least once
+        history._moments[tick] = moment._replace(items=made[id(moment.items)])
+    return history
 
 
 def _not_plain(error: Exception) -> InputError:

@@ -63,6 +63,10 @@ class Stack:
     forms: int
     count: int
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy is an arrangement of its own: numbers of another process mean nothing here."""
+        vars(self).update(state, forms=next(ARRANGEMENTS))
+
     def placed(self, box_xyxy: Ints) -> Stack:
         """A stack of the same items in the same order at other places; both share the other columns."""
         return self._with(("sizes",), box_xyxy=box_xyxy)
@@ -285,13 +289,15 @@ class Items:
 
     def state(self) -> dict[str, Any]:
         """What a copy is made of: views of the columns, and lists of looks and names."""
-        columns = {name: getattr(self, name)[: self.count] for name in COLUMNS}
+        columns = {name: getattr(self, name) for name in COLUMNS}
+        columns = {name: col if len(col) == self.count else col[: self.count] for name, col in columns.items()}
         return columns | {name: list(getattr(self, name)) for name in (*Looks._fields, "names")}
 
     @classmethod
-    def restored(cls, state: dict[str, Any]) -> Items:
-        """Items with the same ids as those of a state; their masks are made anew."""
+    def restored(cls, state: dict[str, Any], atlas: MaskAtlas | None = None) -> Items:
+        """Items with the same ids as those of a state; their masks are made anew, and entered into an atlas."""
         items = cls()
+        items.atlas = atlas or items.atlas
         items.skip_to(len(state["names"]))
         for name in COLUMNS:
             getattr(items, name)[: items.count] = state[name]

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common.checks import Floats, InputError, array_of, choice, each, integer, integers, reals, within
+from ..common.checks import Floats, InputError, array_of, choice, each, integers, reals, within
 from ..common.limits import POSITION_MAX, SUB
 from ..grid.fixed_point import all_quarter_turns
-from .sprite import Sprite, as_sprite
+from .sprite import Sprite, as_sprite, frame_number
 from .variants import FLIPS, Transform, whole_scale
 
 NUMBERS = frozenset((int, float, np.float64))
@@ -75,7 +75,7 @@ class Looks(NamedTuple):
         if scale is not None:
             x, y = _scale_rows(scale, n)
         if frame is not None or sprite is not None:
-            frames = _frame_rows(list(frames) if frame is None else frame, [one.frame_count for one in sprites])
+            frames = _frame_rows(list(frames) if frame is None else frame, sprites)
         if flip is not None:
             flips = _flip_rows(flip, n)
         return Looks(sprites, angles, list(map(Transform, frames, flips, x, y, *turns)))
@@ -94,14 +94,18 @@ def _sprite_rows(sprite: object, n: int) -> list[Sprite]:
     return made
 
 
-def _frame_rows(frame: object, counts: list[int]) -> list[int]:
-    """Check frame numbers of objects, one for all or (n,); `counts` are the frames of their sprites."""
-    n = len(counts)
-    numbers: list[int] = integers("frame", each("frame", frame, n), (n,), 0, 2**31).tolist()
-    for row, (number, count) in enumerate(zip(numbers, counts, strict=True)):
-        if number >= count:
+def _frame_rows(frame: object, sprites: list[Sprite]) -> list[int]:
+    """Check frames of objects, one for all or (n,), as numbers or as names in their sprites."""
+    given = each("frame", frame, len(sprites))
+    if given.dtype.kind == "U" and given.shape != (len(sprites),):
+        raise InputError(f"frame: expected one for all or {len(sprites)}, got {given.size}")
+    numbers: list[Any] = given.tolist()
+    if given.dtype.kind != "U":
+        numbers = integers("frame", given, (len(sprites),), 0, 2**31).tolist()
+    for row, sprite in enumerate(sprites):
+        if isinstance(numbers[row], str) or numbers[row] >= sprite.frame_count:
             with within(f"row {row}"):
-                integer("frame", number, 0, count - 1)
+                numbers[row] = frame_number(sprite, numbers[row])
     return numbers
 
 

@@ -13,7 +13,7 @@ from ..common.limits import ITEMS_MAX, PLANE_AREA_MAX, PLANE_SIDE_MAX, SCALE_BIT
 from ..grid.fixed_point import pixel
 from ..grid.spans import Box
 from .items import ROLES, Items, Role
-from .sprite import Sprite
+from .sprite import Sprite, frame_pivot
 from .variants import picture_of
 
 BARE = {
@@ -77,7 +77,7 @@ def _beyond(items: Items, item: int, view_xyxy: Box) -> bool:
     if not sprite.frames or ROLES[int(items.role[item])] is Role.HUD:
         return False
     height, width = sprite.frames[form.frame].mask.shape
-    pivot = max(map(abs, sprite.pivot_256 or (0, 0))) // SUB
+    pivot = max(map(abs, frame_pivot(sprite, sprite.frames[form.frame]))) // SUB
     reach = (height + width + 2 * pivot + 2) * (max(form.scale_x, form.scale_y, 1 << SCALE_BITS) >> SCALE_BITS) * 2
     x, y = pixel(items.position_256[item]).tolist()
     return not (view_xyxy[0] - reach <= x <= view_xyxy[2] + reach and view_xyxy[1] - reach <= y <= view_xyxy[3] + reach)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,6 +25,7 @@ from ..common.checks import (
     path_of,
     reals,
     rising,
+    within,
 )
 from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from ..common.tables import Text, typed
@@ -40,6 +41,7 @@ from .variants import transform_of
 if TYPE_CHECKING:
     from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
+    from .carving import HitPixels
 
 
 Read = TypeVar("Read", bound=np.generic)
@@ -154,7 +156,7 @@ class Scene:
         angle: float = 0.0,
         scale: float | Sequence[float] = 1.0,
         flip: str = "none",
-        frame: int = 0,
+        frame: int | str = 0,
         layer: int = 0,
         categories: int | Sequence[str] | None = None,
         owner: int | None = None,
@@ -172,7 +174,7 @@ class Scene:
         angle : degrees, clockwise on the screen
         scale : one number, or (sx, sy)
         flip : "none", "x" (left to right), "y" or "xy"
-        frame : number of the sprite's frame
+        frame : number or name of the sprite's frame
         layer : greater is nearer the viewer
         categories : names, or bits; by default bit 0 for objects, all bits for occluders
         owner : id of the object that this one is a part of; by default itself
@@ -264,6 +266,36 @@ class Scene:
         for name, values in columns.items():
             getattr(self.items, name)[rows] = values
         self.items.record(rows, columns)
+
+    def carve(self, pixels: HitPixels | Mapping[int, object]) -> dict[int, int]:
+        """Take pixels out of objects, as terrain that is shot away, and return how many each of them lost.
+
+        An object loses exactly these pixels of its mask as it stands, and keeps its id, name and pose. The hole turns,
+        flips and grows with it; other frames stay whole. One of which nothing is left stays, with an empty mask.
+
+        Parameters
+        ----------
+        pixels : hits of `fire` at this scene as it is now; or pixels for each id, as Spans or whole numbers (n, 2)
+
+        Raises
+        ------
+        InputError
+            If the scene has changed since the shot, or is another one; or naming the id.
+        """
+        rows, sprites, lost = [], [], {}
+        for item, xy in late.carving.pixels_to_carve(self, pixels).items():
+            row = int(self._existing(integer("pixels", item, 0, self.items.count - 1))[0])
+            variant, place = self.items.variants[row], f"pixels[{row}]"
+            hole = late.carving.hole_of(place, xy, variant.mask, self.items.corner(row))
+            if count := int(np.count_nonzero(hole.hit)):
+                with within(place):
+                    sprites.append(late.carving.carved(self.items.sprites[row], variant, hole))
+                rows.append(row)
+                lost[row] = count
+        if rows:
+            self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
+            self.items.record(np.array(rows), ("mask",))
+        return lost
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""

@@ -17,6 +17,7 @@ from ..common.checks import (
     Ints,
     array_of,
     bools,
+    choice,
     integer,
     integers,
     listed,
@@ -26,7 +27,7 @@ from ..common.checks import (
     within,
 )
 from ..common.limits import ALPHA_THRESHOLD, ANGLE_STEPS_MAX, FRAMES_MAX, HALF, MASK_AREA_MAX, MASK_SIDE_MAX, SUB
-from ..common.tables import inside
+from ..common.tables import Names, inside
 from ..grid.fixed_point import snap
 
 
@@ -44,6 +45,9 @@ def check_size(name: str, width: int, height: int) -> None:
 
 UIDS = itertools.count()
 
+OUTLINE_MARGIN = 2
+"""Pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of the shape as it was made."""
+
 
 class Known:
     """An object with a number `uid` that is unique in this process; a copy, even an unpickled one, gets its own."""
@@ -56,10 +60,11 @@ class Known:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame of a sprite: the mask (h, w), and the image (h, w, 4) that it was made of, if any."""
+    """A frame of a sprite: the mask (h, w), the image (h, w, 4) that it was made of, if any, and a pivot of its own."""
 
     mask: Bools
     image: Image | None = None
+    pivot_256: tuple[int, int] | None = None
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Copy the arrays, and make them read-only again."""
@@ -67,6 +72,25 @@ class Frame:
         for array in (self.mask, self.image):
             if array is not None:
                 array.flags.writeable = False
+
+
+@dataclass(frozen=True, eq=False)
+class Carving:
+    """What was carved out of a frame or a shape: cells that are gone. It is flipped, scaled and turned with the sprite.
+
+    Parameters
+    ----------
+    gone : (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
+    per_px : number of cells along a pixel, a power of two: a turned or enlarged sprite loses parts of its pixels
+    """
+
+    gone: Bools
+    per_px: int = 1
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Copy the array, and make it read-only again."""
+        vars(self).update(state)
+        self.gone.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -81,7 +105,8 @@ class Outline:
 class Sprite(Known):
     """The look and the mask of an object: frames of image and mask, or one shape. The class methods make sprites.
 
-    `source` is its entry in a scene file, as JSON, or None.
+    `source` is its entry in a scene file, as JSON, or None. `carvings` has what `Scene.carve` took out of frames, by
+    their numbers.
     """
 
     frames: tuple[Frame, ...]
@@ -90,6 +115,8 @@ class Sprite(Known):
     color: tuple[int, int, int] | None = None
     source: dict[str, Any] | None = None
     angle_step: float | None = None
+    frame_names: tuple[str, ...] = ()
+    carvings: dict[int, Carving] = field(default_factory=dict)
     uid: int = field(default_factory=UIDS.__next__, init=False)
 
     def __post_init__(self) -> None:
@@ -107,7 +134,8 @@ class Sprite(Known):
         color_key: Sequence[int] | None = None,
         grid_wh: Sequence[int] | None = None,
         rects_xywh: Sequence[Sequence[int]] | None = None,
-        pivot_xy: Sequence[float] | None = None,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
+        frame_names: Sequence[str] = (),
         angle_step: float | None = None,
         source: dict[str, Any] | None = None,
     ) -> Sprite:
@@ -120,7 +148,9 @@ class Sprite(Known):
         color_key : RGB of transparent pixels
         grid_wh : size of a frame; frames run left to right, then top to bottom
         rects_xywh : (n, 4) frames as rectangles
-        pivot_xy : point of a frame that is put at the object's position, px; by default its centre ((w-1)/2, (h-1)/2)
+        pivot_xy : point of a frame that is put at the object's position, px from its pixel [0, 0]; one for all frames,
+            or one for each (n, 2), as trimmed sheets have; by default the centre ((w-1)/2, (h-1)/2) of each
+        frame_names : a name for each frame, which `scene.set(ids, frame=...)` takes as well as its number
         angle_step : degrees, a whole number of which make a turn: the mask is turned to the nearest multiple
 
         Raises
@@ -128,19 +158,54 @@ class Sprite(Known):
         InputError
             If the image is not such an array, frames leave it, or the grid does not divide it.
         """
-        rgba = _as_rgba(image)
         threshold = integer("alpha_threshold", alpha_threshold, 0, 255)
-        mask = rgba[:, :, 3] > threshold
-        if color_key is not None:
-            key = integers("color_key", color_key, (3,), 0, 255)
-            mask &= (rgba[:, :, :3] != key).any(axis=2)
-            rgba[:, :, 3] = np.where(mask, rgba[:, :, 3], 0)
+        rgba, mask = _keyed("image", image, threshold, color_key)
         rects = _frame_rects(rgba.shape[1], rgba.shape[0], grid_wh, rects_xywh)
+        parts = [(mask[y : y + h, x : x + w], rgba[y : y + h, x : x + w]) for x, y, w, h in rects]
+        return cls._of_parts(parts, threshold, pivot_xy, frame_names, angle_step, source)
+
+    @classmethod
+    def from_images(
+        cls,
+        images: Sequence[object],
+        *,
+        alpha_threshold: int = ALPHA_THRESHOLD,
+        color_key: Sequence[int] | None = None,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
+        frame_names: Sequence[str] = (),
+        angle_step: float | None = None,
+        source: dict[str, Any] | None = None,
+    ) -> Sprite:
+        """Take images as frames, each of a size of its own; the other parameters are those of `from_image`.
+
+        Parameters
+        ----------
+        images : n of them, each (h, w, 3) RGB or (h, w, 4) RGBA, bytes
+        """
+        threshold, given = integer("alpha_threshold", alpha_threshold, 0, 255), listed("images", images, "a list")
+        if not 1 <= len(given) <= FRAMES_MAX:
+            raise InputError(f"images: expected 1 to {FRAMES_MAX}, got {len(given) or 'none'}")
+        parts = [_keyed(f"images[{i}]", image, threshold, color_key)[::-1] for i, image in enumerate(given)]
+        return cls._of_parts(parts, threshold, pivot_xy, frame_names, angle_step, source)
+
+    @classmethod
+    def _of_parts(
+        cls,
+        parts: Sequence[tuple[Bools, Image]],
+        threshold: int,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None,
+        frame_names: Sequence[str],
+        angle_step: float | None,
+        source: dict[str, Any] | None,
+    ) -> Sprite:
+        """A sprite of masks and images."""
+        pivot, pivots = _pivots(pivot_xy, len(parts))
+        names = _frame_names(frame_names, len(parts))
         frames = tuple(
-            Frame(frozen(mask[y : y + h, x : x + w]), frozen(rgba[y : y + h, x : x + w])) for x, y, w, h in rects
+            Frame(frozen(mask), frozen(image), own) for (mask, image), own in zip(parts, pivots, strict=True)
         )
         known = (_source(source) or {}) | {"alpha_threshold": threshold}
-        return cls(frames, _pivot(pivot_xy), source=known, angle_step=_angle_step(angle_step))
+        return cls(frames, pivot, source=known, angle_step=_angle_step(angle_step), frame_names=names)
 
     @classmethod
     def from_mask(
@@ -265,7 +330,24 @@ def size_of(rings: Sequence[Ints]) -> tuple[int, int]:
 def frame_pivot(sprite: Sprite, frame: Frame) -> tuple[int, int]:
     """Pivot of a frame, in 1/256 px from the centre of its pixel [0, 0]."""
     h, w = frame.mask.shape
-    return sprite.pivot_256 or ((w - 1) * HALF, (h - 1) * HALF)
+    return frame.pivot_256 or sprite.pivot_256 or ((w - 1) * HALF, (h - 1) * HALF)
+
+
+def local_grid(sprite: Sprite, number: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Width and height of the pixel grid of a frame or a shape as it was made, and its pivot.
+
+    The pivot is in 1/256 px from the centre of pixel [0, 0]. The grid of a shape has a margin, as the points of a
+    transformed shape are rounded.
+    """
+    if sprite.outline is None:
+        frame = sprite.frames[number]
+        return frame.mask.shape[::-1], frame_pivot(sprite, frame)
+    radius = sprite.outline.radius
+    points = np.concatenate(sprite.outline.rings) if radius is None else np.array([[-radius] * 2, [radius] * 2])
+    low = points.min(axis=0) // SUB - OUTLINE_MARGIN
+    width, height = (-(-points.max(axis=0) // SUB) + OUTLINE_MARGIN + 1 - low).tolist()
+    x, y = (-SUB * low).tolist()
+    return (width, height), (x, y)
 
 
 def _source(source: object) -> dict[str, Any] | None:
@@ -276,6 +358,8 @@ def _source(source: object) -> dict[str, Any] | None:
         raise InputError(f"source: expected an object, got {shown(source)}")
     if "image" in source:
         inside("source.image", source["image"])
+    for i, name in enumerate(source.get("images", ())):
+        inside(f"source.images[{i}]", name)
     return dict(source)
 
 
@@ -284,6 +368,31 @@ def _pivot(pivot_xy: Sequence[float] | None) -> tuple[int, int] | None:
         return None
     x, y = snap(reals("pivot_xy", pivot_xy, (2,), MASK_SIDE_MAX)).tolist()
     return x, y
+
+
+Pair = tuple[int, int] | None
+
+
+def _pivots(pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None, n: int) -> tuple[Pair, list[Pair]]:
+    """The pivot of all frames, and a pivot of each, in 1/256 px; the given ones are either."""
+    if pivot_xy is None or array_of("pivot_xy", pivot_xy).ndim < 2:
+        return _pivot(pivot_xy), [None] * n  # type: ignore[arg-type]
+    return None, [(x, y) for x, y in snap(reals("pivot_xy", pivot_xy, (n, 2), MASK_SIDE_MAX)).tolist()]
+
+
+def _frame_names(frame_names: Sequence[str], n: int) -> tuple[str, ...]:
+    """Check the names of frames: none, or a different one for each."""
+    names = Names().check("frame_names", listed("frame_names", frame_names, "a list of names"))
+    if names and len(names) != n:
+        raise InputError(f"frame_names: expected one for each of {n} frames, got {len(names)}")
+    return tuple(names)
+
+
+def frame_number(sprite: Sprite, frame: object) -> int:
+    """Check the number or the name of a frame, and return its number."""
+    if isinstance(frame, str):
+        return sprite.frame_names.index(choice("frame", frame, sprite.frame_names))
+    return integer("frame", frame, 0, sprite.frame_count - 1)
 
 
 def _color(color: Sequence[int] | None) -> tuple[int, int, int] | None:
@@ -303,11 +412,22 @@ def _angle_step(value: float | None) -> float | None:
     return step
 
 
-def _as_rgba(image: object) -> Image:
-    array = array_of("image", image)
+def _keyed(field: str, image: object, threshold: int, color_key: Sequence[int] | None) -> tuple[Image, Bools]:
+    """An image as RGBA, transparent where it has the colour key, and its mask."""
+    rgba = _as_rgba(field, image)
+    mask = rgba[:, :, 3] > threshold
+    if color_key is not None:
+        key = integers("color_key", color_key, (3,), 0, 255)
+        mask &= (rgba[:, :, :3] != key).any(axis=2)
+        rgba[:, :, 3] = np.where(mask, rgba[:, :, 3], 0)
+    return rgba, mask
+
+
+def _as_rgba(field: str, image: object) -> Image:
+    array = array_of(field, image)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] not in (3, 4):
-        raise InputError(f"image: expected bytes of shape (h, w, 3 or 4), got {array.dtype} {array.shape}")
-    check_size("image", array.shape[1], array.shape[0])
+        raise InputError(f"{field}: expected bytes of shape (h, w, 3 or 4), got {array.dtype} {array.shape}")
+    check_size(field, array.shape[1], array.shape[0])
     if array.shape[2] == 4:
         return array.copy()
     return np.dstack([array, np.full(array.shape[:2], 255, np.uint8)])

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.backend import LruCache, kernels_of
-from ..common.checks import Bools, Image, Ints, choice, integer, real
+from ..common.checks import Bools, Image, Ints, choice, real
 from ..common.limits import (
     ATLAS_SLACK_BYTES,
     HALF,
@@ -35,7 +35,19 @@ from ..common.limits import (
 from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
 from ..grid.rasterize import ellipse, polygon
 from ..grid.spans import Spans
-from .sprite import UIDS, Known, Outline, Sprite, check_size, fits, frame_pivot, frozen, size_of
+from .sprite import (
+    UIDS,
+    Known,
+    Outline,
+    Sprite,
+    check_size,
+    fits,
+    frame_number,
+    frame_pivot,
+    frozen,
+    local_grid,
+    size_of,
+)
 
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
@@ -65,10 +77,18 @@ class Transform(NamedTuple):
         """Whether its scale is not 1."""
         return self.scale_x != ONE or self.scale_y != ONE
 
+    @property
+    def direction(self) -> tuple[int, int]:
+        """Cosine and sine of the whole turn, times 2**30."""
+        c, s = self.c, self.s
+        for _ in range(self.quarter):
+            c, s = -s, c
+        return c, s
+
 
 def transform_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Transform:
     """Check a pose and reduce it to its Transform."""
-    number = integer("frame", frame, 0, sprite.frame_count - 1)
+    number = frame_number(sprite, frame)
     x, y = whole_scale(*scale_xy)
     return Transform(number, choice("flip", flip, FLIPS), x, y, *quarter_turns(sprite.stepped(angle)))
 
@@ -105,6 +125,11 @@ def variants_of(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[V
     """Masks of transformed sprites, a form each; those that are not cached are made together."""
     keys = [(sprite.uid, form) for sprite, form in zip(sprites, forms, strict=True)]
     return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [forms[row] for row in rows]))
+
+
+def keep_variant(sprite: Sprite, variant: Variant) -> None:
+    """Cache the mask of a sprite that was just made, in the pose in which it was made."""
+    _kept.get((sprite.uid, variant.form), lambda: variant)
 
 
 @dataclass
@@ -162,7 +187,11 @@ def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> 
         grids = _grids_of([mask], [(x, y)], [form])
         image = _mapped(grids, [mask], np.zeros(1, np.int64), [image])[0]
         x, y = grids.pivot_256[0].tolist()
-    return _quarter_turned(image, x, y, form.quarter)
+    image, x, y = _quarter_turned(image, x, y, form.quarter)
+    if form.frame in sprite.carvings:
+        image = image.copy()
+        image[~_left(sprite, form, image.shape[1::-1], (x, y), masked=False), 3] = 0
+    return image, x, y
 
 
 def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
@@ -180,7 +209,47 @@ def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant
             mapped[row] = sprite, form
     if mapped:
         made |= zip(mapped, _mapped_frames(*zip(*mapped.values(), strict=True)), strict=True)
+    for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
+        if form.frame in sprite.carvings and made[row].area:
+            mask, pivot = made[row].mask, (made[row].pivot_x, made[row].pivot_y)
+            made[row] = cropped(form, mask & _left(sprite, form, mask.shape[::-1], pivot, masked=True), pivot)
     return [made[row] for row in range(len(forms))]
+
+
+def _left(
+    sprite: Sprite, form: Transform, size_wh: tuple[int, int], pivot_256: tuple[int, int], *, masked: bool
+) -> Bools:
+    """Which pixels (h, w) of a grid about the pivot of a transformed sprite its carving leaves.
+
+    A pixel is left if its centre, mapped back, lies in the closed square of a cell that is left, and in the frame's
+    mask if `masked`.
+    """
+    carving, (size, pivot) = sprite.carvings[form.frame], local_grid(sprite, form.frame)
+    left = ~carving.gone
+    if masked and sprite.outline is None:
+        left &= sprite.frames[form.frame].mask.repeat(carving.per_px, axis=0).repeat(carving.per_px, axis=1)
+    left, (x, y) = _flipped(left, form.flip), _flipped_pivot(size, pivot, form.flip)
+    if form.plain and carving.per_px == 1:
+        turned_left, x, y = _quarter_turned(left, x, y, form.quarter)
+        row, column = (y - pivot_256[1]) // SUB, (x - pivot_256[0]) // SUB
+        return turned_left[row : row + size_wh[1], column : column + size_wh[0]]
+    c, s = form.direction
+    back, at = np.array([[c, s], [-s, c]]), np.array(pivot_256)
+    fine = np.array([form.scale_x, form.scale_y]) << FINE_BITS
+    first = (np.array([x, y]) + HALF) * fine - (back * at).sum(axis=1)
+    grid = Grids(at[None], np.array([size_wh]), first[None], (SUB * back)[None], (SUB * fine // carving.per_px)[None])
+    out: Bools = _mapped(grid, [left], np.zeros(1, np.int64), [left])[0]
+    return out
+
+
+def cropped(form: Transform, mask: Bools, pivot_256: tuple[int, int]) -> Variant:
+    """Variant of the part of a mask that holds all its set pixels; `pivot_256` is from the centre of its [0, 0]."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)).tolist() for axis in (1, 0))
+    if not rows:
+        return Variant(form, frozen(np.zeros((0, 0), np.bool_)), 0, 0, 0)
+    part = frozen(mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
+    x, y = pivot_256[0] - SUB * columns[0], pivot_256[1] - SUB * rows[0]
+    return Variant(form, part, x, y, int(np.count_nonzero(part)))
 
 
 def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
@@ -384,19 +453,19 @@ def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
 def _flipped_frame(sprite: Sprite, form: Transform) -> tuple[Bools, tuple[int, int]]:
     """Flipped mask of a frame, and its pivot (x, y) in 1/256 px."""
     frame = sprite.frames[form.frame]
-    (h, w), (x, y) = frame.mask.shape, frame_pivot(sprite, frame)
-    if "x" in form.flip:
-        x = SUB * (w - 1) - x
-    if form.flip in ("y", "xy"):
-        y = SUB * (h - 1) - y
-    return _flipped(frame.mask, form.flip), (x, y)
+    h, w = frame.mask.shape
+    return _flipped(frame.mask, form.flip), _flipped_pivot((w, h), frame_pivot(sprite, frame), form.flip)
+
+
+def _flipped_pivot(size_wh: tuple[int, int], pivot_256: tuple[int, int], flip: str) -> tuple[int, int]:
+    """Pivot (x, y) of a flipped grid, in 1/256 px."""
+    (w, h), (x, y) = size_wh, pivot_256
+    return SUB * (w - 1) - x if "x" in flip else x, SUB * (h - 1) - y if flip in ("y", "xy") else y
 
 
 def _shape_spans(field: str, outline: Outline, form: Transform) -> Spans:
     """Flip, scale and turn the points of a shape, then fill it; `field` is for errors."""
-    c, s = form.c, form.s
-    for _ in range(form.quarter):
-        c, s = -s, c
+    c, s = form.direction
     if outline.radius is not None:
         a, b = (int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y))
         half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))

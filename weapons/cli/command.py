@@ -16,7 +16,7 @@ from typing import Any, NoReturn, TextIO
 from hitplanes.planes.common.checks import InputError, integer, printable, real, within
 from hitplanes.planes.common.limits import SEED_MAX
 from hitplanes.planes.files.png import check_output, write_png, write_text
-from hitplanes.planes.files.scene_folder import FILE_NAME, load_scene, scene_folder
+from hitplanes.planes.files.scene_folder import FILE_NAME, images_of, load_scene, scene_folder
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
@@ -464,7 +464,7 @@ def _check_outputs(picture: Path, facts: Path | None) -> None:
 def _check_not_of_scene(scene: Scene, folder: Path, *outputs: Path | None) -> None:
     """Refuse an output that would overwrite a file of the scene."""
     folder = scene_folder(folder)
-    images = {str((sprite.source or {}).get("image", "")) for sprite in scene.items.sprites}
+    images = {name for sprite in scene.items.sprites for name in images_of(sprite)}
     own = {_real(folder / name) for name in {FILE_NAME, *images}}
     for output in outputs:
         if output is not None and _real(output) in own:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -174,7 +174,8 @@ class RayDetail:
     def samples(self) -> Samples:
         """Cells as samples."""
         ray, xy, verdict, rank = self.cells
-        return Samples(xy, self.rays.round[ray], self.rays.pellet[ray], verdict, np.append(self.stack.ids, -1)[rank])
+        items = np.append(self.stack.ids, -1)[rank]
+        return Samples(xy, self.rays.round[ray], self.rays.pellet[ray], verdict, items, np.zeros(len(xy), np.bool_))
 
     def counts(self) -> Ints:
         """Number of cells (N, 6) of each shot by verdict."""
@@ -234,6 +235,15 @@ def pixels_of_rays(detail: RayDetail) -> dict[tuple[int, int], Spans]:
         x, y = xy[((round_ == key[0]) & (item == key[1]))[met.pair]].T
         found[key] = Spans.from_runs(y, x, x)
     return found
+
+
+def object_cells(scene: Scene, parts: Parts, shots: Shots) -> Iterator[tuple[int, Spans]]:
+    """Pixels that shots hit, as (object, pixels); many shots are walked at a time."""
+    rays = rays_of(parts, shots)
+    each = np.bincount(rays.shot, _cells_most(rays, parts[2].radius_256), len(shots)).astype(np.int64)
+    for part in pieces(each, CELLS_AT_ONCE):
+        found = pixels_of_rays(ray_detail(scene, parts, shots.take(part.start, part.stop)))
+        yield from ((item, spans) for (_, item), spans in found.items())
 
 
 def blocked_rays(detail: RayDetail) -> list[Blocked]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +15,7 @@ from hitplanes.planes import late
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
-from hitplanes.planes.grid.spans import Box, Spans, each_pixel
+from hitplanes.planes.grid.spans import Box, Spans, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
 
 from ..fire.prefilter import pairs_of, refused
@@ -31,7 +31,7 @@ class Samples(NamedTuple):
 
     `item` is the object that was hit first, the first item on the way that shelters the sample, the occluder that ended
     the walk, or the first item that was skipped; -1 where there is none. `sheltered` says whether it was an item on
-    the way; None if no line of sight is needed.
+    the way from the pellet's pixel.
     """
 
     xy: Ints
@@ -39,7 +39,7 @@ class Samples(NamedTuple):
     pellet: Ints
     verdict: Ints
     item: Ints
-    sheltered: Bools | None = None
+    sheltered: Bools
 
 
 class Share(NamedTuple):
@@ -73,6 +73,8 @@ class Blocked(NamedTuple):
     samples: int
     behind: tuple[Behind, ...]
 
+
+RUN = ("y", "x_first", "x_last")
 
 REASONS = ("missed", "category", "excluded", "behind", "outside", "inside", "tunnelled", "budget")
 
@@ -112,7 +114,6 @@ class Detail:
     verdict : verdict of each sample
     rank, ended : ranks of the items that decided the verdict and that ended the walk of each sample, -1 for none
     sheltered : whether an item on the way to a sample decided
-    sighted : whether the weapon needs a line of sight
     """
 
     stack: Stack
@@ -126,7 +127,6 @@ class Detail:
     rank: Ints
     ended: Ints
     sheltered: Bools
-    sighted: bool
 
     @cached_property
     def start(self) -> Ints:
@@ -152,7 +152,7 @@ def samples_of(detail: Detail) -> Samples:
     xy = np.stack([detail.x, detail.runs.y[detail.run]], axis=1)
     return Samples(
         xy, placements.round[placement], placements.pellet[placement], detail.verdict, ids[detail.rank],
-        detail.sheltered if detail.sighted else None,
+        detail.sheltered,
     )  # fmt: skip
 
 
@@ -168,6 +168,26 @@ def hit_spans(detail: Detail) -> dict[tuple[int, int], Spans]:
         round_, item = keys[own[0]].tolist()
         found[round_, item] = Spans.from_runs(under.y[own], detail.hit.x_first[own], detail.hit.x_last[own])
     return found
+
+
+def object_spans(context: QueryContext, weapon: Weapon, shots: Shots) -> Iterator[tuple[int, Spans]]:
+    """Pixels that shots hit, as (object, pixels); many shots are walked at a time."""
+    placements = placements_for(weapon, shots)
+    each = np.bincount(placements.shot, placements.count, len(shots)).astype(np.int64)
+    for part in pieces(each, CHUNK_SAMPLES):
+        detail = detail_of(context, weapon, shots.take(part.start, part.stop))
+        yield from ((item, spans) for (_, item), spans in hit_spans(detail).items())
+
+
+def united(parts: Iterable[tuple[int, Spans]]) -> dict[int, Spans]:
+    """Union of the pixels of each object, by rising id."""
+    found: dict[int, list[Spans]] = {}
+    for item, spans in parts:
+        found.setdefault(item, []).append(spans)
+    return {
+        item: Spans.from_runs(*(np.concatenate([getattr(one, name) for one in own]) for name in RUN))
+        for item, own in sorted(found.items())
+    }
 
 
 def blockers_of(detail: Detail) -> list[Blocked]:
@@ -286,8 +306,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
         rank[outside] = ended[outside] = -1
         hidden &= ~outside
     hit = _inside(events.take(np.flatnonzero(events.kind == HIT)), runs, bounds)
-    sighted = parts_of(weapon)[2].line_of_sight is not None
-    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended, hidden, sighted)
+    return Detail(stack, shots, placements, runs, run, x, hit, verdict, rank, ended, hidden)
 
 
 def _refused_first(events: Events, start: Ints, samples: int) -> Ints:

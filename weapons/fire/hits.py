@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import index
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
@@ -186,6 +187,7 @@ class Hits:
     first_xy = _column("first_xy", "Hit pixel (n, 2) nearest to the round's pixel; of rays the first cell.")
     distance2 = _column("distance2", "Squared distance of `first_xy` from the round's pixel, px^2.")
     _scenes: list[Scene] | None = None
+    _versions: Mapping[int, int] = MappingProxyType({})  # of scenes of the past that came out of a pickle, by id
     _walked: tuple[int, Any] | None = None
 
     def __init__(
@@ -204,6 +206,20 @@ class Hits:
     def _keep(self, rows: Rows, scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, plan: Plan) -> None:
         self._rows, self.weapon, self.shots, self.plan = rows, weapon, shots, plan
         self.scene, self.version, self._stack = scene, scene.items.version, stack
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the answer, worked out, with its scenes; the copy of a stale one is stale, too."""
+        behind = 0 if self._scenes is not None else self.scene.version - self.version
+        kept = self._rows, self.scene, self._stack if behind else None, self.weapon, self.shots, self.plan
+        return _restored, (self._kind(), self._answers(), kept, behind, self._scenes)
+
+    def _kind(self) -> type[Hits]:
+        """Class of a copy."""
+        return Hits
+
+    def _answers(self) -> dict[str, Any]:
+        """What is worked out from the scene, for a copy."""
+        return {"verdicts": self.verdicts}
 
     @property
     def nbytes(self) -> int:
@@ -327,6 +343,20 @@ class Hits:
         """Pixels that each round of one shot hit of each object, as {(round, object): pixels}."""
         return late.samples.hit_spans(self._detail(shot))
 
+    def object_pixels(self) -> dict[int, Spans]:
+        """Pixels that all shots together hit of each object, as {object: pixels}; `Scene.carve` takes them away."""
+        self.scene_of(0)  # raises if the scene has changed, also if nothing was hit
+        shots_of: dict[int, list[int]] = {}
+        for shot in np.unique(self.shot).tolist():
+            shots_of.setdefault(id(self.scene_of(shot)), []).append(shot)
+        rows = (np.array(shots) for shots in shots_of.values())
+        parts = (self._pixels_of(self.scene_of(int(own[0])), self.shots.pick(own)) for own in rows)
+        return late.samples.united(part for own in parts for part in own)
+
+    def _pixels_of(self, scene: Scene, shots: Shots) -> Iterator[tuple[int, Spans]]:
+        """Pixels of objects of a scene that shots hit, as (object, pixels), in any number of parts."""
+        return late.samples.object_spans(context_of(scene, scene.items.stack(), self.weapon), self.weapon, shots)
+
     def shares(self, shot: int | None = None) -> list[Share]:
         """Samples of each row as shares of the pattern, of the visible object and of its mask; for a shot, or all."""
         if self._scenes is None:
@@ -384,18 +414,19 @@ class Hits:
 
     def scene_of(self, shot: int) -> Scene:
         """The scene that a shot was fired at; an InputError if the scene has changed since."""
+        scene, version = self.scene, self.version
         if self._scenes is not None:
-            return self._scenes[self._checked(shot)]  # of the past, which does not change
-        if self.scene.version != self.version:
-            now = self.scene.version
-            raise InputError(f"hits: expected the scene at version {self.version}, got version {now}: {BEFORE}")
-        return self.scene
+            scene = self._scenes[self._checked(shot)]  # of the past, which does not change unless it is a copy
+            version = self._versions.get(id(scene), scene.version)
+        if scene.version != version:
+            raise InputError(f"hits: expected the scene at version {version}, got version {scene.version}: {BEFORE}")
+        return scene
 
     def _then(self, shot: int) -> tuple[Scene, Stack]:
         """The scene that a shot was fired at, which may have changed since, and its stack of then, which stays."""
         if self._scenes is None:
             return self.scene, self._stack
-        scene = self._scenes[shot]
+        scene = self.scene_of(shot)
         return scene, scene.items.stack()
 
     def _context(self, shot: int) -> QueryContext:
@@ -435,6 +466,24 @@ class Hits:
         """Keep the scene of each shot."""
         scene_of = {row: part.scene for part, own in zip(parts, rows, strict=True) for row in own.tolist()}
         self._scenes = [scene_of[row] for row in range(len(self.shots))]
+
+
+def _restored(
+    kind: type[Hits], answers: dict[str, Any], kept: tuple[Any, ...], behind: int, scenes: list[Scene] | None
+) -> Hits:
+    """Hits of the parts that copies and pickles take."""
+    hits = object.__new__(kind)
+    rows, scene, stack, *rest = kept
+    hits._keep(rows, scene, stack or scene.items.stack(), *rest)
+    vars(hits).update(answers)
+    for columns in answers.values():
+        for array in (columns, *getattr(columns, "__dict__", {}).values()):
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+    hits.version -= behind
+    if scenes is not None:
+        hits._scenes, hits._versions = scenes, {id(scene): scene.version for scene in scenes}
+    return hits
 
 
 def _named(row: tuple[Any, ...]) -> HitRow:

@@ -59,6 +59,11 @@ class Plan:
         self._stage_of: dict[str, Stage] = {}
         self._mark = perf_counter_ns()
 
+    def __getstate__(self) -> tuple[None, dict[str, Any]]:
+        """What a copy is made of: the stages, as notes may hold the scene."""
+        self._read()
+        return None, {name: getattr(self, name) for name in self.__slots__}
+
     def run(self, name: str, why: str, bytes_made: int = 0, pairs: tuple[int, int] | None = None) -> None:
         """Record that a stage ended; if it runs several times, its numbers add up, and the first `why` is kept."""
         self._notes.append((name, why, bytes_made, pairs, perf_counter_ns()))

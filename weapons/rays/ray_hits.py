@@ -281,6 +281,12 @@ class RayHits(Hits):
         """Stop of each ray, and its reason."""
         return _unwritable(self._later[1]())
 
+    def _kind(self) -> type[Hits]:
+        return RayHits
+
+    def _answers(self) -> dict[str, Any]:
+        return {"rays": self.rays, "passes": self.passes, "stop": self.stop}
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hits):
             return NotImplemented
@@ -323,6 +329,9 @@ class RayHits(Hits):
     def pixels_at(self, shot: int = 0) -> dict[tuple[int, int], Spans]:
         """Pixels of objects that one shot hit, as {(round, object): pixels}."""
         return late.ray_samples.pixels_of_rays(self._rays(shot))
+
+    def _pixels_of(self, scene: Scene, shots: Shots) -> Iterator[tuple[int, Spans]]:
+        return late.ray_samples.object_cells(scene, self._parts, shots)
 
     def why_not(self, shot: int = 0) -> list[WhyNot]:
         """Objects that one shot did not hit, and why: on the whole length of its rays, or within 32 px of their way."""

@@ -408,7 +408,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             for entry in hits.blockers(row)
         ],
         "samples": _sample_runs(samples),
-        **({} if samples.sheltered is None else {"sheltered": _runs_of(samples.xy[samples.sheltered])}),
+        **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if _needs_sight(hits) else {}),
         "plan": hits.plan.to_dict(),
         **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
@@ -459,6 +459,10 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
         }
         for row, share in zip(rows, shares, strict=True)
     ]
+
+
+def _needs_sight(hits: Hits) -> bool:
+    return not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
 
 
 def _shares(share: Share) -> dict[str, float]:
