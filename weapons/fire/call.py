@@ -58,8 +58,8 @@ def fire(
     ----------
     scene : the Scene that is fired at, or a History, fired at the given ticks
     weapon : one weapon for all shots
-    at : (2,) position of one shot, or (N, 2) of a batch, px
-    aim : angle in degrees, 0 along +x, clockwise on the screen
+    at : (2,) position of one shot, or (N, 2) of a batch, px; with N aims or targets, (2,) is the position of all shots
+    aim : () or (N,) angle in degrees, 0 along +x, clockwise on the screen
     toward : (2,) or (N, 2) point that the weapon is aimed at, px; it replaces `aim`
     accept : category names or bits of the objects that may be hit; all by default
     blocked_by : category names or bits of the occluders that block; all by default, and none for [] or 0

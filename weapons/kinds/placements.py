@@ -399,7 +399,11 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    at_256, single = _places(at)
+    toward = None if toward is None else array_of("toward", toward)
+    aim = aim if aim is None or isinstance(aim, int | float) else array_of("aim", aim)
+    at_256, single = _for_each_aim(
+        *_places(at), "aim" if toward is None else "toward", aim if toward is None else toward
+    )
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -426,6 +430,22 @@ def _places(at: object) -> tuple[Ints, bool]:
         return np.array((one,), np.int64), True
     single = array_of("at", at).shape == (2,)
     return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+
+
+def _for_each_aim(at_256: Ints, single: bool, field: str, value: object) -> tuple[Ints, bool]:
+    """Positions (N, 2) of all shots, and whether there is one shot.
+
+    One position is that of all aims (N,) or targets (N, 2), which are the value of the field.
+    """
+    shape: tuple[int, ...] = value.shape if isinstance(value, np.ndarray) else ()
+    if len(shape) != {"aim": 1, "toward": 2}[field]:
+        return at_256, single
+    if single:
+        return np.repeat(at_256, shape[0], axis=0), False
+    if shape[0] != len(at_256):
+        expected = (len(at_256), *shape[1:])
+        raise InputError(f"{field}: expected shape {expected}, as at has shape {at_256.shape}, got {shape}")
+    return at_256, False
 
 
 def filter_of(accept: Ints | int, blocked_by: Ints | int) -> Ints | int:
