@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
+import random
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ray_battles import Battle, Close, Gun, Place, Shot, pair, some_body, some_place, some_target
 
 from hitplanes import (
+    ALL,
     Beam,
     Cone,
     Disc,
     History,
     InputError,
+    Laser,
     Pistol,
+    Reason,
     Rounds,
     Scene,
     ShotRecord,
@@ -26,7 +33,10 @@ from hitplanes import (
     prepare,
     replay,
     report_of,
+    scan,
+    sees,
 )
+from hitplanes.weapons.rays import ray_call, sight
 
 WEAPONS: dict[str, Weapon] = {
     "disc": Disc(30),
@@ -126,3 +136,232 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_places_and_aims_of_different_numbers_are_named(how: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError, match=f"^{told}"):
         fire(yard(), Pistol(60), **how)
+
+
+# Lines of sight and scans, beside the oracle
+
+
+WAYS = ("auto", "walk", "cast", "march")
+
+
+def force(monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    """Answer by one way wherever it serves."""
+    chosen = ray_call.chosen_ray_way
+    monkeypatch.setattr(ray_call, "chosen_ray_way", lambda _, *rest: chosen(way, *rest))
+
+
+@dataclass(frozen=True)
+class World:
+    """A small world, places, targets and angles, and the filters of each place."""
+
+    battle: Battle
+    places: list[Place]
+    targets: list[Place]
+    angles: list[float]
+    range: float
+    accept: list[int]
+    blocked_by: list[int]
+    exclude: list[int]
+
+    @property
+    def filters(self) -> dict[str, Any]:
+        return {"accept": self.accept, "blocked_by": self.blocked_by, "exclude": self.exclude}
+
+    def walked(self, gun: Gun, row: int, shots: list[Shot]) -> list[tuple[str, float]]:
+        """How the oracle ends the rays of a place: why, and how far on."""
+        filters = {"accept": self.accept[row], "blocked_by": self.blocked_by[row], "exclude": (self.exclude[row],)}
+        battle = replace(self.battle, gun=gun, shots=[replace(shot, **filters) for shot in shots])
+        ends = [(walk.stop.reason, walk.path.px(walk.stop.time)) for ((_, walk),) in battle.walks()]
+        return ends
+
+    def sees(self) -> list[list[bool]]:
+        """Who sees whom, pair by pair."""
+        table = []
+        for row, eye in enumerate(self.places):
+            apart = [target for target in self.targets if pair(target) != pair(eye)]
+            ends = iter(self.walked(Gun("pistol", None), row, [Shot(eye, target) for target in apart]))
+            table.append([pair(target) == pair(eye) or next(ends)[0] == "range" for target in self.targets])
+        return table
+
+    def scan(self) -> list[list[Any]]:
+        """How far beams go, one by one."""
+        gun, table = Gun("pistol", self.range), []
+        for row, at in enumerate(self.places):
+            ends = self.walked(gun, row, [Shot(at, aim=angle) for angle in self.angles])
+            table.append([math.inf if reason == "range" else Close(px) for reason, px in ends])
+        return table
+
+
+def some_world(rng: random.Random) -> World:
+    """A crowded little world; some targets are places, and some places lie on pixels."""
+    bodies = [some_body(rng, number) for number in range(rng.choice([1, 3, 5, 8]))]
+    places = [some_place(rng, bodies) for _ in range(rng.randint(1, 3))]
+    targets = [some_target(rng, rng.choice(places), bodies) for _ in range(rng.randint(0, 4))]
+    targets += rng.sample(places, rng.randint(0, len(places)))
+    bounds = rng.choice([None, (0, 0, 11, 9), (2, 1, 7, 8), (-9, -9, 30, 30)])
+    n = len(places)
+    return World(
+        Battle(Gun(), [], bodies, bounds), places, targets,
+        [rng.choice([0, 90, 180, -90, 45, -135, rng.randint(-30, 30) * 12.5]) for _ in range(rng.randint(0, 5))],
+        rng.choice([4, 7.25, 12, 0]), [rng.choice([0, 0, ALL, 1, 6]) for _ in range(n)],
+        [rng.choice([ALL, ALL, ALL, 1, 6, 0]) for _ in range(n)],
+        [rng.choice([-1, -1, rng.randrange(len(bodies))]) for _ in range(n)],
+    )  # fmt: skip
+
+
+def told(world: World, scene: Scene | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """What the library says."""
+    scene, targets = scene or world.battle.scene(), np.reshape(world.targets, (-1, 2))
+    seen = sees(scene, world.places, targets, **world.filters)
+    found = scan(scene, world.places, world.angles, world.range, **world.filters)
+    assert seen.dtype == np.bool_ and seen.shape == (len(world.places), len(targets))
+    assert found.dtype == np.float64 and found.shape == (len(world.places), len(world.angles))
+    return seen, found
+
+
+def compare(worlds: int, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    force(monkeypatch, way)
+    answers = set()
+    for seed in range(worlds):
+        world = some_world(random.Random(f"{seed} of {way}"))
+        seen, found = told(world)
+        assert seen.tolist() == world.sees(), seed
+        assert world.scan() == found.tolist(), seed
+        answers |= {str(one) for one in seen.reshape(-1)}
+        answers |= {"inside" if px == 0 else "far" if px == math.inf else "met" for px in found.reshape(-1)}
+        dx, dy = 10**9, -(10**9)
+        there = replace(
+            world, battle=world.battle.moved(dx, dy), places=[(x + dx, y + dy) for x, y in world.places],
+            targets=[(x + dx, y + dy) for x, y in world.targets],
+        )  # fmt: skip
+        if there.battle.bounds is None or seed % 4 == 0:
+            moved = told(there)
+            assert np.array_equal(moved[0], seen) and np.array_equal(moved[1], found), seed
+    assert answers == {"False", "True", "inside", "far", "met"}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_lines_of_sight_and_beams_are_those_of_the_slow_walk(
+    way: str, jit: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compare(40, way, monkeypatch)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("way", WAYS)
+def test_many_lines_of_sight_are_those_of_the_slow_walk(way: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    compare(1000, way, monkeypatch)
+
+
+@pytest.mark.parametrize("at_once", [3, 2**14])
+def test_beams_are_rays_of_a_pistol_and_sight_that_of_a_laser(at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit by bit, for each way, and whatever the chunks."""
+    monkeypatch.setattr(sight, "RAYS_AT_ONCE", at_once)
+    scene, rng = yard(), np.random.default_rng(4)
+    places, angles = rng.uniform(-5, 80, (7, 2)), rng.uniform(0, 360, 9)
+    at, targets = np.repeat(places, 9, axis=0), rng.uniform(-5, 80, (9, 2))
+    for way in WAYS:
+        force(monkeypatch, way)
+        stop = fire(scene, Pistol(40), at, aim=np.tile(angles, 7), exclude=1, strategy="walk").stop
+        far = np.where(stop.reason == Reason.RANGE, np.inf, stop.distance).reshape(7, 9)
+        assert np.array_equal(scan(scene, places, angles, 40, exclude=1), far)
+        assert np.array_equal(scan(scene, places, np.tile(angles, (7, 1)), 40, exclude=1), far)
+        assert np.array_equal(scan(scene, places[2], angles, 40, exclude=[1]), far[2:3])
+        clear = fire(scene, Laser(None), at, toward=np.tile(targets, (7, 1))).stop.reason == Reason.RANGE
+        assert np.array_equal(sees(scene, places, targets), clear.reshape(7, 9))
+        assert np.array_equal(sees(scene, places[2], targets), clear.reshape(7, 9)[2:3])
+    assert len(np.unique(far)) > 7 and 0 < clear.sum() < 63
+
+
+def test_who_sees_is_seen(jit: bool) -> None:
+    scene, rng = yard(), np.random.default_rng(2)
+    spots = np.concatenate([rng.uniform(0, 80, (30, 2)), rng.integers(0, 160, (30, 2)) / 2, [HERE, (40, 30)]])
+    for how in ({}, {"accept": ALL}, {"blocked_by": []}, {"exclude": 3}):
+        seen = sees(scene, spots, spots, **how)
+        assert np.array_equal(seen, seen.T) and seen.diagonal().all()
+        assert seen.all() == (how in ({"blocked_by": []}, {"exclude": 3}))
+
+
+def test_whoever_stands_in_a_wall_sees_only_itself() -> None:
+    scene = yard()  # the wall: x from 39 to 41, y from 24 to 43
+    spots = [(40, 30), (41.5, 30), (41.75, 30), (60, 30)]
+    assert sees(scene, spots, spots).tolist() == [
+        [True, False, False, False],
+        [False, True, False, False],
+        [False, False, True, True],
+        [False, False, True, True],
+    ]
+    assert scan(scene, spots[:2], [0, 180], 50).tolist() == [[0, 0], [0, 0]]
+    assert scan(scene, (41.75, 30), [0, 180], 50).tolist() == [[3.75, 0.25]]
+    assert scan(scene, (41.75, 30), [0, 180], 50, exclude=[0, 3]).tolist() == [[math.inf, math.inf]]
+    assert scan(scene, (41.75, 30), [0, 180], 3.75, accept=[]).tolist() == [[math.inf, 0.25]]
+
+
+def test_no_eyes_no_targets_no_beams() -> None:
+    scene, none = yard(), np.zeros((0, 2))
+    history = History(scene, ticks=2)
+    history.record(0)
+    for where, how in ((scene, {}), (Scene(), {}), (history, {"tick": 0})):
+        assert sees(where, HERE, none, **how).shape == (1, 0) and sees(where, none, TARGETS, **how).shape == (0, 4)
+        assert sees(where, none, none, **how).shape == (0, 0) and sees(where, HERE, HERE, **how).tolist() == [[True]]
+        assert scan(where, none, AIMS, 5, **how).shape == (0, 4) and scan(where, HERE, [], 5, **how).shape == (1, 0)
+        assert scan(where, none, np.zeros((0, 3)), 5, **how).shape == (0, 3)
+
+
+def test_past_ticks_are_seen_and_scanned() -> None:
+    scene = yard()
+    history = History(scene, ticks=4)
+    for tick in range(3):
+        history.record(tick)
+        scene.move(3, (40 + 3 * tick, 34))
+    eyes = [HERE, (39, 5), HERE, (60, 55)]
+    ticks = [2, 0, 1, 2]
+    seen, found = sees(history, eyes, TARGETS, tick=ticks), scan(history, eyes, AIMS, 70, tick=ticks)
+    for row, (eye, tick) in enumerate(zip(eyes, ticks, strict=True)):
+        assert np.array_equal(seen[row : row + 1], sees(history.at(tick), eye, TARGETS))
+        assert np.array_equal(found[row : row + 1], scan(history.at(tick), eye, AIMS, 70))
+        assert np.array_equal(found[row : row + 1], scan(history, eye, AIMS, 70, tick=tick))
+
+
+def test_categories_have_names() -> None:
+    scene = Scene((40, 20), categories=["glass", "wall"])
+    for x, category in ((10, "glass"), (20, "wall")):
+        scene.add(np.ones((20, 3), np.bool_), (x, 10), role="occluder", categories=[category])
+    guard = scene.add(np.ones((4, 4), np.bool_), (5, 10), categories=["glass"])
+    targets = [(7, 10), (15, 10), (30, 10)]
+    assert sees(scene, (1, 10), targets).tolist() == [[True, False, False]]
+    assert sees(scene, (1, 10), targets, blocked_by="wall").tolist() == [[True, True, False]]
+    assert sees(scene, (1, 10), targets, blocked_by=["wall"], accept="glass").tolist() == [[False, False, False]]
+    assert scan(scene, (1, 10), [0], 90, exclude=guard).tolist() == [[7.5]]
+    assert scan(scene, (1, 10), [0], 90, exclude=guard, blocked_by="wall").tolist() == [[17.5]]
+
+
+NONSENSE: list[tuple[Any, str]] = [
+    (lambda s: sees(None, HERE, HERE), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
+    (lambda s: sees(s, (1, 2, 3), HERE), r"eyes: expected shape \(any, 2\), got \(3,\)"),
+    (lambda s: sees(s, [HERE, (math.nan, 2)], HERE), r"eyes\[1\]\[0\]: expected a finite number, got nan"),
+    (lambda s: sees(s, HERE, "here"), r"targets: expected numbers, got 'here'"),
+    (lambda s: sees(s, HERE, [(1, 2), (2, math.inf)]), r"targets\[1\]\[1\]: expected a finite number, got inf"),
+    (
+        lambda s: sees(s, [HERE, (0, 0)], [HERE, (2**20 + 1, 0)]),
+        r"targets\[1\]: expected a point within 1048576 px of eyes\[1\], got one at \[1048577.0, 0.0\] of it",
+    ),
+    (lambda s: sees(s, HERE, HERE, tick=3), "tick: expected none, as a Scene has no past, got 3"),
+    (lambda s: sees(History(s), HERE, HERE), "tick: expected one, or one for each shot"),
+    (lambda s: sees(s, HERE, HERE, accept="hare"), "accept: .*got 'hare'"),
+    (lambda s: sees(s, [HERE] * 2, HERE, blocked_by=[1, 2, 3]), r"blocked_by: expected shape \(2,\), got \(3,\)"),
+    (lambda s: scan(s, [HERE] * 2, AIMS, 5, exclude=[1, 2, 3]), r"exclude: expected shape \(2, any\)"),
+    (lambda s: scan(s, "x", AIMS, 5), "at: expected numbers, got 'x'"),
+    (lambda s: scan(s, HERE, 3, 5), r"angles: expected shape \(1, any\), got \(\)"),
+    (lambda s: scan(s, [HERE] * 2, [AIMS] * 3, 5), r"angles: expected shape \(2, any\), got \(3, 4\)"),
+    (lambda s: scan(s, HERE, [0, math.nan], 5), r"angles\[1\]: expected a finite number, got nan"),
+    (lambda s: scan(s, HERE, AIMS, None), "range: expected numbers, got None"),
+    (lambda s: scan(s, HERE, AIMS, -1), "range: expected a number from 0 to 1048576, got -1"),
+    (lambda s: scan(s, HERE, AIMS, 2**20 + 1), "range: expected a number from 0 to 1048576, got 1048577"),
+]
+
+
+@pytest.mark.parametrize(("call", "said"), NONSENSE)
+def test_nonsense_is_named(call: Any, said: str) -> None:
+    with pytest.raises(InputError, match=f"^{said}"):
+        call(yard())

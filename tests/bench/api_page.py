@@ -39,7 +39,20 @@ MODULES: dict[str, tuple[str, ...]] = {
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "The scene": ("Scene", "Sprite", "Role", "Planes", "load_scene", "read_png", "write_png"),
-    "Fire": ("fire", "prepare", "Ready", "Hits", "RayHits", "Verdict", "Reason", "Spans", "ALL", "InputError"),
+    "Fire": (
+        "fire",
+        "sees",
+        "scan",
+        "prepare",
+        "Ready",
+        "Hits",
+        "RayHits",
+        "Verdict",
+        "Reason",
+        "Spans",
+        "ALL",
+        "InputError",
+    ),
     "Weapons of patterns": ("Point", "Disc", "Ring", "Box", "Polygon", "Cone", "Beam", "Stencil"),
     "Weapons of rays": ("Pistol", "Rifle", "Laser", "Projectile", "Sweep"),
     "Weapons of other weapons, and their JSON": ("Spread", "Rounds", "Weapon", "arsenal_of", "weapon_from_json"),
@@ -66,6 +79,7 @@ PROPERTIES = property, cached_property, cached_attribute
 SPELLED = {
     "Pellet": "AreaWeapon | RayWeapon", "Repeated": "AreaWeapon | RayWeapon | Spread | Sweep", "AnyHits": "Hits",
     "Ready[Any]": "Ready", "Places": "ArrayLike", "Angles": "ArrayLike", "Wholes": "ArrayLike",
+    "Categories": "ArrayLike", "Owners": "ArrayLike",
     "Unpack[Fired]": "Any",
 }  # fmt: skip
 """Types that only a type checker tells apart, as a reader knows them."""

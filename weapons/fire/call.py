@@ -90,15 +90,14 @@ def fire(
     """
     plan = Plan()
     _check_words(prefilter, broadphase, strategy)
-    present = scene if isinstance(scene, Scene) else _history(scene).scene
+    present = present_of(scene)
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
-    if not isinstance(scene, Scene):
-        return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
-    if tick is not None:
-        raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
-    return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+    moments = moments_of(scene, tick, len(shots))
+    if isinstance(scene, Scene):
+        return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+    return _fired_at_moments(moments, weapon, shots, (prefilter, broadphase, strategy), plan)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:
@@ -110,10 +109,9 @@ def _check_words(prefilter: object, broadphase: object, strategy: object) -> Non
 
 
 def _fired_at_moments(
-    history: History, tick: object, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
+    moments: list[tuple[Scene, Ints]], weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
 ) -> Hits:
     """Fire shots at the scenes of their ticks; `how` is (pre-filter, broad phase, strategy)."""
-    moments = moments_of(history, tick, len(shots))
     plan.run("past", f"{len(moments)} scenes of it")
     parts: list[Hits] = []
     for past, rows in moments:
@@ -125,16 +123,23 @@ def _fired_at_moments(
     return hits
 
 
-def _history(scene: object) -> History:
+def present_of(scene: object) -> Scene:
+    """The scene itself, or the present scene of a history."""
+    if isinstance(scene, Scene):
+        return scene
     from hitplanes.planes.scene.history import History
 
     if not isinstance(scene, History):
         raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
-    return scene
+    return scene.scene
 
 
-def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
-    """Past scenes that shots are fired at, each with the rows of its shots."""
+def moments_of(history: Scene | History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
+    """Scenes that shots are fired at, of a history those of their ticks, each with the rows of its shots."""
+    if isinstance(history, Scene):
+        if tick is not None:
+            raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
+        return [(history, np.arange(n))]
     if tick is None:
         raise InputError("tick: expected one, or one for each shot, as it is a History that is fired at, got none")
     ticks = reals("tick", each("tick", tick, n), (n,))

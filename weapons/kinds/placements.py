@@ -248,6 +248,10 @@ class Shots:
         rest = self._meets, self._exclude, self._number, self._seed, self._row
         return Shots(self.at_256, direction, self.toward_256, *rest)
 
+    def aimed_at(self, toward_256: Ints) -> Shots:
+        """The same shots, aimed at points at offsets (N, 2)."""
+        return Shots(self.at_256, None, toward_256, self._meets, self._exclude, self._number, self._seed, self._row)
+
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
         return self if first == 0 and last >= len(self) else self.pick(slice(first, last))
@@ -401,9 +405,8 @@ def checked_shots(
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
     toward = None if toward is None else array_of("toward", toward)
     aim = aim if aim is None or isinstance(aim, int | float) else array_of("aim", aim)
-    at_256, single = _for_each_aim(
-        *_places(at), "aim" if toward is None else "toward", aim if toward is None else toward
-    )
+    aimed = ("aim", aim) if toward is None else ("toward", toward)
+    at_256, single = _for_each_aim(*_places("at", at), *aimed)
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -419,7 +422,20 @@ def checked_shots(
     )
 
 
-def _places(at: object) -> tuple[Ints, bool]:
+def unaimed_shots(field: str, at: object, accept: object, blocked_by: object, exclude: object) -> Shots:
+    """Check places and filters of shots that are aimed later; the places are the value of the field."""
+    at_256, single = _places(field, at)
+    n = len(at_256)
+    meets = filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n))
+    return Shots(at_256, STRAIGHT, None, meets, _owners(exclude, n, single), 0, 0, 0)
+
+
+def places_256(field: str, at: object) -> Ints:
+    """Check positions (N, 2), or one (2,), and return them (N, 2) in 1/256 px."""
+    return _places(field, at)[0]
+
+
+def _places(field: str, at: object) -> tuple[Ints, bool]:
     """Positions (N, 2) in 1/256 px, and whether one position (2,) was given."""
     if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
         many: Ints | None = kernels_of(fixed_point).snapped(at)
@@ -428,8 +444,8 @@ def _places(at: object) -> tuple[Ints, bool]:
     one = one_place(at)
     if one is not None:
         return np.array((one,), np.int64), True
-    single = array_of("at", at).shape == (2,)
-    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+    single = array_of(field, at).shape == (2,)
+    return snap(reals(field, at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 
 
 def _for_each_aim(at_256: Ints, single: bool, field: str, value: object) -> tuple[Ints, bool]:
