@@ -266,6 +266,9 @@ def test_beams_are_rays_of_a_pistol_and_sight_that_of_a_laser(at_once: int, monk
         far = np.where(stop.reason == Reason.RANGE, np.inf, stop.distance).reshape(7, 9)
         assert np.array_equal(scan(scene, places, angles, 40, exclude=1), far)
         assert np.array_equal(scan(scene, places, np.tile(angles, (7, 1)), 40, exclude=1), far)
+        own = angles + 40 * np.arange(7)[:, None]
+        rows = [scan(scene, place, row, 40, exclude=[1])[0] for place, row in zip(places, own, strict=True)]
+        assert np.array_equal(scan(scene, places, own, 40, exclude=1), rows) and not np.array_equal(rows, far)
         assert np.array_equal(scan(scene, places[2], angles, 40, exclude=[1]), far[2:3])
         clear = fire(scene, Laser(None), at, toward=np.tile(targets, (7, 1))).stop.reason == Reason.RANGE
         assert np.array_equal(sees(scene, places, targets), clear.reshape(7, 9))
