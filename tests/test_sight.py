@@ -300,6 +300,22 @@ def test_whoever_stands_in_a_wall_sees_only_itself() -> None:
     assert scan(scene, (41.75, 30), [0, 180], 3.75, accept=[]).tolist() == [[math.inf, 0.25]]
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_walls_alone_block(way: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without objects nothing is refused, as far as filters let it."""
+    force(monkeypatch, way)
+    scene = Scene((80, 60), categories=["wall", "glass"])
+    for x, category in ((20, "wall"), (40, "glass")):
+        scene.add(np.ones((60, 3), np.bool_), (x, 30), role="occluder", categories=[category])
+    for accept in ([], "wall", ALL):
+        targets = [(15, 40), (30, 20), (60, 45)]
+        assert sees(scene, (5, 30), targets, accept=accept).tolist() == [[True, False, False]]
+        assert sees(scene, (30, 30), targets, accept=accept, blocked_by="wall").tolist() == [[False, True, True]]
+        assert sees(scene, (30, 30), targets, accept=accept, exclude=[0, 1]).tolist() == [[True, True, True]]
+    with pytest.raises(InputError, match=r"^accept: .*hare"):
+        sees(scene, (5, 30), (1, 2), accept="hare")
+
+
 def test_no_eyes_no_targets_no_beams() -> None:
     scene, none = yard(), np.zeros((0, 2))
     history = History(scene, ticks=2)

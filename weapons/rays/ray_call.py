@@ -101,13 +101,15 @@ def _planned(
     return Range(scene.items, stack, scene.bounds, candidates, plan, field=field), chosen, choose
 
 
-def first_ends(scene: Scene, ray: RayWeapon, count: int) -> Callable[[Shots], tuple[Rays, Terminations]]:
+def first_ends(
+    scene: Scene, ray: RayWeapon, count: int, strategy: str = "auto"
+) -> Callable[[Shots], tuple[Rays, Terminations]]:
     """Function that finds the ends of the rays of shots of one ray each, planned for so many rays in all.
 
     Rays end at the first thing that they meet. Rows, passes and stops are not made.
     """
     keep_arena()
-    through, chosen, choose = _planned(scene, ray, count, ("auto", "auto", "auto"), Plan())
+    through, chosen, choose = _planned(scene, ray, count, ("auto", "auto", strategy), Plan())
 
     def ends_of(shots: Shots) -> tuple[Rays, Terminations]:
         rays = rays_of((None, None, ray), shots)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, array_of, real, reals
 from hitplanes.planes.common.limits import ALL, REACH_MAX, SUB
 from hitplanes.planes.grid.fixed_point import unit
@@ -66,6 +67,9 @@ def sees(
         If an argument is invalid; the text names the argument and the row.
     """
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
+    if isinstance(scene, Scene) and scene.items.stack().occluder.all():  # rays that refuse nothing march faster
+        shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)
+    strategy = "cast" if shots.choosy and jit_is_on() else "auto"  # a march stops at all that does not block
     targets_256 = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
 
@@ -76,7 +80,7 @@ def sees(
         apart = np.flatnonzero(offset.any(axis=1))
         return pair[apart], shots.pick(eye[apart]).aimed_at(offset[apart])
 
-    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, aimed):
+    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, aimed, strategy):
         seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
     return seen
 
@@ -152,7 +156,7 @@ def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
 
 
 def _ends(
-    scene: Scene | History, tick: object, ray: Pistol, shape: tuple[int, ...], aimed: Aimed
+    scene: Scene | History, tick: object, ray: Pistol, shape: tuple[int, ...], aimed: Aimed, strategy: str = "auto"
 ) -> Iterator[tuple[Ints, Rays, Terminations]]:
     """Follow the rays of a table (N, M), whose rows are places.
 
@@ -163,7 +167,7 @@ def _ends(
     places, each = shape
     for moment, rows in moments_of(scene, tick, places):
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
-        ends_of = first_ends(moment, ray, len(cells))
+        ends_of = first_ends(moment, ray, len(cells), strategy)
         for begin in range(0, len(cells), RAYS_AT_ONCE):
             some, shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
             if len(some):
