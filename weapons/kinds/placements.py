@@ -17,22 +17,13 @@ import numpy.typing as npt
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, array_of, each, integer, integers, reals
-from hitplanes.planes.common.limits import (
-    ALL,
-    CATEGORY_BITS,
-    EVERYTHING,
-    GOLDEN,
-    POSITION_MAX,
-    REACH_MAX,
-    SEED_MAX,
-    SUB,
-)
+from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, GOLDEN, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.poses import one_place, points
 
-from .areas import AreaWeapon, has_no_range, parts_of, pattern_of, patterns_of
+from .areas import AreaWeapon, check_aimed, parts_of, pattern_of, patterns_of
 from .weapon import PatternTable, Weapon
 
 C = TypeVar("C", bound="ShotColumns")
@@ -406,7 +397,7 @@ def checked_shots(
     toward = None if toward is None else array_of("toward", toward)
     aim = aim if aim is None or isinstance(aim, int | float) else array_of("aim", aim)
     aimed = ("aim", aim) if toward is None else ("toward", toward)
-    at_256, single = _for_each_aim(*_places("at", at), *aimed)
+    at_256, single = _for_each_aim(*places_256("at", at), *aimed)
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -424,18 +415,13 @@ def checked_shots(
 
 def unaimed_shots(field: str, at: object, accept: object, blocked_by: object, exclude: object) -> Shots:
     """Check places and filters of shots that are aimed later; the places are the value of the field."""
-    at_256, single = _places(field, at)
+    at_256, single = places_256(field, at)
     n = len(at_256)
     meets = filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n))
     return Shots(at_256, STRAIGHT, None, meets, _owners(exclude, n, single), 0, 0, 0)
 
 
-def places_256(field: str, at: object) -> Ints:
-    """Check positions (N, 2), or one (2,), and return them (N, 2) in 1/256 px."""
-    return _places(field, at)[0]
-
-
-def _places(field: str, at: object) -> tuple[Ints, bool]:
+def places_256(field: str, at: object) -> tuple[Ints, bool]:
     """Positions (N, 2) in 1/256 px, and whether one position (2,) was given."""
     if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
         many: Ints | None = kernels_of(fixed_point).snapped(at)
@@ -561,20 +547,6 @@ def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
         got = targets[same[0]].tolist()
         raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
     return offset
-
-
-def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
-    """Check that a ray without a range is aimed at a point within reach."""
-    if not has_no_range(weapon):
-        return
-    if offset is None:
-        raise InputError("toward: expected a point, as the weapon has no range, got none")
-    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
-    if len(far):
-        got = (offset[far[0]] / SUB).tolist()
-        raise InputError(
-            f"toward[{far[0]}]: expected a point within {REACH_MAX} px of the shot, got one at {got} of it"
-        )
 
 
 def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:

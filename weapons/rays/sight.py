@@ -70,7 +70,7 @@ def sees(
     if isinstance(scene, Scene) and scene.items.stack().occluder.all():  # rays that refuse nothing march faster
         shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)
     strategy = "cast" if shots.choosy and jit_is_on() else "auto"  # a march stops at all that does not block
-    targets_256 = places_256("targets", targets)
+    targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
 
     def aimed(pair: Ints) -> tuple[Ints, Shots]:

@@ -50,8 +50,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire, fired
 from ..fire.hits import Hits
-from ..kinds.areas import Rays, weapon_from_json
-from ..kinds.placements import Fired, Places, Shots, check_aimed, filter_of
+from ..kinds.areas import Rays, check_aimed, weapon_from_json
+from ..kinds.placements import Fired, Places, Shots, filter_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
