@@ -346,7 +346,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "aim, NaN": (lambda: shot(aim=math.nan), "aim.*: expected a finite number, got nan"),
     "aim of a row": (
         lambda: shot(at=[(1, 2), (3, 4)], aim=[0, math.inf]), r"aim\[1\]: expected a finite number, got inf"),
-    "aims, too many": (lambda: shot(aim=[1, 2]), r"aim: expected shape \(1,\), got \(2,\)"),
+    "aims, too many": (lambda: shot(at=[(1, 2)], aim=[1, 2]), r"aim: expected shape \(1,\), as at has .*got \(2,\)"),
     "aim and toward": (lambda: shot(aim=1, toward=(3, 4)), "aim: expected aim or toward, got both"),
     "toward itself": (lambda: shot(toward=(32, 20)), r"toward\[0\]: expected a point other than the shot's own"),
     "toward, NaN": (lambda: shot(toward=(math.nan, 0)), r"toward\[0\]: expected a finite number, got nan"),

@@ -747,7 +747,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"at": [(0, 0), (0, 2.0**40 + 1)]}, r"at\[1\]\[1\]: expected a number within"),
     ({"at": [(1j, 0)]}, r"at: expected numbers"),
     ({"aim": [0, INF]}, r"aim\[1\]: expected a finite number, got inf"),
-    ({"aim": [0, 1, 2]}, r"aim: expected shape \(2,\), got \(3,\)"),
+    ({"aim": [0, 1, 2]}, r"aim: expected shape \(2,\), as at has shape \(2, 2\), got \(3,\)"),
     ({"aim": "up"}, r"aim: expected numbers"),
     ({"aim": 0, "toward": (5, 5)}, r"aim: expected aim or toward, got both"),
     ({"toward": [(5, 5), (1, 1)]}, r"toward\[1\]: expected a point other than the shot's own"),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import assert_type
 
 import numpy as np
+import numpy.typing as npt
 
 from hitplanes import (
     Disc,
@@ -28,6 +29,8 @@ from hitplanes import (
     fire,
     fire_shots,
     prepare,
+    scan,
+    sees,
 )
 
 scene = Scene((90, 60), categories=["tank"])
@@ -62,10 +65,15 @@ fire(scene, Disc(3), [(1, 2), (3, 4)], aim=[3, 4.5], accept=["tank"], exclude=[1
 fire(scene, Disc(3), np.zeros((2, 2)), aim=np.array([3, 4]), accept=np.array([1, 2]), exclude=np.array([[1, -1]]))
 fire(scene, Disc(3), (np.float32(1), np.int64(2)), toward=[5, 6.5], accept=5, exclude=np.int64(2), blocked_by=0)
 fire(scene, Disc(3), scene.position(tank), toward=scene.position([tank])[0], exclude=[[1, 2], [3, -1]])
+fire(scene, Disc(3), (1, 2), toward=[(3, 4), (5, 6)])
+fire(scene, Pistol(80), (1, 2), aim=np.arange(5))
 scene.set(tank, position_xy=(1, 2), angle=3)
 scene.carve(fire(scene, Disc(3), (5, 5)))
 scene.carve(fire(scene, Pistol(80), (5, 5)))
 scene.carve({tank: [(5, 5)], int(scene.ids()[0]): np.zeros((3, 2), np.int64)})
+assert_type(sees(scene, (5, 5), [(1, 2), (3, 4)], accept="tank", blocked_by=[], exclude=tank), npt.NDArray[np.bool_])
+assert_type(scan(History(scene), np.zeros((2, 2)), np.arange(9), 80, tick=[1, 2.5]), npt.NDArray[np.float64])
+scan(scene, (5, 5), [0, 90.5], range=7.5, exclude=[tank])
 
 # And as it does not.
 scene.carve([tank])  # type: ignore[arg-type]
@@ -76,5 +84,8 @@ fire(scene, Disc(3), (1, 2), aim="up")  # type: ignore[arg-type]
 fire(scene, Disc(3), (1, 2), aims=3)  # type: ignore[call-overload]
 fire(scene, Disc, (1, 2))  # type: ignore[call-overload]
 fire(scene, Disc(3))  # type: ignore[call-overload]
+sees(scene, (5, 5))  # type: ignore[call-arg]
+sees(scene, (5, 5), "here")  # type: ignore[arg-type]
+scan(scene, (5, 5), [0, 90], None)  # type: ignore[arg-type]
 prepare(scene, Pistol(80), tick=3)  # type: ignore[call-overload]
 Spread(Sweep(Pistol(80), 40, 5), 5, 9)  # type: ignore[type-var]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from ..common.checks import Bools, InputError, Ints, integers, shown
+from ..common.checks import Bools, InputError, Ints, integers, shown, within
 from ..common.limits import HALF, MASK_AREA_MAX, POSITION_MAX, SUB
 from ..grid.fixed_point import over_one, rounded_div, turned
 from ..grid.spans import Spans
@@ -22,6 +22,7 @@ from .sprite import Carving, Sprite, fits, local_grid
 from .variants import ONE, Transform, Variant, cropped, keep_variant
 
 if TYPE_CHECKING:
+    from .items import Items
     from .scene import Scene
 
 SLACK = 17, 16
@@ -46,6 +47,19 @@ def pixels_to_carve(scene: Scene, pixels: HitPixels | Mapping[int, object]) -> M
     if pixels.scene is not scene:
         raise InputError("hits: expected those of this scene as it is, got those of another scene, or of the past")
     return pixels.object_pixels()
+
+
+def carved_sprites(items: Items, pixels: Mapping[int, object]) -> tuple[list[Sprite], dict[int, int]]:
+    """New sprites of the items of which pixels go, and how many pixels each of them loses, by its id."""
+    sprites, lost = [], {}
+    for row, xy in pixels.items():
+        variant, place = items.variants[row], f"pixels[{row}]"
+        hole = hole_of(place, xy, variant.mask, items.corner(row))
+        if count := int(np.count_nonzero(hole.hit)):
+            with within(place):
+                sprites.append(carved(items.sprites[row], variant, hole))
+            lost[row] = count
+    return sprites, lost
 
 
 class Hole(NamedTuple):

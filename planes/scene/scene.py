@@ -25,7 +25,6 @@ from ..common.checks import (
     path_of,
     reals,
     rising,
-    within,
 )
 from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
 from ..common.tables import Text, typed
@@ -75,10 +74,8 @@ class Scene:
     ) -> None:
         self.name = Text().check("name", name)
         names = listed("categories", categories, "a list of names")
-        self.categories = (
-            DEFAULT_CATEGORY,
-            *(Text().check(f"categories[{i}]", other) for i, other in enumerate(names)),
-        )
+        others = (Text().check(f"categories[{i}]", other) for i, other in enumerate(names))
+        self.categories = (DEFAULT_CATEGORY, *others)
         if len(self.categories) > CATEGORY_BITS:
             raise InputError(f"categories: expected at most {CATEGORY_BITS - 1} names, got {len(self.categories) - 1}")
         if len(set(self.categories)) < len(self.categories):
@@ -282,17 +279,10 @@ class Scene:
         InputError
             If the scene has changed since the shot, or is another one; or naming the id.
         """
-        rows, sprites, lost = [], [], {}
-        for item, xy in late.carving.pixels_to_carve(self, pixels).items():
-            row = int(self._existing(integer("pixels", item, 0, self.items.count - 1))[0])
-            variant, place = self.items.variants[row], f"pixels[{row}]"
-            hole = late.carving.hole_of(place, xy, variant.mask, self.items.corner(row))
-            if count := int(np.count_nonzero(hole.hit)):
-                with within(place):
-                    sprites.append(late.carving.carved(self.items.sprites[row], variant, hole))
-                rows.append(row)
-                lost[row] = count
-        if rows:
+        wanted = late.carving.pixels_to_carve(self, pixels)
+        given = {int(self._existing(integer("pixels", i, 0, self.items.count - 1))[0]): xy for i, xy in wanted.items()}
+        sprites, lost = late.carving.carved_sprites(self.items, given)
+        if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
             self.items.record(np.array(rows), ("mask",))
         return lost

@@ -390,7 +390,7 @@ def _frame_names(frame_names: Sequence[str], n: int) -> tuple[str, ...]:
 
 def frame_number(sprite: Sprite, frame: object) -> int:
     """Check the number or the name of a frame, and return its number."""
-    if isinstance(frame, str):
+    if isinstance(frame, str) and sprite.frame_names:
         return sprite.frame_names.index(choice("frame", frame, sprite.frame_names))
     return integer("frame", frame, 0, sprite.frame_count - 1)
 

@@ -42,6 +42,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Fire": (
         "fire",
         "fire_shots",
+        "sees",
+        "scan",
         "prepare",
         "Ready",
         "Hits",
@@ -79,6 +81,7 @@ PROPERTIES = property, cached_property, cached_attribute
 SPELLED = {
     "Pellet": "AreaWeapon | RayWeapon", "Repeated": "AreaWeapon | RayWeapon | Spread | Sweep", "AnyHits": "Hits",
     "Ready[Any]": "Ready", "Places": "ArrayLike", "Angles": "ArrayLike", "Wholes": "ArrayLike",
+    "Categories": "ArrayLike", "Owners": "ArrayLike",
     "Unpack[Fired]": "Any",
 }  # fmt: skip
 """Types that only a type checker tells apart, as a reader knows them."""

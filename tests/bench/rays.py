@@ -1,4 +1,4 @@
-"""Rays: microseconds for one of 1000 px, beside pymunk in the same run, and what stretches and boxes save.
+"""Rays: microseconds for one of 1000 px, beside pymunk in the same run, and what stretches and boxes save; and scans.
 
 python tests/bench/rays.py [objects ...]
 
@@ -8,9 +8,11 @@ side. pymunk gets the convex hulls of the same masks, and answers one ray a call
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 
 import cv2
@@ -18,10 +20,11 @@ import numpy as np
 import pymunk
 from turns import least
 
-from hitplanes import Laser, Pistol, RayHits, Rifle, Role, Scene, Sprite, Weapon, fire, use_jit
+from hitplanes import Laser, Pistol, RayHits, Rifle, Role, Scene, Sprite, Weapon, fire, scan, sees, use_jit
 from hitplanes.weapons.rays import ray_walk
 
 LENGTH, BATCH, SINGLE = 1000, 10_000, 100
+SCAN = 300
 WORLD = (1920, 1080)
 Shots = tuple[np.ndarray, np.ndarray]
 
@@ -55,10 +58,10 @@ def scene_of(objects: int, size_wh: tuple[int, int]) -> Scene:
     return scene
 
 
-def space_of(scene: Scene) -> pymunk.Space:
-    """The same items, as the hulls of their masks."""
+def space_of(scene: Scene, ids: np.ndarray | None = None) -> pymunk.Space:
+    """The same items, or some of them, as the hulls of their masks."""
     space = pymunk.Space()
-    for item in scene.ids().tolist():
+    for item in (scene.ids() if ids is None else ids).tolist():
         mask, corner = scene.mask(item)
         y, x = np.nonzero(mask)
         squares = np.concatenate([np.stack([x + i, y + j], axis=1) for i in (-0.5, 0.5) for j in (-0.5, 0.5)])
@@ -87,12 +90,19 @@ def one_by_one(scene: Scene, weapon: Weapon, shots: Shots) -> None:
         fire(scene, weapon, at, aim=aim)
 
 
-def queries(space: pymunk.Space, shots: Shots, radius: float, everything: bool) -> None:
+def queries(space: pymunk.Space, shots: Shots, radius: float, everything: bool, length: float = LENGTH) -> None:
+    """Ask pymunk for the first shape on each ray, or for all."""
+    ends = shots[0] + length * np.stack([np.cos(np.radians(shots[1])), np.sin(np.radians(shots[1]))], axis=1)
+    segments(space, shots[0], ends, radius, everything)
+
+
+def segments(
+    space: pymunk.Space, starts: np.ndarray, ends: np.ndarray, radius: float = 0, everything: bool = False
+) -> None:
     """Ask pymunk for the first shape on each segment, or for all."""
-    ends = shots[0] + LENGTH * np.stack([np.cos(np.radians(shots[1])), np.sin(np.radians(shots[1]))], axis=1)
     ask = space.segment_query if everything else space.segment_query_first
     shape_filter = pymunk.ShapeFilter()
-    for start, end in zip(shots[0].tolist(), ends.tolist(), strict=True):
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
         ask(tuple(start), tuple(end), radius, shape_filter)
 
 
@@ -173,6 +183,37 @@ def ways(scene: Scene, size_wh: tuple[int, int]) -> None:
 WAYS = ("walk", "cast", "march", "auto")
 
 
+def sights(scene: Scene, size_wh: tuple[int, int]) -> None:
+    """Microseconds a beam of 10 lidars, and a pair of 60 eyes, beside a loop of pymunk's queries for the first shape.
+
+    Of a scene that moves an object moves before each call. The space of the lines of sight has no objects.
+    """
+    rng, degrees = np.random.default_rng(7), np.arange(360.0)
+    places, eyes = rng.uniform((0, 0), size_wh, (10, 2)), rng.uniform((0, 0), size_wh, (60, 2))
+    at, aims = np.repeat(places, len(degrees), axis=0), np.tile(degrees, len(places))
+    pairs = np.repeat(eyes, len(eyes), axis=0), np.tile(eyes, (len(eyes), 1))
+    space, walls, carrier = space_of(scene), space_of(scene, scene.ids(Role.OCCLUDER)), int(scene.ids(Role.HITTABLE)[0])
+    x, y = scene.position(carrier).tolist()
+    steps = itertools.cycle((x + step, y) for step in range(4))
+    ways: dict[str, Callable[[], object]] = {
+        "scan": lambda: scan(scene, places, degrees, SCAN),
+        "scan, an owner excluded": lambda: scan(scene, places, degrees, SCAN, exclude=carrier),
+        "scan, an object moves": lambda: (scene.move(carrier, next(steps)), scan(scene, places, degrees, SCAN)),
+        "sees": lambda: sees(scene, eyes, eyes),
+        "sees, an object moves": lambda: (scene.move(carrier, next(steps)), sees(scene, eyes, eyes)),
+    }
+    print(f"{'10 x 360 beams, 60 x 60 pairs':30} {'us':>7} {'pymunk':>7} {'ratio':>6}")
+    for name, ours in ways.items():
+        ours()
+        theirs = (
+            partial(segments, walls, *pairs)
+            if name.startswith("sees")
+            else partial(queries, space, (at, aims), 0, False, SCAN)
+        )
+        here, there = (1e6 * s / len(at) for s in least(ours, theirs))
+        print(f"{name:30} {here:7.2f} {there:7.2f} {here / there:6.2f}", flush=True)
+
+
 def main(counts: list[int]) -> None:
     """Print the tables."""
     worlds = [(count, WORLD) for count in counts]
@@ -187,6 +228,7 @@ def main(counts: list[int]) -> None:
             use_jit(mode)
             print("with compiled kernels" if mode else "in numpy")
             ways(scene, size_wh)
+            sights(scene, size_wh)
         use_jit(None)
 
 

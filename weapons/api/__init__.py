@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from hitplanes.weapons.prepared.warm_up import warm_up as warm_up
     from hitplanes.weapons.rays.contacts import Reason as Reason
     from hitplanes.weapons.rays.ray_hits import RayHits as RayHits
+    from hitplanes.weapons.rays.sight import scan as scan
+    from hitplanes.weapons.rays.sight import sees as sees
     from hitplanes.weapons.replay.record import ShotRecord as ShotRecord
     from hitplanes.weapons.replay.record import replay as replay
     from hitplanes.weapons.replay.shot_log import fire_shots as fire_shots
@@ -95,6 +97,7 @@ _HOME = {
     **dict.fromkeys(("Hits",), "weapons.fire.hits"),
     **dict.fromkeys(("Reason",), "weapons.rays.contacts"),
     **dict.fromkeys(("RayHits",), "weapons.rays.ray_hits"),
+    **dict.fromkeys(("scan", "sees"), "weapons.rays.sight"),
     **dict.fromkeys(("Ready", "prepare"), "weapons.prepared.prepare"),
     **dict.fromkeys(("warm_up",), "weapons.prepared.warm_up"),
     **dict.fromkeys(("report_of",), "weapons.report.report"),

@@ -16,7 +16,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..kinds.areas import Rays, ray_parts_of
-from ..kinds.placements import Fired, Places, Shots, checked_shots
+from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import request_of, verdicts_by_spans, verdicts_by_tiles
 from .hits import Hits, Rows
@@ -28,6 +28,7 @@ from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
+    from ..kinds.arguments import Fired, Places
     from ..rays.ray_hits import RayHits
 
 OWNERS_NAMED = 3
@@ -61,8 +62,8 @@ def fire(
     ----------
     scene : the Scene that is fired at, or a History, fired at the given ticks
     weapon : one weapon for all shots
-    at : (2,) position of one shot, or (N, 2) of a batch, px
-    aim : angle in degrees, 0 along +x, clockwise on the screen
+    at : (2,) position of one shot, or (N, 2) of a batch, px; with N aims or targets, (2,) is the position of all shots
+    aim : () or (N,) angle in degrees, 0 along +x, clockwise on the screen
     toward : (2,) or (N, 2) point that the weapon is aimed at, px; it replaces `aim`
     accept : category names or bits of the objects that may be hit; all by default
     blocked_by : category names or bits of the occluders that block; all by default, and none for [] or 0
@@ -93,7 +94,7 @@ def fire(
     """
     plan = Plan()
     _check_words(prefilter, broadphase, strategy)
-    present = scene if isinstance(scene, Scene) else _history(scene).scene
+    present = present_of(scene)
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
     if exclude is not None:
@@ -101,11 +102,10 @@ def fire(
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if aim is None and toward is None:
         plan.leave_out_all(unaimed, weapon)
-    if not isinstance(scene, Scene):
-        return _fired_at_moments(scene, tick, weapon, shots, (prefilter, broadphase, strategy), plan)
-    if tick is not None:
-        raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
-    return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+    if isinstance(scene, Scene) and tick is None:
+        return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
+    moments = moments_of(scene, tick, len(shots))
+    return _fired_at_moments(moments, weapon, shots, (prefilter, broadphase, strategy), plan)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:
@@ -117,10 +117,9 @@ def _check_words(prefilter: object, broadphase: object, strategy: object) -> Non
 
 
 def _fired_at_moments(
-    history: History, tick: object, weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
+    moments: list[tuple[Scene, Ints]], weapon: Weapon, shots: Shots, how: tuple[str, str, str], plan: Plan
 ) -> Hits:
     """Fire shots at the scenes of their ticks; `how` is (pre-filter, broad phase, strategy)."""
-    moments = moments_of(history, tick, len(shots))
     plan.run("past", f"{len(moments)} scenes of it")
     parts: list[Hits] = []
     for past, rows in moments:
@@ -132,16 +131,23 @@ def _fired_at_moments(
     return hits
 
 
-def _history(scene: object) -> History:
+def present_of(scene: object) -> Scene:
+    """The scene itself, or the present scene of a history."""
+    if isinstance(scene, Scene):
+        return scene
     from hitplanes.planes.scene.history import History
 
     if not isinstance(scene, History):
         raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
-    return scene
+    return scene.scene
 
 
-def moments_of(history: History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
-    """Past scenes that shots are fired at, each with the rows of its shots."""
+def moments_of(history: Scene | History, tick: object, n: int) -> list[tuple[Scene, Ints]]:
+    """Scenes that shots are fired at, of a history those of their ticks, each with the rows of its shots."""
+    if isinstance(history, Scene):
+        if tick is not None:
+            raise InputError(f"tick: expected none, as a Scene has no past, got {shown(tick)}: fire at its History")
+        return [(history, np.arange(n))]
     if tick is None:
         raise InputError("tick: expected one, or one for each shot, as it is a History that is fired at, got none")
     ticks = reals("tick", each("tick", tick, n), (n,))

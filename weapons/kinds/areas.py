@@ -511,3 +511,17 @@ def _farthest(points_256: Ints) -> int:
     if not len(points_256):
         return 0
     return max(math.isqrt(x * x + y * y - 1) + 1 if x or y else 0 for x, y in points_256.tolist())
+
+
+def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
+    """Check that a ray without a range is aimed at a point within reach."""
+    if not has_no_range(weapon):
+        return
+    if offset is None:
+        raise InputError("toward: expected a point, as the weapon has no range, got none")
+    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
+    if len(far):
+        got = (offset[far[0]] / SUB).tolist()
+        raise InputError(
+            f"toward[{far[0]}]: expected a point within {REACH_MAX} px of the shot, got one at {got} of it"
+        )

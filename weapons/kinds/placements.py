@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, SupportsFloat, SupportsIndex, TypedDict, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,22 +17,13 @@ import numpy.typing as npt
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, integer, integers, reals
-from hitplanes.planes.common.limits import (
-    ALL,
-    CATEGORY_BITS,
-    EVERYTHING,
-    GOLDEN,
-    POSITION_MAX,
-    REACH_MAX,
-    SEED_MAX,
-    SUB,
-)
+from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, GOLDEN, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.poses import one_place, points
 
-from .areas import AreaWeapon, has_no_range, parts_of, pattern_of, patterns_of
+from .areas import AreaWeapon, check_aimed, parts_of, pattern_of, patterns_of
 from .weapon import PatternTable, Weapon
 
 C = TypeVar("C", bound="ShotColumns")
@@ -262,6 +253,10 @@ class Shots:
         rest = self._meets, self._exclude, self._number, self._seed, self._row
         return Shots(self.at_256, direction, self.toward_256, *rest)
 
+    def aimed_at(self, toward_256: Ints) -> Shots:
+        """The same shots, aimed at points at offsets (N, 2)."""
+        return Shots(self.at_256, None, toward_256, self._meets, self._exclude, self._number, self._seed, self._row)
+
     def take(self, first: int, last: int) -> Shots:
         """Shots first .. last - 1."""
         return self if first == 0 and last >= len(self) else self.pick(slice(first, last))
@@ -372,35 +367,6 @@ class Placements:
         return self.xy is not self.turn_xy
 
 
-Angles = SupportsFloat | Sequence[SupportsFloat] | npt.NDArray[Any]
-Places = Sequence[SupportsFloat] | Sequence[Sequence[SupportsFloat]] | Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
-Wholes = SupportsIndex | Sequence[SupportsIndex] | npt.NDArray[Any]
-Categories = str | Sequence[str] | Wholes
-Owners = Wholes | Sequence[Sequence[SupportsIndex]]
-"""What a type checker takes for numbers (N,), points (N, 2), whole numbers (N,), names or bits, and owners (N, K)."""
-
-
-class Filtered(TypedDict, total=False):
-    """What shots pass over, and the seed of their pellets, for type checkers; see `fire`."""
-
-    accept: Categories
-    blocked_by: Categories
-    exclude: Owners | None
-    seed: Wholes
-
-
-class Fired(Filtered, total=False):
-    """All named arguments of `fire`, for type checkers."""
-
-    aim: Angles | None
-    toward: Places | None
-    shot: Wholes | None
-    tick: Angles | None
-    prefilter: str
-    broadphase: str
-    strategy: str
-
-
 def checked_shots(
     weapon: Weapon,
     at: object,
@@ -413,7 +379,10 @@ def checked_shots(
     shot: object,
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
-    at_256, single = _places(at)
+    toward = None if toward is None else array_of("toward", toward)
+    aim = aim if aim is None or isinstance(aim, int | float) else array_of("aim", aim)
+    aimed = ("aim", aim) if toward is None else ("toward", toward)
+    at_256, single = _for_each_aim(*places_256("at", at), *aimed)
     n = len(at_256)
     offset = None if toward is None else _offsets(at_256, aim, toward)
     check_aimed(weapon, offset)
@@ -431,7 +400,15 @@ def checked_shots(
     )
 
 
-def _places(at: object) -> tuple[Ints, bool]:
+def unaimed_shots(field: str, at: object, accept: object, blocked_by: object, exclude: object) -> Shots:
+    """Check places and filters of shots that are aimed later; the places are the value of the field."""
+    at_256, single = places_256(field, at)
+    n = len(at_256)
+    meets = filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n))
+    return Shots(at_256, STRAIGHT, None, meets, _owners(exclude, n, single), 0, 0, 0)
+
+
+def places_256(field: str, at: object) -> tuple[Ints, bool]:
     """Positions (N, 2) in 1/256 px, and whether one position (2,) was given."""
     if type(at) is np.ndarray and at.shape[1:] == (2,) and at.dtype == np.float64 and at.flags.aligned:
         many: Ints | None = kernels_of(fixed_point).snapped(at)
@@ -440,8 +417,24 @@ def _places(at: object) -> tuple[Ints, bool]:
     one = one_place(at)
     if one is not None:
         return np.array((one,), np.int64), True
-    single = array_of("at", at).shape == (2,)
-    return snap(reals("at", at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+    single = array_of(field, at).shape == (2,)
+    return snap(reals(field, at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
+
+
+def _for_each_aim(at_256: Ints, single: bool, field: str, value: object) -> tuple[Ints, bool]:
+    """Positions (N, 2) of all shots, and whether there is one shot.
+
+    One position is that of all aims (N,) or targets (N, 2), which are the value of the field.
+    """
+    shape: tuple[int, ...] = value.shape if isinstance(value, np.ndarray) else ()
+    if len(shape) != {"aim": 1, "toward": 2}[field]:
+        return at_256, single
+    if single:
+        return np.repeat(at_256, shape[0], axis=0), False
+    if shape[0] != len(at_256):
+        expected = (len(at_256), *shape[1:])
+        raise InputError(f"{field}: expected shape {expected}, as at has shape {at_256.shape}, got {shape}")
+    return at_256, False
 
 
 def filter_of(accept: Ints | int, blocked_by: Ints | int) -> Ints | int:
@@ -546,20 +539,6 @@ def _offsets(at_256: Ints, aim: object, toward: object) -> Ints:
         got = targets[same[0]].tolist()
         raise InputError(f"toward[{same[0]}]: expected a point other than the shot's own, got {got}")
     return offset
-
-
-def check_aimed(weapon: Weapon, offset: Ints | None) -> None:
-    """Check that a ray without a range is aimed at a point within reach."""
-    if not has_no_range(weapon):
-        return
-    if offset is None:
-        raise InputError("toward: expected a point, as the weapon has no range, got none")
-    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
-    if len(far):
-        got = (offset[far[0]] / SUB).tolist()
-        raise InputError(
-            f"toward[{far[0]}]: expected a point within {REACH_MAX} px of the shot, got one at {got} of it"
-        )
 
 
 def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:

@@ -20,7 +20,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.call import category_bits, check_owners, fire
 from ..fire.hits import Hits
 from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
-from ..kinds.placements import Angles, Filtered, Places, Wholes, accepted_of, blocking_of, checked_shots
+from ..kinds.placements import accepted_of, blocking_of, checked_shots
 from ..kinds.rays import is_thin_first
 from ..kinds.weapon import Weapon
 from . import position_cache
@@ -28,6 +28,7 @@ from .one_shot import Answer, Filter, Present, Told, answer_of, reach_of, rounds
 from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
+    from ..kinds.arguments import Angles, Filtered, Places, Wholes
     from ..rays.ray_hits import RayHits
 
 AnyHits = TypeVar("AnyHits", bound=Hits, covariant=True)

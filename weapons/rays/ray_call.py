@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from hitplanes.planes.common.backend import keep_arena
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.scene import Scene
@@ -54,17 +55,10 @@ def fired_rays(
     scene: Scene, weapon: Weapon, parts: Parts, shots: Shots, how: tuple[str, str, str], plan: Plan
 ) -> RayHits:
     """Decide what shots of a ray weapon hit; `how` is (prefilter, broadphase, strategy) of `fire`."""
-    stack, ray = read_stack(scene, plan), parts[2]
+    ray = parts[2]
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
-    prefilter, broadphase, strategy = how
-    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, each * len(shots))
-    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
-    walks = chosen.way == "walk"
-    candidates = choose(each * len(shots) if walks else 0)
-    field = scene.derived.distance_field() if chosen.way == "march" else None
-    through = Range(scene.items, stack, scene.bounds, candidates, plan, field=field)
-    plan.run("plan", candidates.why if walks else chosen.why)
+    through, chosen, choose = _planned(scene, ray, each * len(shots), how, plan)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
     found: list[tuple[int, Walk | Made | FirstHits]] = []
@@ -75,7 +69,7 @@ def fired_rays(
         plan.run("rays", "both ends on the grid", rays.nbytes)
         if ends_at_first(ray):
             ends = _first_ends(rays, ray, some, through, chosen.way, choose)
-            first = FirstHits(rays, ray, ends, stack)
+            first = FirstHits(rays, ray, ends, through.stack)
             rows.append(first.rows(len(some)))
             found.append((begin, first))
             plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
@@ -85,11 +79,43 @@ def fired_rays(
             found += [(begin, walk) for walk in followed]
         if begin:
             rows[-1].shot[:] += begin
-    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, stack, weapon, shots, plan)
+    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, through.stack, weapon, shots, plan)
     plan.run("rows", "")
-    _leave_out_unused(plan, scene, through, shots, ray, (strategy, chosen))
+    _leave_out_unused(plan, scene, through, shots, ray, (how[2], chosen))
     plan.run("plan", "")
     return hits
+
+
+def _planned(
+    scene: Scene, ray: RayWeapon, count: int, how: tuple[str, str, str], plan: Plan
+) -> tuple[Range, RayChoice, Choose]:
+    """Choose the way of so many rays, and what goes before it; `how` is (prefilter, broadphase, strategy) of `fire`."""
+    stack = read_stack(scene, plan)
+    prefilter, broadphase, strategy = how
+    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, count)
+    choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
+    walks = chosen.way == "walk"
+    candidates = choose(count if walks else 0)
+    field = scene.derived.distance_field() if chosen.way == "march" else None
+    plan.run("plan", candidates.why if walks else chosen.why)
+    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field), chosen, choose
+
+
+def first_ends(
+    scene: Scene, ray: RayWeapon, count: int, strategy: str = "auto"
+) -> Callable[[Shots], tuple[Rays, Terminations]]:
+    """Function that finds the ends of the rays of shots of one ray each, planned for so many rays in all.
+
+    Rays end at the first thing that they meet. Rows, passes and stops are not made.
+    """
+    keep_arena()
+    through, chosen, choose = _planned(scene, ray, count, ("auto", "auto", strategy), Plan())
+
+    def ends_of(shots: Shots) -> tuple[Rays, Terminations]:
+        rays = rays_of((None, None, ray), shots)
+        return rays, _first_ends(rays, ray, shots, through, chosen.way, choose)
+
+    return ends_of
 
 
 def _told(found: list[tuple[int, Walk | Made | FirstHits]]) -> Told:

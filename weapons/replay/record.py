@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO, NamedTuple, Unpack, overload
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Unpack, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -50,11 +50,14 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire, fired
 from ..fire.hits import Hits
-from ..kinds.areas import Rays, weapon_from_json
-from ..kinds.placements import Fired, Places, Shots, check_aimed, filter_of
+from ..kinds.areas import Rays, check_aimed, weapon_from_json
+from ..kinds.placements import Shots, filter_of
 from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
+
+if TYPE_CHECKING:
+    from ..kinds.arguments import Fired, Places
 from ..report.phrases import Entry, by_path, first_of, key_of, pairs
 from ..report.phrases import shown as number_of
 

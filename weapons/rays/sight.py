@@ -1,0 +1,179 @@
+"""Lines of sight and scans: which eyes see which targets, and how far beams go, without rows, passes and stops.
+
+places and filters -> shots of one ray each, in chunks -> `ray_call.first_ends` -> a table (N, M)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hitplanes.planes.common.backend import jit_is_on
+from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, array_of, real, reals
+from hitplanes.planes.common.limits import ALL, REACH_MAX, SUB
+from hitplanes.planes.grid.fixed_point import unit
+from hitplanes.planes.scene.scene import Scene
+
+from ..fire.call import category_bits, check_owners, moments_of, present_of
+from ..kinds.placements import Shots, places_256, unaimed_shots
+from ..kinds.rays import Pistol
+from .contacts import Rays, Reason, Terminations
+from .ray_call import RAYS_AT_ONCE, first_ends
+from .ray_walk import lines_of
+
+if TYPE_CHECKING:
+    from hitplanes.planes.scene.history import History
+
+    from ..kinds.arguments import Angles, Categories, Owners, Places
+
+Aimed = Callable[[Ints], tuple[Ints, Shots]]
+"""Function that aims the shots of cells (n,) of a table; it returns the cells that have a shot, and the shots."""
+
+
+def sees(
+    scene: Scene | History,
+    eyes: Places,
+    targets: Places,
+    *,
+    accept: Categories = (),
+    blocked_by: Categories = ALL,
+    exclude: Owners | None = None,
+    tick: Angles | None = None,
+) -> Bools:
+    """Decide which eyes see which targets.
+
+    An eye sees a target if no occluder touches the straight line between them, ends included. So who sees is seen, and
+    a point in an occluder, or on its border, neither sees nor is seen. A pair on one spot always sees each other.
+
+    Parameters
+    ----------
+    scene : a Scene, or a History, seen at the given ticks
+    eyes : (N, 2) or (2,) points, px
+    targets : (M, 2) or (2,) points, px, at most 2**20 px from each eye in x and in y
+    accept : category names or bits of the objects that block, too, also those in which an end lies; none by default
+    blocked_by : category names or bits of the occluders that block; all by default
+    exclude : owners whose items do not block: a number, or for one eye a list (K,); for several (N,), (N, K), or (1, K)
+    tick : time of each eye, if `scene` is a History
+
+    Each of accept, blocked_by, exclude and tick is one value for all eyes, or one for each.
+
+    Returns
+    -------
+    (N, M) bool
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid; the text names the argument and the row.
+    """
+    shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
+    if isinstance(scene, Scene) and scene.items.stack().occluder.all():  # rays that refuse nothing march faster
+        shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)
+    strategy = "cast" if shots.choosy and jit_is_on() else "auto"  # a march stops at all that does not block
+    targets_256, _ = places_256("targets", targets)
+    seen = np.ones((len(shots), len(targets_256)), np.bool_)
+
+    def aimed(pair: Ints) -> tuple[Ints, Shots]:
+        eye, target = np.divmod(pair, len(targets_256))
+        offset = targets_256[target] - shots.at_256[eye]
+        _check_reach(offset, eye, target)
+        apart = np.flatnonzero(offset.any(axis=1))
+        return pair[apart], shots.pick(eye[apart]).aimed_at(offset[apart])
+
+    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, aimed, strategy):
+        seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
+    return seen
+
+
+def scan(
+    scene: Scene | History,
+    at: Places,
+    angles: Angles,
+    range: float,  # noqa: A002
+    *,
+    accept: Categories = ALL,
+    blocked_by: Categories = ALL,
+    exclude: Owners | None = None,
+    tick: Angles | None = None,
+) -> Floats:
+    """Measure how far beams go to the first thing that they meet, as a lidar does.
+
+    A beam meets objects and occluders as the ray of a `Pistol` does: its distance is that of `hits.stop`, and 0 if it
+    starts in one of them.
+
+    Parameters
+    ----------
+    scene : a Scene, or a History, scanned at the given ticks
+    at : (N, 2) or (2,) places, px
+    angles : (B,) degrees of the beams of every place, 0 along +x, clockwise on the screen; or (N, B), those of each
+    range : length of the beams, px
+    accept : category names or bits of the objects that beams meet; all by default
+    blocked_by : category names or bits of the occluders that beams meet; all by default
+    exclude : owners whose items are passed through, such as who carries the lidar: a number, or for one place a list
+        (K,); for several (N,), (N, K), or (1, K)
+    tick : time of each scan, if `scene` is a History
+
+    Each of accept, blocked_by, exclude and tick is one value for all places, or one for each.
+
+    Returns
+    -------
+    (N, B) float, px; infinite where a beam meets nothing within its range
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid; the text names the argument and the row.
+    """
+    shots, ray = _shots("at", at, scene, accept, blocked_by, exclude), Pistol(real("range", range, 0, REACH_MAX))
+    shared = array_of("angles", angles).ndim == 1
+    direction = np.stack(unit(reals("angles", angles, (None,) if shared else (len(shots), None))), axis=-1)
+    distance = np.full((len(shots), direction.shape[-2]), np.inf)
+
+    def aimed(beam: Ints) -> tuple[Ints, Shots]:
+        place, angle = np.divmod(beam, distance.shape[1])
+        return beam, shots.pick(place).aimed(direction.reshape(-1, 2)[angle if shared else beam])
+
+    for beam, rays, ends in _ends(scene, tick, ray, distance.shape, aimed):
+        met = np.flatnonzero(ends.rank >= 0)
+        lines = lines_of(rays, ray).take(met)
+        distance.reshape(-1)[beam[met]] = ends.time[met] / lines.scale * lines.length
+    return distance
+
+
+def _shots(field: str, at: object, scene: object, accept: object, blocked_by: object, exclude: object) -> Shots:
+    """Shots from places, which are the value of a field, with their filters."""
+    present = present_of(scene)
+    bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
+    shots = unaimed_shots(field, at, *bits, exclude)
+    if exclude is not None:
+        check_owners(present, shots)
+    return shots
+
+
+def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
+    far = np.flatnonzero((np.abs(offset) > SUB * REACH_MAX).any(axis=1))
+    if len(far):
+        got = (offset[far[0]] / SUB).tolist()
+        where = f"targets[{target[far[0]]}]: expected a point within {REACH_MAX} px of eyes[{eye[far[0]]}]"
+        raise InputError(f"{where}, got one at {got} of it")
+
+
+def _ends(
+    scene: Scene | History, tick: object, ray: Pistol, shape: tuple[int, ...], aimed: Aimed, strategy: str = "auto"
+) -> Iterator[tuple[Ints, Rays, Terminations]]:
+    """Follow the rays of a table (N, M), whose rows are places.
+
+    Yields
+    ------
+    cells (n,) of the table, their rays, and the ends of these
+    """
+    places, each = shape
+    for moment, rows in moments_of(scene, tick, places):
+        cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
+        ends_of = first_ends(moment, ray, len(cells), strategy)
+        for begin in range(0, len(cells), RAYS_AT_ONCE):
+            some, shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
+            if len(some):
+                yield some, *ends_of(shots)
