@@ -268,7 +268,7 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         placements = placements_for(request.weapon, part)
         if len(part) > 1 < len(placements.table) and not placements.table.fits:
-            step = len(part) // 2
+            step = most = len(part) // 2
             continue
         yield begin, part, placements
         begin += len(part)
