@@ -83,6 +83,7 @@ class Request:
     ----------
     view : what all shots accept; None if they accept different items
     filtered : whether the call names a pre-filter or a broad phase
+    placements : number of placements of all shots
     """
 
     scene: Scene
@@ -92,17 +93,14 @@ class Request:
     traits: Traits
     view: View | None
     filtered: bool
-
-    @property
-    def placements(self) -> int:
-        """Number of placements of all shots."""
-        return self.traits.placements * len(self.shots)
+    placements: int
 
 
 def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtered: bool) -> Request:
     """What a call asks."""
     traits = traits_of(weapon)
-    return Request(scene, weapon, shots, stack, traits, view_of(traits.pierces, shots), filtered)
+    placements = traits.placements * len(shots)
+    return Request(scene, weapon, shots, stack, traits, view_of(traits.pierces, shots), filtered, placements)
 
 
 def view_of(pierce: bool, shots: Shots) -> View | None:

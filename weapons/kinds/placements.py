@@ -510,7 +510,10 @@ def _directions(n: int, aim: object) -> Ints | tuple[int, int]:
     if aim is None:
         return STRAIGHT
     if isinstance(aim, int | float):
-        return unit_of(aim if type(aim) is float and math.isfinite(aim) else float(reals("aim", aim, ())))
+        plain = (type(aim) is float and math.isfinite(aim)) or (
+            type(aim) is int and -POSITION_MAX <= aim <= POSITION_MAX
+        )
+        return unit_of(float(aim if plain else reals("aim", aim, ())))
     return np.stack(unit(reals("aim", each("aim", aim, n), (n,))), axis=1)
 
 
