@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hitplanes import Beam, Box, Cone, Disc, Polygon, Rounds, Scene, Spread, Stencil, Weapon, fire
+from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.tiles import big_pattern
+from hitplanes.planes.common.backend import COMPILED
+from hitplanes.planes.common.limits import REACH_MAX
 from hitplanes.planes.grid import rasterize
-from hitplanes.planes.grid.fixed_point import ONE, unit
+from hitplanes.planes.grid.fixed_point import ONE, turned, unit
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
 
@@ -45,25 +49,25 @@ def directions(seed: int, count: int = 40) -> Any:
 
 
 @pytest.mark.parametrize("name", WEAPONS)
-def test_bit_rows_of_all_directions_are_those_of_each(name: str) -> None:
-    weapon, direction = WEAPONS[name], directions(3)
+def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> None:
+    weapon, direction = WEAPONS[name], directions(3 + jit)  # those of a seed are kept
     patterns = patterns_of(weapon, direction)
     assert isinstance(patterns, AimedPatterns) and len(patterns) == len(direction) > FEW_AIMS
-    bits, begin = patterns.bits, 0
+    bits, begin = patterns.bits, 64
     for i, (c, s) in enumerate(direction.tolist()):
         spans = weapon.spans(c, s)
         assert patterns[i].spans == spans
         words, big, own = columns_of(spans), big_of_bits(bits, i), big_pattern(spans)
         assert vars(big) | {"depths": 0} == vars(own) | {"depths": 0}
         assert tuple(bits.box_xyxy[i]) == spans.box_xyxy
-        assert bits.rows[i] == words.shape[1] and bits.first[i] == begin + 64
+        assert bits.rows[i] == words.shape[1] and bits.first[i] == begin
         assert np.array_equal(bits.words[begin : begin + words.size], words.reshape(-1))
         begin += words.size
         if len(bits.strips):
             a, b, low, high = bits.strips[i].tolist()
             across = spans.pixels() @ np.array([a, b])
             assert (low, high) == (across.min(), across.max())
-    assert begin == len(bits.words)
+    assert begin == len(bits.words) and not bits.words[:64].any()
 
 
 def test_strips_are_kept_for_long_patterns_alone() -> None:
@@ -101,6 +105,98 @@ def test_rings_that_are_not_convex_are_left_to_the_even_odd_rule(ring: list[tupl
     points = 256 * np.array([ring])
     assert rasterize.convex_polygons(points) is None
     assert rasterize.convex_polygons(points[:, ::-1]) is None
+
+
+def same(module: Any, name: str, *given: Any) -> Any:
+    """What a numpy kernel gives, which is compared with what the compiled one gives."""
+    pytest.importorskip("numba")
+    own, other = (getattr(one, name)(*given) for one in (module, importlib.import_module(COMPILED[module.__name__])))
+    assert (own is None) == (other is None)
+    for mine, others in zip(*map(columns, (own, other)), strict=True) if own is not None else ():
+        assert np.array_equal(mine, others)
+    return own
+
+
+def columns(found: Any) -> list[Any]:
+    """Columns of runs or of bit rows; an empty run may be told in any way."""
+    if not isinstance(found, rasterize.RowRuns):
+        return list(found)
+    empty = [first > last for first, last in found.parts]
+    ends = [np.where(none, 0, end) for none, part in zip(empty, found.parts, strict=True) for end in part]
+    return [found.shape, found.y, *empty, *ends]
+
+
+SIZES = st.one_of(st.integers(0, 300), st.integers(0, 20000), st.sampled_from([0, 1, 127, 128, 181, 182, 256, 25600]))
+ANGLES = st.one_of(st.sampled_from(SPECIAL), st.floats(-360, 360))
+AIMS_AT_A_TIME = st.lists(ANGLES, min_size=1, max_size=5)
+
+
+def aimed_at(aims: list[float]) -> Any:
+    return np.stack(unit(np.array(aims, float)), axis=1)
+
+
+@settings(deadline=None)
+@given(AIMS_AT_A_TIME, SIZES, SIZES, SIZES)
+def test_compiled_beams_are_those_of_numpy(aims: list[float], length: int, radius: int, x: int) -> None:
+    a = np.array([x, -x // 3])
+    runs = same(rasterize, "beams", a, a + turned(np.array([[length, 0]]), *aimed_at(aims).T), radius)
+    same(bit_rows, "bits_of_runs", runs, len(aims), aimed_at(aims))
+
+
+@settings(deadline=None)
+@given(AIMS_AT_A_TIME, SIZES, ANGLES)
+def test_compiled_cones_are_those_of_numpy(aims: list[float], reach: int, angle: float) -> None:
+    c_half, s_half = map(int, unit(abs(angle) / 2))
+    same(
+        bit_rows,
+        "bits_of_runs",
+        same(rasterize, "cones", reach, aimed_at(aims), c_half, s_half),
+        len(aims),
+        np.zeros((0, 2), np.int64),
+    )
+
+
+@settings(deadline=None)
+@given(st.lists(st.lists(st.tuples(SIZES, SIZES), min_size=3, max_size=3), min_size=1, max_size=4), AIMS_AT_A_TIME)
+def test_compiled_polygons_are_those_of_numpy(rings: Any, aims: list[float]) -> None:
+    runs = same(rasterize, "convex_polygons", np.array(rings))
+    if runs is not None:
+        same(bit_rows, "bits_of_runs", runs, len(rings), np.array(rings)[:, 0])
+    box = Box(1 + rings[0][0][0] // 100, 1 + rings[0][0][1] // 100)._corners()
+    same(
+        bit_rows,
+        "bits_of_runs",
+        same(rasterize, "convex_polygons", turned(box, *aimed_at(aims).T[..., None])),
+        len(aims),
+        aimed_at(aims),
+    )
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.integers(-2, 2), st.integers(-2, 2)), min_size=3, max_size=7), st.sampled_from([1, 256]))
+def test_compiled_polygons_refuse_the_rings_that_numpy_refuses(ring: Any, size: int) -> None:
+    same(rasterize, "convex_polygons", size * np.array([ring, ring[::-1]]))
+
+
+@pytest.mark.parametrize("aim", [0, 1e-4, 89.99, 90, 135, 180.3, 269.9999, 45])
+def test_compiled_shapes_of_the_longest_reach_are_those_of_numpy(aim: float) -> None:
+    longest, direction = 256 * REACH_MAX, aimed_at([aim])
+    end = turned(np.array([[longest, 0]]), *direction.T)
+    for radius in (0, 100, 5000):
+        same(rasterize, "beams", np.zeros(2, np.int64), end, radius)
+    same(rasterize, "cones", longest, direction, *map(int, unit(0.001)))
+    same(
+        rasterize,
+        "convex_polygons",
+        turned(256 * np.array([(0, -3), (REACH_MAX, -3), (REACH_MAX, 4), (0, 1)]), *direction.T)[None],
+    )
+
+
+def test_compiled_widest_shapes_are_those_of_numpy() -> None:
+    longest = 256 * REACH_MAX
+    same(rasterize, "beams", np.zeros(2, np.int64), np.array([[longest, longest // 3]]), longest)
+    for half in (30, 90, 120, 180):
+        same(rasterize, "cones", longest, aimed_at([33]), *map(int, unit(half)))
 
 
 def crowd(corner: tuple[int, int]) -> Scene:

@@ -436,7 +436,7 @@ def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
     spans = Spans.from_mask(mask, tuple(rng.integers(-200, 200, 2).tolist()))
     words, (left, top, *_) = weapon.columns_of(spans), spans.box_xyxy or (0, 0)
     told = {
-        (left - WORD + 1 + WORD * column + bit, top - WORD + row)
+        (left - WORD + 1 + WORD * column + bit, top + row)
         for column, row in zip(*(each.tolist() for each in words.nonzero()), strict=True)
         for bit in range(WORD)
         if int(words[column, row]) >> bit & 1

@@ -125,7 +125,8 @@ _SUM = np.uint64(0x0001000100010001)
 class PatternBits(NamedTuple):
     """Bit rows of patterns, from which windows of 64 columns are read, as columns by pattern.
 
-    A pattern is stored as columns of words, so that a window of many rows is two stretches of memory and a shift.
+    A pattern is stored as columns of words, so that a window of many rows is two stretches of memory and a shift. There
+    are WORD empty rows before the first column, and after each.
 
     Parameters
     ----------
@@ -167,10 +168,10 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
         return None
     end = np.append(begin[1:], len(shape)) - 1
     box = np.stack([np.minimum.reduceat(first, begin), y[begin], np.maximum.reduceat(last, begin), y[end]], axis=1)
-    rows = box[:, 3] - box[:, 1] + (1 + 2 * WORD)
+    rows = box[:, 3] - box[:, 1] + (1 + WORD)
     size = rows * ((2 * WORD - 2 + box[:, 2] - box[:, 0] + 1) // WORD + 1)
     corner = np.cumsum(size) - size + WORD
-    words = np.zeros(int(size.sum()), np.uint64)
+    words = np.zeros(WORD + int(size.sum()), np.uint64)
     at, left, step = (corner - box[:, 1])[shape] + y, (box[:, 0] - (WORD - 1))[shape], rows[shape]
     for part in parts:
         _lay_runs(words, at, step, *(side - left for side in part))

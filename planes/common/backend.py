@@ -50,6 +50,7 @@ Part = TypeVar("Part")
 
 COMPILED = {
     "hitplanes.planes.grid.fixed_point": "hitplanes.planes.jit.scene",
+    "hitplanes.planes.grid.rasterize": "hitplanes.planes.jit.scene",
     "hitplanes.planes.scene.variants": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.scene",
     "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",

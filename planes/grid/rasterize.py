@@ -158,7 +158,8 @@ def beam(a: Ints, b: Ints, radius: int) -> Spans:
 def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     """Beams from one point (2,) to several (n, 2); see `beam`. Its own rows are a disc at each end and what is between.
 
-    These three are parts of a convex set, so the first and the last of their pixels bound all of a row.
+    These three are parts of a convex set, so the first and the last of their pixels bound all of a row. The axis adds
+    nothing to a beam that is as wide as a pixel's diagonal.
     """
     step = b - a
     low, high = np.minimum(a[1], b[:, 1]), np.maximum(a[1], b[:, 1])
@@ -168,20 +169,29 @@ def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     x, level = b[:, 0][shape], SUB * y - b[:, 1][shape]
     for begin, end in (_disc_rows(x, level, radius), _between(a, step, radius, shape, y)):
         first, last = np.minimum(first, begin), np.maximum(last, end)
-    return RowRuns(shape, y, [(first, last), _axis_rows(a, step, shape, y)])
+    axis = [] if radius >= DIAGONAL else [_axis_rows(a, step, shape, y)]
+    return RowRuns(shape, y, [(first, last), *axis])
 
 
 def _between(a: Ints, step: Ints, radius: int, shape: Ints, y: Ints) -> tuple[Ints, Ints]:
     """Runs of the centres p beside segments: 0 <= (p - a) . d <= |d|^2, and |(p - a) x d| <= radius |d|."""
     dx, dy = step.T
     length2 = dx * dx + dy * dy
-    side = np.array([math.isqrt(radius * radius * n) for n in length2.tolist()], np.int64)
+    side = sides_of(radius, step)
     v = SUB * y - a[1]
     along, across = (a[0] * dx)[shape] - dy[shape] * v, (a[0] * dy)[shape] + dx[shape] * v
     first, last = _slab(along, along + length2[shape], dx[shape])
     begin, end = _slab(across - side[shape], across + side[shape], dy[shape])
     first, last = np.maximum(first, begin), np.minimum(last, end)
     return _or_nothing(first, last, (first > last) | (length2 == 0)[shape])
+
+
+def sides_of(radius: int, step: Ints) -> Ints:
+    """The radius times the lengths of vectors (n, 2), rounded down."""
+    length2 = (step * step).sum(axis=1)
+    if radius * radius * int(length2.max(initial=0)) < ROOM:
+        return isqrt(radius * radius * length2)
+    return np.array([math.isqrt(radius * radius * n) for n in length2.tolist()], np.int64)
 
 
 def cone(reach: int, c: int, s: int, c_half: int, s_half: int) -> Spans:
@@ -405,15 +415,12 @@ class Lines:
     @cached_property
     def sides(self) -> Ints:
         """Largest distance of covered centres from the axis, times the length, rounded down."""
-        return self._lengths_times(self.radius)
+        return sides_of(self.radius, self.step)
 
     @cached_property
     def wide_sides(self) -> Ints:
         """The same bound for all cells, including those that only the axis touches."""
-        return self._lengths_times(max(self.radius, DIAGONAL))
-
-    def _lengths_times(self, reach: int) -> Ints:
-        return np.array([math.isqrt(reach * reach * n) for n in self.length2.tolist()], np.int64)
+        return sides_of(max(self.radius, DIAGONAL), self.step)
 
     def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
         """Cells of each segment within its own inclusive box (n, 4), as (segment, x, y), sorted by segment.

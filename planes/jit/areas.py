@@ -45,7 +45,7 @@ CELL_BITS = 6
 """Least side of those cells, 2**CELL_BITS = 64 px; no tile is wider."""
 
 PAD = WORD
-"""Empty rows before and after the rows of a pattern, as `kinds.weapon.columns_of` lays them out."""
+"""Empty rows before and after each column of words of a pattern, see `bits.bit_rows.PatternBits`."""
 
 LISTED = 50.0
 """Pairs of a placement and a tile that take as long as one that the placement's cell lists."""
@@ -448,7 +448,7 @@ def _front_to_back(
     longest = 0
     for kind in range(len(first)):
         longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
-    near, words = np.empty(len(box), np.int64), np.empty(longest, np.uint64)
+    near, words = np.empty(len(box), np.int64), np.empty(PAD + longest, np.uint64)
     some = len(box) if each > 1 else 0
     row_of, part_of = np.full(rank[-1] + 1 if some else 0, -1), np.full(some, -1)
     hit, together = np.empty(some, np.int64), np.empty(some * TOGETHER, np.uint64)

@@ -11,9 +11,10 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from ..bits import bit_rows, cells, shadows
-from ..bits.bit_rows import Words
+from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
+from ..grid.rasterize import WIDEST, RowRuns
 from .cache import compiled
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
@@ -282,6 +283,93 @@ def hide_behind(
     boxes = np.ascontiguousarray(blockers.box_xyxy)
     _hide_behind(rows, corner_xy, origin_xy, boxes, blockers.begin, blockers.rects, bounds, pair, blocker)
     return None
+
+
+@njit
+def _bounds_of(parts, y, at, end, box):
+    """Write the box around the runs `at` .. `end` - 1 of a pattern; it has x_max < x_min if all are empty."""
+    left, right, top, low = WIDEST, -WIDEST, WIDEST, -WIDEST
+    for part in range(len(parts)):
+        first, last = parts[part, 0, at:end], parts[part, 1, at:end]
+        for i in range(len(first)):
+            filled = first[i] <= last[i]
+            left, right = min(left, first[i] if filled else WIDEST), max(right, last[i] if filled else -WIDEST)
+        begin, stop = 0, len(first) - 1
+        while begin <= stop and first[begin] > last[begin]:
+            begin += 1
+        while stop >= begin and first[stop] > last[stop]:
+            stop -= 1
+        if begin <= stop:
+            top, low = min(top, y[at + begin]), max(low, y[at + stop])
+    box[0], box[1], box[2], box[3] = left, top, right, low
+
+
+@njit
+def _strip_of(parts, y, at, end, strip):
+    """Write the least and the greatest distance of the runs `at` .. `end` - 1 along a normal, the strip's a and b."""
+    a, b, low, high = strip[0], strip[1], FAR, -FAR
+    for i in range(at, end):
+        for part in range(len(parts)):
+            first, last = parts[part, 0, i], parts[part, 1, i]
+            if first <= last:
+                low, high = (
+                    min(low, b * y[i] + min(a * first, a * last)),
+                    max(high, b * y[i] + max(a * first, a * last)),
+                )
+    strip[2], strip[3] = low, high
+
+
+@njit
+def _lay(first, last, left, words):
+    """Add the pixels of runs, row by row, to words whose bit 0 is column `left`; without a branch in the loop."""
+    for i in range(len(words)):
+        begin, end = max(first[i] - left, 0), min(last[i] - left, 63)
+        run = (ALL << np.uint64(begin & 63)) & (ALL >> np.uint64((63 - end) & 63))
+        words[i] |= run if begin <= end else np.uint64(0)
+
+
+@compiled(
+    types.Tuple((ROWS_OUT, OUT, OUT, types.uint64[::1], ROWS_OUT))(
+        INTS, INTS, types.Array(types.int64, 3, "C", readonly=True), types.int64,
+        types.Array(types.int64, 2, "A", readonly=True),
+    )
+)  # fmt: skip
+def _bits_of_runs(shape, y, parts, count, normal):
+    box, strips = np.empty((count, 4), np.int64), np.empty((len(normal), 4), np.int64)
+    corner, rows, begin = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count + 1, np.int64)
+    total, end = WORD, 0
+    for k in range(count):
+        begin[k] = at = end
+        while end < len(shape) and shape[end] == k:
+            end += 1
+        _bounds_of(parts, y, at, end, box[k])
+        if box[k, 0] > box[k, 2]:
+            return box, corner, rows, np.empty(0, np.uint64), strips
+        if len(normal):
+            strips[k, 0], strips[k, 1] = normal[k, 0], normal[k, 1]
+            _strip_of(parts, y, at, end, strips[k])
+        corner[k], rows[k] = total, box[k, 3] - box[k, 1] + 1 + WORD
+        total += rows[k] * ((2 * WORD - 2 + box[k, 2] - box[k, 0] + 1) // WORD + 1)
+    words = np.zeros(total, np.uint64)
+    for k in range(count):
+        high, left, at = rows[k] - WORD, box[k, 0] - (WORD - 1), corner[k]
+        first = begin[k] + box[k, 1] - y[begin[k]]
+        while left <= box[k, 2]:
+            for part in range(len(parts)):
+                ends = parts[part, 0, first : first + high], parts[part, 1, first : first + high]
+                _lay(*ends, left, words[at : at + high])
+            left, at = left + WORD, at + rows[k]
+    return box, corner, rows, words, strips
+
+
+def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
+    """See `bits.bit_rows.bits_of_runs`."""
+    box, corner, rows, words, strips = _bits_of_runs(runs.shape, runs.y, np.array(runs.parts), count, normal)
+    if not len(words):
+        return None
+    return PatternBits(
+        box, corner, rows, words, strips if len(normal) else NO_STRIPS, NO_SUMS, np.zeros(count, np.int64)
+    )
 
 
 BRUTE_PAIRS = 2**21

@@ -1,4 +1,4 @@
-"""Compiled kernels of fixed point, turned masks and label planes, and of the draws of pellets."""
+"""Compiled kernels of fixed point, shapes, turned masks and label planes, and of the draws of pellets."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numba import njit, types
 
 from ..bits.label_plane import CELL_BITS, Front
 from ..common.checks import Bools, Floats, Ints, Labels
-from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB
+from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import DOUBT, UNIT
+from ..grid.rasterize import DIAGONAL, WIDEST, RowRuns, sides_of
 from ..grid.spans import Box
 from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
 from .cache import compiled
@@ -142,6 +143,298 @@ def resample(
     source = np.empty((len(which), *size_wh[::-1]), np.int64)
     _resample(planes, which, first, step, *unit, source)
     return source
+
+
+@njit
+def _lower(quotient, rest, more, over, per, out):
+    """Lower out[k] to the whole part of a quotient, which grows by more + over / per from each to the next.
+
+    No division is needed; `rest` / `per` is what the quotient lacks.
+    """
+    for k in range(len(out)):
+        out[k] = min(out[k], quotient)
+        rest += over
+        carried = rest >= per
+        quotient += more + carried
+        rest -= per if carried else 0
+
+
+@njit
+def _raise(quotient, rest, more, over, per, out):
+    """Raise out[k] to the negative of such a quotient."""
+    for k in range(len(out)):
+        out[k] = max(out[k], -quotient)
+        rest += over
+        carried = rest >= per
+        quotient += more + carried
+        rest -= per if carried else 0
+
+
+@njit
+def _at_most(value, step, per, last):
+    """Lower last[k] to the floor of (value + k * step) / per."""
+    _lower(value // per, value % per, step // per, step % per, per, last)
+
+
+@njit
+def _at_least(value, step, per, first):
+    """Raise first[k] to the ceiling of (value + k * step) / per."""
+    _raise(-value // per, -value % per, -step // per, -step % per, per, first)
+
+
+@njit(inline="always")
+def _ceil(value, per):
+    return -(-value // per)
+
+
+@njit
+def _root(value):
+    """Square root of a whole number, rounded down."""
+    root = np.int64(np.sqrt(np.float64(value)))
+    while root * root > value:
+        root -= 1
+    while (root + 1) * (root + 1) <= value:
+        root += 1
+    return root
+
+
+@njit
+def _layout(top, low):
+    """Shape and row of all rows top .. low of shapes, and where those of each begin (n + 1,)."""
+    begin = np.zeros(len(top) + 1, np.int64)
+    for k in range(len(top)):
+        begin[k + 1] = begin[k] + max(low[k] - top[k] + 1, 0)
+    shape, y = np.empty(begin[-1], np.int64), np.empty(begin[-1], np.int64)
+    for k in range(len(top)):
+        for i in range(begin[k], begin[k + 1]):
+            shape[i], y[i] = k, top[k] + i - begin[k]
+    return shape, y, begin
+
+
+@njit
+def _winding(ring):
+    """1 or -1 for a convex ring (m, 2) that turns right or left; 0 for any other: see `rasterize.convex_polygons`."""
+    count, changes, right, left, level = len(ring), 0, 0, 0, True
+    for i in range(count):
+        j, k = (i + 1) % count, (i + 2) % count
+        dx, dy, next_x, next_y = (
+            ring[j, 0] - ring[i, 0],
+            ring[j, 1] - ring[i, 1],
+            ring[k, 0] - ring[j, 0],
+            ring[k, 1] - ring[j, 1],
+        )
+        turn = dx * next_y - dy * next_x
+        right, left, level = right + (turn > 0), left + (turn < 0), level and dy == 0
+        changes += (dy < 0) != (next_y < 0)
+        if turn == 0 and dx * next_x + dy * next_y <= 0:
+            return 0
+    if changes > 2 or level or (right > 0) == (left > 0):
+        return 0
+    return 1 if right else -1
+
+
+@compiled(types.Tuple((types.boolean, OUT, OUT, OUT, OUT))(STEPS))
+def _convex_polygons(points):
+    count, corners = points.shape[:2]
+    top, low, winding = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    for k in range(count):
+        winding[k] = _winding(points[k])
+        top[k], low[k] = _ceil(points[k, :, 1].min(), SUB), points[k, :, 1].max() // SUB
+    if not winding.all():
+        return False, top, low, top, low
+    shape, y, begin = _layout(top, low)
+    first, last = np.full(len(y), -WIDEST), np.full(len(y), WIDEST)
+    for k in range(count):
+        for i in range(corners):
+            (x0, y0), (x1, y1) = points[k, i], points[k, (i + 1) % corners]
+            is_first = (y1 < y0) == (winding[k] > 0)
+            if y1 < y0:
+                x0, y0, x1, y1 = x1, y1, x0, y0
+            dx, dy, upper, lower = x1 - x0, y1 - y0, _ceil(y0, SUB), y1 // SUB
+            if dy == 0 or upper > lower:
+                continue
+            across, at = x0 * dy - y0 * dx + SUB * dx * upper, begin[k] - top[k]
+            if is_first:
+                _at_least(across, SUB * dx, SUB * dy, first[at + upper : at + lower + 1])
+            else:
+                _at_most(across, SUB * dx, SUB * dy, last[at + upper : at + lower + 1])
+    return True, shape, y, first, last
+
+
+def convex_polygons(points: Ints) -> RowRuns | None:
+    """See `grid.rasterize.convex_polygons`."""
+    convex, shape, y, first, last = _convex_polygons(points)
+    return RowRuns(shape, y, [(first, last)]) if convex else None
+
+
+@njit
+def _axis_rows(x0, y0, dx, dy, top, first, last):
+    """Runs of the supercover of a segment in rows from `top` on; empty in rows that it does not meet."""
+    first[:], last[:] = WIDEST, -WIDEST
+    low_y, high_y = y0 + min(dy, 0), y0 + max(dy, 0)
+    upper, lower = _ceil(low_y - HALF, SUB), (high_y + HALF) // SUB
+    first, last = first[upper - top : lower - top + 1], last[upper - top : lower - top + 1]
+    if dy == 0:
+        first[:], last[:] = _ceil(min(x0, x0 + dx) - HALF, SUB), (max(x0, x0 + dx) + HALF) // SUB
+        return
+    per, slope = abs(dy), dx if dy > 0 else -dx
+    base, cell = x0 * per - y0 * slope, SUB * per
+    half, begin = cell >> 1, base + (SUB * upper - HALF) * slope
+    ahead = SUB * slope
+    first[:], last[:] = -WIDEST, WIDEST
+    _at_least(min(begin, begin + ahead) - half, ahead, cell, first)
+    _at_most(max(begin, begin + ahead) + half, ahead, cell, last)
+    enter, leave = base + low_y * slope, base + high_y * slope  # its ends lie within the first and the last row
+    if slope >= 0:
+        first[0], last[-1] = _ceil(enter - half, cell), (leave + half) // cell
+    else:
+        last[0], first[-1] = (enter + half) // cell, _ceil(leave - half, cell)
+
+
+@njit
+def _side(value, step, slope, first, last):
+    """Keep of runs the centres with slope * x >= value + k * step in row k, x in 1/256 px."""
+    if slope > 0:
+        _at_least(value, step, SUB * slope, first)
+    elif slope < 0:
+        _at_most(-value, -step, -SUB * slope, last)
+    else:
+        for k in range(len(first)):
+            if value + k * step > 0:
+                first[k], last[k] = WIDEST, -WIDEST
+
+
+@njit
+def _between(x, y, dx, dy, reach, side, top, first, last):
+    """Keep of runs in rows from `top` on the centres beside a segment, see `rasterize._between`.
+
+    Only rows near an end can have centres beyond it.
+    """
+    level = SUB * top - y
+    across, along, length2 = x * dy + dx * level, x * dx - dy * level, dx * dx + dy * dy
+    _side(across - side, SUB * dx, dy, first, last)
+    _side(-across - side, -SUB * dx, -dy, first, last)
+    for sign, at in ((1, y), (-1, y + dy)):
+        begin, end = max(_ceil(at - reach, SUB) - top, 0), (at + reach) // SUB + 1 - top
+        value = (along if sign > 0 else -along - length2) - sign * SUB * dy * begin
+        _side(value, -sign * SUB * dy, sign * dx, first[begin:end], last[begin:end])
+    for k in range(len(first)):
+        if first[k] > last[k] or length2 == 0:
+            first[k], last[k] = WIDEST, -WIDEST
+
+
+@njit
+def _add_disc(x, y, radius, top, first, last):
+    """Extend runs in rows from `top` on to the centres at most `radius` from a point."""
+    for row in range(_ceil(y - radius, SUB), (y + radius) // SUB + 1):
+        level = SUB * row - y
+        half = _root(radius * radius - level * level)
+        begin, end = -((half - x) >> 8), (x + half) >> 8
+        if begin <= end:
+            first[row - top], last[row - top] = min(first[row - top], begin), max(last[row - top], end)
+
+
+@compiled(types.Tuple((OUT, OUT, types.int64[:, :, ::1]))(WHOLE, WHOLE, PELLETS, WHOLE, INTS))
+def _beams(x, y, ends, radius, sides):
+    count, reach = len(ends), max(radius, HALF)
+    top, low = np.empty(count, np.int64), np.empty(count, np.int64)
+    for k in range(count):
+        top[k], low[k] = _ceil(min(y, ends[k, 1]) - reach, SUB), (max(y, ends[k, 1]) + reach) // SUB
+    shape, row, begin = _layout(top, low)
+    parts = np.empty((1 if radius >= DIAGONAL else 2, 2, len(row)), np.int64)
+    for k in range(count):
+        dx, dy = ends[k, 0] - x, ends[k, 1] - y
+        first, last = parts[0, 0, begin[k] : begin[k + 1]], parts[0, 1, begin[k] : begin[k + 1]]
+        first[:], last[:] = -WIDEST, WIDEST
+        _between(x, y, dx, dy, reach, sides[k], top[k], first, last)
+        _add_disc(x, y, radius, top[k], first, last)
+        _add_disc(ends[k, 0], ends[k, 1], radius, top[k], first, last)
+        if len(parts) > 1:
+            _axis_rows(x, y, dx, dy, top[k], parts[1, 0, begin[k] : begin[k + 1]], parts[1, 1, begin[k] : begin[k + 1]])
+    return shape, row, parts
+
+
+def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
+    """See `grid.rasterize.beams`."""
+    shape, y, parts = _beams(*a.tolist(), b, radius, sides_of(radius, b - a))
+    return RowRuns(shape, y, list(parts))
+
+
+@njit
+def _half_plane(slope, limit, top, first, last):
+    """Keep of runs in rows from `top` on the centres with slope * x <= limit * y; both are below 2**62.
+
+    Row 0 has quotient 0; from there the first row is reached by steps, as a product could leave int64.
+    """
+    if slope == 0:
+        for k in range(len(first)):
+            if (limit < 0 and top + k > 0) or (limit > 0 and top + k < 0):
+                first[k], last[k] = WIDEST, -WIDEST
+        return
+    per = abs(slope)
+    more, over, quotient, rest = min(max(limit // per, -WIDEST), WIDEST), limit % per, 0, 0
+    for _ in range(top):
+        rest += over
+        carried = rest >= per
+        quotient += more + carried
+        rest -= per if carried else 0
+    for _ in range(-top):
+        rest -= over
+        borrowed = rest < 0
+        quotient -= more + borrowed
+        rest += per if borrowed else 0
+    if slope > 0:
+        _lower(quotient, rest, more, over, per, last)
+    else:
+        _raise(quotient, rest, more, over, per, first)
+
+
+@njit(inline="always")
+def _over_one(value):
+    """See `fixed_point.over_one`."""
+    return (value + (UNIT // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
+
+
+@compiled(types.Tuple((OUT, OUT, types.int64[:, :, ::1]))(WHOLE, PELLETS, WHOLE, WHOLE))
+def _cones(reach, direction, c_half, s_half):
+    count = len(direction)
+    top, low = np.empty(count, np.int64), np.empty(count, np.int64)
+    for k in range(count):
+        c, s = direction[k]
+        one, other = s * c_half - c * s_half, s * c_half + c * s_half
+        least = -UNIT if -s >= c_half else min(min(one, other) >> TRIG_BITS, 0)
+        most = UNIT if s >= c_half else max(max(one, other) >> TRIG_BITS, 0)
+        top[k] = ((reach * least >> TRIG_BITS) - 1 - HALF) // SUB
+        low[k] = _ceil((reach * most >> TRIG_BITS) + 2 + HALF, SUB)
+    shape, y, begin = _layout(top, low)
+    wide = s_half != 0 or c_half < 0
+    half = np.empty(reach // SUB + 1, np.int64)
+    for row in range(len(half) if wide else 0):
+        half[row] = _root(reach * reach - (SUB * row) ** 2) >> 8
+    parts = np.empty(((3 if c_half < 0 else 2) if wide else 1, 2, len(y)), np.int64)
+    for k in range(count):
+        c, s = direction[k]
+        axis = parts[0, 0, begin[k] : begin[k + 1]], parts[0, 1, begin[k] : begin[k + 1]]
+        _axis_rows(0, 0, _over_one(reach * c), _over_one(reach * s), top[k], *axis)
+        for part in range(1, len(parts)):
+            first, last = parts[part, 0, begin[k] : begin[k + 1]], parts[part, 1, begin[k] : begin[k + 1]]
+            for i in range(len(first)):
+                row = abs(top[k] + i)
+                first[i], last[i] = (-half[row], half[row]) if row < len(half) else (WIDEST, -WIDEST)
+            for sign in (1, -1):
+                if len(parts) == 2 or (sign == 1) == (part == 1):
+                    slope, limit = -sign * s * c_half - c * s_half, s * s_half - sign * c * c_half
+                    _half_plane(slope, limit, top[k], first, last)
+            for i in range(len(first)):
+                if first[i] > last[i]:
+                    first[i], last[i] = WIDEST, -WIDEST
+    return shape, y, parts
+
+
+def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
+    """See `grid.rasterize.cones`."""
+    shape, y, parts = _cones(reach, direction, c_half, s_half)
+    return RowRuns(shape, y, list(parts))
 
 
 @compiled()

@@ -118,7 +118,8 @@ def __getattr__(name: str) -> Any:
         return version("hitplanes")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)  # read at once from now on
+    return value
 
 
 def __dir__() -> list[str]:

@@ -91,6 +91,7 @@ class Request:
     ----------
     view : what all shots accept; None if they accept different items
     filtered : whether the call names a pre-filter or a broad phase
+    placements : number of placements of all shots
     blockers : items that may shelter pixels; None if there is none, or the weapon needs no line of sight
     """
 
@@ -101,20 +102,16 @@ class Request:
     traits: Traits
     view: View | None
     filtered: bool
-    blockers: Blockers | None
-
-    @property
-    def placements(self) -> int:
-        """Number of placements of all shots."""
-        return self.traits.placements * len(self.shots)
+    placements: int
+    blockers: Blockers | None = None
 
 
 def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtered: bool) -> Request:
     """What a call asks."""
     traits = traits_of(weapon)
-    view = view_of(traits.pierces, shots)
+    view, placements = view_of(traits.pierces, shots), traits.placements * len(shots)
     blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view) if traits.sight else None
-    return Request(scene, weapon, shots, stack, traits, view, filtered, blockers)
+    return Request(scene, weapon, shots, stack, traits, view, filtered, placements, blockers)
 
 
 def view_of(pierce: bool, shots: Shots) -> View | None:
@@ -284,7 +281,7 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
         placements = placements_for(request.weapon, part)
         if len(part) > 1 < len(placements.table) and not placements.table.fits:
-            step = len(part) // 2
+            step = most = len(part) // 2
             continue
         _refuse_starts(request, part, placements)
         yield begin, part, placements

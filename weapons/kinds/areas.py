@@ -11,12 +11,13 @@ from weakref import ref
 
 import numpy as np
 
-from hitplanes.planes.common.backend import LruCache
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
+from hitplanes.planes.grid import rasterize
 from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned, unit
-from hitplanes.planes.grid.rasterize import RowRuns, beams, cones, convex_polygons, disc, polygon, ring
+from hitplanes.planes.grid.rasterize import RowRuns, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, rows_of
@@ -161,7 +162,7 @@ class Box(AreaWeapon):
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """Closed rectangles, along directions (n, 2)."""
-        return convex_polygons(turned(self._corners(), *direction.T[..., None]))
+        return _convex(self._corners(), direction)
 
     def _corners(self) -> Ints:
         sides = [(HALF * (1 - n % 2), HALF * n) for n in (int(self.width), int(self.height))]
@@ -197,7 +198,7 @@ class Polygon(AreaWeapon):
     def runs(self, direction: Ints) -> RowRuns | None:
         """The filled rings, if they are convex, along directions (n, 2)."""
         rings = self._rings()
-        return convex_polygons(turned(rings[0], *direction.T[..., None])) if len(rings) == 1 else None
+        return _convex(rings[0], direction) if len(rings) == 1 else None
 
     def _rings(self) -> list[Ints]:
         return [snap(ring) for ring in (self.points, *self.holes)]
@@ -228,7 +229,8 @@ class Cone(AreaWeapon):
     def runs(self, direction: Ints) -> RowRuns:
         """Closed sectors, along directions (n, 2)."""
         c_half, s_half = unit(self.angle / 2)
-        return cones(_snapped(self.reach), direction, int(c_half), int(s_half))
+        runs: RowRuns = kernels_of(rasterize).cones(_snapped(self.reach), direction, int(c_half), int(s_half))
+        return runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +254,9 @@ class Beam(AreaWeapon):
 
     def runs(self, direction: Ints) -> RowRuns:
         """Segments with round ends, along directions (n, 2)."""
-        return beams(ORIGIN, turned(np.array([_snapped(self.length), 0]), *direction.T), _snapped(self.width / 2))
+        end = turned(np.array([_snapped(self.length), 0]), *direction.T)
+        runs: RowRuns = kernels_of(rasterize).beams(ORIGIN, end, _snapped(self.width / 2))
+        return runs
 
     def swept(self, c: int, s: int) -> Swept:
         """The segment from the shot's pixel along the aim, and half the width."""
@@ -500,6 +504,12 @@ def arsenal_of(scene: Scene) -> dict[str, Weapon]:
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
     weapons = typed("weapons", scene.weapons, dict)
     return {name: weapon_from_json(data, f"weapons.{name}") for name, data in weapons.items()}
+
+
+def _convex(ring: Ints, direction: Ints) -> RowRuns | None:
+    """Runs of a ring (m, 2), turned to directions (n, 2), if it is convex."""
+    runs: RowRuns | None = kernels_of(rasterize).convex_polygons(turned(ring, *direction.T[..., None]))
+    return runs
 
 
 def _snapped(length: float) -> int:

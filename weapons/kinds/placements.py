@@ -517,7 +517,8 @@ def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[Pat
 def _angles(n: int, aim: object) -> Floats | float:
     """Angles (n,) of aims, degrees, or one for all shots."""
     if isinstance(aim, int | float):
-        return aim if type(aim) is float and math.isfinite(aim) else float(reals("aim", aim, ()))
+        plain = math.isfinite(aim) if type(aim) is float else type(aim) is int and -POSITION_MAX <= aim <= POSITION_MAX
+        return float(aim if plain else reals("aim", aim, ()))
     return reals("aim", each("aim", aim, n), (n,))
 
 

@@ -12,16 +12,17 @@ from weakref import ref
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words, bits_of_runs
+from hitplanes.planes.bits import bit_rows
+from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
-from hitplanes.planes.common.backend import LruCache
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid.fixed_point import ONE, turned
 from hitplanes.planes.grid.rasterize import RowRuns
-from hitplanes.planes.grid.spans import NO_STRIPS, Spans, Strip, ragged, strip_of, strips_of
+from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
 
 Kind = TypeVar("Kind", bound=np.generic)
 
@@ -340,8 +341,12 @@ class AimedPatterns(Sequence[Pattern]):
     @property
     def nbytes(self) -> int:
         """Bytes of the bit rows, at most."""
-        side = 2 * -(-self._reach_256 // SUB) + 3
-        return len(self) * _window_bytes(side, side, self._falloff is not None)
+        return len(self) * _window_bytes(self._side, self._side, self._falloff is not None)
+
+    @property
+    def _side(self) -> int:
+        """Rows and columns of a pattern, at most."""
+        return 2 * -(-self._reach_256 // SUB) + 3
 
     @cached_property
     def bits(self) -> PatternBits:
@@ -355,19 +360,18 @@ class AimedPatterns(Sequence[Pattern]):
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
-        straight, made = self._make(ONE, 0), []
-        for first in range(0, len(self), AIMS_AT_ONCE):
-            direction = self._direction[first : first + AIMS_AT_ONCE]
-            runs = self._runs(direction)
-            part = None if runs is None else bits_of_runs(runs, len(direction), _normals(straight, direction))
+        straight, made, lay = self._make(ONE, 0), [], kernels_of(bit_rows).bits_of_runs
+        normals, at_once = _normals(straight, self._direction), max(ROWS_AT_ONCE // self._side, 1)
+        for first in range(0, len(self), at_once):
+            now = slice(first, first + at_once)
+            runs = self._runs(self._direction[now])
+            part = None if runs is None else lay(runs, len(self._direction[now]), normals[now])
             if part is None:
                 return _made(list(self))
             made.append(part)
         begin = np.cumsum([0, *(len(part.words) for part in made[:-1])]).tolist()
         made = [part._replace(first=part.first + at) for part, at in zip(made, begin, strict=True)]
-        if not all(len(part.strips) for part in made):
-            made = [part._replace(strips=NO_STRIPS) for part in made]
-        bits = PatternBits(*map(np.concatenate, zip(*made, strict=True)))
+        bits = made[0] if len(made) == 1 else PatternBits(*map(np.concatenate, zip(*made, strict=True)))
         return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
 
 
@@ -443,8 +447,8 @@ def _bytes(windows: PatternBits) -> int:
     return ENTRY_BYTES + sum(column.nbytes for column in windows if isinstance(column, np.ndarray))
 
 
-AIMS_AT_ONCE = 256
-"""Directions whose patterns are rasterized at a time: 200 KB for each of their columns of rows."""
+ROWS_AT_ONCE = 2**16
+"""Most rows of patterns that are rasterized at a time: 512 KB for each of their columns."""
 
 _kept: LruCache[tuple[ref[Pattern], ...], PatternBits] = LruCache(
     WINDOW_CACHE_BYTES, _bytes, lambda key: KEY_BYTES * len(key)
@@ -466,7 +470,7 @@ _FULL = np.uint64(2**64 - 1)
 
 
 def _window_bytes(wide: int, high: int, weighted: bool) -> int:
-    return 4 * weighted * high * (wide + 1) + ((wide - 1) // WORD + 3) * (high + 2 * WORD) * 8
+    return 4 * weighted * high * (wide + 1) + 8 * (WORD + ((wide - 1) // WORD + 3) * (high + WORD))
 
 
 def fits_at_reach(reach: int, weighted: bool) -> bool:
@@ -508,7 +512,7 @@ def _made(patterns: Sequence[Pattern]) -> PatternBits:
     first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
     sums = [sums_along_rows(pattern.spans, pattern.prefix) for pattern in patterns if pattern.prefix is not None]
     first_sum = np.cumsum([0, *(one.size for one in sums[:-1])])
-    words = _joined([words.reshape(-1) for words in columns])
+    words = np.concatenate([np.zeros(WORD, np.uint64), *(words.reshape(-1) for words in columns)])
     return PatternBits(boxes, first, rows, words, strips, _joined(sums) if sums else NO_SUMS, first_sum)
 
 
@@ -532,14 +536,14 @@ def _pattern_words(pattern: Pattern) -> Words:
 
 
 def columns_of(spans: Spans) -> Words:
-    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows around it."""
+    """Words (columns of words, rows) of a pattern, with 63 empty pixels before it and 64 empty rows after its own."""
     x, y, x_max, y_max = spans.box_xyxy or (0, 0, -1, -1)
     columns = (WORD - 2 + x_max - x + 1) // WORD + 2
-    made = np.zeros((columns, y_max - y + 1 + 2 * WORD), np.uint64)
+    made = np.zeros((columns, y_max - y + 1 + WORD), np.uint64)
     column = x - (WORD - 1) + WORD * np.arange(columns)
     first, last = (np.clip(end[:, None] - column, 0, WORD).view(np.uint64) for end in (spans.x_first, spans.x_last + 1))
     row = np.flatnonzero(np.diff(spans.y, prepend=y - 1))
     if len(row):
         runs = (_FULL << first) & ~(_FULL << last)  # by 64 all is shifted out
-        made[:, spans.y[row] - y + WORD] = np.bitwise_or.reduceat(runs, row, axis=0).T
+        made[:, spans.y[row] - y] = np.bitwise_or.reduceat(runs, row, axis=0).T
     return made

@@ -219,4 +219,4 @@ def _numbers(one: Round) -> Ints:
     """Fields of a round, as `_shot` reads them."""
     words = columns_of(one.spans)
     head = (*(one.spans.box_xyxy or (0, 0, -1, -1)), WORD, words.shape[1], words.size)
-    return np.concatenate([np.array(head, np.int64), words.reshape(-1).view(np.int64)])
+    return np.concatenate([np.array(head, np.int64), np.zeros(WORD, np.int64), words.reshape(-1).view(np.int64)])
