@@ -63,7 +63,7 @@ def numbers_at(data: object, key: str) -> Iterator[float]:
 
 
 def test_every_scene_has_a_script() -> None:
-    assert {"corridor", "crowd", "edges", "empty", "far", "gallery", "targets"} <= set(SCENES)
+    assert {"arena", "corridor", "crowd", "edges", "empty", "far", "gallery", "targets"} <= set(SCENES)
     assert [path.parent.name for path in sorted(FIXTURES.glob("*/draw.py"))] == SCENES
 
 
@@ -418,3 +418,33 @@ def test_rewind_is_drawn_as_in_the_folder(rewind: dict[str, Any]) -> None:
         near[max(y - 4, 0) : y + 5, max(x - 12, 0) : x + 13] = True
     assert np.array_equal(drawn[~near], bare[~near]) and 0 < near.mean() < 0.05
     assert (drawn[near] != bare[near]).any()
+
+
+# --- the arena ------------------------------------------------------------------------------------------------------
+
+
+PLAYED = {
+    "frames": 600, "tanks left": {"red": 20, "blue": 18}, "destroyed by": {"blast": 17, "shell": 2, "shotgun": 3},
+    "pixels of crates shot away": 4864,
+}  # fmt: skip
+"""What happened when the arena was looked at."""
+
+
+def test_the_arena_is_played_without_a_window(tmp_path: Path) -> None:
+    """600 frames go as they went, and the reports of the deadliest shots tell what these hit."""
+    game = runpy.run_path(str(FIXTURES / "arena" / "play.py"))
+    told = game["play"](tmp_path)
+    assert told == PLAYED
+    reports = sorted(tmp_path.glob("*.json"))
+    assert len(reports) == 3
+    for path in reports:
+        (shot,) = json.loads(path.read_text(encoding="utf-8"))["shots"]
+        assert any(row["name"].startswith(("red", "blue")) for row in shot["rows"]), path.name
+        assert read_png(path.with_suffix(".png")).shape[2] == 4
+
+
+def test_walls_of_the_arena_shelter() -> None:
+    scene = load_scene(FIXTURES / "arena")
+    blast, flame, *_ = fired_at(scene)
+    assert names_hit(blast, scene)[:2] == ["crate 1", "crate 0"] and blast.samples_at(0).sheltered.any()
+    assert names_hit(flame, scene) == ["crate 6"], "it shelters the crates behind it"
