@@ -124,14 +124,14 @@ def some_scene(rng: np.random.Generator, most: int = 40, count: int = 25) -> Sce
 
 def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[np.ndarray, dict[str, Any]]:
     """Places and filters, one for all or one for each."""
-    count, items = int(rng.integers(1, most)), len(scene)
+    count, items = int(rng.integers(1, most)), scene.items.count
     how: dict[str, Any] = {"aim": rng.integers(0, 8, count) * 45.0 if rng.random() < 0.5 else 30.0}
     if rng.random() < 0.5:
         how["accept"] = int(rng.choice([1, 2, 7, ALL])) if rng.random() < 0.5 else rng.integers(0, 8, count)
     if rng.random() < 0.4:
         how["blocked_by"] = int(rng.choice([0, 1, 6])) if rng.random() < 0.5 else rng.integers(0, 8, count)
     if rng.random() < 0.4:
-        how["exclude"] = rng.integers(-1, items + 1, (count, 2) if rng.random() < 0.7 else (1, 2))
+        how["exclude"] = rng.integers(-1, items, (count, 2) if rng.random() < 0.7 else (1, 2))
     low, high = ((-50, -50), (250, 210)) if rng.random() < 0.4 else (40, 130)
     return rng.uniform(low, high, (count, 2)), how
 
@@ -170,7 +170,10 @@ def test_the_oracle_says_the_same(kernels: str) -> None:
         bits = rng.choice([1, 2, 3, ALL, ALL], (3, 2)).tolist()
         shots = [Shot((x, y), 90.0 * rng.integers(4), None, *two) for (x, y), two in zip(at, bits, strict=True)]
         for number, shot in enumerate(shots):
-            shot.exclude, shot.number = (() if rng.random() < 0.6 else (int(rng.integers(9)),)), number
+            shot.exclude, shot.number = (
+                (() if rng.random() < 0.6 else (int(rng.integers(-1, scene.items.count)),)),
+                number,
+            )
         if rng.random() < 0.5:
             for shot in shots:
                 shot.accept, shot.blocked_by, shot.exclude = ALL, ALL, ()

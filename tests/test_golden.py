@@ -370,7 +370,7 @@ def test_bad_arguments(tmp_path: Path, hits: Any, planes: Any, told: str) -> Non
 def test_hits_of_a_scene_that_changed(tmp_path: Path) -> None:
     hits = shot()
     hits.scene.move(0, (9, 9))
-    with pytest.raises(InputError, match="read this before the scene changes"):
+    with pytest.raises(InputError, match='changed since: object 0 "duck": fire again'):
         settle(call(tmp_path), hits, {})
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import json
 import random
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,21 +22,28 @@ from hitplanes import (
     Box,
     Cone,
     Disc,
+    History,
     InputError,
     Point,
     Ring,
     Rounds,
     Scene,
+    ShotRecord,
     Spread,
     Sprite,
     Verdict,
     Weapon,
+    arsenal_of,
     fire,
+    fire_shots,
+    load_scene,
     picture_of_report,
     prepare,
+    replay,
     report_of,
 )
 from hitplanes.planes.bits.shadows import rectangles
+from hitplanes.weapons.cli.command import main
 
 SIGHTS = ("occluders", "all")
 WAYS = ("spans", "tiles", "visible")
@@ -353,3 +362,33 @@ def test_far_away_and_far_reaching() -> None:
             hits = fire(scene, weapon, (shift, -shift), strategy=strategy)
             rows.append([(row.object, row.pixels, row.distance2) for row in hits])
     assert all(row == rows[0] for row in rows) and 0 < len(rows[0]) < 5
+
+
+def test_cover_in_files_logs_records_and_the_past(tmp_path: Path) -> None:
+    """Scene file, record and replay, log of shots, golden's report, and a rewind all keep the line of sight."""
+    scene, weapon = street(), Spread(Disc(30, line_of_sight="all", inside="ignore_until_exit"), 2, 3)
+    scene.weapons = {"bomb": weapon.to_json()}
+    scene.shots = [{"weapon": "bomb", "at": [20, 15], "seed": 4}]
+    scene.save(tmp_path / "street")
+    loaded = load_scene(tmp_path / "street")
+    (again,) = fire_shots(loaded)
+    truth = fire(scene, weapon, (20, 15), seed=4)
+    assert again == truth and truth.verdict_counts()["occluded"] > 50 and arsenal_of(loaded)["bomb"] == weapon
+
+    with ShotRecord(tmp_path / "match.jsonl") as record:
+        record.fire(scene, weapon, (20, 15), seed=4)
+    assert replay(tmp_path / "match.jsonl", loaded) is None
+    loaded.move(1, (30, 9))
+    assert replay(tmp_path / "match.jsonl", loaded) is not None
+
+    history = History(scene)
+    history.record(0)
+    scene.move(1, (30, 5))
+    history.record(1)
+    then, now = (fire(history, weapon, (20, 15), seed=4, tick=tick) for tick in (0, 1))
+    assert then == truth != now
+
+    log, answers = tmp_path / "log.jsonl", tmp_path / "answers.jsonl"
+    log.write_text('{"weapon": "bomb", "at": [20, 15], "seed": 4}\n')
+    assert main(["fire", str(tmp_path / "street"), str(log), "-o", str(answers)]) == 0
+    assert json.loads(answers.read_text().splitlines()[1])["verdicts"] == list(truth.verdict_counts().values())

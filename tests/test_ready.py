@@ -372,7 +372,7 @@ BAD_SHOTS: list[dict[str, Any]] = [
 ] + [
     {"at": (4.0, 4.0), **how}
     for how in (
-        {"aim": math.nan}, {"aim": math.inf}, {"aim": True}, {"aim": "up"}, {"aim": [1, 2]}, {"aim": 10**400},
+        {"aim": math.nan}, {"aim": math.inf}, {"aim": True}, {"aim": "up"}, {"aim": [[1, 2]]}, {"aim": 10**400},
         {"aim": Fraction(1)}, {"aim": 1.0, "toward": (1, 1)}, {"toward": (4, 4)}, {"toward": (math.nan, 1)},
         {"toward": (1, 2, 3)}, {"toward": 1.0}, {"toward": (2.0**41, 1)}, {"shot": True}, {"shot": -1}, {"shot": 2**63},
         {"shot": 0.5}, {"shot": "1"}, {"shot": [1, 2]}, {"aim": 1.0, "shot": True}, {"aim": None, "shot": Fraction(1)},

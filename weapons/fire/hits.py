@@ -474,7 +474,7 @@ def _restored(
     """Hits of the parts that copies and pickles take."""
     hits = object.__new__(kind)
     rows, scene, stack, *rest = kept
-    hits._keep(rows, scene, stack or scene.items.stack(), *rest)
+    hits._keep(rows, scene, scene.items.stack() if stack is None else stack, *rest)
     vars(hits).update(answers)
     for columns in answers.values():
         for array in (columns, *getattr(columns, "__dict__", {}).values()):
