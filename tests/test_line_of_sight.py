@@ -225,6 +225,13 @@ def test_shares_blockers_and_why_not() -> None:
     assert all(share.exposed == 1 for share in near)
 
 
+@pytest.mark.parametrize("strategy", WAYS)
+def test_the_plan_says_what_may_shelter(strategy: str) -> None:
+    stages = {stage.name: stage.why for stage in fire(street(), Disc(9, line_of_sight="all"), (9, 9)).plan.ran}
+    assert stages["line of sight"] == "2 items may shelter"
+    assert not fire(street(), Disc(9), (9, 9), strategy=strategy).plan.has_run("line of sight")
+
+
 def test_margins_count_shifts_of_the_whole_shot() -> None:
     """One px up, the ray to the guard's last row clears the crate."""
     scene = Scene((60, 30))

@@ -67,6 +67,11 @@ class Blockers(NamedTuple):
     bounds: Box | None
     until_exit: bool
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the columns, without the rectangles, which are kept with the masks."""
+        return sum(int(column.nbytes) for column in (self.rank, self.box_xyxy, self.categories, self.owner))
+
     def rects_of(self, blocker: Ints, origin_xy: Ints) -> tuple[Ints, Ints]:
         """Rectangles of blockers (k,), seen from origins (k, 2), as (place in `blocker`, (m, 4)); none is empty."""
         place, number = ragged((self.begin[1:] - self.begin[:-1])[blocker])
