@@ -26,7 +26,7 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..grid.spans import Box, begins, each_pixel, merged_runs, ragged
+from ..grid.spans import Box, Spans, begins, each_pixel, merged_runs, ragged
 from ..scene.items import clipped
 from . import cells
 from .bit_rows import WORD, Words
@@ -136,12 +136,13 @@ def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
 
 def rectangles(mask: Bools) -> Ints:
     """Rectangles (k, 4) that cover a mask (h, w): each run of a row, as far up and down as all of it goes on."""
-    edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    (y, x_first), x_end = np.nonzero(edges == 1), np.nonzero(edges == -1)[1]
-    if not len(y):
+    runs = Spans.from_mask(mask)
+    if not len(runs):
         return np.zeros((0, 4), np.int64)
-    reach = [_reach(mask, y, x_first, x_end), _reach(mask[::-1], len(mask) - 1 - y, x_first, x_end)]
-    return np.unique(np.stack([x_first, y - reach[1], x_end - 1, y + reach[0]], axis=1), axis=0)
+    y, x_end = runs.y, runs.x_last + 1
+    down = _reach(mask, y, runs.x_first, x_end)
+    up = _reach(mask[::-1], len(mask) - 1 - y, runs.x_first, x_end)
+    return np.unique(np.stack([runs.x_first, y - up, runs.x_last, y + down], axis=1), axis=0)
 
 
 def _reach(mask: Bools, y: Ints, x_first: Ints, x_end: Ints) -> Ints:
