@@ -137,8 +137,9 @@ class Battle:
         width = max((len(s.exclude) for s in shots), default=0)
         each: dict[str, Any] = {"accept": [s.accept for s in shots], "shot": [s.number for s in shots]}
         each["blocked_by"] = [s.blocked_by for s in shots]
-        if width:
-            each["exclude"] = [[*s.exclude, *[-1] * (width - len(s.exclude))] for s in shots]
+        if width:  # an owner of whom a test took the body away would be an error
+            owners = [[o if o < len(self.bodies) else -1 for o in s.exclude] for s in shots]
+            each["exclude"] = [[*o, *[-1] * (width - len(o))] for o in owners]
         if shots[0].toward is not None:
             each["toward"] = [s.toward for s in shots]
         else:
@@ -389,7 +390,6 @@ def some_battle(rng: random.Random) -> Battle:
         at = some_place(rng, bodies)
         toward = some_target(rng, at, bodies)
         exclude = (rng.randint(0, 9),) if rng.random() < 0.2 else ()
-        exclude = tuple(owner if owner < len(bodies) else -1 for owner in exclude)
         accept = rng.choice([ALL] * 8 + [1, 3, 6])
         shot = Shot(at, toward, 0.0, accept, ALL, exclude, rng.choice([number, 2**40]))
         if aimed:
