@@ -127,15 +127,8 @@ def check_random_scene(seed: int) -> None:
             assert told(got) == (rows, verdicts), f"{seed=}"
             assert count == len(rows)
         straight = [ready.fire(shot.at) for _ in range(4)]
-        alone = fire(
-            scene,
-            volley.weapon,
-            shot.at,
-            accept=filtered.accept,
-            blocked_by=filtered.blocked_by,
-            exclude=list(filtered.exclude),
-            seed=volley.seed,
-        )
+        filters = {"accept": filtered.accept, "blocked_by": filtered.blocked_by, "exclude": list(filtered.exclude)}
+        alone = fire(scene, volley.weapon, shot.at, **filters, seed=volley.seed, strategy="direct")
         assert all(one == alone for one in straight), f"{seed=}"
         changed(scene, rng)
 
@@ -165,12 +158,13 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
     "piercing point": (Point(pierce=True), {"accept": ["default"]}),
     "disc": (Disc(20), {}),
     "piercing": (Disc(40, pierce=True), {}),
-    "largest whole": (Disc(47.9, falloff="smooth"), {"exclude": [1, 4]}),
+    "largest whole": (Disc(47.9), {"exclude": [1, 4]}),
+    "fading": (Disc(47.9, falloff="smooth"), {"exclude": [1, 4]}),
     "first in tiles": (Disc(48), {"accept": ["glass"]}),
     "tiles": (Disc(90, pierce=True), {}),
     "nothing": (Stencil([".."]), {}),
     "beam": (Beam(200, 9), {}),
-    "box": (Box(31, 8, falloff="linear"), {"exclude": 2}),
+    "box": (Box(31, 8), {"exclude": 2}),
     "shotgun": (Spread(Disc(2), 6, 21.3), {"seed": 5}),
     "wide spread": (Spread(Box(9, 2), 6, 80), {"seed": 2**64 - 1}),
     "burst": (Rounds(Beam(60, 3), 3, (5, -70), 11), {}),
@@ -211,7 +205,7 @@ def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> N
             how = {"toward": (at[0] - 3 - k, at[1] + 1)}
         for _ in range(3):
             got = ready.fire(at, **how)
-            same(got, fire(scene, weapon, at, **options, **how))
+            same(got, fire(scene, weapon, at, strategy="direct", **options, **how))
             rows += len(got)
         some = rng.choice(scene.ids(), 2, replace=False)
         if k % 3 == 0:
@@ -263,7 +257,7 @@ def test_a_shot_of_the_past_is_still_what_it_was(jit: bool) -> None:
     scene, rng = crowd(4), np.random.default_rng(4)
     ready = prepare(scene, Disc(25))
     places = [tuple(at) for at in rng.uniform((0, 0), WORLD, (30, 2)).tolist()]
-    truths = [fire(scene, Disc(25), at) for at in places]
+    truths = [fire(scene, Disc(25), at, strategy="direct") for at in places]
     told = [[hits.by_owner(), hits.shares(), hits.why_not(), hits.blockers(), hits.margins()] for hits in truths]
     shots = [ready.fire(at) for at in places]
     scene.move(scene.ids(), rng.uniform((0, 0), WORLD, (len(scene), 2)))
@@ -329,7 +323,7 @@ def test_a_position_that_is_changed_later_was_read() -> None:
         target: Any = [3.0, 4.0]
         got = ready.fire(at, toward=target)
         at[0], target[0] = 170.0, 100.0
-        same(got, fire(scene, Disc(9), (40, 50)))
+        same(got, fire(scene, Disc(9), (40, 50), strategy="direct"))
         assert got.shots.at_256.tolist() == [[40 * 256, 50 * 256]]
 
 
@@ -392,7 +386,7 @@ def test_bad_shots_are_refused_in_the_same_words(bad: dict[str, Any], weapon: We
     how = dict(bad)
     at = how.pop("at")
     with pytest.raises(InputError) as truth:
-        fire(scene, weapon, at, **how)
+        fire(scene, weapon, at, strategy="direct", **how)
     with pytest.raises(InputError) as got:
         ready.fire(at, **how)
     assert str(got.value) == str(truth.value)
@@ -409,7 +403,7 @@ def test_bad_preparations_are_refused_in_the_same_words(name: str, bad: Any) -> 
     scene, how = crowd(6), {"weapon": Disc(3), name: bad}
     weapon: Any = how.pop("weapon")
     with pytest.raises(InputError) as truth:
-        fire(scene, weapon, (0, 0), **how)
+        fire(scene, weapon, (0, 0), strategy="direct", **how)
     with pytest.raises(InputError) as got:
         prepare(scene, weapon, **how)
     assert str(got.value) == str(truth.value)
@@ -423,7 +417,8 @@ def test_only_a_scene_is_prepared_for() -> None:
 def test_a_batch_goes_the_way_of_fire() -> None:
     scene, at = crowd(8), np.random.default_rng(1).uniform((0, 0), WORLD, (7, 2))
     weapon = Spread(Disc(3), 3, 9)
-    assert prepare(scene, weapon, exclude=[1, 2], seed=4).fire(at) == fire(scene, weapon, at, exclude=[[1, 2]], seed=4)
+    truth = fire(scene, weapon, at, exclude=[[1, 2]], seed=4, strategy="direct")
+    assert prepare(scene, weapon, exclude=[1, 2], seed=4).fire(at) == truth
 
 
 def test_of_pixels_that_are_pierced_the_front_one_comes_first(jit: bool) -> None:
@@ -496,7 +491,7 @@ def test_threads_that_fire_one_at_once_agree(jit: bool) -> None:
             scene.move(scene.ids(), rng.uniform((0, 0), WORLD, (len(scene), 2)))
             places = list(map(tuple, rng.uniform((0, 0), WORLD, (60, 2)).tolist()))
             asked = [pool.submit(shoot, places) for _ in range(4)]
-            truth = [tuple(row.object for row in fire(scene, Disc(9), at)) for at in places]
+            truth = [tuple(row.object for row in fire(scene, Disc(9), at, strategy="direct")) for at in places]
             assert all(answer.result() == truth for answer in asked)
 
 
@@ -523,7 +518,7 @@ def test_many_rows_at_once(jit: bool) -> None:
     ready = prepare(scene, Disc(60, pierce=True))
     for at in ((30, 30), (31, 7)):
         assert len(ready.fire(at)) > 600
-        same(ready.fire(at), fire(scene, Disc(60, pierce=True), at))
+        same(ready.fire(at), fire(scene, Disc(60, pierce=True), at, strategy="direct"))
 
 
 def test_shots_that_are_not_kept_leave_nothing() -> None:

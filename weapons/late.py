@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from .explain import ray_samples as ray_samples
     from .explain import samples as samples
     from .fire import shelter as shelter
+    from .prepared import prepare as prepare
     from .rays import ray_call as ray_call
     from .replay import shot_log as shot_log
 
 _PLACES = {
     "owners": "explain.owners",
+    "prepare": "prepared.prepare",
     "ray_call": "rays.ray_call",
     "ray_margins": "explain.ray_margins",
     "ray_samples": "explain.ray_samples",

@@ -14,7 +14,8 @@ Items keep what depends on nothing else: the stack and its tiles. What depends o
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .. import late
 from ..common.backend import LruCache
@@ -29,11 +30,16 @@ if TYPE_CHECKING:
     from ..broadphase.boxes import Index
     from .items import Change, Items
 
+Made = TypeVar("Made")
+
 NEVER = -1
 """A version before all others."""
 
 VIEWS_MOST = 8
 """Most visible sets of a scene, one for each view."""
+
+AGAIN_MOST = 8
+"""Most things of a scene that are made when they are asked for a second time."""
 
 
 class Derivative:
@@ -80,6 +86,16 @@ class Derived:
         self._label_plane: LabelPlane | None = None
         self._distance_field: DistanceField | None = None
         self._indexes: dict[str, Index] = {}
+        self._again: LruCache[Hashable, list[Any]] = LruCache(AGAIN_MOST, lambda _: 1)
+
+    def when_asked_again(self, key: Hashable, make: Callable[[], Made]) -> Made | None:
+        """What `make` makes, kept for its key; None when it is asked for the first time, which may be the last."""
+        kept: list[Made | None] = self._again.get(key, list)
+        if not kept:
+            kept.append(None)
+        elif kept[0] is None:
+            kept[0] = make()
+        return kept[0]
 
     def visible(self, view: View) -> Visible:
         """What is visible of the objects for shots of a view; those of the last few views are kept."""

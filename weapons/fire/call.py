@@ -5,7 +5,7 @@ scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Unpack, overload
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 import numpy as np
 
@@ -29,7 +29,11 @@ if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
     from ..kinds.arguments import Fired, Places
+    from ..prepared.prepare import Ready
     from ..rays.ray_hits import RayHits
+
+AUTO = ("auto", "auto", "auto")
+"""Pre-filter, broad phase and strategy of a call that names none."""
 
 OWNERS_NAMED = 3
 """Most owners that an error names: those of the greatest ids, which are nearest to one that is too great."""
@@ -42,15 +46,15 @@ def fire(scene: Scene | History, weapon: Weapon, at: Places, **how: Unpack[Fired
 def fire(
     scene: Scene | History,
     weapon: Weapon,
-    at: object,
+    at: Any,
     *,
-    aim: object = None,
-    toward: object = None,
+    aim: Any = None,
+    toward: Any = None,
     accept: object = ALL,
     blocked_by: object = ALL,
     exclude: object = None,
     seed: object = 0,
-    shot: object = None,
+    shot: Any = None,
     tick: object = None,
     prefilter: str = "auto",
     broadphase: str = "auto",
@@ -92,8 +96,37 @@ def fire(
     InputError
         If an argument is invalid; the text names the argument and the row.
     """
-    plan = Plan()
     _check_words(prefilter, broadphase, strategy)
+    how = prefilter, broadphase, strategy
+    if how == AUTO and tick is None and type(scene) is Scene and _is_one(at):
+        ready = _ready(scene, weapon, accept, blocked_by, exclude, seed)
+        if ready is not None:
+            return ready.fire(at, aim, toward, shot)
+    return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
+
+
+def fire_anew(
+    scene: Scene | History,
+    weapon: Weapon,
+    at: object,
+    aim: object,
+    toward: object,
+    filters: tuple[object, object, object],
+    seed: object,
+    shot: object,
+    tick: object = None,
+    how: tuple[str, str, str] = AUTO,
+) -> Hits:
+    """Decide what shots hit by what the scene keeps, not by weapons that are ready for it.
+
+    Parameters
+    ----------
+    filters : (accept, blocked_by, exclude)
+    how : (pre-filter, broad phase, strategy)
+
+    The other arguments, and errors, are those of `fire`.
+    """
+    plan, (accept, blocked_by, exclude) = Plan(), filters
     present = present_of(scene)
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
@@ -103,9 +136,32 @@ def fire(
     if aim is None and toward is None:
         plan.leave_out_all(unaimed, weapon)
     if isinstance(scene, Scene) and tick is None:
-        return fired(scene, weapon, shots, prefilter, broadphase, strategy, plan)
-    moments = moments_of(scene, tick, len(shots))
-    return _fired_at_moments(moments, weapon, shots, (prefilter, broadphase, strategy), plan)
+        return fired(scene, weapon, shots, *how, plan)
+    return _fired_at_moments(moments_of(scene, tick, len(shots)), weapon, shots, how, plan)
+
+
+def _is_one(at: object) -> bool:
+    """Whether this may be the position of one shot; a batch of two shots is not."""
+    if type(at) is np.ndarray:
+        return bool(at.shape == (2,))
+    return isinstance(at, tuple | list) and len(at) == 2 and isinstance(at[0], int | float)
+
+
+def _ready(
+    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: Any, seed: Any
+) -> Ready[Hits] | None:
+    """The weapon as `prepare` makes it, if it was fired at the scene with this filter, one shot a call, before."""
+    accepts: Any = category_bits(scene, "accept", accept)
+    blocks: Any = category_bits(scene, "blocked_by", blocked_by)
+    owner = int(exclude) if isinstance(exclude, np.integer) else exclude
+    plain = type(accepts) is type(blocks) is type(seed) is int and (owner is None or type(owner) is int)
+    if not plain or not isinstance(weapon, Weapon):
+        return None  # also of True, which would find what is kept for 1
+
+    def make() -> Ready[Hits]:
+        return late.prepare.prepare(scene, weapon, accept=accepts, blocked_by=blocks, exclude=owner, seed=seed)
+
+    return scene.derived.when_asked_again((weapon, accepts, blocks, owner, seed), make)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

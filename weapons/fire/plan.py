@@ -241,7 +241,7 @@ def _unused(
     yield "broad phase", "visible: cells" if way == "visible" else candidates.why_unindexed
     if not candidates.prefilter.volume:
         yield "volumes", "boxes are the pre-filter" if candidates.prefilter == BOX else "no pre-filter"
-    yield from _absent(candidates.stack, weighted, bounded, choosy)
+    yield from absent(candidates.stack, weighted, bounded, choosy)
     yield "verdicts", "counted when asked for"
     if way == "spans":
         idle = "no sample needed the stack"
@@ -251,7 +251,7 @@ def _unused(
         yield "visible set", f"{way} needs none"
     if way != "labels":
         yield "label plane", f"{way} needs none"
-    yield from _undrawn(imagery)
+    yield from undrawn(imagery)
 
 
 def unaimed(weapon: Weapon) -> Iterator[tuple[str, str]]:
@@ -262,10 +262,11 @@ def unaimed(weapon: Weapon) -> Iterator[tuple[str, str]]:
 
 def leave_out_absent(plan: Plan, scene: Scene, stack: Stack, weighted: bool, choosy: bool) -> None:
     """Record the stages for what the shots and the scene do not have."""
-    plan.leave_out_all(_absent, stack, weighted, scene.bounds is not None, choosy)
+    plan.leave_out_all(absent, stack, weighted, scene.bounds is not None, choosy)
 
 
-def _absent(stack: Stack, weighted: bool, bounded: bool, choosy: bool) -> Iterator[tuple[str, str]]:
+def absent(stack: Stack, weighted: bool, bounded: bool, choosy: bool) -> Iterator[tuple[str, str]]:
+    """Stages for what the shots and the scene do not have."""
     there = weighted, bounded, stack.has_occluders, stack.layered, choosy
     return (stage for stage, present in zip(ABSENT, there, strict=True) if not present)
 
@@ -281,8 +282,9 @@ ABSENT = (
 
 def leave_out_imagery(plan: Plan, scene: Scene) -> None:
     """Record the roles of items that decide no hit, and are only drawn."""
-    plan.leave_out_all(_undrawn, scene.items.imagery())
+    plan.leave_out_all(undrawn, scene.items.imagery())
 
 
-def _undrawn(imagery: Sequence[Role]) -> Iterator[tuple[str, str]]:
+def undrawn(imagery: Sequence[Role]) -> Iterator[tuple[str, str]]:
+    """Roles of items that decide no hit."""
     return ((role.value, "drawn only for a picture") for role in imagery)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,12 +15,12 @@ from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
 from hitplanes.planes.grid.fixed_point import snap, unit_toward
 from hitplanes.planes.grid.spans import Box, Spans
-from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow, Hits, Rows, rows_of_span_hits
-from ..fire.plan import Plan, unaimed
-from ..fire.prefilter import Candidates
+from ..fire.plan import Plan, absent, unaimed, undrawn
+from ..fire.prefilter import Candidates, may_refuse
 from ..fire.spans import QueryContext, SpanHits, direct
 from ..kinds.areas import parts_of, pierces
 from ..kinds.placements import Placements, Shots, accepted_of, blocking_of, checked_shots, placements_for
@@ -45,10 +45,11 @@ class Round(NamedTuple):
 def reach_of(weapon: Weapon) -> int | None:
     """Greatest distance of a pixel of an area weapon from that of its round, px.
 
-    None if it is too large, if the pixels depend on the fraction of the position, or if a line of sight is needed.
+    None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position or have weights, or
+    if a line of sight is needed.
     """
     burst, spread, plain = parts_of(weapon)
-    if plain.line_of_sight or (burst and (snap(burst.recoil_xy) % SUB).any()):
+    if plain.line_of_sight or plain.falloff or (burst and (snap(burst.recoil_xy) % SUB).any()):
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
     reach += int(snap(spread.radius)) // SUB if spread else 0
@@ -60,17 +61,24 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
     if offset_256 is not None:
         shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
     placements = placements_for(weapon, shots)
+    pellets, patterns = placements.pellets, placements.table.patterns
     found: list[Round] = []
-    for number in np.unique(placements.round).tolist():
-        pellets = np.flatnonzero(placements.round == number)
-        x, y = placements.origin_xy[pellets[0]].tolist()
-        placed = zip(placements.pattern[pellets].tolist(), placements.xy[pellets].tolist(), strict=True)
-        sets = [placements.table.patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed]
-        runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
-        spans = Spans.from_runs(*runs)
+    for number, (x, y) in enumerate(placements.turn_xy.tolist()):
+        rows = slice(number * pellets, (number + 1) * pellets)
+        placed = zip(placements.pattern[rows].tolist(), placements.xy[rows].tolist(), strict=True)
+        spans = _union([patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed])
         if len(spans):
             found.append(Round(x, y, number, spans))
     return found
+
+
+def _union(sets: list[Spans]) -> Spans:
+    """Pixels of all pellets of a round."""
+    if len(sets) == 1:
+        return sets[0]
+    return Spans.from_runs(
+        *(np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
+    )
 
 
 Told = tuple[object, object, object]
@@ -98,7 +106,7 @@ class Filter:
 
 @dataclass(frozen=True, eq=False)
 class Present:
-    """Snapshot of a scene at one version, with the weapon and its filter."""
+    """Snapshot of a scene at one version, with the weapon and its filter; the roles are of items that decide no hit."""
 
     scene: Scene
     version: int
@@ -106,6 +114,7 @@ class Present:
     bounds: Box | None
     weapon: Weapon
     filter: Filter
+    imagery: Sequence[Role]
 
 
 class Answer(Hits):
@@ -118,6 +127,7 @@ class Answer(Hits):
     _present: Present
     _at: tuple[float, float]
     _told: Told = (None, None, None)
+    _weighted = False
 
     scene: cached_attribute[Scene] = cached_attribute(lambda one: one._present.scene)
     version: cached_attribute[int] = cached_attribute(lambda one: one._present.version)
@@ -155,14 +165,19 @@ class Answer(Hits):
     def plan(self) -> Plan:
         """Plan of the shot."""
         plan = Plan()
-        plan.run("prepared", "looked up; the stages after it ran when they were asked for")
+        plan.run(
+            "prepared", "the weapon is ready for the scene: looked up; the stages after it ran when they were asked for"
+        )
         if self._told[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)
+        present, choosy = self._present, may_refuse(self._stack, self.shots)
+        plan.leave_out_all(absent, self._stack, self._weighted, present.bounds is not None, choosy)
+        plan.leave_out_all(undrawn, present.imagery)
         return plan
 
 
 class OneShot(Answer, list[HitRow]):
-    """Answer of a weapon whose samples are pixels of full weight: a list of its rows.
+    """Answer of a weapon that has one pellet: a list of its rows.
 
     It is a list because a call of a Python function for each row would take a tenth of the time of a shot.
     """
@@ -180,8 +195,8 @@ class OneShot(Answer, list[HitRow]):
         return Rows(*(np.array(column, np.int64) for column in zip(*self, strict=True))) if self else Rows.none()
 
 
-class Uneven(Answer):
-    """Answer of a weapon with several pellets or with falloff.
+class ManyPellets(Answer):
+    """Answer of a weapon with several pellets.
 
     The look-up only counts its rows; they are made by a walk when they are read.
     """
@@ -212,5 +227,4 @@ def answer_of(weapon: Weapon) -> tuple[Callable[[], Answer], Callable[[Any, HitR
 
     Called as a function of the class, appending takes a third of the time: `__getattr__` makes attributes slow.
     """
-    _, spread, plain = parts_of(weapon)
-    return (OneShot, OneShot.append) if spread is None and plain.falloff is None else (Uneven, Uneven.append)
+    return (OneShot, OneShot.append) if parts_of(weapon)[1] is None else (ManyPellets, ManyPellets.append)

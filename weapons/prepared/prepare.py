@@ -15,9 +15,10 @@ import numpy as np
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.call import category_bits, check_owners, fire
+from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
 from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
 from ..kinds.placements import accepted_of, blocking_of, checked_shots
@@ -81,11 +82,13 @@ class Ready(Generic[AnyHits]):
         """Decide what one shot hits; the arguments are those of `fire`."""
         kept = self._filter
         exclude = kept.exclude if kept.exclude.size else None
-        hits = fire(
-            self.scene, self.weapon, at, aim=aim, toward=toward, accept=accepted_of(kept.meets),
-            blocked_by=blocking_of(kept.meets), exclude=exclude, seed=kept.seed, shot=shot,
-        )  # fmt: skip
+        filters = accepted_of(kept.meets), blocking_of(kept.meets), exclude
+        hits = fire_anew(self.scene, self.weapon, at, aim, toward, filters, kept.seed, shot)
         return cast("AnyHits", hits)
+
+    def _snapshot(self, version: int, stack: Stack) -> Present:
+        scene = self.scene
+        return Present(scene, version, stack, scene.bounds, self.weapon, self._filter, scene.items.imagery())
 
 
 class ReadyPattern(Ready[Hits]):
@@ -223,7 +226,7 @@ class ReadyPattern(Ready[Hits]):
                 self._aims, self._told, self._quick = {}, {}, {}
             stack = self._items.stack()
             self._squares.follow(stack)
-            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
+            self._present = self._snapshot(version, stack)
             self._version = version
 
 

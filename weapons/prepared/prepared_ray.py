@@ -46,6 +46,11 @@ class OneRay(OneShot, RayHits):
 
     _found: tuple[int, ...]
 
+    @cached_attribute
+    def _weighted(self) -> bool:
+        parts = ray_parts_of(self.weapon)
+        return parts is not None and parts[2].fades is not None
+
     @cached_property
     def _first(self) -> FirstHits:
         """First hits of the ray as a batch of one."""
@@ -147,7 +152,7 @@ class ReadyRay(Ready[RayHits]):
                 self._accepts, self._arrangement = None if accepts.all() else accepts, stack.forms
                 self._objects = np.where(stack.occluder, -1, stack.ids).data
             self._first = self._unsettled
-            self._present = Present(self.scene, version, stack, self.scene.bounds, self.weapon, self._filter)
+            self._present = self._snapshot(version, stack)
             self._version = version
 
 

@@ -1,0 +1,154 @@
+"""A weapon that `fire` gets alone again is made ready: the answers are the same, and so are the errors."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ray_battles import some_battle as some_ray_battle
+from test_fire import Placements, expected, some_battle, told
+from test_ready import WEAPONS, changed, crowd, same
+
+from hitplanes import Box, Disc, History, InputError, Pistol, Scene, Weapon, fire
+from hitplanes.planes.scene import derived
+
+AT = (60.5, 50.25)
+
+
+def is_ready(hits: Any) -> bool:
+    """Whether the weapon of a shot was ready for the scene."""
+    return [stage.name for stage in hits.plan.ran][:1] == ["prepared"]
+
+
+def readiness(scene: Scene, weapon: Weapon, n: int, **how: Any) -> list[bool]:
+    """The same of n shots, each a call."""
+    return [is_ready(fire(scene, weapon, AT, **how)) for _ in range(n)]
+
+
+@pytest.mark.parametrize("weapon", [Disc(3), Box(9, 4), Pistol(50)], ids=lambda weapon: weapon.kind)
+def test_a_weapon_is_ready_from_the_second_shot_on(weapon: Weapon, jit: bool) -> None:
+    scene = crowd(1)
+    assert readiness(scene, weapon, 3) == [False, True, True]
+    assert readiness(scene, weapon, 2, aim=33) == readiness(scene, weapon, 2, toward=(9, 9)) == [True, True]
+    assert readiness(crowd(1), weapon, 2) == [False, True]  # another scene, though like it
+
+
+def test_another_filter_or_seed_is_another_weapon() -> None:
+    scene = crowd(1)
+    assert readiness(scene, Disc(3), 2) == [False, True]
+    others: list[dict[str, Any]] = [
+        {"accept": ["glass"]}, {"blocked_by": 0}, {"exclude": 4}, {"exclude": np.int64(8)}, {"seed": 3}
+    ]  # fmt: skip
+    for how in others:
+        assert readiness(scene, Disc(3), 3, **how) == [False, True, True]
+        assert fire(scene, Disc(3), AT, **how) == fire(scene, Disc(3), AT, strategy="direct", **how)
+    assert readiness(scene, Disc(3), 1, accept="glass") == [True]
+    assert readiness(scene, Disc(3.0), 1) == [True]  # an equal one
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"strategy": "direct"}, {"prefilter": "box"}, {"broadphase": "none"}, {"exclude": [[1, 2]]},
+        {"accept": [3]}, {"seed": np.array([3], np.uint64)},
+    ],
+)  # fmt: skip
+def test_what_asks_for_more_is_answered_by_the_scene(how: dict[str, Any]) -> None:
+    assert readiness(crowd(1), Disc(3), 3, **how) == [False] * 3
+
+
+def test_batches_and_the_past_are_answered_by_the_scene() -> None:
+    scene = crowd(1)
+    history = History(scene, ticks=2)
+    history.record(0)
+    for _ in range(3):
+        assert not is_ready(fire(scene, Disc(3), [AT, AT]))
+        assert not is_ready(fire(scene, Disc(3), [AT]))
+        assert not is_ready(fire(history, Disc(3), AT, tick=0))
+
+
+def test_the_last_few_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, weapons = crowd(1), [Disc(r) for r in range(1, derived.AGAIN_MOST + 2)]
+    for _ in range(2):
+        for weapon in weapons:
+            assert not is_ready(fire(scene, weapon, AT))
+    assert readiness(scene, weapons[-1], 1) == [True]
+
+
+@pytest.mark.parametrize("name", WEAPONS)
+def test_every_weapon_in_a_crowd_that_changes(name: str, jit: bool) -> None:
+    weapon, options = WEAPONS[name]
+    scene, rng = crowd(7), random.Random(3)
+    for k in range(12):
+        at = rng.uniform(-60, 300), rng.uniform(-60, 220)
+        how: dict[str, Any] = [{}, {"aim": 22.5}, {"toward": (at[0] - 3, at[1] + 1)}, {"shot": 9}][k % 4]
+        if name == "line of sight":
+            how = {"toward": (at[0] - 3 - k, at[1] + 1)}
+        truth = fire(scene, weapon, at, strategy="direct", **options, **how)
+        for _ in range(3):
+            same(fire(scene, weapon, at, **options, **how), truth)
+        if k % 3 == 2:
+            changed(scene, rng)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**6))
+def test_random_scenes_against_the_oracle(seed: int) -> None:
+    battle = some_battle(seed)
+    scene, volley = battle.scene(), battle.volley
+    for which, shot in enumerate(volley.shots):
+        truth = expected(scene, Placements(volley.weapon, [shot], volley.seed))
+        for _ in range(3):
+            assert told(volley.alone(scene, which)) == truth, f"{seed=}"
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.randoms(use_true_random=False))
+def test_random_rays_against_the_walk(rng: random.Random) -> None:
+    battle = some_ray_battle(rng)
+    scene, weapon = battle.scene(), battle.gun.weapon()
+    for shot in battle.shots:
+        how: dict[str, Any] = {"toward": shot.toward} if shot.toward else {"aim": shot.aim}
+        how |= {"accept": shot.accept, "blocked_by": shot.blocked_by, "seed": battle.seed, "shot": shot.number}
+        if shot.exclude and shot.exclude[0] < len(battle.bodies):
+            how["exclude"] = shot.exclude[0]
+        try:
+            truth = fire(scene, weapon, shot.at, strategy="walk", **how)
+        except InputError:  # its eye is in what it must not start in
+            for _ in range(3):
+                with pytest.raises(InputError):
+                    fire(scene, weapon, shot.at, **how)
+            continue
+        for _ in range(3):
+            same(fire(scene, weapon, shot.at, **how), truth)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"accept": True}, {"accept": -1}, {"accept": 1.5}, {"accept": ["glas"]}, {"blocked_by": True},
+        {"exclude": True}, {"exclude": -2}, {"exclude": 10**6}, {"seed": True}, {"seed": -1}, {"shot": -1},
+        {"aim": "left"},
+        {"aim": 1, "toward": (1, 2)}, {"at": (1, float("nan"))}, {"at": (1, 2, 3)}, {"at": ("a", 2)}, {"tick": 3},
+        {"weapon": "disc"}, {"scene": "world"}, {"strategy": "fast"}, {"prefilter": ["box"]}, {"broadphase": 3},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_bad_input_is_refused_in_the_same_words_at_each_call(bad: dict[str, Any]) -> None:
+    """Also values that equal good ones, like True and 1, at a scene where a weapon is ready for these."""
+    scene = crowd(6)
+    for how in ({}, {"accept": 1}, {"blocked_by": 1}, {"exclude": 1}, {"seed": 1}):
+        readiness(scene, Disc(3), 2, **how)
+    given = {"scene": scene, "weapon": Disc(3), "at": AT} | bad
+    texts = set()
+    for _ in range(3):
+        with pytest.raises(InputError) as error:
+            fire(**given)
+        texts.add(str(error.value))
+    with pytest.raises(InputError) as alone:
+        fire(**(given | {"scene": crowd(6)} | bad))
+    assert texts == {str(alone.value)}
