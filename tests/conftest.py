@@ -3,11 +3,12 @@
 import os
 import signal
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 
-from hitplanes import use_jit
-from hitplanes.planes.common import costs
+from hitplanes import use_jit, warm_up
+from hitplanes.planes.common import backend, costs
 
 if os.name == "nt":
     collect_ignore = ["test_bad_files.py", "test_record.py", "test_stream.py"]  # they set limits, which Windows lacks
@@ -35,11 +36,19 @@ def bounded() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
+@cache
+def all_compiled() -> None:
+    """Compile what is not on disk, so that no plan tells that its call did."""
+    warm_up()
+    backend.news()
+
+
 @pytest.fixture(params=[False, True])
 def jit(request: pytest.FixtureRequest) -> Iterator[bool]:
     """Whether compiled kernels are used for all calls of a test: once without, once with."""
     if request.param:
         pytest.importorskip("numba")
+        all_compiled()
     use_jit(request.param)
     yield request.param
     use_jit(None)

@@ -128,7 +128,8 @@ class _Kept(NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, signature: Any, made: Any) -> None:
-        """Keep machine code for types of arguments."""
+        """Keep machine code for types of arguments, which was just compiled."""
+        tell(f"compiled {self._kernel.__name__}, which hitplanes warm-up does at a better time")
         folder = _folder()
         if folder is None or made.library.has_dynamic_globals:
             return
