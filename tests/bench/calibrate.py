@@ -29,6 +29,7 @@ from hitplanes.weapons.fire.strategy import expected_near
 FILE = Path(__file__).parents[2] / "planes" / "common" / "costs.py"
 SIZE_WH, RADIUS, RANGE = (1920, 1080), 24, 500
 SHOTS, ITEMS = (1, 100, 3000), (10, 100, 1000)
+WALKS, CASTS = (1, 100, 1000), (1, 30, 300)
 HANDED_OVER = 20
 """Work is given to a thread if it takes so many times as long as handing it over."""
 
@@ -144,10 +145,10 @@ def of_boxes(rounds: int) -> dict[str, float]:
 def of_rays(rounds: int, labels_pixel: float) -> dict[str, float]:
     """Costs of the walk, the cast, the march, and the distance field."""
     pistol, found, rows = Pistol(RANGE), {}, []
-    for n, scene, ns in timed(pistol, "walk", rounds, (1, 100, 1000)):
+    for n, scene, ns in timed(pistol, "walk", rounds, WALKS):
         rows.append((1, n, len(scene), n * expected_near(scene.items.stack(), 0), ns))
     found |= fitted("walk_call walk_ray walk_item walk_met", rows)
-    casts = [(1, n, n * len(scene), ns) for n, scene, ns in timed(pistol, "cast", rounds, (1, 30, 300))]
+    casts = [(1, n, n * len(scene), ns) for n, scene, ns in timed(pistol, "cast", rounds, CASTS)]
     found |= fitted("cast_call cast_ray cast_pair", casts)
     found |= fitted("march_call march_ray", [(1, n, ns) for n, _, ns in timed(pistol, "march", rounds)])
     fields = [row[3] / row[2] for row in made(pistol, "march", rounds, "cast")]
