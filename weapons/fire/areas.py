@@ -237,9 +237,8 @@ def _rule(request: Request, shots: Shots, placements: Placements) -> Rule:
     return Rule(pierce, bounds, view.meets, np.array([view.exclude], np.int64), request.blockers)
 
 
-# house: way of areas
 def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
-    """Rows by what is visible of all objects, listed by cells of shot positions."""
+    """Rows by the loop of `by_tiles` over the tiles of what is visible, listed by cells of shot positions."""
     assert request.view is not None  # the strategy has asked
     scene, plan, parts = request.scene, context.plan, []
     visible = scene.derived.visible(request.view)

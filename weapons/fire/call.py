@@ -83,7 +83,7 @@ def fire(
     strategy : how the shots are answered; it changes no row. A way that cannot serve a call is passed over, and the
         plan says why.
 
-        - "auto": the cheapest way
+        - "auto": the cheapest way; a weapon and filter that were fired alone before are made ready, as by `prepare`
         - "direct": one that needs nothing but the scene; "built": one for which what is visible, labels or distances
           are worked out first, if they are not there
         - a way by its name: of areas "spans" (the reference), "tiles", "visible", "labels", "integers"; of rays "walk"
