@@ -283,8 +283,7 @@ class BruteForce(BroadPhase):
         return self._meeting_all(queries, every, self.ids, work)
 
 
-INDEX_GROWTH = 4
-"""Growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes."""
+INDEX_GROWTH = 4  # growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes
 
 
 class Index(Derivative):

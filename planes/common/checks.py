@@ -22,16 +22,12 @@ Image = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.unsignedinteger[Any]]  # of a label plane, see `hitplanes.planes.bits.label_plane`
 Shape = tuple[int | None, ...]
 
-SHOWN = 60
-"""Most characters of a value that an error shows."""
+SHOWN = 60  # most characters of a value that an error shows
 
 FLOAT_MAX = sys.float_info.max
 
-FLOAT_BITS = 1023
-"""Whole numbers of fewer bits than this fit a float."""
-
-NAMES_SHOWN = 20
-"""Most names that an error lists: beyond it the nearest name says more than a list."""
+FLOAT_BITS = 1023  # whole numbers of fewer bits than this fit a float
+NAMES_SHOWN = 20  # most names that an error lists: beyond it the nearest name says more than a list
 
 
 class InputError(ValueError):

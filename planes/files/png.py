@@ -45,8 +45,7 @@ else:
 
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-START = 33
-"""Length of the signature and the header chunk, bytes."""
+START = 33  # length of the signature and the header chunk, bytes
 
 GREY, RGB, PALETTE, GREY_ALPHA, RGBA = 0, 2, 3, 4, 6
 CHANNELS = {GREY: 1, RGB: 3, PALETTE: 1, GREY_ALPHA: 2, RGBA: 4}

@@ -57,8 +57,7 @@ from ..scene.variants import FLIPS
 from .png import possible, read_png, read_text, write_png, write_text
 
 FORMAT = "hitplanes-scene/2"
-ONE_FILTER = "hitplanes-scene/1"
-"""Older format, in which `accept` of a shot is the filter of what blocks, too."""
+ONE_FILTER = "hitplanes-scene/1"  # older format, in which `accept` of a shot is the filter of what blocks, too
 
 FILE_NAME = "scene.json"
 SECTIONS = {
@@ -73,8 +72,7 @@ PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
 ID = Whole(0, ITEMS_MAX - 1)
-CELLS_MOST = 512
-"""Most cells along a pixel of a carved sprite: what the largest scale needs, turned."""
+CELLS_MOST = 512  # most cells along a pixel of a carved sprite: what the largest scale needs, turned
 
 CARVED = Keys({"image": Text(), "frame": Whole(0, 2**31 - 1), "cells_per_px": Whole(1, CELLS_MOST)}, ("image",))
 FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
@@ -130,11 +128,8 @@ SCENE = Keys(
 )
 """The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
 
-SHEET_WIDTH = 4096
-"""Approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px."""
-
-MASK_ROWS_AREA = 4096
-"""Largest mask that is saved as rows of text, px; larger ones are saved as images."""
+SHEET_WIDTH = 4096  # approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px
+MASK_ROWS_AREA = 4096  # largest mask that is saved as rows of text, px; larger ones are saved as images
 
 
 @dataclass

@@ -18,8 +18,7 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
 from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
 
-UNIT = 1 << TRIG_BITS
-"""1 as a component of a direction."""
+UNIT = 1 << TRIG_BITS  # 1 as a component of a direction
 
 DOUBT = 2.0**-12
 """A scaled sine nearer to a tie than this is in doubt; float sines err by a few ulp, 2**-21 after the scaling."""
@@ -59,8 +58,7 @@ Whole = TypeVar("Whole", int, Ints)
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
 
-ANGLES_KEPT = 2**12
-"""Angles whose directions are kept: objects turn by the same steps again and again."""
+ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
 
 def snap(values: object) -> Ints:

@@ -29,8 +29,7 @@ from .spans import Spans, each_pixel, ragged
 
 Runs = tuple[Ints, Ints, Ints]
 
-WIDEST = 2**40
-"""A column beyond all others, px."""
+WIDEST = 2**40  # a column beyond all others, px
 
 QUOTIENT_ERROR = 2.0**-50
 """A quotient of two numbers, each rounded to float64, times a row number has a relative error below it."""
@@ -350,14 +349,9 @@ def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
     return Spans.from_runs(y[on], x[on], x[on])
 
 
-DIAGONAL = 182
-"""Half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre."""
-
-COMMON = 2**60
-"""Scale of the times of rays at moving items, where each item would otherwise have a scale of its own."""
-
-ROOM = 2**62
-"""Products below it leave room for a sum in int64; larger ones are computed in Python integers."""
+DIAGONAL = 182  # half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre
+COMMON = 2**60  # scale of the times of rays at moving items, where each item would otherwise have a scale of its own
+ROOM = 2**62  # products below it leave room for a sum in int64; larger ones are computed in Python integers
 
 FAR = 2**90
 """Squares below it differ from those of their float roots by less than 2**46, which one Newton step corrects."""

@@ -209,14 +209,9 @@ Strip = tuple[int, int, int, int]
 
 NO_STRIPS: Ints = np.zeros((0, 4), np.int64)
 
-SCALE = 2**10
-"""Approximate length of the normals of strips: they are whole numbers."""
-
-TILE = 48
-"""Typical side of the boxes that patterns are tested against, px: a strip rejects larger boxes less often."""
-
-PAYS = 0.75
-"""Strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too."""
+SCALE = 2**10  # approximate length of the normals of strips: they are whole numbers
+TILE = 48  # typical side of the boxes that patterns are tested against, px: a strip rejects larger boxes less often
+PAYS = 0.75  # strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too
 
 
 def strips_of(strips: Sequence[Strip] | Ints, boxes_xyxy: Ints) -> Ints:

@@ -28,11 +28,8 @@ FAR = np.int64(2**62)
 EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
 ONE = np.uint64(1)
 ROW_BITS, WORD_ROWS = 7, 127
-ROOM, ROOM_LEAST = 8, 64
-"""Initial room for rows: ROOM for each placement, plus ROOM_LEAST."""
-
-FEW_ROWS = 128
-"""Most rows of a placement that are sorted by insertion; if any has more, all rows are sorted at the end."""
+ROOM, ROOM_LEAST = 8, 64  # initial room for rows: ROOM for each placement, plus ROOM_LEAST
+FEW_ROWS = 128  # most rows of a placement that are sorted by insertion; if any has more, all rows are sorted at the end
 
 SIDE, SIDE_BITS = np.int64(2**17), 19  # farther than any pixel of a pattern from its origin
 
@@ -209,8 +206,7 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     return seen
 
 
-BEYOND = 2**40
-"""Farther than any column."""
+BEYOND = 2**40  # farther than any column
 
 
 @njit(inline="always")
@@ -372,8 +368,7 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
     )
 
 
-BRUTE_PAIRS = 2**21
-"""Most pairs of boxes that are compared one by one; with more, numpy lists them in cells."""
+BRUTE_PAIRS = 2**21  # most pairs of boxes that are compared one by one; with more, numpy lists them in cells
 
 
 @njit(inline="always")

@@ -29,11 +29,8 @@ if TYPE_CHECKING:
     from ..broadphase.boxes import Index
     from .items import Change, Items
 
-NEVER = -1
-"""A version before all others."""
-
-VIEWS_MOST = 8
-"""Most visible sets of a scene, one for each view."""
+NEVER = -1  # a version before all others
+VIEWS_MOST = 8  # most visible sets of a scene, one for each view
 
 
 class Derivative:

@@ -29,8 +29,7 @@ from .variants import MaskAtlas, variant_of
 
 T = TypeVar("T")
 
-RUNS_SHOWN = 8
-"""Most runs of ticks that an error lists; of more it gives only the number."""
+RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only the number
 
 PART_BITS = 31
 """A step between two ticks is cut into fewer than 2**31 parts: the square of their number stays inside int64."""
@@ -388,8 +387,7 @@ def _runs(ticks: list[int]) -> str:
     return ", ".join(str(ticks[i]) if j == i + 1 else f"{ticks[i]} to {ticks[j - 1]}" for i, j in ends)
 
 
-NANOSECONDS = 10**9
-"""Nanoseconds in a second: time is a whole number of them, and a step has as many whole parts."""
+NANOSECONDS = 10**9  # nanoseconds in a second: time is a whole number of them, and a step has as many whole parts
 
 ELAPSED_MAX = 10**6
 """Longest time between two calls, s (12 days): in nanoseconds it is whole in float64, with bits to spare."""

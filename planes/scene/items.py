@@ -175,14 +175,9 @@ Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
 PLACE, BOX = Struct("=2q"), Struct("=4q")
 """Layouts of a row of positions and of a row of boxes, to read and write a single item without an array."""
 
-NOTHING = Sprite(frames=())
-"""Sprite of an id without an object: a removed one, or one that never was."""
-
-NO_TRANSFORM = Transform()
-"""Transform of an id without an object."""
-
-NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)
-"""Mask of an id without an object."""
+NOTHING = Sprite(frames=())  # sprite of an id without an object: a removed one, or one that never was
+NO_TRANSFORM = Transform()  # transform of an id without an object
+NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of an id without an object
 
 NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
@@ -215,8 +210,7 @@ COLUMNS: dict[str, tuple[int, ...]] = {
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
-UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))
-"""Columns whose change leaves the arrangement as it is."""
+UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))  # columns whose change leaves the arrangement as it is
 
 ORDERING = frozenset(("alive", "role", "layer"))
 """Columns whose change may reorder the items, or change which of them decide hits."""

@@ -49,8 +49,7 @@ ROLE_NAMES = tuple(role.value for role in ROLES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")
 """Names of the planes of each role, in the order of ROLES."""
 
-DEFAULT_CATEGORY = "default"
-"""Name of the first category bit, which objects have by default."""
+DEFAULT_CATEGORY = "default"  # name of the first category bit, which objects have by default
 
 
 class Scene:

@@ -52,8 +52,7 @@ from .sprite import (
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
 
-FINE_BITS = TRIG_BITS - SCALE_BITS
-"""Bits by which a turned position is finer than a scaled one."""
+FINE_BITS = TRIG_BITS - SCALE_BITS  # bits by which a turned position is finer than a scaled one
 
 
 class Transform(NamedTuple):

@@ -34,8 +34,7 @@ from ..common.limits import (
 
 Signs = npt.NDArray[np.int8]
 Numbers = npt.NDArray[Any]
-Given = list[tuple[str, Floats]]
-"""Columns, each with the name of its argument."""
+Given = list[tuple[str, Floats]]  # columns, each with the name of its argument
 
 SIGN_ROWS = 8192
 """Rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back to the system."""

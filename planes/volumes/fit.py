@@ -58,8 +58,7 @@ from .polygons import (
 )
 from .volumes import Aabbs, BoxSets, Capsules, Circles, Core, Hulls, Obbs, Parts, Polygons, Volumes, joined
 
-AXES = 33
-"""Number of lengths of a capsule's axis that are tried."""
+AXES = 33  # number of lengths of a capsule's axis that are tried
 
 
 def hull(pixels: object) -> Polygons:
@@ -236,8 +235,7 @@ def _radius_about(corners: list[Point], a_px: Iterable[float], b_px: Iterable[fl
     return radius
 
 
-Center = tuple[int, int, int]
-"""(x, y, d) with d > 0 stands for (x / d, y / d)."""
+Center = tuple[int, int, int]  # (x, y, d) with d > 0 stands for (x / d, y / d)
 
 
 def _least_center(points: list[Point]) -> tuple[float, float]:

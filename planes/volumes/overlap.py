@@ -152,8 +152,7 @@ def edge_parts(first: Core, second: Core, rows: Ints, k: int, conservative: bool
     return found
 
 
-Rows = Ints | None
-"""Numbers of rows; None for all rows."""
+Rows = Ints | None  # numbers of rows; None for all rows
 
 Test = Callable[[Any, Any, bool], Bools]
 """A test of two volumes of equal length, row against row; the flag skips the exact stage."""

@@ -220,8 +220,7 @@ def _whole(points: list[Corner]) -> list[Whole]:
 
 Point = tuple[int, int]
 Line = tuple[int, int, int]
-Extents = tuple[Ints, Ints, Ints]
-"""Rows with pixels, rising, and the first and last column of each."""
+Extents = tuple[Ints, Ints, Ints]  # rows with pixels, rising, and the first and last column of each
 
 
 def extents(mask: Bools) -> Extents:
@@ -319,8 +318,7 @@ def _is(value: float, numerator: int, denominator: int) -> bool:
     return top * denominator == numerator * bottom
 
 
-EDGES = 6
-"""Most edges of a polygon of a union: those of a square swept along a segment."""
+EDGES = 6  # most edges of a polygon of a union: those of a square swept along a segment
 
 GAP = 2.0**-30
 """Widest gap between two shapes that is ignored, px; floats resolve wider ones for segments of up to 2**20 px."""
@@ -328,20 +326,11 @@ GAP = 2.0**-30
 PARALLEL = 2.0**-40
 """Largest sine of the angle between edges that count as parallel: they cross beyond any shift of interest."""
 
-CUSP = 2.0**-12
-"""Distance that is looked along two boundaries that touch from outside at an angle of at most this, px."""
-
-TOUCHING = 1 + 2.0**-40
-"""Largest ratio of two distances that count as equal."""
-
-FEW = 24
-"""Most edges in a square of shifts of which all pairs are tried."""
-
-SMALL = 2.0**-10
-"""Half the side of a square of shifts that is not cut further, px."""
-
-AT_A_TIME = 2**19
-"""Comparisons, or pairs of boundaries, worked on at a time."""
+CUSP = 2.0**-12  # distance that is looked along two boundaries that touch from outside at an angle of at most this, px
+TOUCHING = 1 + 2.0**-40  # largest ratio of two distances that count as equal
+FEW = 24  # most edges in a square of shifts of which all pairs are tried
+SMALL = 2.0**-10  # half the side of a square of shifts that is not cut further, px
+AT_A_TIME = 2**19  # comparisons, or pairs of boundaries, worked on at a time
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,7 @@ from ..common.limits import TRIG_BITS
 from ..grid.fixed_point import unit
 from .polygons import convex_parts, convex_rows, neighbours, outlines, rows_of, rows_taken, starts_of
 
-Move = Callable[[Floats, Ints], Floats]
-"""A function that moves points (n, d), given the row of each point."""
+Move = Callable[[Floats, Ints], Floats]  # a function that moves points (n, d), given the row of each point
 
 
 @dataclass(frozen=True, eq=False)

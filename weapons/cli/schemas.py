@@ -54,8 +54,7 @@ from ..report.report import FORMAT
 
 FOLDER = Path(__file__).parent.parent / "schemas"
 
-FARTHEST = POSITION_MAX + 2 * REACH_MAX
-"""Largest coordinate of a pixel of a pattern, px."""
+FARTHEST = POSITION_MAX + 2 * REACH_MAX  # largest coordinate of a pixel of a pattern, px
 
 COUNT = Whole(0, 2**62)
 PIXEL = Wholes((2,), -FARTHEST, FARTHEST)
@@ -142,8 +141,7 @@ NOW = _all({
     "gone": Rows(_all(dict(ITEM))), "new": Rows(_all(dict(ITEM))),
     "shots": Rows(Optional(Rows(_all({**ITEM, "pixels": COUNT})))),
 })  # fmt: skip
-REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))
-"""Table that validates a report."""
+REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))  # table that validates a report
 
 
 def read_report(path: Path) -> dict[str, Any]:

@@ -18,8 +18,7 @@ from hitplanes.planes.files.scene_folder import FILE_NAME, laid_out, new_folder
 
 SCHEMAS = Path(__file__).parent.parent / "schemas"
 
-FROM_IMAGE = "--from-image"
-"""Option of the command that names a picture."""
+FROM_IMAGE = "--from-image"  # option of the command that names a picture
 
 WIDTH, HEIGHT = 320, 180
 Color = tuple[int, int, int]
@@ -30,8 +29,7 @@ WOOD: Color = (188, 132, 76)
 GRASS: Color = (92, 158, 76)
 SKY_HIGH, SKY_LOW = (104, 170, 220), (220, 238, 240)
 
-SCHEMA_NAME = "scene.schema.json"
-"""JSON Schema beside scene.json, by which an editor completes keys and marks mistakes."""
+SCHEMA_NAME = "scene.schema.json"  # JSON Schema beside scene.json, by which an editor completes keys and marks mistakes
 
 SCENE: dict[str, Any] = {
     "$schema": SCHEMA_NAME,

@@ -29,14 +29,12 @@ from ..rays.contacts import Reason, Terminations, terminations_of
 from .ray_samples import RayDetail, gap, squares
 from .samples import Margin, spans_of
 
-RAYS_MAX = 1024
-"""Most rays of a shot that has margins; all rays are handled at once, and so many take some seconds."""
+RAYS_MAX = 1024  # most rays of a shot that has margins; all rays are handled at once, and so many take some seconds
 
 NEARLY = 2.0**-20
 """Distance of a pixel centre from the rim of a thick ray, px, below which it is computed in Python integers."""
 
-TINY = float(np.nextafter(0, 1))
-"""Distance of an object that is not touched but whose distance rounds to 0."""
+TINY = float(np.nextafter(0, 1))  # distance of an object that is not touched but whose distance rounds to 0
 
 Shift = tuple[float, float]
 

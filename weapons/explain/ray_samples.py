@@ -30,8 +30,7 @@ REACH_BITS = 23
 """Bits of a coordinate of a cell; cells lie within 2**22 px of their ray's origin, so x, y and the ray fit int64."""
 
 
-CELLS_AT_ONCE = 2**19
-"""Cells of rays counted at a time: 4 MB for each of their columns."""
+CELLS_AT_ONCE = 2**19  # cells of rays counted at a time: 4 MB for each of their columns
 
 
 class Miss(NamedTuple):

@@ -16,17 +16,10 @@ if TYPE_CHECKING:
     from .check import Collected
 
 
-GOLDENS = "goldens"
-"""Name of the folder of goldens beside the test files."""
-
-WORKER_KEY = "hitplanes"
-"""Key under which a worker of pytest-xdist sends the tests that it collected."""
-
-REPORT_KEY = "hits_golden"
-"""Attribute of a test report that holds the outcomes of the test's goldens."""
-
-RECORDS = pytest.StashKey[list[dict[str, Any]]]()
-"""Key of the outcomes in the stash of a test."""
+GOLDENS = "goldens"  # name of the folder of goldens beside the test files
+WORKER_KEY = "hitplanes"  # key under which a worker of pytest-xdist sends the tests that it collected
+REPORT_KEY = "hits_golden"  # attribute of a test report that holds the outcomes of the test's goldens
+RECORDS = pytest.StashKey[list[dict[str, Any]]]()  # key of the outcomes in the stash of a test
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -41,40 +41,22 @@ from .file import (
 )
 from .hits_alone import EXACT, Tolerance, reports_of_hits
 
-RED = (255, 40, 40)
-"""Colour of pixels that differ."""
-
-GROUND = (12, 13, 16)
-"""Colour of the zeros of a plane."""
-
-NOWHERE = (60, 62, 68)
-"""Colour of pixels outside the smaller one of two pictures."""
-
-DIM = 140
-"""Brightness of pixels that do not differ, of 255."""
-
-PICTURE_CLOSE, PLANE_CLOSE = 80, 40
-"""Width of the part that a close view shows of a picture and of a plane, px."""
-
-CLOSE_SIDE = 320
-"""Approximate width at which a close view is drawn, px."""
-
-GAP = 8
-"""Gap between close views, px."""
-
-PLANE = "plane-{}-"
-"""Prefix of the files of a plane, with its number, as its name may not be valid in a file name."""
-
-COMPARED = "hits.png"
-"""Picture of the expected hits and those got, side by side."""
+RED = (255, 40, 40)  # colour of pixels that differ
+GROUND = (12, 13, 16)  # colour of the zeros of a plane
+NOWHERE = (60, 62, 68)  # colour of pixels outside the smaller one of two pictures
+DIM = 140  # brightness of pixels that do not differ, of 255
+PICTURE_CLOSE, PLANE_CLOSE = 80, 40  # width of the part that a close view shows of a picture and of a plane, px
+CLOSE_SIDE = 320  # approximate width at which a close view is drawn, px
+GAP = 8  # gap between close views, px
+PLANE = "plane-{}-"  # prefix of the files of a plane, with its number, as its name may not be valid in a file name
+COMPARED = "hits.png"  # picture of the expected hits and those got, side by side
 
 HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 """Primes that give neighbouring labels different colours: Teschner et al., "Optimized Spatial Hashing" (2003)."""
 
 Plane = npt.NDArray[Any]
 
-Row = list[tuple[str, str]]
-"""Caption and file of pictures that are shown side by side."""
+Row = list[tuple[str, str]]  # caption and file of pictures that are shown side by side
 
 
 def pictures_of(changed: Unlike) -> list[str]:
@@ -191,14 +173,9 @@ def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, sid
     return [*whole, (around, f"{prefix}crop.png")]
 
 
-FOLDER = "hits-failures"
-"""Folder of failures, in the root of the tests."""
-
-PAGE = "index.html"
-"""Page of the failures."""
-
-LIST = "files.txt"
-"""List of the files that belong to us; its first line is MARK."""
+FOLDER = "hits-failures"  # folder of failures, in the root of the tests
+PAGE = "index.html"  # page of the failures
+LIST = "files.txt"  # list of the files that belong to us; its first line is MARK
 
 IGNORE = ".gitignore"
 
@@ -351,11 +328,8 @@ def _listed(folder: Path) -> list[str]:
     ]
 
 
-LINES_MAX, PAGE_LINES_MAX = 20, 500
-"""Most lines of a failure's message, and of its text on the page."""
-
-NAME_LETTERS, HASH_DIGITS = 80, 10
-"""Most letters of a file's name, and digits of the hash in it."""
+LINES_MAX, PAGE_LINES_MAX = 20, 500  # most lines of a failure's message, and of its text on the page
+NAME_LETTERS, HASH_DIGITS = 80, 10  # most letters of a file's name, and digits of the hash in it
 
 PLAIN = re.compile(r"[a-z0-9_]+(\[[a-z0-9_.,=+-]*\])?"), re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
 
@@ -474,8 +448,7 @@ def _show(
     return failure, call.shown(folder / PAGE)
 
 
-KINDS = (".json", ".npz", ".png")
-"""Endings of the files of a golden."""
+KINDS = (".json", ".npz", ".png")  # endings of the files of a golden
 
 
 class Collected:

@@ -38,14 +38,9 @@ FORMAT = "hitplanes-golden/1"
 PLANES_AREA_MAX = 4 * 2**20
 """Largest scene whose planes are stored, px; two compressed planes of this size take some tens of kB."""
 
-SCENE_PLANES = ("hittable", "occluders")
-"""Planes of a scene that decide hits."""
-
-CHANGED_MAX = 8
-"""Most changed objects that a line names."""
-
-LINE_DEPTH = 5
-"""Depth from which JSON stays on one line: a row, a blocker or the samples of a verdict."""
+SCENE_PLANES = ("hittable", "occluders")  # planes of a scene that decide hits
+CHANGED_MAX = 8  # most changed objects that a line names
+LINE_DEPTH = 5  # depth from which JSON stays on one line: a row, a blocker or the samples of a verdict
 
 DAMAGE = (
     OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError, SyntaxError,

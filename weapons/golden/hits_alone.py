@@ -11,8 +11,7 @@ from hitplanes.planes.common.limits import POSITION_MAX
 
 from ..report.differences import BATCH_COLUMNS, differences
 
-HITS = "hits"
-"""The only part that may be asked for alone."""
+HITS = "hits"  # the only part that may be asked for alone
 
 HOW = ("shot", "weapon", "at", "aim", "seed", "accept", "blocked_by", "exclude")
 """Keys of a shot that say how it was fired; they are kept to be read, and not compared."""
@@ -47,8 +46,7 @@ class Tolerance:
         return told + ([f"first hit {far2**0.5:.1f} px away, tolerance_px={self.px}"] if far2 > self.px**2 else [])
 
 
-EXACT = Tolerance()
-"""No difference is tolerated."""
+EXACT = Tolerance()  # no difference is tolerated
 
 
 def tolerance_of(only: object, tolerance_pixels: object, tolerance_px: object) -> Tolerance:

@@ -247,8 +247,7 @@ def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
 
 
 C = TypeVar("C", Passes, Stops)
-Told = tuple[Callable[[], Passes], Callable[[], Stops]]
-"""Functions that make the passes and the stops of rays."""
+Told = tuple[Callable[[], Passes], Callable[[], Stops]]  # functions that make the passes and the stops of rays
 
 
 class RayHits(Hits):

@@ -62,11 +62,8 @@ from ..report.phrases import Entry, by_path, first_of, key_of, pairs
 from ..report.phrases import shown as number_of
 
 FORMAT = "hitplanes-shots/3"
-WITHOUT_CHAIN = "hitplanes-shots/1"
-"""Oldest format, without chain and end."""
-
-ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)
-"""Older formats, in which `accept` is the filter of what blocks, too."""
+WITHOUT_CHAIN = "hitplanes-shots/1"  # oldest format, without chain and end
+ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)  # older formats, in which `accept` is the filter of what blocks, too
 
 SEAL = b',"chain":"%b"}\n'
 SEAL_BYTES = len(SEAL % bytes(16))
@@ -99,8 +96,7 @@ AT_ONCE, BYTES_AT_ONCE = 1024, 2**21
 
 NO_END = "has no end: it was not closed, as after a crash, and may lack shots"
 
-NUMBER_MAX = 2**63
-"""Largest absolute value of a number in a result."""
+NUMBER_MAX = 2**63  # largest absolute value of a number in a result
 
 
 class Difference(NamedTuple):

@@ -37,8 +37,7 @@ from ..kinds.areas import arsenal_of, has_no_range, weapon_from_json
 from ..kinds.placements import Shots, Words
 from ..kinds.weapon import Weapon
 
-AIM_MAX = 10**9
-"""Largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle."""
+AIM_MAX = 10**9  # largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle
 
 
 class WeaponJson(Ref):
@@ -199,14 +198,9 @@ def _owner(scene: Scene, value: object, row: int) -> int:
         return integer("owner", value, 0, scene.items.count - 1)
 
 
-LINE_MAX = 2**20
-"""Longest line of a log, bytes; enough for a shot that excludes thousands of objects by name."""
-
-CHUNK_BYTES = 2**22
-"""Bytes of lines that are read at a time; in memory they take about ten times as much."""
-
-FEW = 16
-"""Unusual lines are read one by one if there are at most this many; otherwise they are split into halves."""
+LINE_MAX = 2**20  # longest line of a log, bytes; enough for a shot that excludes thousands of objects by name
+CHUNK_BYTES = 2**22  # bytes of lines that are read at a time; in memory they take about ten times as much
+FEW = 16  # unusual lines are read one by one if there are at most this many; otherwise they are split into halves
 
 _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
 

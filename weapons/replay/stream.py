@@ -40,11 +40,8 @@ from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
 from .shot_log import Salvo, ShotReader, body_of, read_lines
 
-SECONDS = 0.2
-"""Least time between two drawings, seconds."""
-
-BAR = 24
-"""Length of the bar, characters."""
+SECONDS = 0.2  # least time between two drawings, seconds
+BAR = 24  # length of the bar, characters
 
 
 class Progress:
@@ -136,11 +133,8 @@ except ImportError:  # Windows, where two writers of one file are not noticed
     fcntl = None  # type: ignore[assignment]
 
 
-HEADER_MAX = 2**20
-"""Bytes that are read of an unexpected header, to name the difference."""
-
-SEAL = b',"crc":"%08x"}\n'
-"""End of a line, with the CRC-32 of all earlier bytes of the file."""
+HEADER_MAX = 2**20  # bytes that are read of an unexpected header, to name the difference
+SEAL = b',"crc":"%08x"}\n'  # end of a line, with the CRC-32 of all earlier bytes of the file
 
 SEAL_BYTES = len(SEAL % 0)
 
@@ -329,8 +323,7 @@ SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 
 SUFFIX = ".jsonl"
 
-NOTHING = b'"rows":[],'
-"""Part of the answer to a shot that hit nothing."""
+NOTHING = b'"rows":[],'  # part of the answer to a shot that hit nothing
 
 
 @dataclass

@@ -103,8 +103,7 @@ def _px(value: Any) -> str:
     return f"{value:.1f} px" if plain else shown(value)
 
 
-PIXELS_NAMED = 2
-"""Most gained or lost pixels that a line names."""
+PIXELS_NAMED = 2  # most gained or lost pixels that a line names
 
 ABOUT = {
     "report": ("version", "times", "filter"),
@@ -173,8 +172,7 @@ def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
     return lines
 
 
-OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")
-"""Keys whose words are only for objects."""
+OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")  # keys whose words are only for objects
 
 
 def _scene(was: Entry, now: Entry) -> list[str] | None:

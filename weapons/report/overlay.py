@@ -24,14 +24,9 @@ from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
 LETTER, ROW = 7, 17
 """Width of a letter and height of a label, px; not taken from the font, whose sizes depend on OpenCV's version."""
 
-LABELS_MAX = 16
-"""Most names in one picture; the cards have all."""
-
-LINKS_MAX = 8
-"""Most occluders that are linked to the object they kept most samples from; the cards have all."""
-
-SHOT_BADGE = 11
-"""Radius of the disc of a shot's number, px."""
+LABELS_MAX = 16  # most names in one picture; the cards have all
+LINKS_MAX = 8  # most occluders that are linked to the object they kept most samples from; the cards have all
+SHOT_BADGE = 11  # radius of the disc of a shot's number, px
 
 NEAR, CLOSE, FAR = 40, 110, 400
 """How far a name may lie from its object, how far a link lies if it can, and how far it and a number may lie, px."""
@@ -190,11 +185,8 @@ def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple
         yield from ((right, up), (left, up), (right, down), (left, down))
 
 
-NUMBERED_MAX = 3
-"""Most rays of a shot whose entries have numbers and normals."""
-
-STEPS_SHOWN = 256
-"""Most tests of a projectile that are drawn, each as a disc."""
+NUMBERED_MAX = 3  # most rays of a shot whose entries have numbers and normals
+STEPS_SHOWN = 256  # most tests of a projectile that are drawn, each as a disc
 
 OF_RAYS = ("filtered", "occluded", "hit")
 """Verdicts whose cells are marked under rays; the arrow shows the cells that meet nothing."""

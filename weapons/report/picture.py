@@ -121,20 +121,11 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     return [*told, *overlay.texts]
 
 
-WIDTH, HEIGHT, GAP = 640, 720, 12
-"""About the size of each of the three pictures, and the space between them, px."""
-
-LONGEST = 1200
-"""Longest side of the compared box, px; a longer one is cut around its middle."""
-
-AROUND = 24
-"""Width of the border shown around the pixels that differ, px."""
-
-LIGHT = 60
-"""Brightness of the scene under the difference, of 255."""
-
-LINES_MAX = 60
-"""Most differences listed on the page; the command prints all."""
+WIDTH, HEIGHT, GAP = 640, 720, 12  # about the size of each of the three pictures, and the space between them, px
+LONGEST = 1200  # longest side of the compared box, px; a longer one is cut around its middle
+AROUND = 24  # width of the border shown around the pixels that differ, px
+LIGHT = 60  # brightness of the scene under the difference, of 255
+LINES_MAX = 60  # most differences listed on the page; the command prints all
 
 LOOKS = {"both": "empty", "other verdict": "filtered", "only expected": "occluded", "only got": "hit"}
 """Verdict whose mark each kind of pixel uses; the shapes differ even in grey."""

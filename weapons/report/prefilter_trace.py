@@ -29,17 +29,10 @@ from ..rays.ray_walk import Looked, Range, trace
 from .canvas import OUTLINES_MAX, World
 from .symbols import LET_THROUGH, PASSED_OVER, SKETCH, within
 
-CELLS_MAX = 4096
-"""If there are more cells than these, only opened cells are reported."""
-
-PATTERNS_MAX = 64
-"""Most volumes reported for one shot, those of its first pellets."""
-
-SHOTS_AT_A_TIME = 2**8
-"""Shots of a batch whose cells are found at once."""
-
-ROUND_CORNERS = 72
-"""Number of corners with which a circle is drawn."""
+CELLS_MAX = 4096  # if there are more cells than these, only opened cells are reported
+PATTERNS_MAX = 64  # most volumes reported for one shot, those of its first pellets
+SHOTS_AT_A_TIME = 2**8  # shots of a batch whose cells are found at once
+ROUND_CORNERS = 72  # number of corners with which a circle is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +188,12 @@ def _round(points: Floats, radius: float) -> Floats:
     return np.concatenate([a + half, b - half])
 
 
-BEYOND = 4.0
-"""Lines are drawn up to this distance beyond the picture, px, so that rounding bends only what is cut off."""
+BEYOND = 4.0  # lines are drawn up to this distance beyond the picture, px, so that rounding bends only what is cut off
 
 BRUSH = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
 """Offsets (4, 2) of the pixels that a thick line sets for each pixel of a thin one."""
 
-OPENED = 26
-"""Opacity of the ground of a cell that was opened, of 255."""
+OPENED = 26  # opacity of the ground of a cell that was opened, of 255
 
 
 def draw_cells(world: World, report: Mapping[str, Any]) -> None:

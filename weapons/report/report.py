@@ -31,8 +31,7 @@ from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
 
-CELLS_MAX = 2**18
-"""Most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels."""
+CELLS_MAX = 2**18  # most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels
 
 
 def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
@@ -151,8 +150,7 @@ def _columns(table: Stops | Passes, columns: Sequence[str], row: int) -> dict[st
     return {names.get(column, column): getattr(table, column)[row].tolist() for column in columns}
 
 
-MOVED_MAX = 200
-"""Most moved objects in a report; a picture with more is too full to read."""
+MOVED_MAX = 200  # most moved objects in a report; a picture with more is too full to read
 
 
 def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
@@ -215,15 +213,13 @@ def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
 
 FORMAT = "hitplanes-report/1"
 
-SHOTS_MAX = 24
-"""Most shots that are listed one by one; more are summed up as a batch."""
+SHOTS_MAX = 24  # most shots that are listed one by one; more are summed up as a batch
 
 PLACEMENTS_AT_A_TIME = 2**16
 
 NO_BOXES: Ints = np.zeros((0, 4), np.int64)
 
-NEAR_OUTSIDE = 48
-"""Width of the strip beyond the bounds in which samples are shown, px."""
+NEAR_OUTSIDE = 48  # width of the strip beyond the bounds in which samples are shown, px
 
 
 def report_of(

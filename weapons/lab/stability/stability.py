@@ -155,8 +155,7 @@ def load_study(path: Path) -> Study:
 
 
 EMPTY = "#f3f5f7"
-WIDTH, LEFT, RIGHT = 11.0, 1.75, 0.85
-"""Widths of the picture and of its margins, inches."""
+WIDTH, LEFT, RIGHT = 11.0, 1.75, 0.85  # widths of the picture and of its margins, inches
 ROW, GAP, NAMES, HEADING, SCALE = 0.255, 0.42, 1.1, 0.62, 0.85
 """Heights of a row, a block's title, the columns' names, the picture's title, and the scale, inches."""
 LIGHTEST = 0.12  # start of the colour scale; lighter colours look like none
