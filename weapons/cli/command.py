@@ -421,7 +421,7 @@ def fire(arguments: argparse.Namespace) -> None:
 
 def study(arguments: argparse.Namespace) -> None:
     """Measure all methods, and print the fastest that is accurate enough for each question."""
-    from ..lab.study.area_questions import kinds_scene  # heavy imports that only this subcommand needs
+    from ..lab.study.questions import kinds_scene  # heavy imports that only this subcommand needs
     from ..lab.study.study import NO_DIAGRAMS, Effort, verdict, write_study
 
     error, seed = real("--error", arguments.error, 0, 1), integer("--seed", arguments.seed, 0, SEED_MAX)

@@ -28,8 +28,7 @@ from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
 from ..peers import PEERS, installed, of_peer
-from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike, save_figure
-from ..study.study import markdown_table
+from ..study.study import FAINT, HATCH, INK, PAPER, looking_alike, markdown_table, save_figure
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
 
