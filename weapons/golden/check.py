@@ -28,18 +28,20 @@ from hitplanes.planes.scene.scene import Scene
 from ..report.canvas import enlarged
 from ..report.picture import picture_of_difference, picture_of_report
 from .file import (
+    EXACT,
     SCENE_PLANES,
     DamagedGoldenError,
     ForeignGoldenError,
     Golden,
+    Tolerance,
     Unlike,
     golden_of,
     opaque,
     pixels_unlike,
     read_golden,
+    reports_of_hits,
     unlike,
 )
-from .hits_alone import EXACT, Tolerance, reports_of_hits
 
 RED = (255, 40, 40)  # colour of pixels that differ
 GROUND = (12, 13, 16)  # colour of the zeros of a plane
@@ -66,12 +68,7 @@ def pictures_of(changed: Unlike) -> list[str]:
 
 
 def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed: Unlike) -> list[Row]:
-    """Write pictures of the expected and the actual hits, and of their difference, into a folder.
-
-    Returns
-    -------
-    rows of pictures for the page
-    """
+    """Write pictures of the expected and the actual hits, and of their difference; return the rows of the page."""
     picture = got.picture
     if picture is None:
         assert got.whole is not None and got.scene is not None  # golden_of has made it
@@ -225,15 +222,8 @@ def note_files(folder: Path, names: Iterable[str]) -> None:
 def replace_page(folder: Path, failures: Sequence[dict[str, Any]]) -> bool:
     """Write the page of this run's failures, and delete the files of earlier runs.
 
-    Without failures the folder is deleted too, unless it holds files of others.
-
-    Parameters
-    ----------
-    failures : dicts with "test", "golden", "lines", "folder", "texts" (files) and "rows" of (caption, file)
-
-    Returns
-    -------
-    whether there is a page
+    Without failures the folder is deleted too, unless it holds files of others. A failure is a dict with "test",
+    "golden", "lines", "folder", "texts" (files) and "rows" of (caption, file). Returned is whether there is a page.
     """
     if not _is_ours(folder):
         return False
@@ -336,30 +326,26 @@ PLAIN = re.compile(r"[a-z0-9_]+(\[[a-z0-9_.,=+-]*\])?"), re.compile(r"[a-z0-9_](
 
 @dataclass(frozen=True)
 class Call:
-    """One call of `hits_golden`.
+    """One call of `hits_golden`."""
 
-    Parameters
-    ----------
-    node : id of the test in this run
-    test : id of the test from its file's name on, which does not depend on where pytest runs
-    name : given in the test, or None
-    base : path of the golden's files, without their endings
-    root : folder to which the paths of tests are relative
-    here : folder to which printed paths are relative
-    update : whether to write a golden that is missing or differs
-    only : "hits" for hits alone, None for the whole answer
-    tolerance : how much the rows of hits alone may differ
-    """
+    node: str  # id of the test in this run
+    test: str  # id of the test from its file's name on, which does not depend on where pytest runs
+    name: str | None  # given in the test, or None
+    base: Path  # path of the golden's files, without their endings
+    root: Path  # folder to which the paths of tests are relative
+    here: Path  # folder to which printed paths are relative
+    update: bool  # whether to write a golden that is missing or differs
+    only: str | None = None  # "hits" for hits alone, None for the whole answer
+    tolerance: Tolerance = EXACT  # how much the rows of hits alone may differ
 
-    node: str
-    test: str
-    name: str | None
-    base: Path
-    root: Path
-    here: Path
-    update: bool
-    only: str | None = None
-    tolerance: Tolerance = EXACT
+    @classmethod
+    def of(cls, item: pytest.Item, folder: str, name: str | None, only: str | None, tolerance: Tolerance) -> Call:
+        """Return the call of a test whose goldens are in a folder of this name beside its file."""
+        inside, config = item.nodeid.partition("::")[2], item.config
+        base = item.path.parent / folder / item.path.stem / safe_name(inside, name)
+        here, update = config.invocation_params.dir, bool(config.getoption("hits_update"))
+        test = f"{item.path.name}::{inside}"
+        return cls(item.nodeid, test, name, base, config.rootpath, here, update, only, tolerance)
 
     def shown(self, path: Path) -> str:
         """Return a path as it is printed."""
@@ -394,10 +380,7 @@ def safe_name(test: str, name: str | None = None) -> str:
 def settle(call: Call, hits: object, planes: Mapping[str, object]) -> Outcome:
     """Compare hits with their golden; if they differ, update the golden or write the failure.
 
-    Raises
-    ------
-    InputError
-        If the hits or the planes are of a wrong type.
+    An InputError says if the hits or the planes are of a wrong type.
     """
     got = golden_of(hits, planes, call.test, call.name, call.only)
     expected, changed, ours = None, None, True
