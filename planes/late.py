@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from .bits import distance_field as distance_field
     from .bits import label_plane as label_plane
     from .bits import shadows as shadows
@@ -20,24 +20,22 @@ if TYPE_CHECKING:
     from .volumes import overlap as overlap
     from .volumes import volumes as volumes
 
-_PLACES = {
-    "boxes": "broadphase.boxes",
-    "carving": "scene.carving",
-    "distance_field": "bits.distance_field",
-    "fit": "volumes.fit",
-    "label_plane": "bits.label_plane",
-    "overlap": "volumes.overlap",
-    "scene_folder": "files.scene_folder",
-    "shadows": "bits.shadows",
-    "tiles": "bits.tiles",
-    "visible": "bits.visible",
-    "volumes": "volumes.volumes",
-}
+
+def importer(here: dict[str, Any], *places: str) -> Callable[[str], ModuleType]:
+    """Function that imports a module of a package, once; `here` are the globals of the module that names them all."""
+    known = {place.rpartition(".")[2]: place for place in places}
+
+    def read(name: str) -> ModuleType:
+        if name not in known:
+            raise AttributeError(f"module {here['__name__']!r} has no attribute {name!r}")
+        module = import_module(f"{here['__package__']}.{known[name]}")
+        here[name] = module
+        return module
+
+    return read
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Import a module, once."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = globals()[name] = import_module(f"{__package__}.{_PLACES[name]}")
-    return module
+__getattr__ = importer(
+    globals(), "broadphase.boxes", "scene.carving", "bits.distance_field", "volumes.fit", "bits.label_plane",
+    "volumes.overlap", "files.scene_folder", "bits.shadows", "bits.tiles", "bits.visible", "volumes.volumes",
+)  # fmt: skip
