@@ -155,32 +155,11 @@ class PastScene(Scene):
         """The scene that was recorded, as it is now."""
         return self._latest
 
-    def add(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past has what it had."""
-        self._refuse()
-
-    def remove(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past has what it had."""
-        self._refuse()
-
-    def move(self, *_: Any, **__: Any) -> NoReturn:
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         """Refuse: the past is as it was."""
-        self._refuse()
-
-    def set(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def carve(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def rename(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def _refuse(self) -> NoReturn:
         raise InputError(f"scene: expected the present one, got that of tick {self.tick:.15g}, which is read-only")
+
+    add = remove = move = set = carve = rename = _refuse
 
 
 class History:
