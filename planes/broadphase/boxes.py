@@ -30,10 +30,7 @@ LARGEST = float(np.finfo(np.float64).max)
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
     """Check boxes, Aabbs or finite rows (N, 4) or (N, 6) with min <= max on every axis, and return a copy as rows.
 
-    Raises
-    ------
-    InputError
-        With the row of the first bad box.
+    An InputError names the row of the first bad box.
     """
     if isinstance(values, Aabbs):
         values = np.concatenate([values.min, values.max], axis=1)

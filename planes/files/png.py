@@ -111,13 +111,7 @@ def possible(what: str) -> Iterator[None]:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file in UTF-8.
-
-    Raises
-    ------
-    InputError
-        If it is missing, too large, not UTF-8, or not a regular file, such as a pipe.
-    """
+    """Read a text file in UTF-8; an InputError says if it is missing, too large, not UTF-8, or a pipe or device."""
     path = path_of("path", path)
     with possible("cannot read it"):
         if path.exists() and not (path.is_file() or path.is_dir()):

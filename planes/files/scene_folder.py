@@ -161,13 +161,7 @@ class SceneFile:
 
 
 def read_scene(folder: Path) -> SceneFile:
-    """Read a scene folder.
-
-    Raises
-    ------
-    InputError
-        With the names of the file, the section, the row and the field.
-    """
+    """Read a scene folder; an InputError names the file, the section, the row and the field."""
     path = folder / FILE_NAME
     with within(str(path)):
         data = SCENE.check("scene", json_of(read_text(path)))
@@ -522,13 +516,7 @@ def new_folder(folder: Path) -> Iterator[list[Path]]:
 
 
 def own_folder(folder: Path, names: Sequence[str]) -> None:
-    """Make a folder, or accept one that holds only files of these names.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made, or holds other files.
-    """
+    """Make a folder, or accept one that holds only files of these names; else an InputError."""
     with possible(f"--output: cannot make {folder}"):
         if folder.exists() and not folder.is_dir():
             raise InputError(f"--output: expected a folder, got the file {folder}")
@@ -540,13 +528,7 @@ def own_folder(folder: Path, names: Sequence[str]) -> None:
 
 
 def cleared(folder: Path, names: Sequence[str]) -> None:
-    """Remove the files of these names that exist.
-
-    Raises
-    ------
-    InputError
-        If one cannot be removed.
-    """
+    """Remove the files of these names that exist; an InputError names one that cannot be removed."""
     for name in names:
         with possible(f"--output: cannot remove {folder / name}"):
             (folder / name).unlink(missing_ok=True)

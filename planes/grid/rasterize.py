@@ -102,17 +102,11 @@ def polygon(rings: Sequence[Ints]) -> Spans:
 
 
 class RowRuns(NamedTuple):
-    """Runs of several shapes, row by row.
+    """Runs of several shapes, row by row."""
 
-    Parameters
-    ----------
-    shape, y : (k,) shape and row, sorted
-    parts : first and last pixels (k,) of parts, which have one run a row; an empty one is (WIDEST, -WIDEST)
-    """
-
-    shape: Ints
-    y: Ints
-    parts: list[tuple[Ints, Ints]]
+    shape: Ints  # of each run (k,), sorted
+    y: Ints  # row of each run (k,), sorted within its shape
+    parts: list[tuple[Ints, Ints]]  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
 
     def spans(self) -> Spans:
         """The pixels of a single shape."""
@@ -359,19 +353,12 @@ FAR = 2**90
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Segments of one width, as columns.
+    """Segments of one width, as columns."""
 
-    Parameters
-    ----------
-    start, step : (n, 2) starts, and vectors from there to the ends, 1/256 px
-    radius : half of the width, 1/256 px; 0 for thin rays
-    common : scale of the times of all segments; 0 if each has its own
-    """
-
-    start: Ints
-    step: Ints
-    radius: int
-    common: int = 0
+    start: Ints  # (n, 2) 1/256 px
+    step: Ints  # (n, 2) vectors from there to the ends, 1/256 px
+    radius: int  # half of the width, 1/256 px; 0 for thin rays
+    common: int = 0  # scale of the times of all segments; 0 if each has its own
 
     def __len__(self) -> int:
         return len(self.start)

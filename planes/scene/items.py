@@ -37,31 +37,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """The items of one version of a scene that decide hits, front to back, as columns.
+    """The items of one version of a scene that decide hits, front to back, as columns."""
 
-    Parameters
-    ----------
-    ids, owner : (M,) int64
-    categories : (M,) category bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
-    occluder : (M,) bool
-    box_xyxy : (M, 4) int64, inclusive, px
-    offset : (M,) start of the item's mask in `masks`, row by row
-    masks : flat booleans of all masks in use
-    layered : whether the items lie on more than one layer
-    forms : number of the arrangement: stacks of the same number differ only in boxes
-    count : number of ids of the scene, including those that are not in the stack
-    """
-
-    ids: Ints
-    occluder: Bools
-    categories: Ints
-    owner: Ints
-    box_xyxy: Ints
-    offset: Ints
-    masks: Bools
-    layered: bool
-    forms: int
-    count: int
+    ids: Ints  # (M,)
+    occluder: Bools  # (M,)
+    categories: Ints  # (M,) bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
+    owner: Ints  # (M,) ids
+    box_xyxy: Ints  # (M, 4) inclusive, px
+    offset: Ints  # (M,) start of the item's mask in `masks`, row by row
+    masks: Bools  # flat booleans of all masks in use
+    layered: bool  # whether the items lie on more than one layer
+    forms: int  # number of the arrangement: stacks of the same number differ only in boxes
+    count: int  # number of ids of the scene, including those that are not in the stack
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy is an arrangement of its own: numbers of another process mean nothing here."""

@@ -127,18 +127,11 @@ class Sprite(Known):
 
     @classmethod
     def from_image(
-        cls,
-        image: object,
-        *,
-        alpha_threshold: int = ALPHA_THRESHOLD,
-        color_key: Sequence[int] | None = None,
-        grid_wh: Sequence[int] | None = None,
-        rects_xywh: Sequence[Sequence[int]] | None = None,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
-        frame_names: Sequence[str] = (),
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, image: object, *, alpha_threshold: int = ALPHA_THRESHOLD, color_key: Sequence[int] | None = None,
+        grid_wh: Sequence[int] | None = None, rects_xywh: Sequence[Sequence[int]] | None = None,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None, frame_names: Sequence[str] = (),
+        angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Cut an image into frames and their masks.
 
         Parameters
@@ -166,16 +159,10 @@ class Sprite(Known):
 
     @classmethod
     def from_images(
-        cls,
-        images: Sequence[object],
-        *,
-        alpha_threshold: int = ALPHA_THRESHOLD,
-        color_key: Sequence[int] | None = None,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
-        frame_names: Sequence[str] = (),
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, images: Sequence[object], *, alpha_threshold: int = ALPHA_THRESHOLD,
+        color_key: Sequence[int] | None = None, pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
+        frame_names: Sequence[str] = (), angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Take images as frames, each of a size of its own; the other parameters are those of `from_image`.
 
         Parameters
@@ -190,14 +177,10 @@ class Sprite(Known):
 
     @classmethod
     def _of_parts(
-        cls,
-        parts: Sequence[tuple[Bools, Image]],
-        threshold: int,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None,
-        frame_names: Sequence[str],
-        angle_step: float | None,
-        source: dict[str, Any] | None,
-    ) -> Sprite:
+        cls, parts: Sequence[tuple[Bools, Image]], threshold: int,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None, frame_names: Sequence[str],
+        angle_step: float | None, source: dict[str, Any] | None,
+    ) -> Sprite:  # fmt: skip
         """A sprite of masks and images."""
         pivot, pivots = _pivots(pivot_xy, len(parts))
         names = _frame_names(frame_names, len(parts))
@@ -209,14 +192,9 @@ class Sprite(Known):
 
     @classmethod
     def from_mask(
-        cls,
-        mask: object,
-        *,
-        pivot_xy: Sequence[float] | None = None,
-        color: Sequence[int] | None = None,
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, mask: object, *, pivot_xy: Sequence[float] | None = None, color: Sequence[int] | None = None,
+        angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Take a boolean array (h, w) as the mask of one frame.
 
         Parameters
@@ -236,13 +214,9 @@ class Sprite(Known):
 
     @classmethod
     def polygon(
-        cls,
-        points_xy: object,
-        holes: Sequence[object] = (),
-        *,
-        color: Sequence[int] | None = None,
+        cls, points_xy: object, holes: Sequence[object] = (), *, color: Sequence[int] | None = None,
         angle_step: float | None = None,
-    ) -> Sprite:
+    ) -> Sprite:  # fmt: skip
         """Shape of points about the position; edges belong to it.
 
         Parameters

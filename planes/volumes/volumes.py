@@ -457,13 +457,7 @@ class ConcavePolygons(Parts):
 
 
 def joined(volumes: Sequence[Volumes]) -> Volumes:
-    """All rows of volumes of one kind, in order.
-
-    Raises
-    ------
-    InputError
-        If there are none, or they differ in kind.
-    """
+    """All rows of volumes of one kind, in order; an InputError if there are none, or they differ in kind."""
     if not volumes or any(type(v) is not type(volumes[0]) for v in volumes):
         raise InputError(f"volumes: expected some, of one kind, got {sorted({type(v).__name__ for v in volumes})}")
     first = volumes[0]

@@ -145,13 +145,7 @@ REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))  # table that
 
 
 def read_report(path: Path) -> dict[str, Any]:
-    """Read and validate a report.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the row and the field.
-    """
+    """Read and validate a report; an InputError names the file, the row and the field."""
     path = path_of("report", path)
     with within(str(path)):
         found = json_of(read_text(path))

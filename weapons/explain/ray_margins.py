@@ -59,21 +59,13 @@ class Runs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Walked segment of a ray relative to the motion of an item, from the pixel of the ray's start; 1/256 px.
+    """Walked segment of a ray relative to the motion of an item, from the pixel of the ray's start; 1/256 px."""
 
-    Parameters
-    ----------
-    begin : (2,) start
-    end, part : (2,) whole and fractional part, in [0, 1), of the end
-    step : (2,) vector of the whole ray
-    radius : half of the width
-    """
-
-    begin: Ints
-    end: Ints
-    part: Floats
-    step: Ints
-    radius: int
+    begin: Ints  # (2,)
+    end: Ints  # (2,) whole part of the end
+    part: Floats  # (2,) fractional part of the end, in [0, 1)
+    step: Ints  # (2,) vector of the whole ray
+    radius: int  # half of the width
 
     @cached_property
     def ray(self) -> float:

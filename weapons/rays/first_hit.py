@@ -38,20 +38,12 @@ from .ray_walk import Range, lines_of
 
 @dataclass(frozen=True, eq=False)
 class FirstHits:
-    """First hits of the rays of whole shots.
+    """First hits of the rays of whole shots."""
 
-    Parameters
-    ----------
-    rays : (R,) the rays
-    ray : their weapon
-    ends : (R,) their ends
-    stack : the items at the version that was fired at
-    """
-
-    rays: Rays
-    ray: RayWeapon
-    ends: Terminations
-    stack: Stack
+    rays: Rays  # (R,) the rays
+    ray: RayWeapon  # their weapon
+    ends: Terminations  # (R,) their ends
+    stack: Stack  # the items at the version that was fired at
 
     def rows(self, shots: int) -> Rows:
         """Rows of so many shots; if a shot has one ray, a row for each hit."""

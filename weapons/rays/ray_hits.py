@@ -105,25 +105,15 @@ class Stops(ShotColumns):
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A chunk of rays that were followed to their ends; their passes and stops are made when they are read.
+    """A chunk of rays that were followed to their ends; their passes and stops are made when they are read."""
 
-    Parameters
-    ----------
-    rays, lines : (R,) the rays
-    met : contacts with objects and occluders, also beyond the ends
-    ends : (R,) where the rays end
-    relative : the line of each pair of `met`, relative to the motion of its item
-    stack : the items at the version that was fired at
-    falloff : of the weapon, or None
-    """
-
-    rays: Rays
-    lines: Lines
-    met: Contacts
-    ends: Terminations
-    relative: Lines
-    stack: Stack
-    falloff: str | None
+    rays: Rays  # (R,)
+    lines: Lines  # (R,) of the rays
+    met: Contacts  # with objects and occluders, also beyond the ends
+    ends: Terminations  # (R,) where the rays end
+    relative: Lines  # the line of each pair of `met`, relative to the motion of its item
+    stack: Stack  # the items at the version that was fired at
+    falloff: str | None  # of the weapon, or None
 
     @cached_property
     def _chosen(self) -> tuple[Contacts, Ints]:

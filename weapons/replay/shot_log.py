@@ -92,29 +92,15 @@ def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[ShotRequest]:
 def order_from_json(
     data: object, scene: Scene, arsenal: Mapping[str, Weapon], place: str = "shot", number: int = 0
 ) -> ShotRequest:
-    """Check one shot.
+    """Check one shot, given as JSON; an InputError names its place and the field.
 
-    Parameters
-    ----------
-    data : JSON of the shot
-    place : prefix of errors
-    number : number of the shot if the JSON has none
-
-    Raises
-    ------
-    InputError
-        Naming the place and the field.
+    `number` is that of the shot if the JSON has none.
     """
     with within(place):
         shot = SHOT.check("shot", data)
         name = None if isinstance(shot["weapon"], Weapon) else choice("weapon", shot["weapon"], arsenal)
         weapon: Weapon = shot["weapon"] if name is None else arsenal[name]
-        if shot.get("aim") is not None and shot.get("toward") is not None:
-            raise InputError("aim: expected aim or toward, got both")
-        if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
-            raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
-        if shot.get("toward") is None and has_no_range(weapon):
-            raise InputError("toward: expected a point, as the weapon has no range, got none")
+        _check_aim(weapon, shot)
         accept, blocked_by = (
             scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
         )
@@ -130,6 +116,17 @@ def order_from_json(
             shot.get("seed", 0),
             shot.get("shot", number),
         )
+
+
+def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
+    """Refuse a shot with two aims, one toward its own place, and one without the end that its weapon needs."""
+    aim, toward = shot.get("aim"), shot.get("toward")
+    if aim is not None and toward is not None:
+        raise InputError("aim: expected aim or toward, got both")
+    if toward is not None and not (snap(toward) - snap(shot["at"])).any():
+        raise InputError(f"toward: expected a point other than the shot's own, got {list(toward)}")
+    if toward is None and has_no_range(weapon):
+        raise InputError("toward: expected a point, as the weapon has no range, got none")
 
 
 def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
@@ -207,28 +204,17 @@ _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
 
 @dataclass(frozen=True, eq=False)
 class Salvo:
-    """Checked shots of any weapons, as columns.
+    """Checked shots of any weapons, as columns."""
 
-    Parameters
-    ----------
-    weapon : the weapon of each
-    at : (n, 2) px
-    aim : (n,) degrees
-    toward : (n, 2) px; NaN for a shot that has an aim
-    accept, blocked_by : (n,) category bits
-    exclude : ids of owners, a tuple for each shot
-    seed, number : (n,) that select the random draws
-    """
-
-    weapon: list[Weapon]
-    at: Floats
-    aim: Floats
-    toward: Floats
-    accept: Ints
-    blocked_by: Ints
-    exclude: list[tuple[int, ...]]
-    seed: Words
-    number: Ints
+    weapon: list[Weapon]  # of each shot
+    at: Floats  # (n, 2) px
+    aim: Floats  # (n,) degrees
+    toward: Floats  # (n, 2) px; NaN for a shot that has an aim
+    accept: Ints  # (n,) category bits
+    blocked_by: Ints  # (n,) category bits
+    exclude: list[tuple[int, ...]]  # ids of owners, a tuple for each shot
+    seed: Words  # (n,) that selects the random draws, with the number
+    number: Ints  # (n,)
 
     def __len__(self) -> int:
         return len(self.weapon)
@@ -312,12 +298,7 @@ def body_of(line: bytes) -> bytes:
 
 
 class ShotReader:
-    """Reader of the lines of a log for one scene and its arsenal.
-
-    Parameters
-    ----------
-    name : name of the log in errors
-    """
+    """Reader of the lines of a log for one scene and its arsenal; `name` is that of the log in errors."""
 
     def __init__(self, scene: Scene, arsenal: Mapping[str, Weapon], name: str) -> None:
         self.scene, self.arsenal, self._name = scene, arsenal, name
@@ -333,16 +314,9 @@ class ShotReader:
         return f"{self._name} line {line + 1}"
 
     def read(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
-        """Check lines.
+        """Check lines without their breaks, of which the first has a number, from 0.
 
-        Parameters
-        ----------
-        bodies : lines without line breaks
-        first : number of the first line, from 0
-
-        Returns
-        -------
-        the shots before the first bad line, and the error of that line or None
+        Returned are the shots before the first bad line, and the error of that line or None.
         """
         try:
             return self._together(bodies, first), None

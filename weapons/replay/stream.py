@@ -47,10 +47,7 @@ BAR = 24  # length of the bar, characters
 class Progress:
     """Progress line of a long run, drawn on terminals only; messages go to any stream.
 
-    Parameters
-    ----------
-    stream : usually sys.stderr; None (as sys.stderr is if it was closed) draws nothing
-    what : name of the things that are counted
+    The stream is usually sys.stderr; None (as sys.stderr is if it was closed) draws nothing. `what` is counted.
     """
 
     def __init__(self, stream: TextIO | None, what: str = "shots") -> None:
@@ -61,12 +58,9 @@ class Progress:
         self._width = 0
 
     def begin(self, size: int, shots: int, at: int) -> None:
-        """Start to measure the speed.
+        """Start to measure the speed; `size` is the bytes of the whole log, or 0 if unknown, as for a pipe.
 
-        Parameters
-        ----------
-        size : bytes of the whole log; 0 if unknown, as for a pipe
-        shots, at : shots that an earlier run answered, and the bytes of their lines
+        An earlier run answered some shots; `at` is the bytes of their lines.
         """
         self._size, self._before = size, (shots, at)
         self._begin = time.monotonic()
@@ -77,13 +71,7 @@ class Progress:
         self._write(f"hitplanes: {printable(text)}\n")
 
     def show(self, shots: int, at: int) -> None:
-        """Draw the line, unless it was drawn a moment ago.
-
-        Parameters
-        ----------
-        shots : shots answered so far
-        at : bytes of their lines
-        """
+        """Draw the line, unless it was drawn a moment ago: shots answered so far, and the bytes of their lines."""
         now = time.monotonic()
         if not self._draws or now - self._drawn < SECONDS:
             return
@@ -328,22 +316,13 @@ NOTHING = b'"rows":[],'  # part of the answer to a shot that hit nothing
 
 @dataclass
 class Streamed:
-    """Totals of a run.
+    """Totals of a run."""
 
-    Parameters
-    ----------
-    shots : shots answered, also by earlier runs
-    resumed : shots answered by earlier runs
-    hit : shots that hit something
-    size : bytes of the answered lines of the log
-    plan : costs of the shots that this run fired
-    """
-
-    shots: int = 0
-    resumed: int = 0
-    hit: int = 0
-    size: int = 0
-    plan: PlanSum = field(default_factory=PlanSum)
+    shots: int = 0  # shots answered, also by earlier runs
+    resumed: int = 0  # shots answered by earlier runs
+    hit: int = 0  # shots that hit something
+    size: int = 0  # bytes of the answered lines of the log
+    plan: PlanSum = field(default_factory=PlanSum)  # costs of the shots that this run fired
 
 
 def fire_log(scene: Scene, log: Path, output: Path, progress: Progress) -> Streamed:

@@ -246,12 +246,7 @@ FAR = 6.0  # length of the shortest arrow that is drawn, px of the picture
 
 
 def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
-    """Draw the present outlines of objects that have moved, and arrows from their old places.
-
-    Returns
-    -------
-    mask (h, w) of the pixels that the arrows cover
-    """
+    """Draw the present outlines of moved objects, and arrows from their old places; return the arrows' mask (h, w)."""
     strokes = Strokes(world.image.shape[:2])
     for entry in report["now"]["moved"]:
         runs = np.array(entry["runs"], np.int64).reshape(-1, 3)

@@ -72,25 +72,15 @@ BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
 
 @dataclass(frozen=True)
 class Card:
-    """Content of a card.
+    """Content of a card."""
 
-    Parameters
-    ----------
-    number : number of the shot in the picture, or None
-    title, told : texts at the left and the right of the first line
-    verdicts : number of samples by verdict
-    inset : inset of the first hit
-    lines : lines below; one cell is a sentence, two are an object and a reason, more are a row of a table
-    ray : the only ray of a shot, drawn above the verdicts; None draws a bar of the verdicts
-    """
-
-    number: int | None
-    title: str
-    told: str
-    verdicts: Mapping[str, int]
-    inset: Inset | None
-    lines: Sequence[Sequence[str]]
-    ray: Mapping[str, Any] | None = None
+    number: int | None  # of the shot in the picture, or None
+    title: str  # at the left of the first line
+    told: str  # at the right of the first line
+    verdicts: Mapping[str, int]  # number of samples by verdict
+    inset: Inset | None  # around the first hit
+    lines: Sequence[Sequence[str]]  # one cell is a sentence, two are an object and a reason, more are a row of a table
+    ray: Mapping[str, Any] | None = None  # the only ray of a shot, drawn above the verdicts; None draws a bar of them
 
     @property
     def height(self) -> int:

@@ -124,15 +124,9 @@ BATCH_COLUMNS = ("shot", "round", "object", "samples", "pixels", "weight", "pell
 
 
 def differences(expected: Entry, got: Entry) -> list[str]:
-    """Differences between two reports.
+    """Differences between two reports, as `report_of` makes them or as their JSON reads, as lines.
 
-    Parameters
-    ----------
-    expected, got : reports, as `report_of` makes them or as their JSON reads
-
-    Returns
-    -------
-    lines, empty if and only if all that decides is equal: plans, versions, the scene's hash and times do not count
+    There are none if and only if all that decides is equal: plans, versions, the scene's hash and times do not count.
     """
     was, now = decisive(expected), decisive(got)
     if same(was, now):

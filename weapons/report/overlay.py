@@ -203,12 +203,7 @@ def marked(shots: Sequence[Mapping[str, Any]], verdict: str) -> list[Mapping[str
 
 
 def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bools]:
-    """Draw the rays of all shots, and the areas that they sweep.
-
-    Returns
-    -------
-    numbers, and mask (h, w) of the pixels that are drawn on
-    """
+    """Draw the rays of all shots, and the areas that they sweep; return numbers and the mask (h, w) of their pixels."""
     shots = [shot for shot in report["shots"] if "rays" in shot]
     signs = Signs(world.image.shape[:2], sum(len(shot["rays"]) for shot in shots))
     for shot in shots:

@@ -64,11 +64,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     InputError
         If it is not a report, or the scene is not that of the report.
     """
-    if not isinstance(report, Mapping):
-        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
-    Const(FORMAT).check("report: format", report.get("format"))
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    _check(report, scene)
     text = flag("text", text)
     if scene.content_hash() != report["scene"]["hash"]:
         raise InputError(f"scene: expected hash {report['scene']['hash']}, got {scene.content_hash()}: it has changed")
@@ -90,6 +86,15 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     if text:
         draw_texts(page, texts)
     return page
+
+
+def _check(report: object, scene: object) -> None:
+    """Refuse what is no report, and what is no scene."""
+    if not isinstance(report, Mapping):
+        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
+    Const(FORMAT).check("report: format", report.get("format"))
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
 
 
 def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
@@ -132,23 +137,12 @@ LOOKS = {"both": "empty", "other verdict": "filtered", "only expected": "occlude
 
 
 def picture_of_difference(
-    expected: Mapping[str, Any],
-    got: Mapping[str, Any],
-    scenes: tuple[Scene | None, Scene | None] = (None, None),
-    *,
+    expected: Mapping[str, Any], got: Mapping[str, Any], scenes: tuple[Scene | None, Scene | None] = (None, None), *,
     text: bool = True,
-) -> Image:
-    """Draw two reports and their difference.
+) -> Image:  # fmt: skip
+    """Draw two reports and their difference, as (h, w, 3) bytes, RGB.
 
-    Parameters
-    ----------
-    expected, got : reports made by `report_of`
-    scenes : scene of each report; None leaves its ground empty
-    text : False leaves the text layer out
-
-    Returns
-    -------
-    (h, w, 3) bytes, RGB
+    A scene of None leaves the ground of its report empty; without `text` the text layer is left out.
     """
     whole = _around(tuple(expected["view_xyxy"]), tuple(got["view_xyxy"]))
     kinds = compared_pixels(expected, got, whole)

@@ -78,12 +78,7 @@ BRUSH = 24.0  # reach of a stroke, px, above which all pixels of its box are tes
 
 
 class Strokes:
-    """Strokes of one colour with a dark ground; crossing strokes do not cover each other.
-
-    Parameters
-    ----------
-    shape : (h, w) of the picture
-    """
+    """Strokes of one colour with a dark ground, on a picture (h, w); crossing strokes do not cover each other."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.shape = shape
@@ -225,12 +220,9 @@ NORMAL = 17.0  # length of a normal, px
 
 
 class Signs:
-    """Ray symbols on one picture, in px of it; they are collected, then laid over it in order.
+    """Ray symbols on one picture (h, w), in px of it; they are collected, then laid over it in order.
 
-    Parameters
-    ----------
-    shape : (h, w) of the picture
-    rays : number of rays; many are drawn thinner, and very many without the dashes beyond their ends
+    Many rays are drawn thinner, and very many without the dashes beyond their ends.
     """
 
     def __init__(self, shape: tuple[int, int], rays: int = 1) -> None:
