@@ -29,7 +29,7 @@ from ..report.cards import place_told
 from ..report.differences import differences
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
-from .schemas import read_report
+from .report_file import read_report
 from .starter import FROM_IMAGE, write_from_picture, write_starter
 
 DESCRIPTION = "Find out what a shot hits in a 2-D scene, pixel by pixel and exactly, and see why."
