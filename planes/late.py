@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from .bits import distance_field as distance_field
     from .bits import label_plane as label_plane
     from .bits import shadows as shadows
@@ -20,22 +20,16 @@ if TYPE_CHECKING:
     from .volumes import overlap as overlap
     from .volumes import volumes as volumes
 
-
-def importer(here: dict[str, Any], *places: str) -> Callable[[str], ModuleType]:
-    """Function that imports a module of a package, once; `here` are the globals of the module that names them all."""
-    known = {place.rpartition(".")[2]: place for place in places}
-
-    def read(name: str) -> ModuleType:
-        if name not in known:
-            raise AttributeError(f"module {here['__name__']!r} has no attribute {name!r}")
-        module = import_module(f"{here['__package__']}.{known[name]}")
-        here[name] = module
-        return module
-
-    return read
-
-
-__getattr__ = importer(
-    globals(), "broadphase.boxes", "scene.carving", "bits.distance_field", "volumes.fit", "bits.label_plane",
-    "volumes.overlap", "files.scene_folder", "bits.shadows", "bits.tiles", "bits.visible", "volumes.volumes",
+_PLACES = (
+    "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible", "broadphase.boxes",
+    "files.scene_folder", "scene.carving", "volumes.fit", "volumes.overlap", "volumes.volumes",
 )  # fmt: skip
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a module, once."""
+    for place in _PLACES:
+        if place.endswith(f".{name}"):
+            module = globals()[name] = import_module(f"{__package__}.{place}")
+            return module
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

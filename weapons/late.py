@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from hitplanes.planes.late import importer
-
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from .explain import owners as owners
     from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
@@ -15,7 +16,16 @@ if TYPE_CHECKING:
     from .rays import ray_call as ray_call
     from .replay import shot_log as shot_log
 
-__getattr__ = importer(
-    globals(), "explain.owners", "rays.ray_call", "explain.ray_margins", "explain.ray_samples", "explain.samples",
-    "fire.shelter", "replay.shot_log",
+_PLACES = (
+    "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.samples", "fire.shelter",
+    "rays.ray_call", "replay.shot_log",
 )  # fmt: skip
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a module, once."""
+    for place in _PLACES:
+        if place.endswith(f".{name}"):
+            module = globals()[name] = import_module(f"{__package__}.{place}")
+            return module
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
