@@ -78,12 +78,9 @@ CARVED = Keys({"image": Text(), "frame": Whole(0, 2**31 - 1), "cells_per_px": Wh
 FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
 COMMON: dict[str, Value] = {"angle_step": Number(360 / ANGLE_STEPS_MAX, 360), "carved": Rows(Within(CARVED))}
 OF_IMAGES: dict[str, Value] = {
-    "alpha_threshold": Whole(0, 255),
-    "color_key": COLOR,
-    "pivot_xy": OneOrEach(PIVOT, Numbers((None, 2), MASK_SIDE_MAX)),
-    "frame_names": Names(),
-    **COMMON,
-}
+    "alpha_threshold": Whole(0, 255), "color_key": COLOR,
+    "pivot_xy": OneOrEach(PIVOT, Numbers((None, 2), MASK_SIDE_MAX)), "frame_names": Names(), **COMMON,
+}  # fmt: skip
 SOURCES: dict[str, dict[str, Value]] = {
     "image": {"image": Text(), "frames": Within(FRAMES), **OF_IMAGES},
     "images": {"images": Rows(Text()), **OF_IMAGES},
@@ -93,39 +90,22 @@ SOURCES: dict[str, dict[str, Value]] = {
     "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, **COMMON},
 }
 POSE: dict[str, Value] = {
-    "angle": Number(),
-    "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
-    "flip": Word(FLIPS),
-    "frame": Either(str, Text(), Whole(0, 2**31 - 1)),
-    "layer": Whole(-LAYER_MAX, LAYER_MAX),
-    "cost": Whole(0, COST_MAX),
-    "velocity_xy": Numbers((2,), REACH_MAX),
-}
+    "angle": Number(), "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
+    "flip": Word(FLIPS), "frame": Either(str, Text(), Whole(0, 2**31 - 1)), "layer": Whole(-LAYER_MAX, LAYER_MAX),
+    "cost": Whole(0, COST_MAX), "velocity_xy": Numbers((2,), REACH_MAX),
+}  # fmt: skip
 PLACED: dict[str, Value] = {
-    "id": ID,
-    "name": Text(),
-    "position_xy": POINT,
-    **POSE,
-    "categories": Names(),
-    "owner": Either(str, Text(), ID),
-}
+    "id": ID, "name": Text(), "position_xy": POINT, **POSE, "categories": Names(), "owner": Either(str, Text(), ID),
+}  # fmt: skip
 OBJECT = {kind: Keys({**PLACED, **keys}, (kind, "position_xy")) for kind, keys in SOURCES.items()}
 BOUNDS = Keys(
     {"origin_xy": Wholes((2,), -POSITION_MAX, POSITION_MAX), "size_wh": Wholes((2,), 1, POSITION_MAX)}, ("size_wh",)
 )
-SCENE = Keys(
-    {
-        "$schema": Text(),
-        "format": Const(FORMAT, (ONE_FILTER,)),
-        "name": Text(),
-        "bounds": Optional(Within(BOUNDS)),
-        "categories": Names(),
-        "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
-        "weapons": Mapped(Ref("weapon")),
-        "shots": Rows(Ref("shot")),
-    },
-    ("format",),
-)
+SCENE = Keys({
+    "$schema": Text(), "format": Const(FORMAT, (ONE_FILTER,)), "name": Text(), "bounds": Optional(Within(BOUNDS)),
+    "categories": Names(), "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
+    "weapons": Mapped(Ref("weapon")), "shots": Rows(Ref("shot")),
+}, ("format",))  # fmt: skip
 """The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
 
 SHEET_WIDTH = 4096  # approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px
@@ -333,8 +313,9 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     color = {} if sprite.color is None else {"color": list(sprite.color)}
     options: dict[str, Any] = {} if sprite.angle_step is None else {"angle_step": sprite.angle_step}
     if sprite.carvings:
+        carved = f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
         options["carved"] = [
-            {"image": _write_apart(folder, _carved_name(sprite), _cells(one), images), "frame": frame,
+            {"image": _write_apart(folder, carved, _cells(one), images), "frame": frame,
              "cells_per_px": one.per_px}
             for frame, one in sorted(sprite.carvings.items())
         ]  # fmt: skip
@@ -356,10 +337,6 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     if sprite.frame_names:
         options["frame_names"] = list(sprite.frame_names)
     return {"image": _write_apart(folder, _image_name(sprite), sheet, images), **options}
-
-
-def _carved_name(sprite: Sprite) -> str:
-    return f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
 
 
 def _cells(carving: Carving) -> Image:

@@ -30,10 +30,7 @@ from .ray_samples import RayDetail, gap, squares
 from .samples import Margin, spans_of
 
 RAYS_MAX = 1024  # most rays of a shot that has margins; all rays are handled at once, and so many take some seconds
-
-NEARLY = 2.0**-20
-"""Distance of a pixel centre from the rim of a thick ray, px, below which it is computed in Python integers."""
-
+NEARLY = 2.0**-20  # distance of a pixel centre from the rim of a thick ray, px, below which integers compute it
 TINY = float(np.nextafter(0, 1))  # distance of an object that is not touched but whose distance rounds to 0
 
 Shift = tuple[float, float]
@@ -118,17 +115,10 @@ def ray_margins(detail: RayDetail, scene: Scene, ray: RayWeapon, shot: int, hit:
 
     The margin of an object that was hit is the shortest shift after which no ray touches it; the rays go as far as they
     would if no object ended them. The margin of an object that was not hit is the shortest shift after which a ray
-    touches it; the rays end where they did. An object in which rays start, and which they ignore, has no margin.
+    touches it; the rays end where they did. An object in which rays start, and which they ignore, has no margin. The
+    shot has a number, and hit the objects of some ids.
 
-    Parameters
-    ----------
-    shot : number of the shot
-    hit : ids of the objects that it hit
-
-    Raises
-    ------
-    InputError
-        If the weapon is a projectile tested in steps, or if there are too many rays.
+    An InputError says if the weapon is a projectile tested in steps, or if there are too many rays.
     """
     if isinstance(ray, Projectile) and ray.steps is not None:
         raise InputError(f"hits: expected those of a ray or of a projectile without steps, got steps={ray.steps}")

@@ -26,8 +26,7 @@ from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, rays_of
 from ..rays.ray_walk import Range, touching, trace
 from .samples import Behind, Blocked, Samples, WhyNot, unmet
 
-REACH_BITS = 23
-"""Bits of a coordinate of a cell; cells lie within 2**22 px of their ray's origin, so x, y and the ray fit int64."""
+REACH_BITS = 23  # of a coordinate of a cell: cells lie within 2**22 px of their ray's origin; x, y and ray fit int64
 
 
 CELLS_AT_ONCE = 2**19  # cells of rays counted at a time: 4 MB for each of their columns

@@ -7,7 +7,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -435,25 +435,16 @@ KINDS = (".json", ".npz", ".png")  # endings of the files of a golden
 
 
 class Collected:
-    """Plugin that lists the tests of all files that have goldens beside them.
+    """Plugin that lists the tests of all files that have goldens beside them, in folders of this name.
 
-    Parameters
-    ----------
-    folder : name of the folders of goldens
-    whole : whether pytest reports all tests of a file
-
-    Attributes
-    ----------
-    files : node ids of test files, by path
-    whole : node ids of the files and classes whose tests are all known
-    known : node ids of the tests and classes in them, whether selected to run or not
+    `whole` says whether pytest reports all tests of a file.
     """
 
     def __init__(self, folder: str, *, whole: bool) -> None:
         self._folder, self._whole = folder, whole
-        self.files: dict[str, str] = {}
-        self.whole: set[str] = set()
-        self.known: set[str] = set()
+        self.files: dict[str, str] = {}  # node ids of test files, by path
+        self.whole: set[str] = set()  # node ids of the files and classes whose tests are all known
+        self.known: set[str] = set()  # node ids of the tests and classes in them, whether selected to run or not
 
     @pytest.hookimpl(wrapper=True)
     def pytest_make_collect_report(
@@ -485,12 +476,7 @@ def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set
     """Return the paths, without endings, of goldens that no test uses.
 
     A golden is stale if its test passed without using it, or no longer exists. A test that was deselected, skipped or
-    failed says nothing about its goldens.
-
-    Parameters
-    ----------
-    used : goldens that were compared in this run
-    passed : node ids of tests that passed
+    failed says nothing about its goldens. In this run some goldens were used, and tests of some node ids passed.
     """
     by_place = {(Path(path).parent, Path(path).stem): node for path, node in collected.files.items()}
     stale = []
@@ -498,7 +484,7 @@ def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set
         there = {path.stem for path in place.iterdir() if path.is_file()}
         for goldens in sorted(path for path in (place / folder).glob("*") if path.is_dir()):
             file = by_place.get((place, goldens.name))
-            for base in _bases(goldens):
+            for base in sorted({path.with_name(path.stem) for path in goldens.iterdir() if path.suffix in KINDS}):
                 gone = goldens.name not in there
                 if gone or (file is not None and _is_stale(base, file, collected, used, passed)):
                     stale.append(base)
@@ -515,20 +501,9 @@ def _is_stale(base: Path, file: str, collected: Collected, used: set[str], passe
     node = f"{file}::{inside}"
     if node in collected.known or node in passed:
         return node in passed
-    above = [file, *(known for known in _prefixes(file, inside) if known in collected.known)]
-    return all(part in collected.whole for part in above)
-
-
-def _prefixes(file: str, inside: str) -> Iterator[str]:
-    """Yield the node ids of the classes around a test."""
     names = inside.split("::")
-    for i in range(1, len(names)):
-        yield "::".join([file, *names[:i]])
-
-
-def _bases(folder: Path) -> Iterable[Path]:
-    """Return the paths of the goldens of a folder, without endings."""
-    return sorted({path.with_name(path.stem) for path in folder.iterdir() if path.suffix in KINDS})
+    classes = ("::".join([file, *names[:i]]) for i in range(1, len(names)))
+    return all(part in collected.whole for part in [file, *(known for known in classes if known in collected.known)])
 
 
 def _test_of(base: Path) -> str | None:

@@ -36,9 +36,7 @@ from ..report.report import report_of
 
 FORMAT = "hitplanes-golden/1"
 
-PLANES_AREA_MAX = 4 * 2**20
-"""Largest scene whose planes are stored, px; two compressed planes of this size take some tens of kB."""
-
+PLANES_AREA_MAX = 4 * 2**20  # largest scene whose planes are stored, px: two compressed planes take some tens of kB
 SCENE_PLANES = ("hittable", "occluders")  # planes of a scene that decide hits
 CHANGED_MAX = 8  # most changed objects that a line names
 LINE_DEPTH = 5  # depth from which JSON stays on one line: a row, a blocker or the samples of a verdict
@@ -174,16 +172,9 @@ def golden_of(hits: object, planes: object, test: str, name: str | None, only: s
         part = json.loads(json.dumps(hits_alone(report)))
         return Golden(test, name, part, {}, (0, 0), None, None, only, scene, report)
     kept, origin_xy, left_out = _scene_planes(scene)
-    return Golden(
-        test,
-        name,
-        json.loads(json.dumps(decisive(report))),
-        kept | _own_planes(planes),
-        origin_xy,
-        left_out,
-        picture_of_report(report, scene, text=False),
-        scene=scene,
-    )
+    kept |= _own_planes(planes)
+    part, picture = json.loads(json.dumps(decisive(report))), picture_of_report(report, scene, text=False)
+    return Golden(test, name, part, kept, origin_xy, left_out, picture, scene=scene)
 
 
 def read_golden(base: Path) -> Golden | None:
@@ -200,16 +191,9 @@ def read_golden(base: Path) -> Golden | None:
         only = data.get("only")
         part = hits_alone(report)
         hits_unlike(part, part, Tolerance(1))  # a damaged part fails here, and not when it is compared
-        return Golden(
-            data["test"],
-            data["name"],
-            report,
-            planes,
-            (int(data["origin_xy"][0]), int(data["origin_xy"][1])),
-            data["left_out"],
-            None if only == HITS else _read_picture(_file(base, "png")),
-            only,
-        )
+        origin_xy = int(data["origin_xy"][0]), int(data["origin_xy"][1])
+        picture = None if only == HITS else _read_picture(_file(base, "png"))
+        return Golden(data["test"], data["name"], report, planes, origin_xy, data["left_out"], picture, only)
     except (AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
         if isinstance(error, DamagedGoldenError):
             raise

@@ -381,18 +381,13 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
-        found = cls(
-            cls._gathered_rows(parts, rows),
-            (
-                lambda: Passes.gathered([part.passes for part in rays], rows),
-                lambda: Stops.gathered([part.stop for part in rays], rows),
-            ),
-            sum(part.rays for part in rays),
-            *parts[0]._then(0),
-            parts[0].weapon,
-            shots,
-            Plan.joined([part.plan for part in parts]),
+        told: Told = (
+            lambda: Passes.gathered([part.passes for part in rays], rows),
+            lambda: Stops.gathered([part.stop for part in rays], rows),
         )
+        number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
+        of = *parts[0]._then(0), parts[0].weapon, shots, plan
+        found = cls(cls._gathered_rows(parts, rows), told, number, *of)
         found._remember(parts, rows)
         return found
 

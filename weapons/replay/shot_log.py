@@ -48,20 +48,12 @@ class WeaponJson(Ref):
         return weapon_from_json(value, name)
 
 
-SHOT = Keys(
-    {
-        "weapon": Either(dict, WeaponJson("weapon"), Text()),
-        "at": Numbers((2,), POSITION_MAX),
-        "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
-        "toward": Optional(Numbers((2,), POSITION_MAX)),
-        "accept": Names(),
-        "blocked_by": Names(),
-        "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))),
-        "seed": Whole(0, SEED_MAX),
-        "shot": Whole(0, 2**63 - 1),
-    },
-    ("weapon", "at"),
-)
+SHOT = Keys({
+    "weapon": Either(dict, WeaponJson("weapon"), Text()), "at": Numbers((2,), POSITION_MAX),
+    "aim": Optional(Number(-AIM_MAX, AIM_MAX)), "toward": Optional(Numbers((2,), POSITION_MAX)), "accept": Names(),
+    "blocked_by": Names(), "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))), "seed": Whole(0, SEED_MAX),
+    "shot": Whole(0, 2**63 - 1),
+}, ("weapon", "at"))  # fmt: skip
 """Table that validates a shot."""
 
 
@@ -104,18 +96,9 @@ def order_from_json(
         accept, blocked_by = (
             scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
         )
-        return ShotRequest(
-            name,
-            weapon,
-            shot["at"],
-            shot.get("aim"),
-            shot.get("toward"),
-            accept,
-            blocked_by,
-            tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ()))),
-            shot.get("seed", 0),
-            shot.get("shot", number),
-        )
+        excluded = tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ())))
+        aims, draws = (shot.get("aim"), shot.get("toward")), (shot.get("seed", 0), shot.get("shot", number))
+        return ShotRequest(name, weapon, shot["at"], *aims, accept, blocked_by, excluded, *draws)
 
 
 def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
@@ -131,20 +114,14 @@ def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
 
 def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
     """Fire one shot; the pre-filter and the broad phase are those of `fire`."""
-    return fire(
-        scene,
-        order.weapon,
-        order.at,
-        aim=order.aim,
-        toward=order.toward,
-        accept=order.accept,
-        blocked_by=order.blocked_by,
-        exclude=order.exclude or None,
-        seed=order.seed,
-        shot=[order.shot],
-        prefilter=prefilter,
-        broadphase=broadphase,
-    )
+    alike = {name: getattr(order, name) for name in ("at", "aim", "toward", "accept", "blocked_by", "seed")}
+    how: dict[str, Any] = {
+        "exclude": order.exclude or None,
+        "shot": [order.shot],
+        "prefilter": prefilter,
+        "broadphase": broadphase,
+    }
+    return fire(scene, order.weapon, **alike, **how)
 
 
 def fire_shots(scene: Scene) -> list[Hits]:
@@ -159,13 +136,10 @@ def fire_shots(scene: Scene) -> list[Hits]:
 
 
 def shot_json(weapon: Weapon, shot: Shots, scene: Scene, stack: Stack) -> dict[str, Any]:
-    """One shot as a scene file has it, the inverse of `order_from_json`; defaults are left out, but for the number.
+    """One shot, a batch of one, as a scene file has it: the inverse of `order_from_json`.
 
-    Parameters
-    ----------
-    shot : a batch of one
-    scene, stack : the scene, for its weapons and names, and the stack that was fired at. Excluded owners that own
-        nothing of it are left out, as a file need not have their ids
+    Defaults are left out, but for the number, and so are excluded owners that own nothing of the stack that was fired
+    at, as a file need not have their ids. The scene is asked for its weapons and names.
     """
     name = next((name for name, other in arsenal_of(scene).items() if other == weapon), None)
     aimed: dict[str, Any] = {}
@@ -247,21 +221,9 @@ class Salvo:
     @classmethod
     def joined(cls, parts: Sequence[Salvo]) -> Salvo:
         """Join several salvos in order."""
-
-        def column(name: str) -> Any:
-            return np.concatenate([getattr(part, name) for part in parts])
-
-        return cls(
-            [weapon for part in parts for weapon in part.weapon],
-            column("at"),
-            column("aim"),
-            column("toward"),
-            column("accept"),
-            column("blocked_by"),
-            [owners for part in parts for owners in part.exclude],
-            column("seed"),
-            column("number"),
-        )
+        columns = [[getattr(part, f.name) for part in parts] for f in fields(cls)]
+        whole: list[Any] = [list(chain(*c)) if isinstance(c[0], list) else np.concatenate(c) for c in columns]
+        return cls(*whole)
 
     @classmethod
     def of_orders(cls, orders: Sequence[ShotRequest]) -> Salvo:
@@ -351,7 +313,7 @@ class ShotReader:
         points = np.full((len(shots), 2), np.nan)
         points[aimed] = _points([point for point in toward if point is not None])
         return Salvo(
-            [self._weapon(shot["weapon"]) for shot in shots],
+            [self.arsenal[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots],
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,
@@ -361,9 +323,6 @@ class ShotReader:
             np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
             np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
         )
-
-    def _weapon(self, told: Any) -> Weapon:
-        return self.arsenal[told] if type(told) is str else weapon_from_json(told)
 
     def _categories(self, shot: dict[str, Any], key: str) -> int:
         if key not in shot:

@@ -133,21 +133,8 @@ class Part:
     """Resumable output file `<output>.part`, which only this process may write.
 
     `write` does not buffer. Each line ends with a checksum of all bytes before it, so a line that was changed, lost or
-    doubled is found.
-
-    Parameters
-    ----------
-    output : path of the complete result
-    header : first line; an older part is continued only if it begins with the same line
-
-    Attributes
-    ----------
-    damaged : number of the first damaged line of an older part, from 1; None if there is none
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, if another process writes it, or if an older part has another header.
+    doubled is found: `damaged` is the number of the first such line of an older part, from 1, or None. An InputError
+    says if the file cannot be written, if another process writes it, or if an older part has another first line.
     """
 
     def __init__(self, output: Path, header: bytes) -> None:
@@ -226,12 +213,9 @@ class Part:
         """Rename the part, now complete, to the output."""
         with self._told():
             if fcntl is None:
-                self._close()
+                os.close(self._file)
+                self._file = -1
             put_in_place(self.path, self.output)  # still locked, so no other process writes it
-
-    def _close(self) -> None:
-        os.close(self._file)
-        self._file = -1
 
     def _hold(self) -> None:
         """Lock the file for this process."""
@@ -303,8 +287,7 @@ PASSES = (
 STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
 """ShotColumns of the end of a ray; a name that ends in _xy stands for two numbers."""
 
-LINES_FIRST, LINES_MAX = 16, 16384
-"""Lines of the first chunk, small as each shot may hit thousands of objects, and of the largest useful chunk."""
+LINES_FIRST, LINES_MAX = 16, 16384  # of the first chunk, as each shot may hit thousands, and of the largest useful one
 
 SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 """After a chunk that took less, the next is four times as large; after one that took more, half as large."""

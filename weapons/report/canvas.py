@@ -39,10 +39,7 @@ present place of an object that has moved, and of what a shot does not see."""
 THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 
 DASH = 5  # length of the dashes of an outline, px
-
-SHADOW, SHADOW_ALPHA = (12, 14, 18), 170
-"""Colour and opacity, of 255, of the ground under the marks of hits, which keeps the gaps between them dark."""
-
+SHADOW, SHADOW_ALPHA = (12, 14, 18), 170  # ground under the marks of hits, which keeps the gaps between them dark
 HEAT_ALPHA = 235  # opacity of the heat of hits, of 255
 OUTLINES_MAX = 1000  # most objects that are outlined in addition to those that were hit or blocked
 
@@ -239,9 +236,7 @@ def _lay(world: Image, where: Bools, color: tuple[int, int, int], alpha: int) ->
     blend(world, color, np.where(where, alpha, 0).astype(np.uint8), 0, 0)
 
 
-WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0
-"""Arrow of an object that has moved: width, length of the dashes, length of the head, px."""
-
+WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0  # width, dashes and head of the arrow of what has moved, px
 FAR = 6.0  # length of the shortest arrow that is drawn, px of the picture
 
 
@@ -264,9 +259,7 @@ def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
 Color = tuple[int, int, int]
 
 EDGE, TOP = 16, 44  # left edge of the picture on the page, and its top, px
-
-LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12
-"""Height of a line, least width of a card, least width of a page, space between cards, px."""
+LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12  # line height, least widths of a card and a page, gap of cards, px
 
 PAGE_GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
 

@@ -64,8 +64,7 @@ BAR = 9  # height of the bar of verdicts, px
 LETTER = 8  # about the width of a digit, px
 
 HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
-WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])
-"""Header of a weapon with falloff; the weight is in samples of full weight."""
+WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])  # with falloff; in samples of full weight
 
 BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
 

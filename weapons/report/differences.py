@@ -201,8 +201,9 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
 
 def _shot(was: Entry, now: Entry) -> list[str]:
     words: dict[str, Words] = {
-        "at": _at, "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts,
-        "rays": ray_changes, "samples": _samples,
+        "at": lambda was, now: [f"fired at {_place(now['at'])}, was {_place(was['at'])}"],
+        "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": ray_changes,
+        "samples": _samples,
     }  # fmt: skip
     return _told(_chief(was), _chief(now), words) or _told(was, now, words)
 
@@ -217,10 +218,6 @@ def _chief(shot: Entry) -> dict[str, Any]:
                 for row in shot[told]
             ]
     return chief
-
-
-def _at(was: Entry, now: Entry) -> list[str]:
-    return [f"fired at {_place(now['at'])}, was {_place(was['at'])}"]
 
 
 def _verdicts(was: Entry, now: Entry) -> list[str] | None:

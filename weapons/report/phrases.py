@@ -89,9 +89,7 @@ REASONS = {
     "budget": "no budget to begin with",
 }
 
-SLANT = 1 + 2**0.5
-"""Tangent of 67.5 degrees; a direction within 22.5 degrees of an axis has one word, any other has two."""
-
+SLANT = 1 + 2**0.5  # tangent of 67.5 degrees: a direction within 22.5 degrees of an axis has one word, any other two
 LEAST_TOLD = 0.05  # least distance that is not rounded to 0.0, px
 NAME_MAX = 24  # most letters of a name on a label
 

@@ -21,7 +21,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import Samples, Share, detail_of
+from ..explain.samples import Samples, detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, HitRow, Hits
 from ..fire.spans import context_of
@@ -351,6 +351,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     margins, samples = _margins(hits, row), hits.samples_at(row)
+    sight = not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
     return {
         "shot": int(shots.number[row]),
         "weapon": weapon,
@@ -377,7 +378,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             for entry in hits.blockers(row)
         ],
         "samples": _sample_runs(samples),
-        **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if _needs_sight(hits) else {}),
+        **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
         **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
@@ -422,21 +423,16 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
             "pellets": row.pellets,
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
-            **({} if share is None else {"shares": _shares(share)}),
+            **(
+                {}
+                if share is None
+                else {"shares": {k: round(v, 6) for k, v in share._asdict().items() if v is not None}}
+            ),
             **margins.get(row.object, {}),
             "runs": pixels[row.round, row.object].runs().tolist(),
         }
         for row, share in zip(rows, shares, strict=True)
     ]
-
-
-def _needs_sight(hits: Hits) -> bool:
-    return not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
-
-
-def _shares(share: Share) -> dict[str, float]:
-    """Shares of a row as JSON; without `exposed` if the weapon needs no line of sight."""
-    return {name: round(value, 6) for name, value in share._asdict().items() if value is not None}
 
 
 def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:

@@ -127,15 +127,8 @@ class Study:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `stability.json`."""
-        return {
-            "format": FORMAT,
-            "seed": self.seed,
-            "quick": self.quick,
-            "complete": self.complete,
-            "versions": self.versions,
-            "families": FAMILIES,
-            "cells": [asdict(cell) for cell in self.cells],
-        }
+        told = {name: getattr(self, name) for name in ("seed", "quick", "complete", "versions")}
+        return {"format": FORMAT, **told, "families": FAMILIES, "cells": [asdict(cell) for cell in self.cells]}
 
 
 def load_study(path: Path) -> Study:

@@ -460,8 +460,7 @@ STYLES: dict[str, Style] = {
     "hull": (GREEN, "*"), "polygon": (GREEN, "p"), "triangles": (RED, "<"), "pymunk": (BLACK, "P"),
     "shapely": (BLACK, "X"), "pygame": (BLACK, "*"),
 }  # fmt: skip
-OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (SKY, "<"))
-"""Styles for all other methods, in turn."""
+OTHERS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (RED, "D"), (PURPLE, "v"), (SKY, "<"))  # for other methods, in turn
 
 
 def work_precision(question: Mapping[str, Any], title: str) -> Figure:
