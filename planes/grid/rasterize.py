@@ -30,9 +30,7 @@ from .spans import Spans, each_pixel, ragged
 Runs = tuple[Ints, Ints, Ints]
 
 WIDEST = 2**40  # a column beyond all others, px
-
-QUOTIENT_ERROR = 2.0**-50
-"""A quotient of two numbers, each rounded to float64, times a row number has a relative error below it."""
+QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, rounded to float64, times a row number
 
 
 def disc(radius: int) -> Spans:
@@ -346,9 +344,7 @@ def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
 DIAGONAL = 182  # half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre
 COMMON = 2**60  # scale of the times of rays at moving items, where each item would otherwise have a scale of its own
 ROOM = 2**62  # products below it leave room for a sum in int64; larger ones are computed in Python integers
-
-FAR = 2**90
-"""Squares below it differ from those of their float roots by less than 2**46, which one Newton step corrects."""
+FAR = 2**90  # squares below it differ from those of their float roots by less than 2**46: one Newton step corrects it
 
 
 @dataclass(frozen=True, eq=False)
@@ -557,16 +553,10 @@ def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, In
 
 
 def cells_of(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
-    """Cells of segments, in any order.
+    """Cells of segments (n, 2), up to 2**48 and of half a width, all in 1/256 px, in any order.
 
-    Parameters
-    ----------
-    start_256, end_256 : (n, 2) 1/256 px, up to 2**48
-    radius_256 : half of the width
-
-    Returns
-    -------
-    segment (k,), pixel (k, 2), entry (k,) and exit (k,); and the scale (n,) of the times: the time at a segment's end
+    Returned are segment (k,), pixel (k, 2), entry (k,) and exit (k,); and the scale (n,) of the times, which is the
+    time at a segment's end.
     """
     origin = (start_256 + HALF) // SUB
     lines = Lines(start_256 - SUB * origin, end_256 - start_256, radius_256)

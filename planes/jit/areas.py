@@ -247,9 +247,7 @@ def hull_of(box, near, count, left, top, bottom):
 def weighed(tiles, tile, windows, word, step, shift, low, high, sums, begin, wide):
     """Sum of the weights of the pixels that a tile shares with a window, run by run.
 
-    Parameters
-    ----------
-    sums, begin, wide : sums along rows; the place of the tile's first column in row `low`; numbers of a row
+    `sums` are along rows; `begin` is the place of the tile's first column in row `low`, `wide` the numbers of a row.
     """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left, total = np.uint64(shift), np.uint64(63 - shift), np.int64(0)

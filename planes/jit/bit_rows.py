@@ -106,10 +106,7 @@ begin with the placement and the rank that it hits, and end with squared distanc
 def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any) -> Ints | None:
     """Rows of all placements, as columns, in threads if there are enough; None if the kernel cannot decide them.
 
-    Parameters
-    ----------
-    least : least number of placements of a thread
-    given : further arguments of the kernel
+    A thread has at least so many placements; `given` are further arguments of the kernel.
     """
     parts = in_parts(count, least, lambda first, last: _filled(kernel, columns, first, last, given))
     known = [part for part in parts if part is not None]
@@ -163,11 +160,8 @@ def pixel_of(key, own, top):
 def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     """Count the pixels that a tile shares with a window, in rows `low` to `high` of the world.
 
-    There is no branch in the loop, so that eight rows take one instruction each.
-
-    Returns
-    -------
-    samples; squared distance, x and y of the nearest pixel, relative to the origin at (own, level), ties by (y, x)
+    There is no branch in the loop, so that eight rows take one instruction each. Returned are the samples, and the
+    squared distance, x and y of the nearest pixel, relative to the origin at (own, level), ties by (y, x).
     """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)

@@ -30,9 +30,7 @@ from .variants import MaskAtlas, variant_of
 T = TypeVar("T")
 
 RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only the number
-
-PART_BITS = 31
-"""A step between two ticks is cut into fewer than 2**31 parts: the square of their number stays inside int64."""
+PART_BITS = 31  # a step between two ticks has fewer than 2**31 parts: the square of their number stays inside int64
 
 
 class PastItems(Items):
@@ -72,12 +70,7 @@ class PastItems(Items):
         """Do nothing: the columns are the recorded ones."""
 
     def between(self, after: PastItems, part: int, parts: int) -> PastItems:
-        """Interpolate between these items and those of a later moment; see `History`.
-
-        Parameters
-        ----------
-        part, parts : fraction of the time that has passed, 0 < part < parts
-        """
+        """Items at part / parts of the time to a later moment, 0 < part < parts; see `History`."""
         if after is self:
             return self
         out = PastItems(self, self)

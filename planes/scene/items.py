@@ -168,8 +168,7 @@ NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of 
 
 NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
-ARRANGEMENTS = itertools.count(1)
-"""Source of numbers of arrangements; each arrangement of items of any scene has its own."""
+ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
 
 def boxes_in(field: str, name: object) -> int | None:
@@ -198,9 +197,7 @@ COLUMNS: dict[str, tuple[int, ...]] = {
 }  # fmt: skip
 
 UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))  # columns whose change leaves the arrangement as it is
-
-ORDERING = frozenset(("alive", "role", "layer"))
-"""Columns whose change may reorder the items, or change which of them decide hits."""
+ORDERING = frozenset(("alive", "role", "layer"))  # columns whose change may reorder items, or which of them decide hits
 
 
 class Items:

@@ -46,9 +46,7 @@ if TYPE_CHECKING:
 Read = TypeVar("Read", bound=np.generic)
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
-FIELDS = ("background", "hittable", "movers", "occluders", "hud")
-"""Names of the planes of each role, in the order of ROLES."""
-
+FIELDS = ("background", "hittable", "movers", "occluders", "hud")  # names of the planes of ROLES, in order
 DEFAULT_CATEGORY = "default"  # name of the first category bit, which objects have by default
 
 

@@ -45,8 +45,7 @@ def check_size(name: str, width: int, height: int) -> None:
 
 UIDS = itertools.count()
 
-OUTLINE_MARGIN = 2
-"""Pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of the shape as it was made."""
+OUTLINE_MARGIN = 2  # pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of it as it was made
 
 
 class Known:
@@ -78,14 +77,11 @@ class Frame:
 class Carving:
     """What was carved out of a frame or a shape: cells that are gone. It is flipped, scaled and turned with the sprite.
 
-    Parameters
-    ----------
-    gone : (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
-    per_px : number of cells along a pixel, a power of two: a turned or enlarged sprite loses parts of its pixels
+    A turned or enlarged sprite loses parts of its pixels, so a pixel has several cells.
     """
 
-    gone: Bools
-    per_px: int = 1
+    gone: Bools  # (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
+    per_px: int = 1  # number of cells along a pixel, a power of two
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Copy the array, and make it read-only again."""

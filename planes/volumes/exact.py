@@ -40,9 +40,7 @@ from ..common.limits import (
 Signs = npt.NDArray[np.int8]
 Numbers = npt.NDArray[Any]
 Given = list[tuple[str, Floats]]  # columns, each with the name of its argument
-
-SIGN_ROWS = 8192
-"""Rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back to the system."""
+SIGN_ROWS = 8192  # rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back
 
 Valued = tuple[Any, tuple[Sequence[Numbers], ...]]
 """A determinant, and arrays for each magnitude on which its error depends."""
