@@ -20,24 +20,16 @@ if TYPE_CHECKING:
     from .volumes import overlap as overlap
     from .volumes import volumes as volumes
 
-_PLACES = {
-    "boxes": "broadphase.boxes",
-    "carving": "scene.carving",
-    "distance_field": "bits.distance_field",
-    "fit": "volumes.fit",
-    "label_plane": "bits.label_plane",
-    "overlap": "volumes.overlap",
-    "scene_folder": "files.scene_folder",
-    "shadows": "bits.shadows",
-    "tiles": "bits.tiles",
-    "visible": "bits.visible",
-    "volumes": "volumes.volumes",
-}
+_PLACES = (
+    "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible", "broadphase.boxes",
+    "files.scene_folder", "scene.carving", "volumes.fit", "volumes.overlap", "volumes.volumes",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> ModuleType:
     """Import a module, once."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = globals()[name] = import_module(f"{__package__}.{_PLACES[name]}")
-    return module
+    for place in _PLACES:
+        if place.endswith(f".{name}"):
+            module = globals()[name] = import_module(f"{__package__}.{place}")
+            return module
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -46,7 +46,7 @@ from hitplanes import (  # fmt: skip
     weapon_from_json,
     write_png,
 )
-from hitplanes.weapons.cli.schemas import read_report
+from hitplanes.weapons.cli.report_file import read_report
 from hitplanes.weapons.cli.starter import write_starter
 from hitplanes.weapons.lab.demo import moments, write_demo, write_frames, write_gif
 from hitplanes.weapons.lab.stability.stability import load_study, run_stability

@@ -361,7 +361,7 @@ def test_new_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.parametrize("there", [True, False])
-@pytest.mark.parametrize("where", ["write_png", "write_text"])
+@pytest.mark.parametrize("where", ["write_bytes", "write_text"])
 def test_an_interrupted_new_leaves_nothing(
     there: bool, where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -384,7 +384,7 @@ def test_an_interrupted_new_leaves_nothing(
 def test_the_scene_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed at any time, it leaves nothing that loads, or all."""
     written = []
-    for name in ("write_png", "write_text"):
+    for name in ("write_bytes", "write_text"):
         monkeypatch.setattr(starter, name, lambda path, data: written.append(path.name))
     starter.write_starter(tmp_path / "range")
     assert written[-1] == "scene.json" and len(written) == 8

@@ -10,11 +10,11 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from bench.schemas import schemas
 from test_fire import square
 
 from hitplanes import Disc, History, InputError, Projectile, Rifle, Scene, fire, load_scene
 from hitplanes.planes.scene.items import COLUMNS
-from hitplanes.weapons.cli.schemas import schemas
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"
 SCHEMA = schemas()["scene"]

@@ -13,8 +13,7 @@ from test_golden import AT, CAN, DUCK, WALL, call, contents, shot, without
 
 from hitplanes import Disc, Hits, InputError, Laser, Pistol, Scene, Spread, Sprite, Weapon, fire, read_png
 from hitplanes.weapons.golden.check import FOLDER, Outcome, settle
-from hitplanes.weapons.golden.file import check_present
-from hitplanes.weapons.golden.hits_alone import EXACT, Tolerance, tolerance_of
+from hitplanes.weapons.golden.file import EXACT, Tolerance, check_present, tolerance_of
 
 Settle = Callable[..., Outcome]
 

@@ -12,6 +12,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from bench.schemas import COMMAND, FOLDER, schemas, write_schemas
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -37,7 +38,7 @@ from hitplanes.planes.common.tables import (
     json_of,
 )
 from hitplanes.planes.files.scene_folder import SCENE
-from hitplanes.weapons.cli.schemas import FOLDER, REPORT, read_report, schemas, write_schemas
+from hitplanes.weapons.cli.report_file import REPORT, read_report
 from hitplanes.weapons.kinds.areas import KINDS
 from hitplanes.weapons.replay.shot_log import SHOT, fire_order, orders_of
 
@@ -164,9 +165,7 @@ def test_shipped_schemas_are_made_of_the_tables(tmp_path: Path) -> None:
     assert {p.name for p in shipped.iterdir()} == {p.name for p in tmp_path.iterdir()}
     assert {p.name for p in FOLDER.glob("*.json")} == {p.name for p in tmp_path.iterdir()}, "where it writes by default"
     for path in tmp_path.iterdir():
-        assert path.read_text() == (shipped / path.name).read_text(), (
-            f"run python -m hitplanes.weapons.cli.schemas: {path.name}"
-        )
+        assert path.read_text() == (shipped / path.name).read_text(), f"run {COMMAND}: {path.name}"
         jsonschema.Draft202012Validator.check_schema(json.loads(path.read_text()))
 
 

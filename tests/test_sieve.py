@@ -27,7 +27,7 @@ from hitplanes import (
     load_scene,
 )
 from hitplanes.weapons.cli.command import main
-from hitplanes.weapons.cli.schemas import REPORT
+from hitplanes.weapons.cli.report_file import REPORT
 from hitplanes.weapons.report.canvas import factor_of
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.picture import picture_of_report

@@ -34,7 +34,7 @@ from hitplanes.weapons.lab.stability.stability import (
     run_stability,
     summary,
 )
-from hitplanes.weapons.lab.study import figures
+from hitplanes.weapons.lab.study.study import save_figure
 
 CELLS = [(predicate, family) for predicate in PREDICATES for family in predicate.families]
 ROWS = 40
@@ -464,9 +464,9 @@ def test_parts_are_told_in_few_letters(per_million: float, told: str) -> None:
 def test_figures_look_alike_whatever_the_user_set(few: None, tmp_path: Path) -> None:
     mpl = pytest.importorskip("matplotlib")
     study = Study(0, True, {}, [Cell("circles", "near", 6, {OURS: Count(6, 1, 0)})])
-    figures.save_figure(heatfigure.heat_figure(study), tmp_path / "a.png")
+    save_figure(heatfigure.heat_figure(study), tmp_path / "a.png")
     with mpl.rc_context({"font.size": 30, "savefig.dpi": 20, "ytick.labelsize": 30}):
-        figures.save_figure(heatfigure.heat_figure(study), tmp_path / "b.png")
+        save_figure(heatfigure.heat_figure(study), tmp_path / "b.png")
         assert mpl.rcParams["font.size"] == 30
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 

@@ -21,9 +21,10 @@ from hitplanes.planes.files.scene_folder import cleared
 from hitplanes.planes.volumes import fit
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.lab.stability.stability import load_study, summary
-from hitplanes.weapons.lab.study import area_questions
+from hitplanes.weapons.lab.study import questions
 from hitplanes.weapons.lab.study import study as study_module
-from hitplanes.weapons.lab.study.area_questions import (
+from hitplanes.weapons.lab.study.methods import Cost, Decisions, Method, Question, copied, enlarged, errors_of, measured
+from hitplanes.weapons.lab.study.questions import (
     Discs,
     areas_question,
     discs_at,
@@ -32,7 +33,6 @@ from hitplanes.weapons.lab.study.area_questions import (
     plane_curves,
     volume_curves,
 )
-from hitplanes.weapons.lab.study.methods import Cost, Decisions, Method, Question, copied, enlarged, errors_of, measured
 from hitplanes.weapons.lab.study.study import (
     FILES,
     Effort,
@@ -147,7 +147,7 @@ def planes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def questions(alone: Scene, discs: Discs, shots: int, seed: int) -> list[Question]:
         return [areas_question(discs, plane_curves(discs)[:2])]
 
-    monkeypatch.setattr(study_module, "_questions", questions)
+    monkeypatch.setattr(study_module, "questions_of", questions)
 
 
 def test_decisions_depend_on_the_seed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,8 +189,8 @@ def test_a_plane_at_full_scale_is_the_truth_where_masks_are() -> None:
 
 FITS = {
     "circle": fit.least_circle, "oriented box": fit.oriented_box, "boxes": partial(fit.boxes, k=3), "hull": fit.hull,
-    "polygon": partial(fit.convex, n=5), "concave": partial(area_questions._concave, tolerance=1.0),
-    "triangles": partial(area_questions._triangles, tolerance=0.5),
+    "polygon": partial(fit.convex, n=5), "concave": partial(questions._concave, tolerance=1.0),
+    "triangles": partial(questions._triangles, tolerance=0.5),
 }  # fmt: skip
 
 
@@ -202,7 +202,7 @@ def test_volumes_fitted_to_masks_hold_their_pixel_squares_where_the_objects_are(
             mask = rng.random(rng.integers(2, 9, 2)) < 0.5
             mask[0, 0] = True
             scene.add(mask, (place, place / 3), angle=float(rng.integers(360)))
-    for item, volume in enumerate(area_questions._fit(FITS[name])(scene)):
+    for item, volume in enumerate(questions._fit(FITS[name])(scene)):
         assert holds(volume, *scene.mask(item)), item
 
 
@@ -211,7 +211,7 @@ def test_the_share_of_a_volume_is_that_of_the_pixels_of_a_disc_or_of_a_lattice_o
         side = np.arange(-radius, radius + 1, 1)
         x, y = (grid.ravel() for grid in np.meshgrid(side, side))
         inside = (x * x + y * y <= radius * radius) & (x % every == 0) & (y % every == 0)
-        found = area_questions._looked_at(float(radius)).tolist()
+        found = questions._looked_at(float(radius)).tolist()
         assert sorted(found) == sorted(np.stack([x, y], axis=1)[inside].tolist()) and found[0] == [0, 0]
     scene = Scene()
     scene.add(Sprite.circle(300.5), (0.3, 0.2))
@@ -382,7 +382,7 @@ def test_front_has_none_that_is_slower_and_as_wrong() -> None:
 
 def test_a_diagram_has_a_floor_where_a_method_is_never_wrong() -> None:
     pytest.importorskip("matplotlib")
-    from hitplanes.weapons.lab.study.figures import work_precision
+    from hitplanes.weapons.lab.study.study import work_precision
 
     def texts(error: float) -> list[str]:
         (question,) = told_study(fast=[point(0.2, 1, 4)], other=[point(error, 3, 8)])["questions"]
@@ -485,7 +485,7 @@ def test_a_second_interrupt_leaves_the_tables(tmp_path: Path, monkeypatch: pytes
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hitplanes.weapons.lab.study.figures.work_precision", interrupted)
+    monkeypatch.setattr("hitplanes.weapons.lab.study.study.work_precision", interrupted)
     monkeypatch.setattr("hitplanes.weapons.lab.study.study.run_study", kept_of_another)
     assert main(["study", "-o", str(tmp_path / "study"), "--quick"]) == 130
     assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["study.csv", "study.json", "study.md"]

@@ -28,7 +28,7 @@ from hitplanes.weapons.lab.study.methods import (
     targets_of,
     velocities_of,
 )
-from hitplanes.weapons.lab.study.ray_questions import movers_question, rays_question, spread_question
+from hitplanes.weapons.lab.study.questions import movers_question, rays_question, spread_question
 from hitplanes.weapons.lab.study.truth import Flights, first_pixels, flown, impacts, parts_of_discs, touching
 
 ROOT = Path(__file__).parent.parent

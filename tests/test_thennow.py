@@ -21,7 +21,7 @@ from hitplanes import (
     picture_of_report,
     report_of,
 )
-from hitplanes.weapons.cli.schemas import REPORT
+from hitplanes.weapons.cli.report_file import REPORT
 from hitplanes.weapons.report import report as thennow
 from hitplanes.weapons.report.canvas import OUTLINES
 

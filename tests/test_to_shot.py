@@ -11,6 +11,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from bench.schemas import schemas
 from test_arsenal import EVERY
 
 from hitplanes import (
@@ -41,7 +42,6 @@ from hitplanes import (
 )
 from hitplanes.planes.grid.fixed_point import unit_of
 from hitplanes.weapons.cli.command import main
-from hitplanes.weapons.cli.schemas import schemas
 from hitplanes.weapons.replay.shot_log import orders_of
 from hitplanes.weapons.replay.stream import Progress, fire_log
 

@@ -12,7 +12,7 @@ import pytest
 
 from hitplanes import Disc, Laser, Point, Scene, Spread, Sprite, arsenal_of, fire, load_scene, read_png, report_of
 from hitplanes.weapons.cli.command import main
-from hitplanes.weapons.cli.schemas import read_report
+from hitplanes.weapons.cli.report_file import read_report
 from hitplanes.weapons.report.canvas import factor_of
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.picture import AROUND, compared_pixels, picture_of_difference

@@ -17,21 +17,16 @@ if TYPE_CHECKING:
     from .rays import ray_call as ray_call
     from .replay import shot_log as shot_log
 
-_PLACES = {
-    "owners": "explain.owners",
-    "prepare": "prepared.prepare",
-    "ray_call": "rays.ray_call",
-    "ray_margins": "explain.ray_margins",
-    "ray_samples": "explain.ray_samples",
-    "samples": "explain.samples",
-    "shelter": "fire.shelter",
-    "shot_log": "replay.shot_log",
-}
+_PLACES = (
+    "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.samples", "fire.shelter",
+    "prepared.prepare", "rays.ray_call", "replay.shot_log",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> ModuleType:
     """Import a module, once."""
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = globals()[name] = import_module(f"{__package__}.{_PLACES[name]}")
-    return module
+    for place in _PLACES:
+        if place.endswith(f".{name}"):
+            module = globals()[name] = import_module(f"{__package__}.{place}")
+            return module
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -30,10 +30,7 @@ LARGEST = float(np.finfo(np.float64).max)
 def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
     """Check boxes, Aabbs or finite rows (N, 4) or (N, 6) with min <= max on every axis, and return a copy as rows.
 
-    Raises
-    ------
-    InputError
-        With the row of the first bad box.
+    An InputError names the row of the first bad box.
     """
     if isinstance(values, Aabbs):
         values = np.concatenate([values.min, values.max], axis=1)
@@ -283,30 +280,20 @@ class BruteForce(BroadPhase):
         return self._meeting_all(queries, every, self.ids, work)
 
 
-INDEX_GROWTH = 4
-"""Growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes."""
+INDEX_GROWTH = 4  # growth in boxes at which a structure is rebuilt: its cells were chosen for the first boxes
 
 
 class Index(Derivative):
     """The broad phase of the items of a scene that decide hits, over their inclusive pixel boxes.
 
-    It follows the changes of the scene, at a cost proportional to them.
-
-    Parameters
-    ----------
-    structure : one of STRUCTURES
-
-    Attributes
-    ----------
-    boxes : the structure, None before the first query
-    followed : number of boxes that were updated for the last query
+    It follows the changes of the scene, at a cost proportional to them. `structure` is one of STRUCTURES.
     """
 
     def __init__(self, structure: str) -> None:
         super().__init__()
         self.structure = choice("structure", structure, tuple(STRUCTURES))
-        self.boxes: BroadPhase | None = None
-        self.followed = 0
+        self.boxes: BroadPhase | None = None  # before the first query
+        self.followed = 0  # number of boxes that were updated for the last query
         self._pending = np.zeros(0, np.int64)
         self._made_of = 0
         self._place_of = np.zeros(0, np.int64)

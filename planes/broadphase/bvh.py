@@ -16,13 +16,9 @@ from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
 
 
 class Tree:
-    """A tree of boxes; it stores outer boxes, which leave the boxes room to move.
+    """A tree of one or more boxes, rows (N, 2d); it stores outer boxes, which leave the boxes room to move.
 
-    Parameters
-    ----------
-    ids : (N,) int64, N >= 1
-    rows : (N, 2d) float64, the boxes
-    slack : length by which a leaf may grow before it counts as worn
+    A leaf may grow by a length, the slack, before it counts as worn.
     """
 
     def __init__(self, ids: Ints, rows: Floats, slack: float) -> None:

@@ -21,8 +21,7 @@ FIRST_BITS = 3
 NOWHERE, BESIDE, MAIN, FRESH = range(4)
 """Where a box is listed: not at all, in the list of oversized boxes, in the sorted cells, in the fresh entries."""
 
-KEY_BITS = {2: 31, 3: 21}
-"""Bits of a key for the cell number on each axis, by dimension; cells beyond share the last number."""
+KEY_BITS = {2: 31, 3: 21}  # bits of a key for the cell on each axis, by dimension; cells beyond share the last number
 
 SMALLEST = float(np.finfo(np.float64).tiny)
 

@@ -23,8 +23,7 @@ from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
 from ..grid.spans import pieces, ragged
 from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
 
-Nodes = dict[str, npt.NDArray[Any]]
-"""Rows of nodes, one array per field of FIELDS."""
+Nodes = dict[str, npt.NDArray[Any]]  # rows of nodes, one array per field of FIELDS
 
 FIELDS: dict[str, tuple[type, int]] = {
     "cell": (np.float64, 4),  # as drawn: the root in quarters
@@ -39,8 +38,7 @@ FIELDS: dict[str, tuple[type, int]] = {
     "length": (np.int64, 0),
 }
 Paths = tuple[Ints, Ints, Bools]
-BULK = 64
-"""The root cell leaves out one box in this many on each side, and is then doubled: outliers do not stretch it."""
+BULK = 64  # the root cell leaves out one box in this many on each side, and is then doubled: outliers do not stretch it
 
 
 class Quadtree(BroadPhase):

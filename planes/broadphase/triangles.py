@@ -21,16 +21,12 @@ from ..volumes.exact import chunked, orient2d, orient3d
 from ..volumes.overlap import overlap
 from ..volumes.volumes import Polygons
 
-Corners = Floats
-"""Triangles of n rows, as columns (3, 3, n): corner, axis, row."""
-
-Sides = Ints
-"""Sides of a plane on which three corners lie, as one number (n,) for their signs: 9 s0 + 3 s1 + s2 + 13."""
+Corners = Floats  # triangles of n rows, as columns (3, 3, n): corner, axis, row
+Sides = Ints  # sides of a plane on which three corners lie, as one number (n,) for their signs: 9 s0 + 3 s1 + s2 + 13
 
 SIDES = [(s0, s1, s2) for s0, s1, s2 in product((-1, 0, 1), repeat=3)]
 IN_PLANE = SIDES.index((0, 0, 0))
-KEPT = ((1, 2), (2, 0), (0, 1))
-"""Axes that remain if x, y or z is dropped, in the order that keeps the turning sense."""
+KEPT = ((1, 2), (2, 0), (0, 1))  # axes that remain if x, y or z is dropped, in the order that keeps the turning sense
 
 
 def triangles_meet(a: npt.ArrayLike, b: npt.ArrayLike, conservative: bool = False) -> Bools:

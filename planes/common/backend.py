@@ -106,9 +106,7 @@ def use_threads(count: int | None = None) -> None:
 def in_parts(count: int, least: float, work: Callable[[int, int], Part]) -> list[Part]:
     """Split range(count) into parts, run `work(first, end)` on each in its own thread, and return the results in order.
 
-    Parameters
-    ----------
-    least : smallest part that is worth a thread
+    No part is smaller than `least`, which is worth a thread.
     """
     parts = int(min(_threads[0] if _threads else _cores(), count // max(least, 1)))
     if parts < 2:
@@ -169,13 +167,10 @@ Value = TypeVar("Value")
 
 
 class LruCache(Generic[Key, Value]):
-    """A least-recently-used cache of bounded size; a value larger than the limit is kept alone.
+    """A least-recently-used cache of at most `limit` bytes; a value larger than that is kept alone.
 
-    Parameters
-    ----------
-    limit : bytes of all values and keys
-    size : bytes of a value, with everything that is later derived from it and kept with it
-    key_size : bytes of a key, if keys may be large
+    `size` tells the bytes of a value, with everything that is later derived from it and kept with it, and `key_size`
+    those of a key, if keys may be large.
     """
 
     def __init__(self, limit: int, size: Callable[[Value], int], key_size: Callable[[Key], int] = lambda _: 0) -> None:

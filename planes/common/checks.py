@@ -22,16 +22,12 @@ Image = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.unsignedinteger[Any]]  # of a label plane, see `hitplanes.planes.bits.label_plane`
 Shape = tuple[int | None, ...]
 
-SHOWN = 60
-"""Most characters of a value that an error shows."""
+SHOWN = 60  # most characters of a value that an error shows
 
 FLOAT_MAX = sys.float_info.max
 
-FLOAT_BITS = 1023
-"""Whole numbers of fewer bits than this fit a float."""
-
-NAMES_SHOWN = 20
-"""Most names that an error lists: beyond it the nearest name says more than a list."""
+FLOAT_BITS = 1023  # whole numbers of fewer bits than this fit a float
+NAMES_SHOWN = 20  # most names that an error lists: beyond it the nearest name says more than a list
 
 
 class InputError(ValueError):
@@ -74,23 +70,9 @@ def each(field: str, value: object, n: int) -> npt.NDArray[Any]:
 
 
 def reals(field: str, values: object, shape: Shape, limit: float = math.inf) -> Floats:
-    """Check an array of finite numbers.
+    """Check an array of finite numbers, anything that `numpy.asarray` takes, and return it as float64.
 
-    Parameters
-    ----------
-    field : name for the error
-    values : anything that `numpy.asarray` takes
-    shape : expected shape; None stands for any length
-    limit : largest absolute value
-
-    Returns
-    -------
-    float64 array of that shape
-
-    Raises
-    ------
-    InputError
-        If it is not numeric, not finite, of another shape, or beyond the limit.
+    In the shape None stands for any length; the limit is of absolute values. Errors name the field.
     """
     array = _float64(_numeric(field, values, shape, "iuf"))
     if not all_within(array, -min(limit, FLOAT_MAX), min(limit, FLOAT_MAX)):

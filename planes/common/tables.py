@@ -16,8 +16,7 @@ from typing import Any, Protocol
 from .checks import InputError, array_of, bools, choice, flag, integer, integers, real, reals, shown, within
 from .limits import MASK_SIDE_MAX
 
-TEXT_MAX = 200
-"""Longest name, characters: a longer one would not fit a line of a report."""
+TEXT_MAX = 200  # longest name, characters: a longer one would not fit a line of a report
 
 DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)\s*(\..*)?", re.IGNORECASE)
 """File names that Windows reserves for devices, with any ending."""

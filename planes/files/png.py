@@ -27,13 +27,7 @@ else:
         """Stands for the module `cv2`."""
 
         def __getattr__(self, name: str) -> Any:
-            """Import OpenCV, or say what to install.
-
-            Raises
-            ------
-            InputError
-                If it cannot be imported.
-            """
+            """Import OpenCV, or say what to install, in an InputError."""
             try:
                 import cv2
             except ImportError as error:
@@ -45,15 +39,13 @@ else:
 
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-START = 33
-"""Length of the signature and the header chunk, bytes."""
+START = 33  # length of the signature and the header chunk, bytes
 
 GREY, RGB, PALETTE, GREY_ALPHA, RGBA = 0, 2, 3, 4, 6
 CHANNELS = {GREY: 1, RGB: 3, PALETTE: 1, GREY_ALPHA: 2, RGBA: 4}
 DEPTHS = {GREY: (1, 2, 4, 8, 16), RGB: (8, 16), PALETTE: (1, 2, 4, 8), GREY_ALPHA: (8, 16), RGBA: (8, 16)}
 FILTERS = 5
-WHOLE = ((0, 0, 1, 1),)
-"""The only pass of an image that is not interlaced: first column and row, and the steps between them."""
+WHOLE = ((0, 0, 1, 1),)  # the only pass of an image that is not interlaced: first column and row, steps between them
 
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 """Passes of an interlaced image, in the same form."""
@@ -61,8 +53,7 @@ ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (
 NO_FSYNC = (errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF, errno.EACCES, errno.EPERM)
 """Errors of systems that cannot sync a folder to disk: Windows, and folders that are not readable."""
 
-FILE_BYTES_MAX = 16 * MASK_AREA_MAX
-"""Largest PNG file, bytes (1 GiB): twice the largest image in 16-bit RGBA without compression."""
+FILE_BYTES_MAX = 16 * MASK_AREA_MAX  # of a PNG (1 GiB): twice the largest image in 16-bit RGBA without compression
 
 
 @dataclass(frozen=True)
@@ -112,13 +103,7 @@ def possible(what: str) -> Iterator[None]:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file in UTF-8.
-
-    Raises
-    ------
-    InputError
-        If it is missing, too large, not UTF-8, or not a regular file, such as a pipe.
-    """
+    """Read a text file in UTF-8; an InputError says if it is missing, too large, not UTF-8, or a pipe or device."""
     path = path_of("path", path)
     with possible("cannot read it"):
         if path.exists() and not (path.is_file() or path.is_dir()):
@@ -198,17 +183,9 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def put_in_place(aside: Path, path: Path) -> None:
-    """Sync a complete file to disk and rename it: a power loss leaves either the old file or all of the new one.
+    """Sync a complete file, or a folder of such, to disk and rename it within its folder; else raise an OSError.
 
-    Parameters
-    ----------
-    aside : a complete file, or a folder of complete files
-    path : its new name, in the same folder
-
-    Raises
-    ------
-    OSError
-        If it cannot be synced or renamed.
+    A power loss leaves either the old file or all of the new one.
     """
     is_folder = aside.is_dir()
     for part in aside.iterdir() if is_folder else (aside,):

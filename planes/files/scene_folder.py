@@ -57,8 +57,7 @@ from ..scene.variants import FLIPS
 from .png import possible, read_png, read_text, write_png, write_text
 
 FORMAT = "hitplanes-scene/2"
-ONE_FILTER = "hitplanes-scene/1"
-"""Older format, in which `accept` of a shot is the filter of what blocks, too."""
+ONE_FILTER = "hitplanes-scene/1"  # older format, in which `accept` of a shot is the filter of what blocks, too
 
 FILE_NAME = "scene.json"
 SECTIONS = {
@@ -73,19 +72,15 @@ PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
 ID = Whole(0, ITEMS_MAX - 1)
-CELLS_MOST = 512
-"""Most cells along a pixel of a carved sprite: what the largest scale needs, turned."""
+CELLS_MOST = 512  # most cells along a pixel of a carved sprite: what the largest scale needs, turned
 
 CARVED = Keys({"image": Text(), "frame": Whole(0, 2**31 - 1), "cells_per_px": Whole(1, CELLS_MOST)}, ("image",))
 FRAMES = Keys({"grid_wh": Wholes((2,), 1, MASK_SIDE_MAX), "rects_xywh": Wholes((None, 4), 0, MASK_SIDE_MAX)})
 COMMON: dict[str, Value] = {"angle_step": Number(360 / ANGLE_STEPS_MAX, 360), "carved": Rows(Within(CARVED))}
 OF_IMAGES: dict[str, Value] = {
-    "alpha_threshold": Whole(0, 255),
-    "color_key": COLOR,
-    "pivot_xy": OneOrEach(PIVOT, Numbers((None, 2), MASK_SIDE_MAX)),
-    "frame_names": Names(),
-    **COMMON,
-}
+    "alpha_threshold": Whole(0, 255), "color_key": COLOR,
+    "pivot_xy": OneOrEach(PIVOT, Numbers((None, 2), MASK_SIDE_MAX)), "frame_names": Names(), **COMMON,
+}  # fmt: skip
 SOURCES: dict[str, dict[str, Value]] = {
     "image": {"image": Text(), "frames": Within(FRAMES), **OF_IMAGES},
     "images": {"images": Rows(Text()), **OF_IMAGES},
@@ -95,46 +90,26 @@ SOURCES: dict[str, dict[str, Value]] = {
     "mask": {"mask": Mask(), "pivot_xy": PIVOT, "color": COLOR, **COMMON},
 }
 POSE: dict[str, Value] = {
-    "angle": Number(),
-    "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
-    "flip": Word(FLIPS),
-    "frame": Either(str, Text(), Whole(0, 2**31 - 1)),
-    "layer": Whole(-LAYER_MAX, LAYER_MAX),
-    "cost": Whole(0, COST_MAX),
-    "velocity_xy": Numbers((2,), REACH_MAX),
-}
+    "angle": Number(), "scale": Either(list, Numbers((2,), SCALE_MAX, low=SCALE_MIN), Number(SCALE_MIN, SCALE_MAX)),
+    "flip": Word(FLIPS), "frame": Either(str, Text(), Whole(0, 2**31 - 1)), "layer": Whole(-LAYER_MAX, LAYER_MAX),
+    "cost": Whole(0, COST_MAX), "velocity_xy": Numbers((2,), REACH_MAX),
+}  # fmt: skip
 PLACED: dict[str, Value] = {
-    "id": ID,
-    "name": Text(),
-    "position_xy": POINT,
-    **POSE,
-    "categories": Names(),
-    "owner": Either(str, Text(), ID),
-}
+    "id": ID, "name": Text(), "position_xy": POINT, **POSE, "categories": Names(), "owner": Either(str, Text(), ID),
+}  # fmt: skip
 OBJECT = {kind: Keys({**PLACED, **keys}, (kind, "position_xy")) for kind, keys in SOURCES.items()}
 BOUNDS = Keys(
     {"origin_xy": Wholes((2,), -POSITION_MAX, POSITION_MAX), "size_wh": Wholes((2,), 1, POSITION_MAX)}, ("size_wh",)
 )
-SCENE = Keys(
-    {
-        "$schema": Text(),
-        "format": Const(FORMAT, (ONE_FILTER,)),
-        "name": Text(),
-        "bounds": Optional(Within(BOUNDS)),
-        "categories": Names(),
-        "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
-        "weapons": Mapped(Ref("weapon")),
-        "shots": Rows(Ref("shot")),
-    },
-    ("format",),
-)
+SCENE = Keys({
+    "$schema": Text(), "format": Const(FORMAT, (ONE_FILTER,)), "name": Text(), "bounds": Optional(Within(BOUNDS)),
+    "categories": Names(), "objects": Within(Keys({section: Rows(Ref("object")) for section in SECTIONS})),
+    "weapons": Mapped(Ref("weapon")), "shots": Rows(Ref("shot")),
+}, ("format",))  # fmt: skip
 """The form of a scene file. Objects, weapons and shots are checked separately when they are read."""
 
-SHEET_WIDTH = 4096
-"""Approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px."""
-
-MASK_ROWS_AREA = 4096
-"""Largest mask that is saved as rows of text, px; larger ones are saved as images."""
+SHEET_WIDTH = 4096  # approximate width of the sheet on which the frames of a saved sprite are laid out in rows, px
+MASK_ROWS_AREA = 4096  # largest mask that is saved as rows of text, px; larger ones are saved as images
 
 
 @dataclass
@@ -166,13 +141,7 @@ class SceneFile:
 
 
 def read_scene(folder: Path) -> SceneFile:
-    """Read a scene folder.
-
-    Raises
-    ------
-    InputError
-        With the names of the file, the section, the row and the field.
-    """
+    """Read a scene folder; an InputError names the file, the section, the row and the field."""
     path = folder / FILE_NAME
     with within(str(path)):
         data = SCENE.check("scene", json_of(read_text(path)))
@@ -344,8 +313,9 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     color = {} if sprite.color is None else {"color": list(sprite.color)}
     options: dict[str, Any] = {} if sprite.angle_step is None else {"angle_step": sprite.angle_step}
     if sprite.carvings:
+        carved = f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
         options["carved"] = [
-            {"image": _write_apart(folder, _carved_name(sprite), _cells(one), images), "frame": frame,
+            {"image": _write_apart(folder, carved, _cells(one), images), "frame": frame,
              "cells_per_px": one.per_px}
             for frame, one in sorted(sprite.carvings.items())
         ]  # fmt: skip
@@ -367,10 +337,6 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     if sprite.frame_names:
         options["frame_names"] = list(sprite.frame_names)
     return {"image": _write_apart(folder, _image_name(sprite), sheet, images), **options}
-
-
-def _carved_name(sprite: Sprite) -> str:
-    return f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
 
 
 def _cells(carving: Carving) -> Image:
@@ -527,13 +493,7 @@ def new_folder(folder: Path) -> Iterator[list[Path]]:
 
 
 def own_folder(folder: Path, names: Sequence[str]) -> None:
-    """Make a folder, or accept one that holds only files of these names.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made, or holds other files.
-    """
+    """Make a folder, or accept one that holds only files of these names; else an InputError."""
     with possible(f"--output: cannot make {folder}"):
         if folder.exists() and not folder.is_dir():
             raise InputError(f"--output: expected a folder, got the file {folder}")
@@ -545,13 +505,7 @@ def own_folder(folder: Path, names: Sequence[str]) -> None:
 
 
 def cleared(folder: Path, names: Sequence[str]) -> None:
-    """Remove the files of these names that exist.
-
-    Raises
-    ------
-    InputError
-        If one cannot be removed.
-    """
+    """Remove the files of these names that exist; an InputError names one that cannot be removed."""
     for name in names:
         with possible(f"--output: cannot remove {folder / name}"):
             (folder / name).unlink(missing_ok=True)

@@ -18,11 +18,8 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
 from ..common.limits import HALF, POSITION_MAX, SUB, TRIG_BITS
 
-UNIT = 1 << TRIG_BITS
-"""1 as a component of a direction."""
-
-DOUBT = 2.0**-12
-"""A scaled sine nearer to a tie than this is in doubt; float sines err by a few ulp, 2**-21 after the scaling."""
+UNIT = 1 << TRIG_BITS  # 1 as a component of a direction
+DOUBT = 2.0**-12  # a scaled sine nearer to a tie is in doubt; float sines err by a few ulp, 2**-21 after the scaling
 
 
 def nearest(degrees: Floats) -> tuple[Ints, Ints, Ints]:
@@ -59,8 +56,7 @@ Whole = TypeVar("Whole", int, Ints)
 _PI = (31415926535897932384626433832795028841971693993751, 10**49)
 _FIXED_BITS = 160  # as exact as _PI
 
-ANGLES_KEPT = 2**12
-"""Angles whose directions are kept: objects turn by the same steps again and again."""
+ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
 
 def snap(values: object) -> Ints:
@@ -210,8 +206,7 @@ def _over_length(component: int, squared_length: int) -> int:
 
 LIMIT, SCALE = np.array(float(POSITION_MAX)), np.array(float(SUB))
 
-ROUNDING = np.array(1.5 * 2.0**52)
-"""A float64 of this size has no fraction: adding a number to it rounds that to a whole number, half to even."""
+ROUNDING = np.array(1.5 * 2.0**52)  # a float64 of this size has no fraction: a number added is rounded, half to even
 
 ROUNDING_BITS = ROUNDING.view(np.int64)
 """Bits of ROUNDING: subtracted from the bits of the sum they leave that whole number, twice as fast as a conversion."""
@@ -236,16 +231,11 @@ def pixels(at_256: Ints) -> Ints:
 def place(
     ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
 ) -> bool:
-    """Move items to new positions; return whether that was done.
+    """Move items of ids (n,) to new positions (n, 2), px; neither array is kept. Return whether that was done.
 
-    Nothing is changed unless the ids are rising and all in the scene, and all positions finite and in range.
-
-    Parameters
-    ----------
-    ids, xy : (n,) and (n, 2), px; neither is kept
-    count : number of ids of the scene
-    alive, edge, position_256, box : columns of `Items`; the last two are changed
-    before, after : (n, 4), filled with the boxes of the items
+    Nothing is changed unless the ids, of which a scene has `count`, are rising and all in the scene, and all positions
+    finite and in range. Of the columns of `Items` the last two are changed; `before` and `after` (n, 4) are filled with
+    the boxes of the items.
     """
     if not (rising(ids, count) and all_within(xy, -POSITION_MAX, POSITION_MAX) and alive.take(ids).all()):
         return False

@@ -29,11 +29,8 @@ from .spans import Spans, each_pixel, ragged
 
 Runs = tuple[Ints, Ints, Ints]
 
-WIDEST = 2**40
-"""A column beyond all others, px."""
-
-QUOTIENT_ERROR = 2.0**-50
-"""A quotient of two numbers, each rounded to float64, times a row number has a relative error below it."""
+WIDEST = 2**40  # a column beyond all others, px
+QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, rounded to float64, times a row number
 
 
 def disc(radius: int) -> Spans:
@@ -103,17 +100,11 @@ def polygon(rings: Sequence[Ints]) -> Spans:
 
 
 class RowRuns(NamedTuple):
-    """Runs of several shapes, row by row.
+    """Runs of several shapes, row by row."""
 
-    Parameters
-    ----------
-    shape, y : (k,) shape and row, sorted
-    parts : first and last pixels (k,) of parts, which have one run a row; an empty one is (WIDEST, -WIDEST)
-    """
-
-    shape: Ints
-    y: Ints
-    parts: list[tuple[Ints, Ints]]
+    shape: Ints  # of each run (k,), sorted
+    y: Ints  # row of each run (k,), sorted within its shape
+    parts: list[tuple[Ints, Ints]]  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
 
     def spans(self) -> Spans:
         """The pixels of a single shape."""
@@ -350,34 +341,20 @@ def _flat_ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
     return Spans.from_runs(y[on], x[on], x[on])
 
 
-DIAGONAL = 182
-"""Half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre."""
-
-COMMON = 2**60
-"""Scale of the times of rays at moving items, where each item would otherwise have a scale of its own."""
-
-ROOM = 2**62
-"""Products below it leave room for a sum in int64; larger ones are computed in Python integers."""
-
-FAR = 2**90
-"""Squares below it differ from those of their float roots by less than 2**46, which one Newton step corrects."""
+DIAGONAL = 182  # half the diagonal of a pixel in 1/256 px, rounded up: no point of a pixel lies farther from its centre
+COMMON = 2**60  # scale of the times of rays at moving items, where each item would otherwise have a scale of its own
+ROOM = 2**62  # products below it leave room for a sum in int64; larger ones are computed in Python integers
+FAR = 2**90  # squares below it differ from those of their float roots by less than 2**46: one Newton step corrects it
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Segments of one width, as columns.
+    """Segments of one width, as columns."""
 
-    Parameters
-    ----------
-    start, step : (n, 2) starts, and vectors from there to the ends, 1/256 px
-    radius : half of the width, 1/256 px; 0 for thin rays
-    common : scale of the times of all segments; 0 if each has its own
-    """
-
-    start: Ints
-    step: Ints
-    radius: int
-    common: int = 0
+    start: Ints  # (n, 2) 1/256 px
+    step: Ints  # (n, 2) vectors from there to the ends, 1/256 px
+    radius: int  # half of the width, 1/256 px; 0 for thin rays
+    common: int = 0  # scale of the times of all segments; 0 if each has its own
 
     def __len__(self) -> int:
         return len(self.start)
@@ -576,16 +553,10 @@ def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, In
 
 
 def cells_of(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:
-    """Cells of segments, in any order.
+    """Cells of segments (n, 2), up to 2**48 and of half a width, all in 1/256 px, in any order.
 
-    Parameters
-    ----------
-    start_256, end_256 : (n, 2) 1/256 px, up to 2**48
-    radius_256 : half of the width
-
-    Returns
-    -------
-    segment (k,), pixel (k, 2), entry (k,) and exit (k,); and the scale (n,) of the times: the time at a segment's end
+    Returned are segment (k,), pixel (k, 2), entry (k,) and exit (k,); and the scale (n,) of the times, which is the
+    time at a segment's end.
     """
     origin = (start_256 + HALF) // SUB
     lines = Lines(start_256 - SUB * origin, end_256 - start_256, radius_256)

@@ -93,9 +93,7 @@ def meets(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Bools:
 def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Ints]:
     """Union of runs on numbered rows, as maximal runs sorted by (row, x_first); empty runs are dropped.
 
-    Returns
-    -------
-    number of the first run that went into each maximal run, x_first, x_last
+    Returned are the number of the first run that went into each maximal run, x_first, and x_last.
     """
     filled = np.flatnonzero(x_first <= x_last)
     order = filled[np.lexsort((x_first[filled], row[filled]))]
@@ -209,14 +207,9 @@ Strip = tuple[int, int, int, int]
 
 NO_STRIPS: Ints = np.zeros((0, 4), np.int64)
 
-SCALE = 2**10
-"""Approximate length of the normals of strips: they are whole numbers."""
-
-TILE = 48
-"""Typical side of the boxes that patterns are tested against, px: a strip rejects larger boxes less often."""
-
-PAYS = 0.75
-"""Strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too."""
+SCALE = 2**10  # approximate length of the normals of strips: they are whole numbers
+TILE = 48  # typical side of the boxes that patterns are tested against, px: a strip rejects larger boxes less often
+PAYS = 0.75  # strips are used if at most this part of the boxes that overlap a pattern's box pass its strip, too
 
 
 def strips_of(strips: Sequence[Strip] | Ints, boxes_xyxy: Ints) -> Ints:
@@ -232,11 +225,8 @@ def strip_of(spans: Spans) -> Strip:
     """The narrow strip that holds a set of pixels, as (a, b, low, high): low <= a * x + b * y <= high.
 
     Its normal is the direction in which the pixels are least spread, by their second moments. This is the separating
-    axis of an oriented box; compiled kernels have the same test inline.
-
-    References
-    ----------
-    Gottschalk, Lin and Manocha, "OBBTree: a hierarchical structure for rapid interference detection" (1996).
+    axis of an oriented box (Gottschalk, Lin and Manocha, "OBBTree: a hierarchical structure for rapid interference
+    detection", 1996); compiled kernels have the same test inline.
     """
     if not len(spans):
         return 0, 0, 0, 0

@@ -38,17 +38,10 @@ from .bit_rows import (
 )
 from .cache import compiled
 
-FEW = 4
-"""Most placements that compare all tiles; for more, tiles are listed in cells of the world first."""
-
-CELL_BITS = 6
-"""Least side of those cells, 2**CELL_BITS = 64 px; no tile is wider."""
-
-PAD = WORD
-"""Empty rows before and after each column of words of a pattern, see `bits.bit_rows.PatternBits`."""
-
-LISTED = 50.0
-"""Pairs of a placement and a tile that take as long as one that the placement's cell lists."""
+FEW = 4  # most placements that compare all tiles; for more, tiles are listed in cells of the world first
+CELL_BITS = 6  # least side of those cells, 2**CELL_BITS = 64 px; no tile is wider
+PAD = WORD  # empty rows before and after each column of words of a pattern, see `bits.bit_rows.PatternBits`
+LISTED = 50.0  # pairs of a placement and a tile that take as long as one that the placement's cell lists
 
 SUMS = types.Array(types.uint32, 1, "C", readonly=True)
 OWNERS = types.Array(types.int64, 2, "A", readonly=True)
@@ -199,8 +192,7 @@ def _accepted(near, count, occluder, categories, owner, meets, exclude, who):
 TURN, RANK, SAMPLES, WEIGHT, PIXELS, PELLETS, KEY, X, Y = range(9)
 """Columns of rows; KEY becomes a squared distance. While a round is counted, Y holds the last pellet of a row."""
 
-TOGETHER = WORD + 8
-"""Words of the pixels of a tile that pellets of a round have hit."""
+TOGETHER = WORD + 8  # words of the pixels of a tile that pellets of a round have hit
 
 
 @njit
@@ -255,9 +247,7 @@ def hull_of(box, near, count, left, top, bottom):
 def weighed(tiles, tile, windows, word, step, shift, low, high, sums, begin, wide):
     """Sum of the weights of the pixels that a tile shares with a window, run by run.
 
-    Parameters
-    ----------
-    sums, begin, wide : sums along rows; the place of the tile's first column in row `low`; numbers of a row
+    `sums` are along rows; `begin` is the place of the tile's first column in row `low`, `wide` the numbers of a row.
     """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left, total = np.uint64(shift), np.uint64(63 - shift), np.int64(0)

@@ -28,11 +28,8 @@ FAR = np.int64(2**62)
 EVERYWHERE = (-(2**62), -(2**62), 2**62, 2**62)
 ONE = np.uint64(1)
 ROW_BITS, WORD_ROWS = 7, 127
-ROOM, ROOM_LEAST = 8, 64
-"""Initial room for rows: ROOM for each placement, plus ROOM_LEAST."""
-
-FEW_ROWS = 128
-"""Most rows of a placement that are sorted by insertion; if any has more, all rows are sorted at the end."""
+ROOM, ROOM_LEAST = 8, 64  # initial room for rows: ROOM for each placement, plus ROOM_LEAST
+FEW_ROWS = 128  # most rows of a placement that are sorted by insertion; if any has more, all rows are sorted at the end
 
 SIDE, SIDE_BITS = np.int64(2**17), 19  # farther than any pixel of a pattern from its origin
 
@@ -109,10 +106,7 @@ begin with the placement and the rank that it hits, and end with squared distanc
 def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any) -> Ints | None:
     """Rows of all placements, as columns, in threads if there are enough; None if the kernel cannot decide them.
 
-    Parameters
-    ----------
-    least : least number of placements of a thread
-    given : further arguments of the kernel
+    A thread has at least so many placements; `given` are further arguments of the kernel.
     """
     parts = in_parts(count, least, lambda first, last: _filled(kernel, columns, first, last, given))
     known = [part for part in parts if part is not None]
@@ -166,11 +160,8 @@ def pixel_of(key, own, top):
 def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     """Count the pixels that a tile shares with a window, in rows `low` to `high` of the world.
 
-    There is no branch in the loop, so that eight rows take one instruction each.
-
-    Returns
-    -------
-    samples; squared distance, x and y of the nearest pixel, relative to the origin at (own, level), ties by (y, x)
+    There is no branch in the loop, so that eight rows take one instruction each. Returned are the samples, and the
+    squared distance, x and y of the nearest pixel, relative to the origin at (own, level), ties by (y, x).
     """
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
     right, left = np.uint64(shift), np.uint64(63 - shift)
@@ -209,8 +200,7 @@ def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right
     return seen
 
 
-BEYOND = 2**40
-"""Farther than any column."""
+BEYOND = 2**40  # farther than any column
 
 
 @njit(inline="always")
@@ -372,8 +362,7 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
     )
 
 
-BRUTE_PAIRS = 2**21
-"""Most pairs of boxes that are compared one by one; with more, numpy lists them in cells."""
+BRUTE_PAIRS = 2**21  # most pairs of boxes that are compared one by one; with more, numpy lists them in cells
 
 
 @njit(inline="always")

@@ -17,8 +17,7 @@ from ..grid.spans import Box
 from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
 from .cache import compiled
 
-TERMS = 8
-"""Terms of each series; up to 45 degrees the rest is below 2**-53."""
+TERMS = 8  # terms of each series; up to 45 degrees the rest is below 2**-53
 
 SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(TERMS))
 COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(TERMS + 1))
@@ -537,8 +536,7 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
 ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)
 SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
 
-AT_ONCE = 256
-"""Least number of pellets that are drawn at a time; those of a round are drawn together."""
+AT_ONCE = 256  # least number of pellets that are drawn at a time; those of a round are drawn together
 
 
 @njit(inline="always")

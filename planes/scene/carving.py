@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from .items import Items
     from .scene import Scene
 
-SLACK = 17, 16
-"""A fraction a little above 1, by which cells are finer than they must be: it covers all rounding of positions."""
+SLACK = 17, 16  # a fraction above 1, by which cells are finer than they must be: it covers all rounding of positions
 
 
 class HitPixels(Protocol):
@@ -75,13 +74,9 @@ class Hole(NamedTuple):
 
 
 def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int]) -> Hole:
-    """The pixels of a mask that are among pixels of the world.
+    """The pixels of a mask (h, w) that are among pixels of the world, given as Spans or (n, 2) whole numbers.
 
-    Parameters
-    ----------
-    field : name for the error
-    pixels : Spans, or (n, 2) whole numbers
-    mask, corner_xy : (h, w), and the world pixel (x, y) at [0, 0]
+    The mask has its pixel [0, 0] at a corner (x, y); `field` is for errors.
     """
     if isinstance(pixels, Spans):
         x, x_last, y = pixels.x_first, pixels.x_last, pixels.y
@@ -98,13 +93,7 @@ def hole_of(field: str, pixels: object, mask: Bools, corner_xy: tuple[int, int])
 
 
 def carved(sprite: Sprite, variant: Variant, hole: Hole) -> Sprite:
-    """A sprite without some pixels of its mask in one pose; all other pixels of that mask stay.
-
-    Parameters
-    ----------
-    variant : the mask in that pose
-    hole : pixels of the mask
-    """
+    """A sprite without some pixels, a hole, of its mask in one pose, a variant; all others of that mask stay."""
     form = variant.form
     cells = _fine_cells(sprite, form)
     gone, per_px, (_, pivot) = cells.gone, cells.per_px, local_grid(sprite, form.frame)
@@ -200,11 +189,6 @@ def _around(mask: Bools) -> Bools:
     return wide
 
 
-def _signs(form: Transform) -> Ints:
-    """-1 for each axis that is flipped."""
-    return np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
-
-
 def _cells_near(form: Transform, variant: Variant, hole: Hole, per_px: int, pivot: tuple[int, int]) -> list[list[int]]:
     """First and last + 1 of the columns and of the rows of cells that may lie in a hole of a variant."""
     x, y = (np.array([at, at + n]) for at, n in zip(hole[1:], hole.hit.shape[::-1], strict=True))
@@ -212,7 +196,7 @@ def _cells_near(form: Transform, variant: Variant, hole: Hole, per_px: int, pivo
     corners -= variant.pivot_x, variant.pivot_y
     c, s = form.direction
     scale = np.array([form.scale_x, form.scale_y])
-    back = rounded_div(turned(corners, c, -s) * ONE, scale) * _signs(form) + pivot + HALF
+    back = rounded_div(turned(corners, c, -s) * ONE, scale) * form.signs + pivot + HALF
     margin = 2 + 2 * per_px * ONE // (SUB * int(scale.min()))  # positions were rounded to 1/256 px
     cells = back * per_px // SUB
     bounds: list[list[int]] = np.stack([cells.min(axis=0) - margin, cells.max(axis=0) + margin], axis=1).tolist()
@@ -226,7 +210,7 @@ def _pixels_of_cells(
     c, s = form.direction
     x, y = (
         rounded_div(((2 * cell + 1 - per_px) * SUB - 2 * per_px * at) * int(sign) * scale, 2 * per_px * ONE)
-        for cell, at, sign, scale in zip(cells, pivot, _signs(form), (form.scale_x, form.scale_y), strict=True)
+        for cell, at, sign, scale in zip(cells, pivot, form.signs, (form.scale_x, form.scale_y), strict=True)
     )
     across, down = x[None, :], y[:, None]
     return (

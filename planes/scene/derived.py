@@ -32,28 +32,19 @@ if TYPE_CHECKING:
 
 Made = TypeVar("Made")
 
-NEVER = -1
-"""A version before all others."""
-
-VIEWS_MOST = 8
-"""Most visible sets of a scene, one for each view."""
-
-AGAIN_MOST = 8
-"""Most things of a scene that are made when they are asked for a second time."""
+NEVER = -1  # a version before all others
+VIEWS_MOST = 8  # most visible sets of a scene, one for each view
+AGAIN_MOST = 8  # most things of a scene that are made when they are asked for a second time
 
 
 class Derivative:
     """Something derived from the items of a scene, made when calls have lost as much time without it as it takes.
 
-    Threads may read it as long as none changes the scene.
-
-    Attributes
-    ----------
-    regret : time that calls have lost for want of it, ns; it begins anew when the thing is made, or goes stale
+    Threads may read it as long as none changes the scene. `regret` is the time that calls have lost for want of it, ns.
     """
 
     def __init__(self) -> None:
-        self.regret = 0.0
+        self.regret = 0.0  # begins anew when the thing is made, or goes stale
         self._seen = NEVER
         self._lock = threading.RLock()
 
@@ -73,12 +64,7 @@ class Derivative:
 
 
 class Derived:
-    """All that is derived from the items of a scene within its bounds; each thing is there when it is first asked for.
-
-    Parameters
-    ----------
-    bounds : inclusive box of the world, or None
-    """
+    """All that is derived from the items of a scene within its bounds, if any; each is made when first asked for."""
 
     def __init__(self, bounds: Box | None) -> None:
         self._bounds = bounds

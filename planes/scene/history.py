@@ -29,11 +29,8 @@ from .variants import MaskAtlas, variant_of
 
 T = TypeVar("T")
 
-RUNS_SHOWN = 8
-"""Most runs of ticks that an error lists; of more it gives only the number."""
-
-PART_BITS = 31
-"""A step between two ticks is cut into fewer than 2**31 parts: the square of their number stays inside int64."""
+RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only the number
+PART_BITS = 31  # a step between two ticks has fewer than 2**31 parts: the square of their number stays inside int64
 
 
 class PastItems(Items):
@@ -73,12 +70,7 @@ class PastItems(Items):
         """Do nothing: the columns are the recorded ones."""
 
     def between(self, after: PastItems, part: int, parts: int) -> PastItems:
-        """Interpolate between these items and those of a later moment; see `History`.
-
-        Parameters
-        ----------
-        part, parts : fraction of the time that has passed, 0 < part < parts
-        """
+        """Items at part / parts of the time to a later moment, 0 < part < parts; see `History`."""
         if after is self:
             return self
         out = PastItems(self, self)
@@ -156,32 +148,11 @@ class PastScene(Scene):
         """The scene that was recorded, as it is now."""
         return self._latest
 
-    def add(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past has what it had."""
-        self._refuse()
-
-    def remove(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past has what it had."""
-        self._refuse()
-
-    def move(self, *_: Any, **__: Any) -> NoReturn:
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         """Refuse: the past is as it was."""
-        self._refuse()
-
-    def set(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def carve(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def rename(self, *_: Any, **__: Any) -> NoReturn:
-        """Refuse: the past is as it was."""
-        self._refuse()
-
-    def _refuse(self) -> NoReturn:
         raise InputError(f"scene: expected the present one, got that of tick {self.tick:.15g}, which is read-only")
+
+    add = remove = move = set = carve = rename = _refuse
 
 
 class History:
@@ -388,8 +359,7 @@ def _runs(ticks: list[int]) -> str:
     return ", ".join(str(ticks[i]) if j == i + 1 else f"{ticks[i]} to {ticks[j - 1]}" for i, j in ends)
 
 
-NANOSECONDS = 10**9
-"""Nanoseconds in a second: time is a whole number of them, and a step has as many whole parts."""
+NANOSECONDS = 10**9  # nanoseconds in a second: time is a whole number of them, and a step has as many whole parts
 
 ELAPSED_MAX = 10**6
 """Longest time between two calls, s (12 days): in nanoseconds it is whole in float64, with bits to spare."""

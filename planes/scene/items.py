@@ -37,31 +37,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """The items of one version of a scene that decide hits, front to back, as columns.
+    """The items of one version of a scene that decide hits, front to back, as columns."""
 
-    Parameters
-    ----------
-    ids, owner : (M,) int64
-    categories : (M,) category bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
-    occluder : (M,) bool
-    box_xyxy : (M, 4) int64, inclusive, px
-    offset : (M,) start of the item's mask in `masks`, row by row
-    masks : flat booleans of all masks in use
-    layered : whether the items lie on more than one layer
-    forms : number of the arrangement: stacks of the same number differ only in boxes
-    count : number of ids of the scene, including those that are not in the stack
-    """
-
-    ids: Ints
-    occluder: Bools
-    categories: Ints
-    owner: Ints
-    box_xyxy: Ints
-    offset: Ints
-    masks: Bools
-    layered: bool
-    forms: int
-    count: int
+    ids: Ints  # (M,)
+    occluder: Bools  # (M,)
+    categories: Ints  # (M,) bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
+    owner: Ints  # (M,) ids
+    box_xyxy: Ints  # (M, 4) inclusive, px
+    offset: Ints  # (M,) start of the item's mask in `masks`, row by row
+    masks: Bools  # flat booleans of all masks in use
+    layered: bool  # whether the items lie on more than one layer
+    forms: int  # number of the arrangement: stacks of the same number differ only in boxes
+    count: int  # number of ids of the scene, including those that are not in the stack
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy is an arrangement of its own: numbers of another process mean nothing here."""
@@ -175,19 +162,13 @@ Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
 PLACE, BOX = Struct("=2q"), Struct("=4q")
 """Layouts of a row of positions and of a row of boxes, to read and write a single item without an array."""
 
-NOTHING = Sprite(frames=())
-"""Sprite of an id without an object: a removed one, or one that never was."""
-
-NO_TRANSFORM = Transform()
-"""Transform of an id without an object."""
-
-NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)
-"""Mask of an id without an object."""
+NOTHING = Sprite(frames=())  # sprite of an id without an object: a removed one, or one that never was
+NO_TRANSFORM = Transform()  # transform of an id without an object
+NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of an id without an object
 
 NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
-ARRANGEMENTS = itertools.count(1)
-"""Source of numbers of arrangements; each arrangement of items of any scene has its own."""
+ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
 
 def boxes_in(field: str, name: object) -> int | None:
@@ -215,11 +196,8 @@ COLUMNS: dict[str, tuple[int, ...]] = {
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
-UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))
-"""Columns whose change leaves the arrangement as it is."""
-
-ORDERING = frozenset(("alive", "role", "layer"))
-"""Columns whose change may reorder the items, or change which of them decide hits."""
+UNARRANGED = frozenset(("position_256", "velocity_256", "cost"))  # columns whose change leaves the arrangement as it is
+ORDERING = frozenset(("alive", "role", "layer"))  # columns whose change may reorder items, or which of them decide hits
 
 
 class Items:

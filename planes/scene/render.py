@@ -29,16 +29,9 @@ GROUND = (38, 41, 47)
 
 
 def draw_view(items: Items, view_xyxy: Box, screen_xy: tuple[int, int] | None = None) -> Image:
-    """Draw a view of a scene: the background, then the layers, then the HUD.
+    """Draw a view of a scene, as (h, w, 3) bytes, RGB: the background, then the layers, then the HUD.
 
-    Parameters
-    ----------
-    view_xyxy : inclusive box of the world, px
-    screen_xy : world pixel at the top left of the player's screen, where the HUD begins; by default the view's
-
-    Returns
-    -------
-    (h, w, 3) bytes, RGB
+    The HUD begins at the world pixel at the top left of the player's screen, by default that of the view.
     """
     x, y, x_max, y_max = view_xyxy
     screen_x, screen_y = (x, y) if screen_xy is None else screen_xy

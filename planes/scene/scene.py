@@ -46,11 +46,8 @@ if TYPE_CHECKING:
 Read = TypeVar("Read", bound=np.generic)
 
 ROLE_NAMES = tuple(role.value for role in ROLES)
-FIELDS = ("background", "hittable", "movers", "occluders", "hud")
-"""Names of the planes of each role, in the order of ROLES."""
-
-DEFAULT_CATEGORY = "default"
-"""Name of the first category bit, which objects have by default."""
+FIELDS = ("background", "hittable", "movers", "occluders", "hud")  # names of the planes of ROLES, in order
+DEFAULT_CATEGORY = "default"  # name of the first category bit, which objects have by default
 
 
 class Scene:
@@ -65,13 +62,9 @@ class Scene:
     """
 
     def __init__(
-        self,
-        size_wh: Sequence[int] | None = None,
-        origin_xy: Sequence[int] = (0, 0),
-        *,
-        categories: Iterable[str] = (),
-        name: str = "scene",
-    ) -> None:
+        self, size_wh: Sequence[int] | None = None, origin_xy: Sequence[int] = (0, 0), *,
+        categories: Iterable[str] = (), name: str = "scene",
+    ) -> None:  # fmt: skip
         self.name = Text().check("name", name)
         names = listed("categories", categories, "a list of names")
         others = (Text().check(f"categories[{i}]", other) for i, other in enumerate(names))
@@ -92,15 +85,9 @@ class Scene:
 
     @classmethod
     def from_planes(
-        cls,
-        *,
-        background: object = None,
-        hittable: object = None,
-        movers: object = None,
-        occluders: object = None,
-        hud: object = None,
-        origin_xy: Sequence[int] = (0, 0),
-    ) -> Scene:
+        cls, *, background: object = None, hittable: object = None, movers: object = None, occluders: object = None,
+        hud: object = None, origin_xy: Sequence[int] = (0, 0),
+    ) -> Scene:  # fmt: skip
         """Make a scene of whole planes of one size.
 
         Parameters
@@ -145,22 +132,11 @@ class Scene:
         return int(self.items.alive[: self.items.count].sum())
 
     def add(
-        self,
-        sprite: object,
-        position_xy: Sequence[float] = (0.0, 0.0),
-        *,
-        role: Role | str = Role.HITTABLE,
-        angle: float = 0.0,
-        scale: float | Sequence[float] = 1.0,
-        flip: str = "none",
-        frame: int | str = 0,
-        layer: int = 0,
-        categories: int | Sequence[str] | None = None,
-        owner: int | None = None,
-        cost: int = 1,
-        velocity_xy: Sequence[float] = (0.0, 0.0),
-        name: str | None = None,
-    ) -> int:
+        self, sprite: object, position_xy: Sequence[float] = (0.0, 0.0), *, role: Role | str = Role.HITTABLE,
+        angle: float = 0.0, scale: float | Sequence[float] = 1.0, flip: str = "none", frame: int | str = 0,
+        layer: int = 0, categories: int | Sequence[str] | None = None, owner: int | None = None, cost: int = 1,
+        velocity_xy: Sequence[float] = (0.0, 0.0), name: str | None = None,
+    ) -> int:  # fmt: skip
         """Place an object and return its id.
 
         Parameters
@@ -184,23 +160,27 @@ class Scene:
         InputError
             Naming the field.
         """
-        made = as_sprite(sprite)
-        kind = _role(role)
-        number = self.items.count
-        turn = float(reals("angle", angle, ()))
+        made, kind, turn = as_sprite(sprite), _role(role), float(reals("angle", angle, ()))
         form = transform_of(made, frame, flip, scale_pair(scale), turn)
-        values: dict[str, object] = {
-            "role": ROLES.index(kind),
+        values = self._new_columns(kind, layer, categories, owner, cost, position_xy, velocity_xy)
+        unnamed = name is None or (isinstance(name, str) and not name)
+        called = f"{kind.value} {self.items.count}" if unnamed else Text().check("name", name)
+        return self.items.add(made, form, turn, called, values)
+
+    def _new_columns(
+        self, role: Role, layer: object, categories: object, owner: object, cost: object, position_xy: object,
+        velocity_xy: object,
+    ) -> dict[str, object]:  # fmt: skip
+        """Check what a new object has in each column."""
+        return {
+            "role": ROLES.index(role),
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
-            "categories": self._bits(categories, _default_bits(kind)),
-            "owner": number if owner is None else integer("owner", owner, 0, number),
+            "categories": self._bits(categories, _default_bits(role)),
+            "owner": self.items.count if owner is None else integer("owner", owner, 0, self.items.count),
             "cost": integer("cost", cost, 0, COST_MAX),
             "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
             "velocity_256": snap(reals("velocity_xy", velocity_xy, (2,), REACH_MAX)),
         }
-        unnamed = name is None or (isinstance(name, str) and not name)
-        called = f"{kind.value} {number}" if unnamed else Text().check("name", name)
-        return self.items.add(made, form, turn, called, values)
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
         """Take objects out of the scene; their ids are not used again."""
@@ -218,22 +198,11 @@ class Scene:
         self.items.move(rows, snap(points("xy", xy, len(rows))))
 
     def set(
-        self,
-        ids: int | Sequence[int] | Ints,
-        *,
-        sprite: object = None,
-        position_xy: object = None,
-        angle: object = None,
-        scale: object = None,
-        flip: str | Sequence[str] | None = None,
-        frame: object = None,
-        layer: object = None,
-        categories: object = None,
-        owner: object = None,
-        cost: object = None,
-        velocity_xy: object = None,
-        role: Role | str | None = None,
-    ) -> None:
+        self, ids: int | Sequence[int] | Ints, *, sprite: object = None, position_xy: object = None,
+        angle: object = None, scale: object = None, flip: str | Sequence[str] | None = None, frame: object = None,
+        layer: object = None, categories: object = None, owner: object = None, cost: object = None,
+        velocity_xy: object = None, role: Role | str | None = None,
+    ) -> None:  # fmt: skip
         """Change objects, all or none; each value is one for all objects, or one per object.
 
         `ids` is one id or several (n,). `scale` is a number, one per object (n,), or pairs (n, 2) or (1, 2); `sprite`

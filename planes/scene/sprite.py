@@ -45,8 +45,7 @@ def check_size(name: str, width: int, height: int) -> None:
 
 UIDS = itertools.count()
 
-OUTLINE_MARGIN = 2
-"""Pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of the shape as it was made."""
+OUTLINE_MARGIN = 2  # pixels around a shape: scaled to 1/256, its points are rounded by up to 1 px of it as it was made
 
 
 class Known:
@@ -78,14 +77,11 @@ class Frame:
 class Carving:
     """What was carved out of a frame or a shape: cells that are gone. It is flipped, scaled and turned with the sprite.
 
-    Parameters
-    ----------
-    gone : (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
-    per_px : number of cells along a pixel, a power of two: a turned or enlarged sprite loses parts of its pixels
+    A turned or enlarged sprite loses parts of its pixels, so a pixel has several cells.
     """
 
-    gone: Bools
-    per_px: int = 1
+    gone: Bools  # (h * per_px, w * per_px) cells of the pixels of `local_grid`, True where nothing is left
+    per_px: int = 1  # number of cells along a pixel, a power of two
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Copy the array, and make it read-only again."""
@@ -127,18 +123,11 @@ class Sprite(Known):
 
     @classmethod
     def from_image(
-        cls,
-        image: object,
-        *,
-        alpha_threshold: int = ALPHA_THRESHOLD,
-        color_key: Sequence[int] | None = None,
-        grid_wh: Sequence[int] | None = None,
-        rects_xywh: Sequence[Sequence[int]] | None = None,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
-        frame_names: Sequence[str] = (),
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, image: object, *, alpha_threshold: int = ALPHA_THRESHOLD, color_key: Sequence[int] | None = None,
+        grid_wh: Sequence[int] | None = None, rects_xywh: Sequence[Sequence[int]] | None = None,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None, frame_names: Sequence[str] = (),
+        angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Cut an image into frames and their masks.
 
         Parameters
@@ -166,16 +155,10 @@ class Sprite(Known):
 
     @classmethod
     def from_images(
-        cls,
-        images: Sequence[object],
-        *,
-        alpha_threshold: int = ALPHA_THRESHOLD,
-        color_key: Sequence[int] | None = None,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
-        frame_names: Sequence[str] = (),
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, images: Sequence[object], *, alpha_threshold: int = ALPHA_THRESHOLD,
+        color_key: Sequence[int] | None = None, pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None = None,
+        frame_names: Sequence[str] = (), angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Take images as frames, each of a size of its own; the other parameters are those of `from_image`.
 
         Parameters
@@ -190,14 +173,10 @@ class Sprite(Known):
 
     @classmethod
     def _of_parts(
-        cls,
-        parts: Sequence[tuple[Bools, Image]],
-        threshold: int,
-        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None,
-        frame_names: Sequence[str],
-        angle_step: float | None,
-        source: dict[str, Any] | None,
-    ) -> Sprite:
+        cls, parts: Sequence[tuple[Bools, Image]], threshold: int,
+        pivot_xy: Sequence[float] | Sequence[Sequence[float]] | None, frame_names: Sequence[str],
+        angle_step: float | None, source: dict[str, Any] | None,
+    ) -> Sprite:  # fmt: skip
         """A sprite of masks and images."""
         pivot, pivots = _pivots(pivot_xy, len(parts))
         names = _frame_names(frame_names, len(parts))
@@ -209,14 +188,9 @@ class Sprite(Known):
 
     @classmethod
     def from_mask(
-        cls,
-        mask: object,
-        *,
-        pivot_xy: Sequence[float] | None = None,
-        color: Sequence[int] | None = None,
-        angle_step: float | None = None,
-        source: dict[str, Any] | None = None,
-    ) -> Sprite:
+        cls, mask: object, *, pivot_xy: Sequence[float] | None = None, color: Sequence[int] | None = None,
+        angle_step: float | None = None, source: dict[str, Any] | None = None,
+    ) -> Sprite:  # fmt: skip
         """Take a boolean array (h, w) as the mask of one frame.
 
         Parameters
@@ -236,13 +210,9 @@ class Sprite(Known):
 
     @classmethod
     def polygon(
-        cls,
-        points_xy: object,
-        holes: Sequence[object] = (),
-        *,
-        color: Sequence[int] | None = None,
+        cls, points_xy: object, holes: Sequence[object] = (), *, color: Sequence[int] | None = None,
         angle_step: float | None = None,
-    ) -> Sprite:
+    ) -> Sprite:  # fmt: skip
         """Shape of points about the position; edges belong to it.
 
         Parameters

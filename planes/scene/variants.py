@@ -52,8 +52,7 @@ from .sprite import (
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
 
-FINE_BITS = TRIG_BITS - SCALE_BITS
-"""Bits by which a turned position is finer than a scaled one."""
+FINE_BITS = TRIG_BITS - SCALE_BITS  # bits by which a turned position is finer than a scaled one
 
 
 class Transform(NamedTuple):
@@ -84,6 +83,11 @@ class Transform(NamedTuple):
         for _ in range(self.quarter):
             c, s = -s, c
         return c, s
+
+    @property
+    def signs(self) -> Ints:
+        """-1 for each axis that is flipped, else 1."""
+        return np.array([-1 if "x" in self.flip else 1, -1 if self.flip in ("y", "xy") else 1])
 
 
 def transform_of(sprite: Sprite, frame: object, flip: object, scale_xy: tuple[float, float], angle: float) -> Transform:
@@ -292,20 +296,14 @@ def _batches(grids: Grids, forms: Sequence[Transform]) -> Iterator[list[int]]:
 class Grids(NamedTuple):
     """Pixel grids that hold scaled and turned frames, and how their centres are mapped back to the frames.
 
-    Parameters
-    ----------
-    pivot_256 : (n, 2) from the centre of pixel [0, 0], 1/256 px
-    size_wh : (n, 2) px
-    first : (n, 2) column and row of the frame, from the border of its pixel [0, 0], at the first centre; in parts
-    step : (n, 2, 2) by how much column and row grow with a step right, and with a step down, in parts
-    unit : (n, 2) number of parts of a column, and of a row
+    Columns and rows of a frame are in parts, from the border of its pixel [0, 0].
     """
 
-    pivot_256: Ints
-    size_wh: Ints
-    first: Ints
-    step: Ints
-    unit: Ints
+    pivot_256: Ints  # (n, 2) from the centre of pixel [0, 0], 1/256 px
+    size_wh: Ints  # (n, 2) px
+    first: Ints  # (n, 2) column and row of the frame at the first centre
+    step: Ints  # (n, 2, 2) by how much column and row grow with a step right, and with a step down
+    unit: Ints  # (n, 2) number of parts of a column, and of a row
 
 
 def _grids_of(masks: Sequence[Bools], pivots_256: Sequence[tuple[int, int]], forms: Sequence[Transform]) -> Grids:
@@ -339,14 +337,9 @@ def _grids_of(masks: Sequence[Bools], pivots_256: Sequence[tuple[int, int]], for
 
 
 def _mapped(grids: Grids, masks: Sequence[Bools], which: Ints, values: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """Values (n, height, width, ...) of frames at the centres of grids; 0 outside the frames.
+    """Values (n, height, width, ...) of frames at the centres of grids (n,) of one scale; 0 outside the frames.
 
-    Parameters
-    ----------
-    grids : (n,) of one scale
-    masks : of the frames, each (h, w)
-    which : (n,) number of the frame of each grid
-    values : of the frames, each (h, w, ...)
+    Frames have masks (h, w) and values (h, w, ...); `which` (n,) is the number of the frame of each grid.
     """
     planes, picked = _bordered(masks), _bordered(values)
     cells = picked.reshape(-1, *picked.shape[3:])
@@ -374,18 +367,9 @@ def resample(
 ) -> Ints:
     """Map each pixel centre of grids back to a pixel of a frame whose closed square holds it, a set one if possible.
 
-    Parameters
-    ----------
-    planes : (k, h + 2, w + 2) masks of frames, each with a border that is not set
-    which : (n,) number of the frame of each grid
-    first : (n, 2) column and row of the frame at the first centre of the grid, in parts
-    step : (n, 2, 2) by how much column and row grow with a step right, and with a step down, in parts
-    unit : number of parts of a column, and of a row
-    size_wh : size of the grids
-
-    Returns
-    -------
-    (n, height, width) flat index in `planes`; for a centre outside the frame, of a pixel of the border
+    Frames are masks in planes (k, h + 2, w + 2), each with a border that is not set; `which` (n,) is the number of the
+    frame of each grid, and `first`, `step` and `unit` are those of `Grids`, whose size is one. Returned are flat
+    indices (n, height, width) in the planes; for a centre outside the frame, of a pixel of the border.
     """
     (_, rows, columns), (width, height) = planes.shape, size_wh
     places, squares, border = [], [], np.zeros((), np.bool_)
@@ -471,9 +455,8 @@ def _shape_spans(field: str, outline: Outline, form: Transform) -> Spans:
         half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
         _check_shape(field, outline, form, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
         return ellipse(a, b, c, s)
-    sign = np.array([-1 if "x" in form.flip else 1, -1 if form.flip in ("y", "xy") else 1])
-    scale = np.array([form.scale_x, form.scale_y])
-    rings = [turned(rounded_div(r * sign * scale, ONE), c, s) for r in outline.rings]
+    scale = form.signs * np.array([form.scale_x, form.scale_y])
+    rings = [turned(rounded_div(r * scale, ONE), c, s) for r in outline.rings]
     _check_shape(field, outline, form, *size_of(rings))
     return polygon(rings)
 

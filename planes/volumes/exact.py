@@ -8,6 +8,11 @@ A predicate is the sign of a polynomial, which is evaluated in up to three stage
 
 Comparisons ask for certainty: with NaN they are false, so NaN is in doubt. Infinite inputs are never certain, and are
 refused in the last stage.
+
+All predicates take finite floats whose leading axes broadcast: points (..., 2) or (..., 3), and radii (...) of 0 or
+more, whose sum is taken exactly. They return signs (...). With `conservative` the last stage is skipped, and rows in
+doubt are 0. An InputError names an argument that is not finite, has a wrong number of coordinates, or does not
+broadcast.
 """
 
 from __future__ import annotations
@@ -34,11 +39,8 @@ from ..common.limits import (
 
 Signs = npt.NDArray[np.int8]
 Numbers = npt.NDArray[Any]
-Given = list[tuple[str, Floats]]
-"""Columns, each with the name of its argument."""
-
-SIGN_ROWS = 8192
-"""Rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back to the system."""
+Given = list[tuple[str, Floats]]  # columns, each with the name of its argument
+SIGN_ROWS = 8192  # rows of a chunk of signs: their temporary arrays stay in the cache, and are not given back
 
 Valued = tuple[Any, tuple[Sequence[Numbers], ...]]
 """A determinant, and arrays for each magnitude on which its error depends."""
@@ -61,25 +63,10 @@ class Predicate:
 
 
 def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative: bool = False) -> Signs:
-    """Side of the line through a and b on which the point c lies.
+    """Side of the line through a and b on which the point c lies, in 2-D.
 
-    Parameters
-    ----------
-    a, b, c : (..., 2) float, finite; leading axes broadcast
-    conservative : skip the exact stage; rows in doubt are 0
-
-    Returns
-    -------
-    (...) int8: 1 when turning from +x towards +y, which is clockwise on the screen; 0 on the line; -1
-
-    Raises
-    ------
-    InputError
-        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
-
-    References
-    ----------
-    Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (1997).
+    It is 1 when turning from +x towards +y, which is clockwise on the screen; 0 on the line; else -1 (Shewchuk,
+    *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates*, 1997).
     """
     return _signs(_ORIENT2D, [*_columns("a", a, 2), *_columns("b", b, 2), *_columns("c", c, 2)], conservative)
 
@@ -87,21 +74,9 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative:
 def orient3d(
     a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, d: npt.ArrayLike, conservative: bool = False
 ) -> Signs:
-    """Side of the plane through a, b and c on which the point d lies: the sign of det(a - d, b - d, c - d).
+    """Side of the plane through a, b and c on which the point d lies, in 3-D: the sign of det(a - d, b - d, c - d).
 
-    Parameters
-    ----------
-    a, b, c, d : (..., 3) float, finite; leading axes broadcast
-    conservative : skip the exact stage; rows in doubt are 0
-
-    Returns
-    -------
-    (...) int8: 1 where a, b, c turn from +x towards +y when seen from +z and d lies below them; 0 in the plane; -1
-
-    Raises
-    ------
-    InputError
-        If a point has not three coordinates, an argument is not finite, or leading axes do not broadcast.
+    It is 1 where a, b, c turn from +x towards +y when seen from +z and d lies below them; 0 in the plane; else -1.
     """
     columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 3)]
     return _signs(_ORIENT3D, columns, conservative)
@@ -110,22 +85,9 @@ def orient3d(
 def circles_sign(
     c1: npt.ArrayLike, r1: npt.ArrayLike, c2: npt.ArrayLike, r2: npt.ArrayLike, conservative: bool = False
 ) -> Signs:
-    """Compare the distance of two centres with the sum of two radii.
+    """Compare the distance of two centres, in 2-D or 3-D, with the sum of two radii.
 
-    Parameters
-    ----------
-    c1, c2 : (..., 2) or (..., 3) float, finite; leading axes broadcast
-    r1, r2 : (...) float, 0 or more; their sum is taken exactly
-    conservative : skip the exact stage; rows in doubt are 0
-
-    Returns
-    -------
-    (...) int8: -1 where the circles share more than a point, 0 where they touch, 1 where they are apart
-
-    Raises
-    ------
-    InputError
-        If the points do not all have two, or all three, coordinates; or as in `orient2d`.
+    It is -1 where the circles share more than a point, 0 where they touch, 1 where they are apart.
     """
     shape = _numbers("c1", c1).shape
     if not shape or shape[-1] not in (2, 3):
@@ -136,63 +98,24 @@ def circles_sign(
 
 
 def point_segment_sign(
-    p: npt.ArrayLike,
-    a: npt.ArrayLike,
-    b: npt.ArrayLike,
-    r: npt.ArrayLike,
-    r2: npt.ArrayLike = 0.0,
+    p: npt.ArrayLike, a: npt.ArrayLike, b: npt.ArrayLike, r: npt.ArrayLike, r2: npt.ArrayLike = 0.0,
     conservative: bool = False,
-) -> Signs:
-    """Compare the distance from p to the segment ab with r + r2.
+) -> Signs:  # fmt: skip
+    """Compare the distance from p to the segment ab, which may be a point, with r + r2, in 2-D.
 
-    Parameters
-    ----------
-    p, a, b : (..., 2) float, finite; leading axes broadcast; a may equal b
-    r, r2 : (...) float, 0 or more; their sum is taken exactly
-    conservative : skip the exact stage; rows in doubt are 0
-
-    Returns
-    -------
-    (...) int8: -1 nearer, 0 at that distance, 1 farther
-
-    Raises
-    ------
-    InputError
-        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
-
-    References
-    ----------
-    Ericson, *Real-Time Collision Detection* (2005), 5.1.2.
+    It is -1 nearer, 0 at that distance, 1 farther (Ericson, *Real-Time Collision Detection*, 2005, 5.1.2).
     """
     points = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2)]
     return _signs(_POINT_SEGMENT, [*points, ("r", _numbers("r", r)), ("r2", _numbers("r2", r2))], conservative)
 
 
 def segment_segment_sign(
-    a: npt.ArrayLike,
-    b: npt.ArrayLike,
-    c: npt.ArrayLike,
-    d: npt.ArrayLike,
-    r: npt.ArrayLike,
-    r2: npt.ArrayLike = 0.0,
-    conservative: bool = False,
-) -> Signs:
-    """Compare the distance between the segments ab and cd with r + r2.
+    a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, d: npt.ArrayLike, r: npt.ArrayLike,
+    r2: npt.ArrayLike = 0.0, conservative: bool = False,
+) -> Signs:  # fmt: skip
+    """Compare the distance between the segments ab and cd, which may be points, with r + r2, in 2-D.
 
-    Parameters
-    ----------
-    a, b, c, d : (..., 2) float, finite; leading axes broadcast; segments may be single points
-    r, r2 : (...) float, 0 or more; their sum is taken exactly
-    conservative : skip the exact stage; rows in doubt are 0
-
-    Returns
-    -------
-    (...) int8: -1 nearer, 0 at that distance (with radii 0: they meet), 1 farther
-
-    Raises
-    ------
-    InputError
-        If a point has not two coordinates, an argument is not finite, or leading axes do not broadcast.
+    It is -1 nearer, 0 at that distance (with radii 0: they meet), 1 farther.
     """
     columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 2)]
     columns += [("r", _numbers("r", r)), ("r2", _numbers("r2", r2))]

@@ -58,8 +58,7 @@ from .polygons import (
 )
 from .volumes import Aabbs, BoxSets, Capsules, Circles, Core, Hulls, Obbs, Parts, Polygons, Volumes, joined
 
-AXES = 33
-"""Number of lengths of a capsule's axis that are tried."""
+AXES = 33  # number of lengths of a capsule's axis that are tried
 
 
 def hull(pixels: object) -> Polygons:
@@ -236,8 +235,7 @@ def _radius_about(corners: list[Point], a_px: Iterable[float], b_px: Iterable[fl
     return radius
 
 
-Center = tuple[int, int, int]
-"""(x, y, d) with d > 0 stands for (x / d, y / d)."""
+Center = tuple[int, int, int]  # (x, y, d) with d > 0 stands for (x / d, y / d)
 
 
 def _least_center(points: list[Point]) -> tuple[float, float]:
@@ -315,12 +313,7 @@ def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant])
 
 
 class Bounds:
-    """A cache of the volumes of one kind of the masks in use, which are made when first read; it is thread-safe.
-
-    Parameters
-    ----------
-    kind : kind of the volumes
-    """
+    """A cache of the volumes of one kind of the masks in use, which are made when first read; it is thread-safe."""
 
     def __init__(self, kind: Kind) -> None:
         self.kind = kind
@@ -399,17 +392,9 @@ def fitted(kind: Kind, mask: Bools) -> Volumes:
 def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volumes:
     """Move a volume of a frame with its object, so that it contains the pixel squares of the variant's mask.
 
-    Parameters
-    ----------
-    volume : one row that contains the pixel squares of the frame, in px from the centre of its pixel [0, 0]; a circle,
-        or corners that are whole multiples of PLACE
-    pivot_256 : pivot of the frame, in 1/256 px from there
-    variant : the frame's mask after flips, scale and turn
-
-    Returns
-    -------
-    one row, in px from the centre of pixel [0, 0] of the variant's mask: a circle stays a circle, and boxes and
-    polygons become polygons
+    The volume is one row that contains the pixel squares of the frame: a circle, or corners that are whole multiples of
+    PLACE. It and the frame's pivot are relative to the centre of pixel [0, 0] of the frame; the result, a circle or
+    polygons, is relative to that of the variant's mask.
     """
     form = variant.form
     parts = volume.parts if isinstance(volume, Parts) else volume
@@ -430,12 +415,8 @@ def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volu
 
 def _turned(points: Floats, form: Transform) -> Floats:
     """Vectors from the pivot, flipped, scaled and turned as the mask is."""
-    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]])
-    x = -x if "x" in form.flip else x
-    y = -y if form.flip in ("y", "xy") else y
-    c, s = form.c, form.s
-    for _ in range(form.quarter):
-        c, s = -s, c
+    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]]) * form.signs[:, None]
+    c, s = form.direction
     return np.stack([x * c - y * s, x * s + y * c], axis=1) / (1 << TRIG_BITS)
 
 

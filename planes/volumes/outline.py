@@ -30,14 +30,10 @@ from .polygons import Point, extents, turn
 
 
 def cover(mask: Bools, k: int) -> Ints:
-    """Cover a mask that is not empty by at most k boxes with few false pixels.
+    """Cover a mask that is not empty by at most k boxes (n, 4) with few false pixels.
 
     Two heuristics are tried, and the better result is returned: cutting the worst box in two, starting with one box;
     and joining the cheapest two, starting with BOXES_MAX boxes. In neither does one box more ever cover more pixels.
-
-    Returns
-    -------
-    (n, 4) boxes, n <= k
     """
     if k == 1:
         rows, first, last = extents(mask)
@@ -100,9 +96,7 @@ def _part(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> _Part:
 def _best_cut(rows: Ints, first: Ints, last: Ints, height: int) -> tuple[int, int, int]:
     """Cut between filled rows so that the two tight boxes are smallest; of equal cuts take the nearest to the middle.
 
-    Returns
-    -------
-    area of both boxes, distance of the cut from the middle, first row of the lower box
+    Returned are the area of both boxes, the distance of the cut from the middle, and the first row of the lower box.
     """
     if len(rows) < 2:
         return height * int(last[0] - first[0] + 1), height, 0
@@ -338,13 +332,9 @@ def _distance(points: npt.NDArray[np.int64], a: Point, c: Point) -> float:
 
 
 def _without_edges(ring: list[Point], offs: list[float], tolerance: float) -> list[Point]:
-    """Remove outer edges of a simple ring, the nearest to its new corner first.
+    """Remove outer edges of a simple ring of corners in 1/256 px, the nearest to its new corner first.
 
-    Parameters
-    ----------
-    ring : corners in 1/256 px
-    offs : distance that edge i, which begins at corner i, may already have from the first outline, px
-    tolerance : largest such distance, px
+    Edge i, which begins at corner i, may already lie `offs[i]` px from the first outline, and at most `tolerance` px.
     """
     ring, offs = list(ring), list(offs)
     drawn = [_drawn_out(ring, offs, i) for i in range(len(ring))]

@@ -25,15 +25,9 @@ from .volumes import Aabbs, Capsules, Circles, Core, Obbs, Parts, Polygons, Volu
 
 
 def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
-    """Test rows of two volumes for overlap in floats.
+    """Test rows of two volumes for overlap in floats: -1 overlapping, 1 apart, 0 undecided.
 
-    Returns
-    -------
-    (len(rows),) int8: -1 overlapping, 1 apart, 0 undecided
-
-    References
-    ----------
-    Ericson, *Real-Time Collision Detection* (2005), 4.4.1, 5.1.2 and 5.2.1.
+    See Ericson, *Real-Time Collision Detection* (2005), 4.4.1, 5.1.2 and 5.2.1.
     """
     signs = np.zeros(len(rows), np.int8)
     order = _by_corners(one, two, rows)
@@ -96,10 +90,8 @@ def _without_length(a: Floats) -> Bools:
 def _edges_sign(a: Floats, b: Floats, ends: Bools, reach: Floats) -> tuple[Signs, Bools]:
     """Sides of the edges of a on which the corners of b lie; edges without length are ignored.
 
-    Returns
-    -------
-    signs : 1 where all corners lie beyond an edge, -1 where one lies within all edges, else 0
-    met : where they all lie beyond no edge, and there is one
+    The sign is 1 where all corners lie beyond an edge, -1 where one lies within all edges, else 0. Returned, too, is
+    where they all lie beyond no edge, and there is one.
     """
     bound = SIDE_ERROR * reach * reach + FLOAT_TINY
     parted, met = np.zeros(len(reach), np.bool_), np.ones(len(reach), np.bool_)
@@ -152,8 +144,7 @@ def edge_parts(first: Core, second: Core, rows: Ints, k: int, conservative: bool
     return found
 
 
-Rows = Ints | None
-"""Numbers of rows; None for all rows."""
+Rows = Ints | None  # numbers of rows; None for all rows
 
 Test = Callable[[Any, Any, bool], Bools]
 """A test of two volumes of equal length, row against row; the flag skips the exact stage."""

@@ -70,11 +70,9 @@ def convex_rows(points: Floats, starts: Ints) -> Ints:
 
 
 def outlines(points: Floats, starts: Ints) -> tuple[Floats, Ints]:
-    """Hulls of ragged rows; rows that are convex are only brought to one turning sense.
+    """Points and starts of the hulls of ragged rows; rows that are convex are only brought to one turning sense.
 
-    Returns
-    -------
-    points, starts : the outlines; rows without area have one or two points
+    A row without area has one or two points.
     """
     if not len(starts):
         return points, starts
@@ -120,17 +118,9 @@ def chain(points: list[Whole]) -> list[Whole]:
 def convex_parts(points: list[Corner]) -> list[list[int]]:
     """Cut a simple polygon into convex parts, as indices of its points; points on edges are allowed.
 
-    It is cut into triangles, and then diagonals that no part needs to be convex are removed. This gives at most four
-    times the least number of parts.
-
-    Raises
-    ------
-    InputError
-        If the polygon crosses or touches itself, or has no area.
-
-    References
-    ----------
-    Meisters, *Polygons have ears* (1975); Hertel and Mehlhorn, *Fast triangulation of simple polygons* (1983).
+    It is cut into triangles (Meisters, *Polygons have ears*, 1975), and then diagonals that no part needs to be convex
+    are removed. This gives at most four times the least number of parts (Hertel and Mehlhorn, *Fast triangulation of
+    simple polygons*, 1983). An InputError says if the polygon crosses or touches itself, or has no area.
     """
     _refuse_crossing(points)
     whole = _whole(points)
@@ -220,8 +210,7 @@ def _whole(points: list[Corner]) -> list[Whole]:
 
 Point = tuple[int, int]
 Line = tuple[int, int, int]
-Extents = tuple[Ints, Ints, Ints]
-"""Rows with pixels, rising, and the first and last column of each."""
+Extents = tuple[Ints, Ints, Ints]  # rows with pixels, rising, and the first and last column of each
 
 
 def extents(mask: Bools) -> Extents:
@@ -234,11 +223,7 @@ def extents(mask: Bools) -> Extents:
 def hull_points(extents: Extents) -> list[Point]:
     """Corners of the hull of pixel squares, given by rows and their ends; no three are on one line.
 
-    Only the ends of rows can be corners, so the monotone chain takes O(rows).
-
-    References
-    ----------
-    Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979).
+    Only the ends of rows can be corners, so the monotone chain (see `hull`) takes O(rows).
     """
     rows, first, last = extents
     place = rows - rows[0]
@@ -319,45 +304,29 @@ def _is(value: float, numerator: int, denominator: int) -> bool:
     return top * denominator == numerator * bottom
 
 
-EDGES = 6
-"""Most edges of a polygon of a union: those of a square swept along a segment."""
-
-GAP = 2.0**-30
-"""Widest gap between two shapes that is ignored, px; floats resolve wider ones for segments of up to 2**20 px."""
+EDGES = 6  # most edges of a polygon of a union: those of a square swept along a segment
+GAP = 2.0**-30  # widest gap between two shapes that is ignored, px; floats resolve wider ones for segments of 2**20 px
 
 PARALLEL = 2.0**-40
 """Largest sine of the angle between edges that count as parallel: they cross beyond any shift of interest."""
 
-CUSP = 2.0**-12
-"""Distance that is looked along two boundaries that touch from outside at an angle of at most this, px."""
-
-TOUCHING = 1 + 2.0**-40
-"""Largest ratio of two distances that count as equal."""
-
-FEW = 24
-"""Most edges in a square of shifts of which all pairs are tried."""
-
-SMALL = 2.0**-10
-"""Half the side of a square of shifts that is not cut further, px."""
-
-AT_A_TIME = 2**19
-"""Comparisons, or pairs of boundaries, worked on at a time."""
+CUSP = 2.0**-12  # distance that is looked along two boundaries that touch from outside at an angle of at most this, px
+TOUCHING = 1 + 2.0**-40  # largest ratio of two distances that count as equal
+FEW = 24  # most edges in a square of shifts of which all pairs are tried
+SMALL = 2.0**-10  # half the side of a square of shifts that is not cut further, px
+AT_A_TIME = 2**19  # comparisons, or pairs of boundaries, worked on at a time
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexUnion:
-    """A union of closed convex polygons and of discs.
+    """A union of closed convex polygons and of discs of one radius.
 
-    Parameters
-    ----------
-    normal, offset : (P, EDGES, 2) and (P, EDGES); polygon p is the points s with normal . s <= offset for all edges.
-        Normals have length 1; an offset of inf stands for no edge
-    centre, radius : (D, 2) centres and common radius of the discs
+    Polygon p is the points s with normal . s <= offset for all edges; an offset of inf stands for no edge.
     """
 
-    normal: Floats
-    offset: Floats
-    centre: Floats
+    normal: Floats  # (P, EDGES, 2) of length 1
+    offset: Floats  # (P, EDGES)
+    centre: Floats  # (D, 2) of the discs
     radius: float
 
     def around(self, middle: Floats, half: float) -> ConvexUnion | None:

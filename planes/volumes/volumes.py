@@ -19,8 +19,7 @@ from ..common.limits import TRIG_BITS
 from ..grid.fixed_point import unit
 from .polygons import convex_parts, convex_rows, neighbours, outlines, rows_of, rows_taken, starts_of
 
-Move = Callable[[Floats, Ints], Floats]
-"""A function that moves points (n, d), given the row of each point."""
+Move = Callable[[Floats, Ints], Floats]  # a function that moves points (n, d), given the row of each point
 
 
 @dataclass(frozen=True, eq=False)
@@ -458,13 +457,7 @@ class ConcavePolygons(Parts):
 
 
 def joined(volumes: Sequence[Volumes]) -> Volumes:
-    """All rows of volumes of one kind, in order.
-
-    Raises
-    ------
-    InputError
-        If there are none, or they differ in kind.
-    """
+    """All rows of volumes of one kind, in order; an InputError if there are none, or they differ in kind."""
     if not volumes or any(type(v) is not type(volumes[0]) for v in volumes):
         raise InputError(f"volumes: expected some, of one kind, got {sorted({type(v).__name__ for v in volumes})}")
     first = volumes[0]

@@ -29,7 +29,7 @@ from ..report.cards import place_told
 from ..report.differences import differences
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
-from .schemas import read_report
+from .report_file import read_report
 from .starter import FROM_IMAGE, write_from_picture, write_starter
 
 DESCRIPTION = "Find out what a shot hits in a 2-D scene, pixel by pixel and exactly, and see why."
@@ -421,7 +421,7 @@ def fire(arguments: argparse.Namespace) -> None:
 
 def study(arguments: argparse.Namespace) -> None:
     """Measure all methods, and print the fastest that is accurate enough for each question."""
-    from ..lab.study.area_questions import kinds_scene  # heavy imports that only this subcommand needs
+    from ..lab.study.questions import kinds_scene  # heavy imports that only this subcommand needs
     from ..lab.study.study import NO_DIAGRAMS, Effort, verdict, write_study
 
     error, seed = real("--error", arguments.error, 0, 1), integer("--seed", arguments.seed, 0, SEED_MAX)

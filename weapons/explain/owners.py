@@ -14,8 +14,7 @@ from ..fire.spans import QueryContext, direct
 from ..kinds.placements import Shots, placements_for
 from ..kinds.weapon import Weapon
 
-Pellet = tuple[int, int, int, int]
-"""A pellet that hit an object: (shot, round, pellet, object)."""
+Pellet = tuple[int, int, int, int]  # a pellet that hit an object: (shot, round, pellet, object)
 
 
 class OwnerRow(NamedTuple):

@@ -29,14 +29,9 @@ from ..rays.contacts import Reason, Terminations, terminations_of
 from .ray_samples import RayDetail, gap, squares
 from .samples import Margin, spans_of
 
-RAYS_MAX = 1024
-"""Most rays of a shot that has margins; all rays are handled at once, and so many take some seconds."""
-
-NEARLY = 2.0**-20
-"""Distance of a pixel centre from the rim of a thick ray, px, below which it is computed in Python integers."""
-
-TINY = float(np.nextafter(0, 1))
-"""Distance of an object that is not touched but whose distance rounds to 0."""
+RAYS_MAX = 1024  # most rays of a shot that has margins; all rays are handled at once, and so many take some seconds
+NEARLY = 2.0**-20  # distance of a pixel centre from the rim of a thick ray, px, below which integers compute it
+TINY = float(np.nextafter(0, 1))  # distance of an object that is not touched but whose distance rounds to 0
 
 Shift = tuple[float, float]
 
@@ -61,21 +56,13 @@ class Runs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Walked segment of a ray relative to the motion of an item, from the pixel of the ray's start; 1/256 px.
+    """Walked segment of a ray relative to the motion of an item, from the pixel of the ray's start; 1/256 px."""
 
-    Parameters
-    ----------
-    begin : (2,) start
-    end, part : (2,) whole and fractional part, in [0, 1), of the end
-    step : (2,) vector of the whole ray
-    radius : half of the width
-    """
-
-    begin: Ints
-    end: Ints
-    part: Floats
-    step: Ints
-    radius: int
+    begin: Ints  # (2,)
+    end: Ints  # (2,) whole part of the end
+    part: Floats  # (2,) fractional part of the end, in [0, 1)
+    step: Ints  # (2,) vector of the whole ray
+    radius: int  # half of the width
 
     @cached_property
     def ray(self) -> float:
@@ -128,17 +115,10 @@ def ray_margins(detail: RayDetail, scene: Scene, ray: RayWeapon, shot: int, hit:
 
     The margin of an object that was hit is the shortest shift after which no ray touches it; the rays go as far as they
     would if no object ended them. The margin of an object that was not hit is the shortest shift after which a ray
-    touches it; the rays end where they did. An object in which rays start, and which they ignore, has no margin.
+    touches it; the rays end where they did. An object in which rays start, and which they ignore, has no margin. The
+    shot has a number, and hit the objects of some ids.
 
-    Parameters
-    ----------
-    shot : number of the shot
-    hit : ids of the objects that it hit
-
-    Raises
-    ------
-    InputError
-        If the weapon is a projectile tested in steps, or if there are too many rays.
+    An InputError says if the weapon is a projectile tested in steps, or if there are too many rays.
     """
     if isinstance(ray, Projectile) and ray.steps is not None:
         raise InputError(f"hits: expected those of a ray or of a projectile without steps, got steps={ray.steps}")

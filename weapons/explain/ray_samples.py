@@ -26,12 +26,10 @@ from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, rays_of
 from ..rays.ray_walk import Range, touching, trace
 from .samples import Behind, Blocked, Samples, WhyNot, unmet
 
-REACH_BITS = 23
-"""Bits of a coordinate of a cell; cells lie within 2**22 px of their ray's origin, so x, y and the ray fit int64."""
+REACH_BITS = 23  # of a coordinate of a cell: cells lie within 2**22 px of their ray's origin; x, y and ray fit int64
 
 
-CELLS_AT_ONCE = 2**19
-"""Cells of rays counted at a time: 4 MB for each of their columns."""
+CELLS_AT_ONCE = 2**19  # cells of rays counted at a time: 4 MB for each of their columns
 
 
 class Miss(NamedTuple):
@@ -76,29 +74,19 @@ class _Keyed:
 
 @dataclass(frozen=True, eq=False)
 class RayDetail:
-    """Cells of rays, with all that decides their verdicts.
-
-    Parameters
-    ----------
-    stack, bounds, shots, rays, lines, ends : the items, and the rays with their ends
-    met : contacts with accepted items, up to the ends and some beyond
-    every : contacts of the whole length of rays with any item, also out of bounds
-    scale : denominator of the times of each pair of `every`
-    in_steps : whether the rays are tested at some moments only
-    ignores : whether the rays ignore items in which they start
-    """
+    """Cells of rays, with all that decides their verdicts."""
 
     stack: Stack
     bounds: Box | None
     shots: Shots
     rays: Rays
     lines: Lines
-    ends: Terminations
-    met: Contacts
-    every: Contacts
-    scale: Ints
-    in_steps: bool
-    ignores: bool
+    ends: Terminations  # of the rays
+    met: Contacts  # contacts with accepted items, up to the ends and some beyond
+    every: Contacts  # contacts of the whole length of rays with any item, also out of bounds
+    scale: Ints  # denominator of the times of each pair of `every`
+    in_steps: bool  # whether the rays are tested at some moments only
+    ignores: bool  # whether the rays ignore items in which they start
 
     @cached_property
     def walked(self) -> Contacts:
@@ -203,12 +191,7 @@ def ray_detail(scene: Scene, parts: Parts, shots: Shots) -> RayDetail:
 
 
 def counted_verdicts(scene_of: Callable[[int], Scene], parts: Parts, shots: Shots) -> Ints:
-    """Number of cells (N, 6) of shots by verdict; many shots are walked at a time.
-
-    Parameters
-    ----------
-    scene_of : function of a shot that returns the scene that it was fired at
-    """
+    """Number of cells (N, 6) of shots by verdict, each at the scene that it was fired at; many are walked at a time."""
     counts = [np.zeros((0, len(Verdict)), np.int64)]
     rays = rays_of(parts, shots)
     each = np.bincount(rays.shot, _cells_most(rays, parts[2].radius_256), len(shots)).astype(np.int64)
@@ -331,11 +314,7 @@ Gap = tuple[float, int, tuple[float, float], tuple[float, float]]
 def _gaps(detail: RayDetail, objects: list[int], bounds: Box | None, most: float | None) -> dict[int, Gap]:
     """Distances of objects from the walked part of the rays: all within `most` px, or only the nearest.
 
-    Only pixels within `bounds` count.
-
-    Returns
-    -------
-    {rank: (distance, ray, point of the ray, point of the object)}
+    Only pixels within `bounds` count. Returned is {rank: (distance, ray, point of the ray, point of the object)}.
     """
     rays, stack = detail.rays, detail.stack
     origin = rays.origin_xy[0]

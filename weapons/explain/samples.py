@@ -103,30 +103,19 @@ class WhyNot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Detail:
-    """Samples of one walk of shots.
-
-    Parameters
-    ----------
-    stack, shots, placements : the items, the shots and their placements
-    runs : runs of pixels
-    run, x : run and column of each sample
-    hit : runs that hit an object; all of them if the weapon pierces
-    verdict : verdict of each sample
-    rank, ended : ranks of the items that decided the verdict and that ended the walk of each sample, -1 for none
-    sheltered : whether an item on the way to a sample decided
-    """
+    """Samples of one walk of shots."""
 
     stack: Stack
     shots: Shots
     placements: Placements
-    runs: Runs
-    run: Ints
-    x: Ints
-    hit: Events
-    verdict: Ints
-    rank: Ints
-    ended: Ints
-    sheltered: Bools
+    runs: Runs  # runs of pixels
+    run: Ints  # of each sample
+    x: Ints  # column of each sample
+    hit: Events  # runs that hit an object; all of them if the weapon pierces
+    verdict: Ints  # of each sample
+    rank: Ints  # of the item that decided a sample's verdict, -1 for none
+    ended: Ints  # rank of the item that ended the walk of each sample, -1 for none
+    sheltered: Bools  # whether an item on the way to a sample decided
 
     @cached_property
     def start(self) -> Ints:
@@ -405,13 +394,7 @@ class Margin(NamedTuple):
 def margins_of(context: QueryContext, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
     """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
 
-    Parameters
-    ----------
-    first_shot : number of the first shot
-
-    Returns
-    -------
-    margins, sorted by (shot, object)
+    They are sorted by (shot, object); shots are numbered from the first one's number on.
     """
     stack, found = context.stack, []
     for row in range(len(shots) if len(stack) else 0):

@@ -16,17 +16,10 @@ if TYPE_CHECKING:
     from .check import Collected
 
 
-GOLDENS = "goldens"
-"""Name of the folder of goldens beside the test files."""
-
-WORKER_KEY = "hitplanes"
-"""Key under which a worker of pytest-xdist sends the tests that it collected."""
-
-REPORT_KEY = "hits_golden"
-"""Attribute of a test report that holds the outcomes of the test's goldens."""
-
-RECORDS = pytest.StashKey[list[dict[str, Any]]]()
-"""Key of the outcomes in the stash of a test."""
+GOLDENS = "goldens"  # name of the folder of goldens beside the test files
+WORKER_KEY = "hitplanes"  # key under which a worker of pytest-xdist sends the tests that it collected
+REPORT_KEY = "hits_golden"  # attribute of a test report that holds the outcomes of the test's goldens
+RECORDS = pytest.StashKey[list[dict[str, Any]]]()  # key of the outcomes in the stash of a test
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -77,15 +70,9 @@ class HitsGolden:
         return f"<hits_golden of {self._item.name}>"
 
     def __call__(
-        self,
-        hits: Hits,
-        *,
-        name: str | None = None,
-        planes: Mapping[str, object] | None = None,
-        only: str | None = None,
-        tolerance_pixels: int = 0,
-        tolerance_px: int = 0,
-    ) -> None:
+        self, hits: Hits, *, name: str | None = None, planes: Mapping[str, object] | None = None,
+        only: str | None = None, tolerance_pixels: int = 0, tolerance_px: int = 0,
+    ) -> None:  # fmt: skip
         """Fail unless the hits, the planes of their scene and their picture equal the accepted ones.
 
         Parameters
@@ -104,23 +91,16 @@ class HitsGolden:
             before.
         """
         __tracebackhide__ = True
-        from .check import Call, safe_name, settle
-        from .file import check_present
-        from .hits_alone import tolerance_of
+        from .check import Call, settle
+        from .file import check_present, tolerance_of
 
         check_present(hits)
         tolerance = tolerance_of(only, tolerance_pixels, tolerance_px)
         self._take(name)
-        item, config = self._item, self._item.config
-        inside = item.nodeid.partition("::")[2]
-        base = item.path.parent / GOLDENS / item.path.stem / safe_name(inside, name)
-        here, update = config.invocation_params.dir, bool(config.getoption("hits_update"))
-        call = Call(
-            item.nodeid, f"{item.path.name}::{inside}", name, base, config.rootpath, here, update, only, tolerance
-        )
+        call = Call.of(self._item, GOLDENS, name, only, tolerance)
         outcome = settle(call, hits, {} if planes is None else planes)
-        record = {"golden": str(base), "outcome": outcome.kind, "failure": outcome.failure}
-        item.stash.setdefault(RECORDS, []).append(record)
+        record = {"golden": str(call.base), "outcome": outcome.kind, "failure": outcome.failure}
+        self._item.stash.setdefault(RECORDS, []).append(record)
         if outcome.message:
             pytest.fail(outcome.message)
 

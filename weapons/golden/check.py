@@ -7,7 +7,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -28,53 +28,37 @@ from hitplanes.planes.scene.scene import Scene
 from ..report.canvas import enlarged
 from ..report.picture import picture_of_difference, picture_of_report
 from .file import (
+    EXACT,
     SCENE_PLANES,
     DamagedGoldenError,
     ForeignGoldenError,
     Golden,
+    Tolerance,
     Unlike,
     golden_of,
     opaque,
     pixels_unlike,
     read_golden,
+    reports_of_hits,
     unlike,
 )
-from .hits_alone import EXACT, Tolerance, reports_of_hits
 
-RED = (255, 40, 40)
-"""Colour of pixels that differ."""
-
-GROUND = (12, 13, 16)
-"""Colour of the zeros of a plane."""
-
-NOWHERE = (60, 62, 68)
-"""Colour of pixels outside the smaller one of two pictures."""
-
-DIM = 140
-"""Brightness of pixels that do not differ, of 255."""
-
-PICTURE_CLOSE, PLANE_CLOSE = 80, 40
-"""Width of the part that a close view shows of a picture and of a plane, px."""
-
-CLOSE_SIDE = 320
-"""Approximate width at which a close view is drawn, px."""
-
-GAP = 8
-"""Gap between close views, px."""
-
-PLANE = "plane-{}-"
-"""Prefix of the files of a plane, with its number, as its name may not be valid in a file name."""
-
-COMPARED = "hits.png"
-"""Picture of the expected hits and those got, side by side."""
+RED = (255, 40, 40)  # colour of pixels that differ
+GROUND = (12, 13, 16)  # colour of the zeros of a plane
+NOWHERE = (60, 62, 68)  # colour of pixels outside the smaller one of two pictures
+DIM = 140  # brightness of pixels that do not differ, of 255
+PICTURE_CLOSE, PLANE_CLOSE = 80, 40  # width of the part that a close view shows of a picture and of a plane, px
+CLOSE_SIDE = 320  # approximate width at which a close view is drawn, px
+GAP = 8  # gap between close views, px
+PLANE = "plane-{}-"  # prefix of the files of a plane, with its number, as its name may not be valid in a file name
+COMPARED = "hits.png"  # picture of the expected hits and those got, side by side
 
 HASH = np.array([73_856_093, 19_349_663, 83_492_791], np.uint64)
 """Primes that give neighbouring labels different colours: Teschner et al., "Optimized Spatial Hashing" (2003)."""
 
 Plane = npt.NDArray[Any]
 
-Row = list[tuple[str, str]]
-"""Caption and file of pictures that are shown side by side."""
+Row = list[tuple[str, str]]  # caption and file of pictures that are shown side by side
 
 
 def pictures_of(changed: Unlike) -> list[str]:
@@ -84,12 +68,7 @@ def pictures_of(changed: Unlike) -> list[str]:
 
 
 def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed: Unlike) -> list[Row]:
-    """Write pictures of the expected and the actual hits, and of their difference, into a folder.
-
-    Returns
-    -------
-    rows of pictures for the page
-    """
+    """Write pictures of the expected and the actual hits, and of their difference; return the rows of the page."""
     picture = got.picture
     if picture is None:
         assert got.whole is not None and got.scene is not None  # golden_of has made it
@@ -191,14 +170,9 @@ def _close(folder: Path, prefix: str, was: Image, now: Image, differ: Bools, sid
     return [*whole, (around, f"{prefix}crop.png")]
 
 
-FOLDER = "hits-failures"
-"""Folder of failures, in the root of the tests."""
-
-PAGE = "index.html"
-"""Page of the failures."""
-
-LIST = "files.txt"
-"""List of the files that belong to us; its first line is MARK."""
+FOLDER = "hits-failures"  # folder of failures, in the root of the tests
+PAGE = "index.html"  # page of the failures
+LIST = "files.txt"  # list of the files that belong to us; its first line is MARK
 
 IGNORE = ".gitignore"
 
@@ -248,15 +222,8 @@ def note_files(folder: Path, names: Iterable[str]) -> None:
 def replace_page(folder: Path, failures: Sequence[dict[str, Any]]) -> bool:
     """Write the page of this run's failures, and delete the files of earlier runs.
 
-    Without failures the folder is deleted too, unless it holds files of others.
-
-    Parameters
-    ----------
-    failures : dicts with "test", "golden", "lines", "folder", "texts" (files) and "rows" of (caption, file)
-
-    Returns
-    -------
-    whether there is a page
+    Without failures the folder is deleted too, unless it holds files of others. A failure is a dict with "test",
+    "golden", "lines", "folder", "texts" (files) and "rows" of (caption, file). Returned is whether there is a page.
     """
     if not _is_ours(folder):
         return False
@@ -351,41 +318,34 @@ def _listed(folder: Path) -> list[str]:
     ]
 
 
-LINES_MAX, PAGE_LINES_MAX = 20, 500
-"""Most lines of a failure's message, and of its text on the page."""
-
-NAME_LETTERS, HASH_DIGITS = 80, 10
-"""Most letters of a file's name, and digits of the hash in it."""
+LINES_MAX, PAGE_LINES_MAX = 20, 500  # most lines of a failure's message, and of its text on the page
+NAME_LETTERS, HASH_DIGITS = 80, 10  # most letters of a file's name, and digits of the hash in it
 
 PLAIN = re.compile(r"[a-z0-9_]+(\[[a-z0-9_.,=+-]*\])?"), re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
 
 
 @dataclass(frozen=True)
 class Call:
-    """One call of `hits_golden`.
+    """One call of `hits_golden`."""
 
-    Parameters
-    ----------
-    node : id of the test in this run
-    test : id of the test from its file's name on, which does not depend on where pytest runs
-    name : given in the test, or None
-    base : path of the golden's files, without their endings
-    root : folder to which the paths of tests are relative
-    here : folder to which printed paths are relative
-    update : whether to write a golden that is missing or differs
-    only : "hits" for hits alone, None for the whole answer
-    tolerance : how much the rows of hits alone may differ
-    """
+    node: str  # id of the test in this run
+    test: str  # id of the test from its file's name on, which does not depend on where pytest runs
+    name: str | None  # given in the test, or None
+    base: Path  # path of the golden's files, without their endings
+    root: Path  # folder to which the paths of tests are relative
+    here: Path  # folder to which printed paths are relative
+    update: bool  # whether to write a golden that is missing or differs
+    only: str | None = None  # "hits" for hits alone, None for the whole answer
+    tolerance: Tolerance = EXACT  # how much the rows of hits alone may differ
 
-    node: str
-    test: str
-    name: str | None
-    base: Path
-    root: Path
-    here: Path
-    update: bool
-    only: str | None = None
-    tolerance: Tolerance = EXACT
+    @classmethod
+    def of(cls, item: pytest.Item, folder: str, name: str | None, only: str | None, tolerance: Tolerance) -> Call:
+        """Return the call of a test whose goldens are in a folder of this name beside its file."""
+        inside, config = item.nodeid.partition("::")[2], item.config
+        base = item.path.parent / folder / item.path.stem / safe_name(inside, name)
+        here, update = config.invocation_params.dir, bool(config.getoption("hits_update"))
+        test = f"{item.path.name}::{inside}"
+        return cls(item.nodeid, test, name, base, config.rootpath, here, update, only, tolerance)
 
     def shown(self, path: Path) -> str:
         """Return a path as it is printed."""
@@ -420,10 +380,7 @@ def safe_name(test: str, name: str | None = None) -> str:
 def settle(call: Call, hits: object, planes: Mapping[str, object]) -> Outcome:
     """Compare hits with their golden; if they differ, update the golden or write the failure.
 
-    Raises
-    ------
-    InputError
-        If the hits or the planes are of a wrong type.
+    An InputError says if the hits or the planes are of a wrong type.
     """
     got = golden_of(hits, planes, call.test, call.name, call.only)
     expected, changed, ours = None, None, True
@@ -474,30 +431,20 @@ def _show(
     return failure, call.shown(folder / PAGE)
 
 
-KINDS = (".json", ".npz", ".png")
-"""Endings of the files of a golden."""
+KINDS = (".json", ".npz", ".png")  # endings of the files of a golden
 
 
 class Collected:
-    """Plugin that lists the tests of all files that have goldens beside them.
+    """Plugin that lists the tests of all files that have goldens beside them, in folders of this name.
 
-    Parameters
-    ----------
-    folder : name of the folders of goldens
-    whole : whether pytest reports all tests of a file
-
-    Attributes
-    ----------
-    files : node ids of test files, by path
-    whole : node ids of the files and classes whose tests are all known
-    known : node ids of the tests and classes in them, whether selected to run or not
+    `whole` says whether pytest reports all tests of a file.
     """
 
     def __init__(self, folder: str, *, whole: bool) -> None:
         self._folder, self._whole = folder, whole
-        self.files: dict[str, str] = {}
-        self.whole: set[str] = set()
-        self.known: set[str] = set()
+        self.files: dict[str, str] = {}  # node ids of test files, by path
+        self.whole: set[str] = set()  # node ids of the files and classes whose tests are all known
+        self.known: set[str] = set()  # node ids of the tests and classes in them, whether selected to run or not
 
     @pytest.hookimpl(wrapper=True)
     def pytest_make_collect_report(
@@ -529,12 +476,7 @@ def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set
     """Return the paths, without endings, of goldens that no test uses.
 
     A golden is stale if its test passed without using it, or no longer exists. A test that was deselected, skipped or
-    failed says nothing about its goldens.
-
-    Parameters
-    ----------
-    used : goldens that were compared in this run
-    passed : node ids of tests that passed
+    failed says nothing about its goldens. In this run some goldens were used, and tests of some node ids passed.
     """
     by_place = {(Path(path).parent, Path(path).stem): node for path, node in collected.files.items()}
     stale = []
@@ -542,7 +484,7 @@ def stale_goldens(collected: Collected, folder: str, used: set[str], passed: set
         there = {path.stem for path in place.iterdir() if path.is_file()}
         for goldens in sorted(path for path in (place / folder).glob("*") if path.is_dir()):
             file = by_place.get((place, goldens.name))
-            for base in _bases(goldens):
+            for base in sorted({path.with_name(path.stem) for path in goldens.iterdir() if path.suffix in KINDS}):
                 gone = goldens.name not in there
                 if gone or (file is not None and _is_stale(base, file, collected, used, passed)):
                     stale.append(base)
@@ -559,20 +501,9 @@ def _is_stale(base: Path, file: str, collected: Collected, used: set[str], passe
     node = f"{file}::{inside}"
     if node in collected.known or node in passed:
         return node in passed
-    above = [file, *(known for known in _prefixes(file, inside) if known in collected.known)]
-    return all(part in collected.whole for part in above)
-
-
-def _prefixes(file: str, inside: str) -> Iterator[str]:
-    """Yield the node ids of the classes around a test."""
     names = inside.split("::")
-    for i in range(1, len(names)):
-        yield "::".join([file, *names[:i]])
-
-
-def _bases(folder: Path) -> Iterable[Path]:
-    """Return the paths of the goldens of a folder, without endings."""
-    return sorted({path.with_name(path.stem) for path in folder.iterdir() if path.suffix in KINDS})
+    classes = ("::".join([file, *names[:i]]) for i in range(1, len(names)))
+    return all(part in collected.whole for part in [file, *(known for known in classes if known in collected.known)])
 
 
 def _test_of(base: Path) -> str | None:

@@ -21,37 +21,39 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.common.checks import Bools, Image, InputError, array_of, printable
+from hitplanes.planes.common.checks import Bools, Image, InputError, array_of, choice, integer, printable
+from hitplanes.planes.common.limits import POSITION_MAX
 from hitplanes.planes.common.tables import Text
 from hitplanes.planes.files.png import read_png, write_bytes, write_png, write_text
 from hitplanes.planes.files.scene_folder import laid_out
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Hits
-from ..report.differences import decisive, differences
+from ..report.differences import BATCH_COLUMNS, decisive, differences
+from ..report.phrases import Entry
 from ..report.picture import picture_of_report
 from ..report.report import report_of
-from .hits_alone import EXACT, HITS, Tolerance, hits_alone, hits_unlike
 
 FORMAT = "hitplanes-golden/1"
 
-PLANES_AREA_MAX = 4 * 2**20
-"""Largest scene whose planes are stored, px; two compressed planes of this size take some tens of kB."""
-
-SCENE_PLANES = ("hittable", "occluders")
-"""Planes of a scene that decide hits."""
-
-CHANGED_MAX = 8
-"""Most changed objects that a line names."""
-
-LINE_DEPTH = 5
-"""Depth from which JSON stays on one line: a row, a blocker or the samples of a verdict."""
+PLANES_AREA_MAX = 4 * 2**20  # largest scene whose planes are stored, px: two compressed planes take some tens of kB
+SCENE_PLANES = ("hittable", "occluders")  # planes of a scene that decide hits
+CHANGED_MAX = 8  # most changed objects that a line names
+LINE_DEPTH = 5  # depth from which JSON stays on one line: a row, a blocker or the samples of a verdict
 
 DAMAGE = (
     OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError, SyntaxError,
     struct.error, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 """Errors that reading a damaged archive of arrays may raise."""
+
+HITS = "hits"  # the only part that may be asked for alone
+
+HOW = ("shot", "weapon", "at", "aim", "seed", "accept", "blocked_by", "exclude")
+"""Keys of a shot that say how it was fired; they are kept to be read, and not compared."""
+
+WHAT = ("object", "name", "round", "samples", "pixels", "weight", "pellets", "first_xy", "distance2", "runs")
+"""Keys of a row that are kept; the others depend on what lies near."""
 
 Plane = npt.NDArray[Any]
 
@@ -64,34 +66,41 @@ class ForeignGoldenError(InputError):
     """The file was written by a newer hitplanes or is no golden; it is never overwritten."""
 
 
+@dataclass(frozen=True)
+class Tolerance:
+    """How much the rows of hits may differ."""
+
+    pixels: int = 0  # most pixels by which the number of hit pixels of an object may differ
+    px: int = 0  # farthest that the first hit pixel of an object may move, px
+
+    def __bool__(self) -> bool:
+        return bool(self.pixels or self.px)
+
+    def exceeded(self, was: Entry, now: Entry) -> list[str]:
+        """What exceeds it in two rows of one object, and by how much; empty if nothing does."""
+        count = abs(now["pixels"] - was["pixels"])
+        far2 = sum((to - at) ** 2 for to, at in zip(now["first_xy"], was["first_xy"], strict=True))
+        told = [f"{count} px more or less, tolerance_pixels={self.pixels}"] if count > self.pixels else []
+        return told + ([f"first hit {far2**0.5:.1f} px away, tolerance_px={self.px}"] if far2 > self.px**2 else [])
+
+
+EXACT = Tolerance()  # no difference is tolerated
+
+
 @dataclass(frozen=True, eq=False)
 class Golden:
-    """Hits as a golden stores them.
+    """Hits as a golden stores them."""
 
-    Parameters
-    ----------
-    test : node id of the test, from its file's name on
-    name : given in the test, if it has several goldens
-    report : report of the hits, without the parts that a comparison ignores
-    planes : planes (h, w) or (h, w, channels) by name: those of the scene, then the user's
-    origin_xy : pixel of the world at [0, 0] of the scene's planes
-    left_out : why the scene's planes are not stored, or None
-    picture : (h, w, 3 or 4) bytes, without text; None for hits alone
-    only : "hits" if there is nothing but the rows of hits, else None
-    scene : scene that was fired at, for texts and pictures; not stored
-    whole : the whole report, for pictures; not stored
-    """
-
-    test: str
-    name: str | None
-    report: dict[str, Any]
-    planes: dict[str, Plane]
-    origin_xy: tuple[int, int]
-    left_out: str | None
-    picture: Image | None
-    only: str | None = None
-    scene: Scene | None = None
-    whole: dict[str, Any] | None = None
+    test: str  # node id of the test, from its file's name on
+    name: str | None  # given in the test, if it has several goldens
+    report: dict[str, Any]  # report of the hits, without the parts that a comparison ignores
+    planes: dict[str, Plane]  # planes (h, w) or (h, w, channels) by name: those of the scene, then the user's
+    origin_xy: tuple[int, int]  # pixel of the world at [0, 0] of the scene's planes
+    left_out: str | None  # why the scene's planes are not stored, or None
+    picture: Image | None  # (h, w, 3 or 4) bytes, without text; None for hits alone
+    only: str | None = None  # "hits" if there is nothing but the rows of hits, else None
+    scene: Scene | None = None  # scene that was fired at, for texts and pictures; not stored
+    whole: dict[str, Any] | None = None  # the whole report, for pictures; not stored
 
     def text(self) -> str:
         """Return the JSON, laid out so that texts compare well."""
@@ -138,13 +147,7 @@ class Unlike:
 
 
 def check_present(hits: object) -> Hits:
-    """Check that hits are Hits, and that their scene is as it was when they were fired.
-
-    Raises
-    ------
-    InputError
-        Naming what has changed.
-    """
+    """Check that hits are Hits, and that their scene is as it was; an InputError names what has changed."""
     if not isinstance(hits, Hits):
         raise InputError(f"hits: expected Hits, as fire returns them, got {type(hits).__name__}")
     scene = hits.scene
@@ -159,13 +162,7 @@ def check_present(hits: object) -> Hits:
 
 
 def golden_of(hits: object, planes: object, test: str, name: str | None, only: str | None = None) -> Golden:
-    """Make a golden of hits and the user's planes, or of hits alone.
-
-    Raises
-    ------
-    InputError
-        If `hits` or a plane is of a wrong type, or the scene has changed since the shots.
-    """
+    """Make a golden of hits and the user's planes, or of hits alone; an InputError says what is wrong."""
     hits = check_present(hits)
     scene = hits.scene
     report = report_of(scene, [hits])
@@ -175,26 +172,13 @@ def golden_of(hits: object, planes: object, test: str, name: str | None, only: s
         part = json.loads(json.dumps(hits_alone(report)))
         return Golden(test, name, part, {}, (0, 0), None, None, only, scene, report)
     kept, origin_xy, left_out = _scene_planes(scene)
-    return Golden(
-        test,
-        name,
-        json.loads(json.dumps(decisive(report))),
-        kept | _own_planes(planes),
-        origin_xy,
-        left_out,
-        picture_of_report(report, scene, text=False),
-        scene=scene,
-    )
+    kept |= _own_planes(planes)
+    part, picture = json.loads(json.dumps(decisive(report))), picture_of_report(report, scene, text=False)
+    return Golden(test, name, part, kept, origin_xy, left_out, picture, scene=scene)
 
 
 def read_golden(base: Path) -> Golden | None:
-    """Read a golden; None if there is none.
-
-    Raises
-    ------
-    DamagedGoldenError, ForeignGoldenError
-        Naming the file.
-    """
+    """Read a golden; None if there is none. A DamagedGoldenError or ForeignGoldenError names the file."""
     path = _file(base, "json")
     if not path.exists():
         return None
@@ -207,16 +191,9 @@ def read_golden(base: Path) -> Golden | None:
         only = data.get("only")
         part = hits_alone(report)
         hits_unlike(part, part, Tolerance(1))  # a damaged part fails here, and not when it is compared
-        return Golden(
-            data["test"],
-            data["name"],
-            report,
-            planes,
-            (int(data["origin_xy"][0]), int(data["origin_xy"][1])),
-            data["left_out"],
-            None if only == HITS else _read_picture(_file(base, "png")),
-            only,
-        )
+        origin_xy = int(data["origin_xy"][0]), int(data["origin_xy"][1])
+        picture = None if only == HITS else _read_picture(_file(base, "png"))
+        return Golden(data["test"], data["name"], report, planes, origin_xy, data["left_out"], picture, only)
     except (AttributeError, KeyError, TypeError, ValueError, IndexError) as error:
         if isinstance(error, DamagedGoldenError):
             raise
@@ -386,3 +363,100 @@ def _read_picture(path: Path) -> Image:
         return read_png(path, "picture")
     except InputError as error:
         raise DamagedGoldenError(f"{path}: {error}") from error
+
+
+# Hits alone
+
+
+def tolerance_of(only: object, tolerance_pixels: object, tolerance_px: object) -> Tolerance:
+    """Check what is asked of a golden beside its name and planes."""
+    if only is not None:
+        choice("only", only, (HITS,))
+    given = {"tolerance_pixels": tolerance_pixels, "tolerance_px": tolerance_px}
+    pixels, px = (integer(name, value, 0, 2 * POSITION_MAX) for name, value in given.items())
+    if only is None and (pixels or px):
+        name = "tolerance_pixels" if pixels else "tolerance_px"
+        raise InputError(f"{name}: expected together with only={HITS!r}, got {pixels or px} for a whole golden")
+    return Tolerance(pixels, px)
+
+
+def hits_alone(report: Entry) -> dict[str, Any]:
+    """The part of a report that a golden of hits alone keeps: how each shot was fired, and its rows."""
+    shots = [
+        {key: shot[key] for key in HOW if key in shot}
+        | {"rows": [{key: row[key] for key in WHAT if key in row} for row in shot["rows"]]}
+        for shot in report["shots"]
+    ]
+    batch = report["batch"] and {
+        "shots": report["batch"]["shots"],
+        "objects": [{key: entry[key] for key in ("object", "name")} for entry in report["batch"]["objects"]],
+        "rows": report["batch"]["rows"],
+    }
+    return {"weapons": report["weapons"], "shots": shots, "batch": batch}
+
+
+def hits_unlike(expected: Entry, got: Entry, tolerance: Tolerance) -> list[str]:
+    """Lines about the hits of two kept parts that differ by more than a tolerance.
+
+    How the shots were fired is not compared, nor the order of the rows of a shot. An object that is newly hit, or no
+    longer, differs whatever the tolerance. With a tolerance the numbers of pixels and the first pixels are compared;
+    samples, weights and pellets follow from them.
+    """
+    was, now = _rows(expected), _rows(got)
+    exceeded: list[str] = []
+    for shot in range(min(len(was), len(now)) if tolerance else 0):
+        after_of = {_key(row): row for row in now[shot]}
+        for place, before in enumerate(was[shot]):
+            after = after_of.get(_key(before), before)
+            told = tolerance.exceeded(before, after)
+            exceeded += [f"shot {shot}: object {after['object']}: {line}" for line in told]
+            was[shot][place] = before if told or _key(before) not in after_of else after
+    parts = expected, got
+    alike = got if len(was) == len(now) else expected
+    objects = {entry["object"]: entry for part in parts for entry in (part["batch"] or {"objects": ()})["objects"]}
+    before, after = (
+        _compared(part, how, rows, [objects[item] for item in sorted(objects)])
+        for part, how, rows in zip(parts, (alike, got), (was, now), strict=True)
+    )
+    return differences(before, after) + exceeded
+
+
+def _rows(part: Entry) -> list[list[Entry]]:
+    """Rows of each shot, sorted by object and round; those of a batch in the form of the others."""
+    rows: list[list[Entry]] = [list(shot["rows"]) for shot in part["shots"]]
+    if part["batch"]:
+        rows = [[] for _ in range(part["batch"]["shots"])]
+        for row in part["batch"]["rows"]:
+            columns = dict(zip(BATCH_COLUMNS, row, strict=True))
+            rows[row[0]].append({**columns, "first_xy": [columns["x"], columns["y"]]})
+    return [sorted(own, key=_key) for own in rows]
+
+
+def _key(row: Entry) -> tuple[int, int]:
+    return row["object"], row["round"]
+
+
+def _compared(part: Entry, how: Entry, rows: list[list[Entry]], objects: list[Entry]) -> dict[str, Any]:
+    """A report of these rows, as `differences` reads it: shots are told as in `how`, and objects of a batch named."""
+    if part["batch"]:
+        listed = [[row[column] for column in BATCH_COLUMNS] for own in rows for row in own]
+        return {"batch": {"shots": len(rows), "objects": objects, "rows": listed}, "shots": []}
+    hows = [{key: shot.get(key) for key in ("weapon", "at", "aim")} for shot in how["shots"]]
+    return {"batch": None, "shots": [{**told, "rows": own} for told, own in zip(hows, rows, strict=True)]}
+
+
+def reports_of_hits(whole: Entry, expected: Entry, got: Entry) -> list[dict[str, Any]]:
+    """Two reports that show the expected hits and those got, and no other samples, on the scene as it is.
+
+    They are made of the whole report of the hits got and of both kept parts. There are none if there is a batch, or not
+    the same number of shots.
+    """
+    if not whole["shots"] or len(expected["shots"]) != len(whole["shots"]):
+        return []
+    reports = []
+    for part in (expected, got):
+        own = [shot["rows"] for shot in part["shots"]]
+        runs = [{"hit": [run for row in rows for run in row["runs"]]} for rows in own]
+        shots = zip(whole["shots"], own, runs, strict=True)
+        reports.append({**whole, "shots": [{**shot, "rows": rows, "samples": hit} for shot, rows, hit in shots]})
+    return reports

@@ -66,15 +66,10 @@ def write_frames(folder: Path, frames: Iterable[Image]) -> None:
 FRAMES = 80  # of a round; the next round is the same
 MILLISECONDS = 70  # duration of a frame
 SEED = 22  # of the boxes' orbits
-FLOCKS, FLOCK, WANDERERS = 3, 60, 120
-"""Number of flocks, boxes in each, and boxes that move on their own."""
-
-WIDTH, HEIGHT = 300, 248
-"""Size of the world, px; each of the two panes shows it."""
-MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392
-"""Space around the two panes, between them and above them, and height of the page, px."""
-NAME, BAR, CHART = 96, 160, 180
-"""Widths of a bar's name, of the longest bar, and of the chart of all frames, px."""
+FLOCKS, FLOCK, WANDERERS = 3, 60, 120  # number of flocks, boxes in each, and boxes that move on their own
+WIDTH, HEIGHT = 300, 248  # size of the world, px; each of the two panes shows it
+MARGIN, GAP, TOP, PAGE_HEIGHT = 12, 16, 52, 392  # around the panes, between and above them, and of the page, px
+NAME, BAR, CHART = 96, 160, 180  # widths of a bar's name, of the longest bar, and of the chart of all frames, px
 WALL = 6  # least distance of a box's centre from the edge of the world, px
 MIDDLE = np.array([WIDTH / 2, HEIGHT / 2])
 QUERY_HALF = np.array([20.0, 16.0])  # half the sides of the query, which is the box of a shot, px

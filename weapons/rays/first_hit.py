@@ -38,20 +38,12 @@ from .ray_walk import Range, lines_of
 
 @dataclass(frozen=True, eq=False)
 class FirstHits:
-    """First hits of the rays of whole shots.
+    """First hits of the rays of whole shots."""
 
-    Parameters
-    ----------
-    rays : (R,) the rays
-    ray : their weapon
-    ends : (R,) their ends
-    stack : the items at the version that was fired at
-    """
-
-    rays: Rays
-    ray: RayWeapon
-    ends: Terminations
-    stack: Stack
+    rays: Rays  # (R,) the rays
+    ray: RayWeapon  # their weapon
+    ends: Terminations  # (R,) their ends
+    stack: Stack  # the items at the version that was fired at
 
     def rows(self, shots: int) -> Rows:
         """Rows of so many shots; if a shot has one ray, a row for each hit."""
@@ -119,12 +111,7 @@ def _ended(met: Ints, found: Touched, origin_xy: Ints, stack: Stack) -> Terminat
 
 # house: way of rays
 def ends_by_cast(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
-    """Find the ends of rays by casting them at the items.
-
-    Returns
-    -------
-    the ends without `fraction`, and the numbers of the rays that are left to the walk
-    """
+    """Find the ends of rays, without `fraction`, by casting them at the items; and the rays left to the walk."""
     stack = through.stack
     whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
     found = kernels_of(raycast).first_touched(stack, through.bounds, rays.start_256, rays.step_256, *whose)
@@ -199,12 +186,7 @@ class _Planes:
 
 # house: way of rays
 def ends_by_march(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
-    """Find the ends of rays by marching them through the distance field.
-
-    Returns
-    -------
-    the ends without `fraction`, and the numbers of the rays that are left to another way
-    """
+    """Find the ends of rays, without `fraction`, by marching them; and the rays left to another way."""
     assert through.field is not None  # a scene without one is not marched through
     corner_xy, choosy = through.field.corner_xy, may_refuse(through.stack, shots)
     planes = _Planes(rays, shots, through, corner_xy, *_read(through, through.field))
@@ -242,10 +224,8 @@ def _read(through: Range, field: DistanceField) -> tuple[Labels, Clearance]:
 def _at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width: int) -> Ints:
     """Cells (n, 4) of the distance field that each ray enters at the same moment; a cell may be listed twice.
 
-    Parameters
-    ----------
-    place : (n,) the cell that a ray enters, or the one beside the corner along x
-    starts : (n,) whether it starts there; otherwise it goes through a corner or along a border
+    `place` (n,) is the cell that a ray enters, or the one beside the corner along x; `starts` (n,) says whether it
+    starts there, as otherwise it goes through a corner or along a border.
     """
     sign = np.where(step_256 < 0, -1, 1)
     on_border = ((start_256 & (SUB - 1)) == HALF) & (starts[:, None] | (step_256 == 0))
@@ -289,5 +269,4 @@ def marcher(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
     return march
 
 
-PREPARED = {"cast": caster, "march": marcher}
-"""Functions that make the functions which follow one prepared ray, by the same names."""
+PREPARED = {"cast": caster, "march": marcher}  # makers of functions that follow one prepared ray

@@ -105,25 +105,15 @@ class Stops(ShotColumns):
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A chunk of rays that were followed to their ends; their passes and stops are made when they are read.
+    """A chunk of rays that were followed to their ends; their passes and stops are made when they are read."""
 
-    Parameters
-    ----------
-    rays, lines : (R,) the rays
-    met : contacts with objects and occluders, also beyond the ends
-    ends : (R,) where the rays end
-    relative : the line of each pair of `met`, relative to the motion of its item
-    stack : the items at the version that was fired at
-    falloff : of the weapon, or None
-    """
-
-    rays: Rays
-    lines: Lines
-    met: Contacts
-    ends: Terminations
-    relative: Lines
-    stack: Stack
-    falloff: str | None
+    rays: Rays  # (R,)
+    lines: Lines  # (R,) of the rays
+    met: Contacts  # with objects and occluders, also beyond the ends
+    ends: Terminations  # (R,) where the rays end
+    relative: Lines  # the line of each pair of `met`, relative to the motion of its item
+    stack: Stack  # the items at the version that was fired at
+    falloff: str | None  # of the weapon, or None
 
     @cached_property
     def _chosen(self) -> tuple[Contacts, Ints]:
@@ -247,8 +237,7 @@ def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
 
 
 C = TypeVar("C", Passes, Stops)
-Told = tuple[Callable[[], Passes], Callable[[], Stops]]
-"""Functions that make the passes and the stops of rays."""
+Told = tuple[Callable[[], Passes], Callable[[], Stops]]  # functions that make the passes and the stops of rays
 
 
 class RayHits(Hits):
@@ -392,18 +381,13 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
-        found = cls(
-            cls._gathered_rows(parts, rows),
-            (
-                lambda: Passes.gathered([part.passes for part in rays], rows),
-                lambda: Stops.gathered([part.stop for part in rays], rows),
-            ),
-            sum(part.rays for part in rays),
-            *parts[0]._then(0),
-            parts[0].weapon,
-            shots,
-            Plan.joined([part.plan for part in parts]),
+        told: Told = (
+            lambda: Passes.gathered([part.passes for part in rays], rows),
+            lambda: Stops.gathered([part.stop for part in rays], rows),
         )
+        number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
+        of = *parts[0]._then(0), parts[0].weapon, shots, plan
+        found = cls(cls._gathered_rows(parts, rows), told, number, *of)
         found._remember(parts, rows)
         return found
 

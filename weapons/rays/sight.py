@@ -33,15 +33,9 @@ Aimed = Callable[[Ints], tuple[Ints, Shots]]
 
 
 def sees(
-    scene: Scene | History,
-    eyes: Places,
-    targets: Places,
-    *,
-    accept: Categories = (),
-    blocked_by: Categories = ALL,
-    exclude: Owners | None = None,
-    tick: Angles | None = None,
-) -> Bools:
+    scene: Scene | History, eyes: Places, targets: Places, *, accept: Categories = (), blocked_by: Categories = ALL,
+    exclude: Owners | None = None, tick: Angles | None = None,
+) -> Bools:  # fmt: skip
     """Decide which eyes see which targets.
 
     An eye sees a target if no occluder touches the straight line between them, ends included. So who sees is seen, and
@@ -69,11 +63,18 @@ def sees(
         If an argument is invalid; the text names the argument and the row.
     """
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
-    if isinstance(scene, Scene) and scene.items.stack().occluder.all():  # rays that refuse nothing march faster
-        shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)
+    if isinstance(scene, Scene) and scene.items.stack().occluder.all():
+        shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)  # rays that refuse nothing march faster
     strategy = "cast" if shots.choosy and jit_is_on() else "auto"  # a march stops at all that does not block
     targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
+    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, _gazes(shots, targets_256), strategy):
+        seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
+    return seen
+
+
+def _gazes(shots: Shots, targets_256: Ints) -> Aimed:
+    """Aim eyes, which are shots, at targets; a pair on one spot has no shot."""
 
     def aimed(pair: Ints) -> tuple[Ints, Shots]:
         eye, target = np.divmod(pair, len(targets_256))
@@ -82,22 +83,13 @@ def sees(
         apart = np.flatnonzero(offset.any(axis=1))
         return pair[apart], shots.pick(eye[apart]).aimed_at(offset[apart])
 
-    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, aimed, strategy):
-        seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
-    return seen
+    return aimed
 
 
 def scan(
-    scene: Scene | History,
-    at: Places,
-    angles: Angles,
-    range: float,  # noqa: A002
-    *,
-    accept: Categories = ALL,
-    blocked_by: Categories = ALL,
-    exclude: Owners | None = None,
-    tick: Angles | None = None,
-) -> Floats:
+    scene: Scene | History, at: Places, angles: Angles, range: float, *,  # noqa: A002
+    accept: Categories = ALL, blocked_by: Categories = ALL, exclude: Owners | None = None, tick: Angles | None = None,
+) -> Floats:  # fmt: skip
     """Measure how far beams go to the first thing that they meet, as a lidar does.
 
     A beam meets objects and occluders as the ray of a `Pistol` does: its distance is that of `hits.stop`, and 0 if it
@@ -127,19 +119,26 @@ def scan(
         If an argument is invalid; the text names the argument and the row.
     """
     shots, ray = _shots("at", at, scene, accept, blocked_by, exclude), Pistol(real("range", range, 0, REACH_MAX))
-    shared = array_of("angles", angles).ndim == 1
-    direction = np.stack(unit(reals("angles", angles, (None,) if shared else (len(shots), None))), axis=-1)
-    distance = np.full((len(shots), direction.shape[-2]), np.inf)
-
-    def aimed(beam: Ints) -> tuple[Ints, Shots]:
-        place, angle = np.divmod(beam, distance.shape[1])
-        return beam, shots.pick(place).aimed(direction.reshape(-1, 2)[angle if shared else beam])
-
-    for beam, rays, ends in _ends(scene, tick, ray, distance.shape, aimed):
+    shape, aimed = _beams(shots, angles)
+    distance = np.full(shape, np.inf)
+    for beam, rays, ends in _ends(scene, tick, ray, shape, aimed):
         met = np.flatnonzero(ends.rank >= 0)
         lines = lines_of(rays, ray).take(met)
         distance.reshape(-1)[beam[met]] = ends.time[met] / lines.scale * lines.length
     return distance
+
+
+def _beams(shots: Shots, angles: object) -> tuple[tuple[int, int], Aimed]:
+    """Shape (N, B) of a table of beams, and the function that aims them."""
+    shared = array_of("angles", angles).ndim == 1
+    direction = np.stack(unit(reals("angles", angles, (None,) if shared else (len(shots), None))), axis=-1)
+    beams = direction.shape[-2]
+
+    def aimed(beam: Ints) -> tuple[Ints, Shots]:
+        place, angle = np.divmod(beam, beams)
+        return beam, shots.pick(place).aimed(direction.reshape(-1, 2)[angle if shared else beam])
+
+    return (len(shots), beams), aimed
 
 
 def _shots(field: str, at: object, scene: object, accept: object, blocked_by: object, exclude: object) -> Shots:
@@ -163,12 +162,7 @@ def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
 def _ends(
     scene: Scene | History, tick: object, ray: Pistol, shape: tuple[int, ...], aimed: Aimed, strategy: str = "auto"
 ) -> Iterator[tuple[Ints, Rays, Terminations]]:
-    """Follow the rays of a table (N, M), whose rows are places.
-
-    Yields
-    ------
-    cells (n,) of the table, their rays, and the ends of these
-    """
+    """Follow the rays of a table (N, M), whose rows are places: cells (n,), their rays, and the ends of these."""
     places, each = shape
     for moment, rows in moments_of(scene, tick, places):
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)

@@ -38,6 +38,7 @@ from hitplanes.planes.common.tables import (
     Ref,
     Rows,
     Text,
+    Value,
     Whole,
     Wholes,
     json_of,
@@ -62,11 +63,8 @@ from ..report.phrases import Entry, by_path, first_of, key_of, pairs
 from ..report.phrases import shown as number_of
 
 FORMAT = "hitplanes-shots/3"
-WITHOUT_CHAIN = "hitplanes-shots/1"
-"""Oldest format, without chain and end."""
-
-ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)
-"""Older formats, in which `accept` is the filter of what blocks, too."""
+WITHOUT_CHAIN = "hitplanes-shots/1"  # oldest format, without chain and end
+ONE_FILTER = ("hitplanes-shots/2", WITHOUT_CHAIN)  # older formats, in which `accept` is the filter of what blocks, too
 
 SEAL = b',"chain":"%b"}\n'
 SEAL_BYTES = len(SEAL % bytes(16))
@@ -75,32 +73,19 @@ END = Keys({"end": Whole(0, 2**63 - 1)}, ("end",))
 AWAY = Wholes((2,), -2 * SUB * POSITION_MAX, 2 * SUB * POSITION_MAX)
 PARTS = ("rows", "passes", "stops")
 RESULT = Keys({**{part: Rows(Ref("columns")) for part in PARTS}, "verdicts": Ref("columns")})
-LINE = Keys(
-    {
-        "scene": Text(),
-        "tick": Optional(Number(-TICK_MAX, TICK_MAX)),
-        "weapon": Ref("weapon"),
-        "at": Numbers((2,), POSITION_MAX),
-        "direction": Wholes((2,), -ONE, ONE),
-        "toward_256": Optional(AWAY),
-        "accept": Whole(0, ALL),
-        "blocked_by": Whole(0, ALL),
-        "exclude": Wholes((None,), 0, 2**31),
-        "seed": Whole(0, SEED_MAX),
-        "shot": Whole(0, 2**63 - 1),
-        "result": Ref("result"),
-        "hash": Text(),
-    },
-    ("scene", "weapon", "at", "direction", "accept", "blocked_by", "exclude", "seed", "shot", "result", "hash"),
-)
+COLUMNS: dict[str, Value] = {
+    "scene": Text(), "tick": Optional(Number(-TICK_MAX, TICK_MAX)), "weapon": Ref("weapon"),
+    "at": Numbers((2,), POSITION_MAX), "direction": Wholes((2,), -ONE, ONE), "toward_256": Optional(AWAY),
+    "accept": Whole(0, ALL), "blocked_by": Whole(0, ALL), "exclude": Wholes((None,), 0, 2**31),
+    "seed": Whole(0, SEED_MAX), "shot": Whole(0, 2**63 - 1), "result": Ref("result"), "hash": Text(),
+}  # fmt: skip
+LINE = Keys(COLUMNS, tuple(name for name in COLUMNS if name not in ("tick", "toward_256")))
 
-AT_ONCE, BYTES_AT_ONCE = 1024, 2**21
-"""Most shots, and about as many bytes of their lines, that one call fires again; more are no faster."""
+AT_ONCE, BYTES_AT_ONCE = 1024, 2**21  # most shots, and about most bytes of lines, of one call; more are no faster
 
 NO_END = "has no end: it was not closed, as after a crash, and may lack shots"
 
-NUMBER_MAX = 2**63
-"""Largest absolute value of a number in a result."""
+NUMBER_MAX = 2**63  # largest absolute value of a number in a result
 
 
 class Difference(NamedTuple):
@@ -345,16 +330,9 @@ class Recorded(NamedTuple):
 
 
 class Reading:
-    """Reader that checks each line of a record.
+    """Reader that checks each line of a record, a file at its first line, whose path errors name.
 
-    Parameters
-    ----------
-    path : named in errors
-    lines : the file, at its first line
-
-    Attributes
-    ----------
-    endless : whether all lines were read and the end is missing
+    `endless` says whether all lines were read and the end is missing.
     """
 
     def __init__(self, path: Path, lines: BinaryIO) -> None:
@@ -521,13 +499,8 @@ def _shots_of(entries: Sequence[Mapping[str, Any]]) -> Shots:
 
 
 def _result_lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:
-    """Yield the differences of two results as lines: objects hit, passes, ends of rays, verdicts."""
-    lines = 0
-    for line in _lines(scene, was, now):
-        lines += 1
-        yield printable(line)
-    if not lines:  # for example, the rows have another order
-        yield from map(printable, by_path("", was, now))
+    """Differences of two results as lines: objects hit, passes, ends of rays, verdicts; else by their paths."""
+    yield from map(printable, [*_lines(scene, was, now)] or by_path("", was, now))  # the order of rows has no words
 
 
 def _lines(scene: Scene, was: Entry, now: Entry) -> Iterator[str]:

@@ -37,8 +37,7 @@ from ..kinds.areas import arsenal_of, has_no_range, weapon_from_json
 from ..kinds.placements import Shots, Words
 from ..kinds.weapon import Weapon
 
-AIM_MAX = 10**9
-"""Largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle."""
+AIM_MAX = 10**9  # largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle
 
 
 class WeaponJson(Ref):
@@ -49,20 +48,12 @@ class WeaponJson(Ref):
         return weapon_from_json(value, name)
 
 
-SHOT = Keys(
-    {
-        "weapon": Either(dict, WeaponJson("weapon"), Text()),
-        "at": Numbers((2,), POSITION_MAX),
-        "aim": Optional(Number(-AIM_MAX, AIM_MAX)),
-        "toward": Optional(Numbers((2,), POSITION_MAX)),
-        "accept": Names(),
-        "blocked_by": Names(),
-        "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))),
-        "seed": Whole(0, SEED_MAX),
-        "shot": Whole(0, 2**63 - 1),
-    },
-    ("weapon", "at"),
-)
+SHOT = Keys({
+    "weapon": Either(dict, WeaponJson("weapon"), Text()), "at": Numbers((2,), POSITION_MAX),
+    "aim": Optional(Number(-AIM_MAX, AIM_MAX)), "toward": Optional(Numbers((2,), POSITION_MAX)), "accept": Names(),
+    "blocked_by": Names(), "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))), "seed": Whole(0, SEED_MAX),
+    "shot": Whole(0, 2**63 - 1),
+}, ("weapon", "at"))  # fmt: skip
 """Table that validates a shot."""
 
 
@@ -93,62 +84,44 @@ def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[ShotRequest]:
 def order_from_json(
     data: object, scene: Scene, arsenal: Mapping[str, Weapon], place: str = "shot", number: int = 0
 ) -> ShotRequest:
-    """Check one shot.
+    """Check one shot, given as JSON; an InputError names its place and the field.
 
-    Parameters
-    ----------
-    data : JSON of the shot
-    place : prefix of errors
-    number : number of the shot if the JSON has none
-
-    Raises
-    ------
-    InputError
-        Naming the place and the field.
+    `number` is that of the shot if the JSON has none.
     """
     with within(place):
         shot = SHOT.check("shot", data)
         name = None if isinstance(shot["weapon"], Weapon) else choice("weapon", shot["weapon"], arsenal)
         weapon: Weapon = shot["weapon"] if name is None else arsenal[name]
-        if shot.get("aim") is not None and shot.get("toward") is not None:
-            raise InputError("aim: expected aim or toward, got both")
-        if shot.get("toward") is not None and not (snap(shot["toward"]) - snap(shot["at"])).any():
-            raise InputError(f"toward: expected a point other than the shot's own, got {list(shot['toward'])}")
-        if shot.get("toward") is None and has_no_range(weapon):
-            raise InputError("toward: expected a point, as the weapon has no range, got none")
+        _check_aim(weapon, shot)
         accept, blocked_by = (
             scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
         )
-        return ShotRequest(
-            name,
-            weapon,
-            shot["at"],
-            shot.get("aim"),
-            shot.get("toward"),
-            accept,
-            blocked_by,
-            tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ()))),
-            shot.get("seed", 0),
-            shot.get("shot", number),
-        )
+        excluded = tuple(_owner(scene, value, i) for i, value in enumerate(shot.get("exclude", ())))
+        aims, draws = (shot.get("aim"), shot.get("toward")), (shot.get("seed", 0), shot.get("shot", number))
+        return ShotRequest(name, weapon, shot["at"], *aims, accept, blocked_by, excluded, *draws)
+
+
+def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
+    """Refuse a shot with two aims, one toward its own place, and one without the end that its weapon needs."""
+    aim, toward = shot.get("aim"), shot.get("toward")
+    if aim is not None and toward is not None:
+        raise InputError("aim: expected aim or toward, got both")
+    if toward is not None and not (snap(toward) - snap(shot["at"])).any():
+        raise InputError(f"toward: expected a point other than the shot's own, got {list(toward)}")
+    if toward is None and has_no_range(weapon):
+        raise InputError("toward: expected a point, as the weapon has no range, got none")
 
 
 def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
     """Fire one shot; the pre-filter and the broad phase are those of `fire`."""
-    return fire(
-        scene,
-        order.weapon,
-        order.at,
-        aim=order.aim,
-        toward=order.toward,
-        accept=order.accept,
-        blocked_by=order.blocked_by,
-        exclude=order.exclude or None,
-        seed=order.seed,
-        shot=[order.shot],
-        prefilter=prefilter,
-        broadphase=broadphase,
-    )
+    alike = {name: getattr(order, name) for name in ("at", "aim", "toward", "accept", "blocked_by", "seed")}
+    how: dict[str, Any] = {
+        "exclude": order.exclude or None,
+        "shot": [order.shot],
+        "prefilter": prefilter,
+        "broadphase": broadphase,
+    }
+    return fire(scene, order.weapon, **alike, **how)
 
 
 def fire_shots(scene: Scene) -> list[Hits]:
@@ -163,13 +136,10 @@ def fire_shots(scene: Scene) -> list[Hits]:
 
 
 def shot_json(weapon: Weapon, shot: Shots, scene: Scene, stack: Stack) -> dict[str, Any]:
-    """One shot as a scene file has it, the inverse of `order_from_json`; defaults are left out, but for the number.
+    """One shot, a batch of one, as a scene file has it: the inverse of `order_from_json`.
 
-    Parameters
-    ----------
-    shot : a batch of one
-    scene, stack : the scene, for its weapons and names, and the stack that was fired at. Excluded owners that own
-        nothing of it are left out, as a file need not have their ids
+    Defaults are left out, but for the number, and so are excluded owners that own nothing of the stack that was fired
+    at, as a file need not have their ids. The scene is asked for its weapons and names.
     """
     name = next((name for name, other in arsenal_of(scene).items() if other == weapon), None)
     aimed: dict[str, Any] = {}
@@ -199,42 +169,26 @@ def _owner(scene: Scene, value: object, row: int) -> int:
         return integer("owner", value, 0, scene.items.count - 1)
 
 
-LINE_MAX = 2**20
-"""Longest line of a log, bytes; enough for a shot that excludes thousands of objects by name."""
-
-CHUNK_BYTES = 2**22
-"""Bytes of lines that are read at a time; in memory they take about ten times as much."""
-
-FEW = 16
-"""Unusual lines are read one by one if there are at most this many; otherwise they are split into halves."""
+LINE_MAX = 2**20  # longest line of a log, bytes; enough for a shot that excludes thousands of objects by name
+CHUNK_BYTES = 2**22  # bytes of lines that are read at a time; in memory they take about ten times as much
+FEW = 16  # unusual lines are read one by one if there are at most this many; otherwise they are split into halves
 
 _decode = json.JSONDecoder(object_pairs_hook=distinct_keys).raw_decode
 
 
 @dataclass(frozen=True, eq=False)
 class Salvo:
-    """Checked shots of any weapons, as columns.
+    """Checked shots of any weapons, as columns."""
 
-    Parameters
-    ----------
-    weapon : the weapon of each
-    at : (n, 2) px
-    aim : (n,) degrees
-    toward : (n, 2) px; NaN for a shot that has an aim
-    accept, blocked_by : (n,) category bits
-    exclude : ids of owners, a tuple for each shot
-    seed, number : (n,) that select the random draws
-    """
-
-    weapon: list[Weapon]
-    at: Floats
-    aim: Floats
-    toward: Floats
-    accept: Ints
-    blocked_by: Ints
-    exclude: list[tuple[int, ...]]
-    seed: Words
-    number: Ints
+    weapon: list[Weapon]  # of each shot
+    at: Floats  # (n, 2) px
+    aim: Floats  # (n,) degrees
+    toward: Floats  # (n, 2) px; NaN for a shot that has an aim
+    accept: Ints  # (n,) category bits
+    blocked_by: Ints  # (n,) category bits
+    exclude: list[tuple[int, ...]]  # ids of owners, a tuple for each shot
+    seed: Words  # (n,) that selects the random draws, with the number
+    number: Ints  # (n,)
 
     def __len__(self) -> int:
         return len(self.weapon)
@@ -267,21 +221,9 @@ class Salvo:
     @classmethod
     def joined(cls, parts: Sequence[Salvo]) -> Salvo:
         """Join several salvos in order."""
-
-        def column(name: str) -> Any:
-            return np.concatenate([getattr(part, name) for part in parts])
-
-        return cls(
-            [weapon for part in parts for weapon in part.weapon],
-            column("at"),
-            column("aim"),
-            column("toward"),
-            column("accept"),
-            column("blocked_by"),
-            [owners for part in parts for owners in part.exclude],
-            column("seed"),
-            column("number"),
-        )
+        columns = [[getattr(part, f.name) for part in parts] for f in fields(cls)]
+        whole: list[Any] = [list(chain(*c)) if isinstance(c[0], list) else np.concatenate(c) for c in columns]
+        return cls(*whole)
 
     @classmethod
     def of_orders(cls, orders: Sequence[ShotRequest]) -> Salvo:
@@ -318,12 +260,7 @@ def body_of(line: bytes) -> bytes:
 
 
 class ShotReader:
-    """Reader of the lines of a log for one scene and its arsenal.
-
-    Parameters
-    ----------
-    name : name of the log in errors
-    """
+    """Reader of the lines of a log for one scene and its arsenal; `name` is that of the log in errors."""
 
     def __init__(self, scene: Scene, arsenal: Mapping[str, Weapon], name: str) -> None:
         self.scene, self.arsenal, self._name = scene, arsenal, name
@@ -339,16 +276,9 @@ class ShotReader:
         return f"{self._name} line {line + 1}"
 
     def read(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
-        """Check lines.
+        """Check lines without their breaks, of which the first has a number, from 0.
 
-        Parameters
-        ----------
-        bodies : lines without line breaks
-        first : number of the first line, from 0
-
-        Returns
-        -------
-        the shots before the first bad line, and the error of that line or None
+        Returned are the shots before the first bad line, and the error of that line or None.
         """
         try:
             return self._together(bodies, first), None
@@ -383,7 +313,7 @@ class ShotReader:
         points = np.full((len(shots), 2), np.nan)
         points[aimed] = _points([point for point in toward if point is not None])
         return Salvo(
-            [self._weapon(shot["weapon"]) for shot in shots],
+            [self.arsenal[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots],
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,
@@ -393,9 +323,6 @@ class ShotReader:
             np.array(_whole([shot.get("seed", 0) for shot in shots]), np.uint64),
             np.array(_whole([shot.get("shot", row) for row, shot in enumerate(shots, first)]), np.int64),
         )
-
-    def _weapon(self, told: Any) -> Weapon:
-        return self.arsenal[told] if type(told) is str else weapon_from_json(told)
 
     def _categories(self, shot: dict[str, Any], key: str) -> int:
         if key not in shot:

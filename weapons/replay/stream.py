@@ -40,20 +40,14 @@ from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
 from .shot_log import Salvo, ShotReader, body_of, read_lines
 
-SECONDS = 0.2
-"""Least time between two drawings, seconds."""
-
-BAR = 24
-"""Length of the bar, characters."""
+SECONDS = 0.2  # least time between two drawings, seconds
+BAR = 24  # length of the bar, characters
 
 
 class Progress:
     """Progress line of a long run, drawn on terminals only; messages go to any stream.
 
-    Parameters
-    ----------
-    stream : usually sys.stderr; None (as sys.stderr is if it was closed) draws nothing
-    what : name of the things that are counted
+    The stream is usually sys.stderr; None (as sys.stderr is if it was closed) draws nothing. `what` is counted.
     """
 
     def __init__(self, stream: TextIO | None, what: str = "shots") -> None:
@@ -64,12 +58,9 @@ class Progress:
         self._width = 0
 
     def begin(self, size: int, shots: int, at: int) -> None:
-        """Start to measure the speed.
+        """Start to measure the speed; `size` is the bytes of the whole log, or 0 if unknown, as for a pipe.
 
-        Parameters
-        ----------
-        size : bytes of the whole log; 0 if unknown, as for a pipe
-        shots, at : shots that an earlier run answered, and the bytes of their lines
+        An earlier run answered some shots; `at` is the bytes of their lines.
         """
         self._size, self._before = size, (shots, at)
         self._begin = time.monotonic()
@@ -80,13 +71,7 @@ class Progress:
         self._write(f"hitplanes: {printable(text)}\n")
 
     def show(self, shots: int, at: int) -> None:
-        """Draw the line, unless it was drawn a moment ago.
-
-        Parameters
-        ----------
-        shots : shots answered so far
-        at : bytes of their lines
-        """
+        """Draw the line, unless it was drawn a moment ago: shots answered so far, and the bytes of their lines."""
         now = time.monotonic()
         if not self._draws or now - self._drawn < SECONDS:
             return
@@ -136,11 +121,8 @@ except ImportError:  # Windows, where two writers of one file are not noticed
     fcntl = None  # type: ignore[assignment]
 
 
-HEADER_MAX = 2**20
-"""Bytes that are read of an unexpected header, to name the difference."""
-
-SEAL = b',"crc":"%08x"}\n'
-"""End of a line, with the CRC-32 of all earlier bytes of the file."""
+HEADER_MAX = 2**20  # bytes that are read of an unexpected header, to name the difference
+SEAL = b',"crc":"%08x"}\n'  # end of a line, with the CRC-32 of all earlier bytes of the file
 
 SEAL_BYTES = len(SEAL % 0)
 
@@ -151,21 +133,8 @@ class Part:
     """Resumable output file `<output>.part`, which only this process may write.
 
     `write` does not buffer. Each line ends with a checksum of all bytes before it, so a line that was changed, lost or
-    doubled is found.
-
-    Parameters
-    ----------
-    output : path of the complete result
-    header : first line; an older part is continued only if it begins with the same line
-
-    Attributes
-    ----------
-    damaged : number of the first damaged line of an older part, from 1; None if there is none
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, if another process writes it, or if an older part has another header.
+    doubled is found: `damaged` is the number of the first such line of an older part, from 1, or None. An InputError
+    says if the file cannot be written, if another process writes it, or if an older part has another first line.
     """
 
     def __init__(self, output: Path, header: bytes) -> None:
@@ -244,12 +213,9 @@ class Part:
         """Rename the part, now complete, to the output."""
         with self._told():
             if fcntl is None:
-                self._close()
+                os.close(self._file)
+                self._file = -1
             put_in_place(self.path, self.output)  # still locked, so no other process writes it
-
-    def _close(self) -> None:
-        os.close(self._file)
-        self._file = -1
 
     def _hold(self) -> None:
         """Lock the file for this process."""
@@ -321,36 +287,25 @@ PASSES = (
 STOPS = ("round", "pellet", "reason", "item", "cell_xy", "distance", "normal_xy")
 """ShotColumns of the end of a ray; a name that ends in _xy stands for two numbers."""
 
-LINES_FIRST, LINES_MAX = 16, 16384
-"""Lines of the first chunk, small as each shot may hit thousands of objects, and of the largest useful chunk."""
+LINES_FIRST, LINES_MAX = 16, 16384  # of the first chunk, as each shot may hit thousands, and of the largest useful one
 
 SECONDS_SHORT, SECONDS_LONG = 0.1, 0.4
 """After a chunk that took less, the next is four times as large; after one that took more, half as large."""
 
 SUFFIX = ".jsonl"
 
-NOTHING = b'"rows":[],'
-"""Part of the answer to a shot that hit nothing."""
+NOTHING = b'"rows":[],'  # part of the answer to a shot that hit nothing
 
 
 @dataclass
 class Streamed:
-    """Totals of a run.
+    """Totals of a run."""
 
-    Parameters
-    ----------
-    shots : shots answered, also by earlier runs
-    resumed : shots answered by earlier runs
-    hit : shots that hit something
-    size : bytes of the answered lines of the log
-    plan : costs of the shots that this run fired
-    """
-
-    shots: int = 0
-    resumed: int = 0
-    hit: int = 0
-    size: int = 0
-    plan: PlanSum = field(default_factory=PlanSum)
+    shots: int = 0  # shots answered, also by earlier runs
+    resumed: int = 0  # shots answered by earlier runs
+    hit: int = 0  # shots that hit something
+    size: int = 0  # bytes of the answered lines of the log
+    plan: PlanSum = field(default_factory=PlanSum)  # costs of the shots that this run fired
 
 
 def fire_log(scene: Scene, log: Path, output: Path, progress: Progress) -> Streamed:

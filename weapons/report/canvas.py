@@ -22,11 +22,8 @@ from .symbols import HEAT, LET_THROUGH, MARK_GROUND, MARKS, SIGNS, SKETCH, TINT,
 if TYPE_CHECKING:
     from .cards import Card
 
-WIDTH, HEIGHT, LARGEST = 1600, 1200, 24
-"""Largest size of an enlarged view, px, and largest factor."""
-
-DIM = 125
-"""Brightness of the scene, of 255."""
+WIDTH, HEIGHT, LARGEST = 1600, 1200, 24  # largest size of an enlarged view, px, and largest factor
+DIM = 125  # brightness of the scene, of 255
 
 OUTSIDE, HATCH = (18, 19, 22), (200, 212, 230)
 OUTLINES = {
@@ -41,17 +38,10 @@ present place of an object that has moved, and of what a shot does not see."""
 
 THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 
-DASH = 5
-"""Length of the dashes of an outline, px."""
-
-SHADOW, SHADOW_ALPHA = (12, 14, 18), 170
-"""Colour and opacity, of 255, of the ground under the marks of hits, which keeps the gaps between them dark."""
-
-HEAT_ALPHA = 235
-"""Opacity of the heat of hits, of 255."""
-
-OUTLINES_MAX = 1000
-"""Most objects that are outlined in addition to those that were hit or blocked."""
+DASH = 5  # length of the dashes of an outline, px
+SHADOW, SHADOW_ALPHA = (12, 14, 18), 170  # ground under the marks of hits, which keeps the gaps between them dark
+HEAT_ALPHA = 235  # opacity of the heat of hits, of 255
+OUTLINES_MAX = 1000  # most objects that are outlined in addition to those that were hit or blocked
 
 
 def factor_of(view: Box, width: int = WIDTH, height: int = HEIGHT) -> int:
@@ -246,20 +236,12 @@ def _lay(world: Image, where: Bools, color: tuple[int, int, int], alpha: int) ->
     blend(world, color, np.where(where, alpha, 0).astype(np.uint8), 0, 0)
 
 
-WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0
-"""Arrow of an object that has moved: width, length of the dashes, length of the head, px."""
-
-FAR = 6.0
-"""Length of the shortest arrow that is drawn, px of the picture."""
+WAY_WIDTH, WAY_DASH, HEAD = 1.4, 6.0, 11.0  # width, dashes and head of the arrow of what has moved, px
+FAR = 6.0  # length of the shortest arrow that is drawn, px of the picture
 
 
 def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
-    """Draw the present outlines of objects that have moved, and arrows from their old places.
-
-    Returns
-    -------
-    mask (h, w) of the pixels that the arrows cover
-    """
+    """Draw the present outlines of moved objects, and arrows from their old places; return the arrows' mask (h, w)."""
     strokes = Strokes(world.image.shape[:2])
     for entry in report["now"]["moved"]:
         runs = np.array(entry["runs"], np.int64).reshape(-1, 3)
@@ -276,19 +258,13 @@ def draw_present(world: World, report: Mapping[str, Any]) -> Bools:
 
 Color = tuple[int, int, int]
 
-EDGE, TOP = 16, 44
-"""Left edge of the picture on the page, and its top, px."""
-
-LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12
-"""Height of a line, least width of a card, least width of a page, space between cards, px."""
+EDGE, TOP = 16, 44  # left edge of the picture on the page, and its top, px
+LINE, COLUMN, NARROWEST, GAP = 19, 464, 1000, 12  # line height, least widths of a card and a page, gap of cards, px
 
 PAGE_GROUND, CARD, INK, FAINT = (24, 26, 30), (35, 38, 44), (238, 240, 244), (158, 164, 174)
 
-LETTER, ENTRY_GAP = 8, 28
-"""About the width of a letter, and the space around an entry of the legend, px."""
-
-SIZE = 0.42
-"""Scale of OpenCV's font, about 8 px a letter."""
+LETTER, ENTRY_GAP = 8, 28  # about the width of a letter, and the space around an entry of the legend, px
+SIZE = 0.42  # scale of OpenCV's font, about 8 px a letter
 
 
 NAMED_SIGNS = [name for name in SIGNS if name not in ("swept", "goes in", "comes out", "number")]

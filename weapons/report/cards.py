@@ -24,11 +24,8 @@ from .symbols import MARKS, tiled_glyph
 CELL, COLUMNS, ROWS = 14, 15, 9
 """Side of a pixel of the world in the inset, px, and how many are shown; odd, so that the hit lies in the middle."""
 
-LIGHT = 200
-"""Brightness of the scene in the inset, of 255; brighter than in the picture."""
-
-GRID = 130
-"""Brightness of the lines of the grid, relative to the inset, of 255."""
+LIGHT = 200  # brightness of the scene in the inset, of 255; brighter than in the picture
+GRID = 130  # brightness of the lines of the grid, relative to the inset, of 255
 
 
 class Inset(NamedTuple):
@@ -60,49 +57,29 @@ def inset_of(shot: Mapping[str, Any], scene: Scene) -> Inset | None:
     return Inset(image, view)
 
 
-HIT_LINES = 24
-"""Most rows of hits on a card; the JSON has all."""
-
-NOT_LINES = 5
-"""Most objects that a card names as blocked or as not hit; the JSON has all."""
-
-CELL_WIDTH, NARROW, MANY = 64, 58, 7
-"""Width of a column of numbers, px; and where there are many."""
-
-BAR = 9
-"""Height of the bar of verdicts, px."""
-
-LETTER = 8
-"""About the width of a digit, px."""
+HIT_LINES = 24  # most rows of hits on a card; the JSON has all
+NOT_LINES = 5  # most objects that a card names as blocked or as not hit; the JSON has all
+CELL_WIDTH, NARROW, MANY = 64, 58, 7  # width of a column of numbers, px; and where there are many
+BAR = 9  # height of the bar of verdicts, px
+LETTER = 8  # about the width of a digit, px
 
 HEADER = ("object hit", "pixels", "pattern", "visible", "mask", "nearest")
-WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])
-"""Header of a weapon with falloff; the weight is in samples of full weight."""
+WEIGHT_HEADER = ("object hit", "pixels", "weight", *HEADER[2:])  # with falloff; in samples of full weight
 
 BATCH_HEADER = ("object hit", "shots", "of shots", "pixels", "weight")
 
 
 @dataclass(frozen=True)
 class Card:
-    """Content of a card.
+    """Content of a card."""
 
-    Parameters
-    ----------
-    number : number of the shot in the picture, or None
-    title, told : texts at the left and the right of the first line
-    verdicts : number of samples by verdict
-    inset : inset of the first hit
-    lines : lines below; one cell is a sentence, two are an object and a reason, more are a row of a table
-    ray : the only ray of a shot, drawn above the verdicts; None draws a bar of the verdicts
-    """
-
-    number: int | None
-    title: str
-    told: str
-    verdicts: Mapping[str, int]
-    inset: Inset | None
-    lines: Sequence[Sequence[str]]
-    ray: Mapping[str, Any] | None = None
+    number: int | None  # of the shot in the picture, or None
+    title: str  # at the left of the first line
+    told: str  # at the right of the first line
+    verdicts: Mapping[str, int]  # number of samples by verdict
+    inset: Inset | None  # around the first hit
+    lines: Sequence[Sequence[str]]  # one cell is a sentence, two are an object and a reason, more are a row of a table
+    ray: Mapping[str, Any] | None = None  # the only ray of a shot, drawn above the verdicts; None draws a bar of them
 
     @property
     def height(self) -> int:

@@ -103,8 +103,7 @@ def _px(value: Any) -> str:
     return f"{value:.1f} px" if plain else shown(value)
 
 
-PIXELS_NAMED = 2
-"""Most gained or lost pixels that a line names."""
+PIXELS_NAMED = 2  # most gained or lost pixels that a line names
 
 ABOUT = {
     "report": ("version", "times", "filter"),
@@ -125,15 +124,9 @@ BATCH_COLUMNS = ("shot", "round", "object", "samples", "pixels", "weight", "pell
 
 
 def differences(expected: Entry, got: Entry) -> list[str]:
-    """Differences between two reports.
+    """Differences between two reports, as `report_of` makes them or as their JSON reads, as lines.
 
-    Parameters
-    ----------
-    expected, got : reports, as `report_of` makes them or as their JSON reads
-
-    Returns
-    -------
-    lines, empty if and only if all that decides is equal: plans, versions, the scene's hash and times do not count
+    There are none if and only if all that decides is equal: plans, versions, the scene's hash and times do not count.
     """
     was, now = decisive(expected), decisive(got)
     if same(was, now):
@@ -173,8 +166,7 @@ def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
     return lines
 
 
-OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")
-"""Keys whose words are only for objects."""
+OBJECTS = ("scene", "weapons", "batch", "verdicts", "samples")  # keys whose words are only for objects
 
 
 def _scene(was: Entry, now: Entry) -> list[str] | None:
@@ -209,8 +201,9 @@ def _shots(was: Entry, now: Entry) -> list[str] | None:
 
 def _shot(was: Entry, now: Entry) -> list[str]:
     words: dict[str, Words] = {
-        "at": _at, "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts,
-        "rays": ray_changes, "samples": _samples,
+        "at": lambda was, now: [f"fired at {_place(now['at'])}, was {_place(was['at'])}"],
+        "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": ray_changes,
+        "samples": _samples,
     }  # fmt: skip
     return _told(_chief(was), _chief(now), words) or _told(was, now, words)
 
@@ -225,10 +218,6 @@ def _chief(shot: Entry) -> dict[str, Any]:
                 for row in shot[told]
             ]
     return chief
-
-
-def _at(was: Entry, now: Entry) -> list[str]:
-    return [f"fired at {_place(now['at'])}, was {_place(was['at'])}"]
 
 
 def _verdicts(was: Entry, now: Entry) -> list[str] | None:

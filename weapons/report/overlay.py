@@ -21,20 +21,11 @@ from .canvas import INK, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
 from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
 
-LETTER, ROW = 7, 17
-"""Width of a letter and height of a label, px; not taken from the font, whose sizes depend on OpenCV's version."""
-
-LABELS_MAX = 16
-"""Most names in one picture; the cards have all."""
-
-LINKS_MAX = 8
-"""Most occluders that are linked to the object they kept most samples from; the cards have all."""
-
-SHOT_BADGE = 11
-"""Radius of the disc of a shot's number, px."""
-
-NEAR, CLOSE, FAR = 40, 110, 400
-"""How far a name may lie from its object, how far a link lies if it can, and how far it and a number may lie, px."""
+LETTER, ROW = 7, 17  # width of a letter and height of a label, px; not the font's, which depend on OpenCV's version
+LABELS_MAX = 16  # most names in one picture; the cards have all
+LINKS_MAX = 8  # most occluders that are linked to the object they kept most samples from; the cards have all
+SHOT_BADGE = 11  # radius of the disc of a shot's number, px
+NEAR, CLOSE, FAR = 40, 110, 400  # how far a name may lie from its object, a link if it can, and a link or a number, px
 
 DARK = (20, 22, 26)
 WHITE = (255, 255, 255)
@@ -190,14 +181,9 @@ def _around(box: Box, half_w: int, half_h: int, farthest: int) -> Iterator[tuple
         yield from ((right, up), (left, up), (right, down), (left, down))
 
 
-NUMBERED_MAX = 3
-"""Most rays of a shot whose entries have numbers and normals."""
-
-STEPS_SHOWN = 256
-"""Most tests of a projectile that are drawn, each as a disc."""
-
-OF_RAYS = ("filtered", "occluded", "hit")
-"""Verdicts whose cells are marked under rays; the arrow shows the cells that meet nothing."""
+NUMBERED_MAX = 3  # most rays of a shot whose entries have numbers and normals
+STEPS_SHOWN = 256  # most tests of a projectile that are drawn, each as a disc
+OF_RAYS = ("filtered", "occluded", "hit")  # whose cells are marked under rays; the arrow shows the empty ones
 
 BADGE_INK = (18, 20, 24)
 
@@ -211,12 +197,7 @@ def marked(shots: Sequence[Mapping[str, Any]], verdict: str) -> list[Mapping[str
 
 
 def draw_rays(world: World, report: Mapping[str, Any]) -> tuple[list[Text], Bools]:
-    """Draw the rays of all shots, and the areas that they sweep.
-
-    Returns
-    -------
-    numbers, and mask (h, w) of the pixels that are drawn on
-    """
+    """Draw the rays of all shots, and the areas that they sweep; return numbers and the mask (h, w) of their pixels."""
     shots = [shot for shot in report["shots"] if "rays" in shot]
     signs = Signs(world.image.shape[:2], sum(len(shot["rays"]) for shot in shots))
     for shot in shots:

@@ -9,14 +9,9 @@ from typing import Any
 
 from hitplanes.planes.common.limits import FRAGILE_PX, SUB, WEIGHT_FULL
 
-LINES_MAX = 12
-"""Most lines of one list; the others are counted."""
-
-VALUE_LETTERS = 80
-"""Most letters of a value that a line shows."""
-
-ABSENT = object()
-"""Stands for a key that an object does not have."""
+LINES_MAX = 12  # most lines of one list; the others are counted
+VALUE_LETTERS = 80  # most letters of a value that a line shows
+ABSENT = object()  # stands for a key that an object does not have
 
 Entry = Mapping[str, Any]
 
@@ -94,14 +89,9 @@ REASONS = {
     "budget": "no budget to begin with",
 }
 
-SLANT = 1 + 2**0.5
-"""Tangent of 67.5 degrees; a direction within 22.5 degrees of an axis has one word, any other has two."""
-
-LEAST_TOLD = 0.05
-"""Least distance that is not rounded to 0.0, px."""
-
-NAME_MAX = 24
-"""Most letters of a name on a label."""
+SLANT = 1 + 2**0.5  # tangent of 67.5 degrees: a direction within 22.5 degrees of an axis has one word, any other two
+LEAST_TOLD = 0.05  # least distance that is not rounded to 0.0, px
+NAME_MAX = 24  # most letters of a name on a label
 
 
 def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:

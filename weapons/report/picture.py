@@ -64,11 +64,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     InputError
         If it is not a report, or the scene is not that of the report.
     """
-    if not isinstance(report, Mapping):
-        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
-    Const(FORMAT).check("report: format", report.get("format"))
-    if not isinstance(scene, Scene):
-        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
+    _check(report, scene)
     text = flag("text", text)
     if scene.content_hash() != report["scene"]["hash"]:
         raise InputError(f"scene: expected hash {report['scene']['hash']}, got {scene.content_hash()}: it has changed")
@@ -90,6 +86,15 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
     if text:
         draw_texts(page, texts)
     return page
+
+
+def _check(report: object, scene: object) -> None:
+    """Refuse what is no report, and what is no scene."""
+    if not isinstance(report, Mapping):
+        raise InputError(f"report: expected one, as report_of makes it, got {shown(report)}")
+    Const(FORMAT).check("report: format", report.get("format"))
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
 
 
 def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
@@ -121,43 +126,23 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     return [*told, *overlay.texts]
 
 
-WIDTH, HEIGHT, GAP = 640, 720, 12
-"""About the size of each of the three pictures, and the space between them, px."""
-
-LONGEST = 1200
-"""Longest side of the compared box, px; a longer one is cut around its middle."""
-
-AROUND = 24
-"""Width of the border shown around the pixels that differ, px."""
-
-LIGHT = 60
-"""Brightness of the scene under the difference, of 255."""
-
-LINES_MAX = 60
-"""Most differences listed on the page; the command prints all."""
+WIDTH, HEIGHT, GAP = 640, 720, 12  # about the size of each of the three pictures, and the space between them, px
+LONGEST = 1200  # longest side of the compared box, px; a longer one is cut around its middle
+AROUND = 24  # width of the border shown around the pixels that differ, px
+LIGHT = 60  # brightness of the scene under the difference, of 255
+LINES_MAX = 60  # most differences listed on the page; the command prints all
 
 LOOKS = {"both": "empty", "other verdict": "filtered", "only expected": "occluded", "only got": "hit"}
 """Verdict whose mark each kind of pixel uses; the shapes differ even in grey."""
 
 
 def picture_of_difference(
-    expected: Mapping[str, Any],
-    got: Mapping[str, Any],
-    scenes: tuple[Scene | None, Scene | None] = (None, None),
-    *,
+    expected: Mapping[str, Any], got: Mapping[str, Any], scenes: tuple[Scene | None, Scene | None] = (None, None), *,
     text: bool = True,
-) -> Image:
-    """Draw two reports and their difference.
+) -> Image:  # fmt: skip
+    """Draw two reports and their difference, as (h, w, 3) bytes, RGB.
 
-    Parameters
-    ----------
-    expected, got : reports made by `report_of`
-    scenes : scene of each report; None leaves its ground empty
-    text : False leaves the text layer out
-
-    Returns
-    -------
-    (h, w, 3) bytes, RGB
+    A scene of None leaves the ground of its report empty; without `text` the text layer is left out.
     """
     whole = _around(tuple(expected["view_xyxy"]), tuple(got["view_xyxy"]))
     kinds = compared_pixels(expected, got, whole)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,36 +29,25 @@ from ..rays.ray_walk import Looked, Range, trace
 from .canvas import OUTLINES_MAX, World
 from .symbols import LET_THROUGH, PASSED_OVER, SKETCH, within
 
-CELLS_MAX = 4096
-"""If there are more cells than these, only opened cells are reported."""
-
-PATTERNS_MAX = 64
-"""Most volumes reported for one shot, those of its first pellets."""
-
-SHOTS_AT_A_TIME = 2**8
-"""Shots of a batch whose cells are found at once."""
-
-ROUND_CORNERS = 72
-"""Number of corners with which a circle is drawn."""
+CELLS_MAX = 4096  # if there are more cells than these, only opened cells are reported
+PATTERNS_MAX = 64  # most volumes reported for one shot, those of its first pellets
+SHOTS_AT_A_TIME = 2**8  # shots of a batch whose cells are found at once
+ROUND_CORNERS = 72  # number of corners with which a circle is drawn
 
 
 @dataclass(frozen=True, eq=False)
 class PrefilterTrace:
-    """Trace of a pre-filter and a broad phase for a report.
-
-    Parameters
-    ----------
-    view_xyxy : box of the world that is shown
-    """
+    """Trace of a pre-filter and a broad phase for a report."""
 
     scene: Scene
     prefilter: Prefilter
     index: Index | None
-    view_xyxy: Box
+    view_xyxy: Box  # box of the world that is shown
 
-    def to_dict(self, opened: Ints) -> dict[str, Any]:
-        """Names, and boxes of the cells of the view, as JSON; `opened` are the numbers of the opened cells."""
+    def to_dict(self, fired: Sequence[Hits]) -> dict[str, Any]:
+        """Names, and boxes of the cells of the view, as JSON, with which of them were opened for the shots of hits."""
         number, boxes = self._cells()
+        opened = np.unique(np.concatenate([np.zeros(0, np.int64), *(self.opened(hits) for hits in fired)]))
         if len(boxes) > CELLS_MAX:
             some = np.flatnonzero(np.isin(number, opened))[:CELLS_MAX]
             number, boxes = number[some], boxes[some]
@@ -68,6 +57,13 @@ class PrefilterTrace:
             "broadphase": self.index.structure if self.index else "none",
             "cells": cells,
         }
+
+    def told_of(self, fired: Sequence[Hits], shots: Sequence[dict[str, Any]]) -> dict[str, Any]:
+        """Add what was tested to the JSON of shots, of all of hits or of none, and return what `to_dict` does."""
+        each = ((hits, row) for hits in fired for row in range(len(hits.shots)))
+        for shot, (hits, row) in zip(shots, each, strict=False):
+            shot["tested"] = self.told(hits, row)
+        return self.to_dict(fired)
 
     def told(self, hits: Hits, row: int) -> dict[str, Any]:
         """Objects whose pixels a shot was tested against, number of all items, and number of opened cells, as JSON."""
@@ -149,17 +145,9 @@ class PrefilterTrace:
 
 
 def prefilter_trace(scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: str | None) -> PrefilterTrace:
-    """Make the trace of a pre-filter and a broad phase.
+    """Make the trace of a pre-filter (None stands for "box") and a broad phase (None stands for "none").
 
-    Parameters
-    ----------
-    prefilter : as for `fire`; None stands for "box"
-    broadphase : "grid", "quadtree" or "bvh"; None stands for "none"
-
-    Raises
-    ------
-    InputError
-        If one is not known, or is "auto", or a broad phase is named without a pre-filter.
+    An InputError says if one is not known, or is "auto", or if a broad phase is named without a pre-filter.
     """
     wanted = prefilter_of("box" if prefilter is None else prefilter)
     if wanted.name == "auto":
@@ -195,14 +183,12 @@ def _round(points: Floats, radius: float) -> Floats:
     return np.concatenate([a + half, b - half])
 
 
-BEYOND = 4.0
-"""Lines are drawn up to this distance beyond the picture, px, so that rounding bends only what is cut off."""
+BEYOND = 4.0  # lines are drawn up to this distance beyond the picture, px, so that rounding bends only what is cut off
 
 BRUSH = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
 """Offsets (4, 2) of the pixels that a thick line sets for each pixel of a thin one."""
 
-OPENED = 26
-"""Opacity of the ground of a cell that was opened, of 255."""
+OPENED = 26  # opacity of the ground of a cell that was opened, of 255
 
 
 def draw_cells(world: World, report: Mapping[str, Any]) -> None:

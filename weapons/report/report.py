@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
-from itertools import chain, count
+from itertools import chain, count, islice
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from hitplanes.planes.scene.history import PastScene
 from hitplanes.planes.scene.items import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..explain.samples import Samples, Share, detail_of
+from ..explain.samples import Samples, detail_of
 from ..fire.call import fired as fire_checked
 from ..fire.hits import BEFORE, HitRow, Hits
 from ..fire.spans import context_of
@@ -31,16 +31,11 @@ from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason, rays_of
 from ..rays.ray_hits import Passes, RayHits, Stops
 
-CELLS_MAX = 2**18
-"""Most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels."""
+CELLS_MAX = 2**18  # most cells of a heat map; in larger views a cell is 2 x 2, 4 x 4, ... pixels
 
 
 def heat_of(fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
-    """Count the samples of all shots in a view.
-
-    Returns
-    -------
-    JSON with the keys
+    """Count the samples of all shots in a view, as JSON with these keys.
 
     - "cell": side of a cell, px
     - "origin_xy": pixel of cell (0, 0)
@@ -151,22 +146,13 @@ def _columns(table: Stops | Passes, columns: Sequence[str], row: int) -> dict[st
     return {names.get(column, column): getattr(table, column)[row].tolist() for column in columns}
 
 
-MOVED_MAX = 200
-"""Most moved objects in a report; a picture with more is too full to read."""
+MOVED_MAX = 200  # most moved objects in a report; a picture with more is too full to read
 
 
 def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -> dict[str, Any]:
-    """Differences between a scene of the past and the present, as JSON.
+    """Differences between a scene of the past, which was fired at, and the present, as JSON.
 
-    Parameters
-    ----------
-    then, now : the scene that was fired at, and the present scene
-    fired : hits in the past scene
-    view_xyxy : only items that were or are in this box are listed
-
-    Returns
-    -------
-    JSON with the keys
+    Only items that were or are in a box are listed. The keys are
 
     - "tick" of the past scene, and "hash" of the present one
     - "moved": items with their present pixels as runs, and the middles of their boxes
@@ -175,33 +161,29 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
     """
     if not isinstance(now, Scene):
         raise InputError(f"now: expected a Scene, got {type(now).__name__}")
-    before, after = then.items.stack(), now.items.stack()
-    was, is_now = ({item: rank for rank, item in enumerate(stack.ids.tolist())} for stack in (before, after))
-    moved: list[dict[str, Any]] = []
-    for item in sorted(was.keys() & is_now.keys()):
-        old, new = before.box_xyxy[was[item]], after.box_xyxy[is_now[item]]
-        if len(moved) == MOVED_MAX:
-            break
-        mask, corner = now.mask(item)
-        same = np.array_equal(old, new) and np.array_equal(before.mask(was[item]), mask)
-        if same or not meets(np.array(view_xyxy), np.stack([old, new])).any():
-            continue
-        moved.append(
-            {
-                **item_told(now, item),
-                "runs": Spans.from_mask(mask, corner).runs().tolist(),
-                "from_xy": ((old[:2] + old[2:]) / 2).tolist(),
-                "to_xy": ((new[:2] + new[2:]) / 2).tolist(),
-            }
-        )
+    was, is_now = (set(scene.items.stack().ids.tolist()) for scene in (then, now))
     return {
         "tick": then.tick if isinstance(then, PastScene) else None,
         "hash": now.content_hash(),
-        "moved": moved,
-        "gone": [item_told(then, item) for item in sorted(was.keys() - is_now.keys())],
-        "new": [item_told(now, item) for item in sorted(is_now.keys() - was.keys())],
+        "moved": list(islice(_moved(then, now, sorted(was & is_now), np.array(view_xyxy)), MOVED_MAX)),
+        "gone": [item_told(then, item) for item in sorted(was - is_now)],
+        "new": [item_told(now, item) for item in sorted(is_now - was)],
         "shots": [_again(now, hits, shot) for hits in fired for shot in range(len(hits.shots))],
     }
+
+
+def _moved(then: Scene, now: Scene, items: Sequence[int], view_xyxy: Ints) -> Iterator[dict[str, Any]]:
+    """Items, as JSON, that lie elsewhere or look different now, and were or are in a box."""
+    before, after = then.items.stack(), now.items.stack()
+    for item in items:
+        rank = int(before.rank_of[item])
+        old, new = before.box_xyxy[rank], after.box_xyxy[after.rank_of[item]]
+        mask, corner = now.mask(item)
+        same = np.array_equal(old, new) and np.array_equal(before.mask(rank), mask)
+        if not same and meets(view_xyxy, np.stack([old, new])).any():
+            from_xy, to_xy = (((box[:2] + box[2:]) / 2).tolist() for box in (old, new))
+            runs = Spans.from_mask(mask, corner).runs().tolist()
+            yield {**item_told(now, item), "runs": runs, "from_xy": from_xy, "to_xy": to_xy}
 
 
 def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
@@ -215,26 +197,19 @@ def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
 
 FORMAT = "hitplanes-report/1"
 
-SHOTS_MAX = 24
-"""Most shots that are listed one by one; more are summed up as a batch."""
+SHOTS_MAX = 24  # most shots that are listed one by one; more are summed up as a batch
 
 PLACEMENTS_AT_A_TIME = 2**16
 
 NO_BOXES: Ints = np.zeros((0, 4), np.int64)
 
-NEAR_OUTSIDE = 48
-"""Width of the strip beyond the bounds in which samples are shown, px."""
+NEAR_OUTSIDE = 48  # width of the strip beyond the bounds in which samples are shown, px
 
 
 def report_of(
-    scene: Scene,
-    fired: Sequence[Hits],
-    names: Sequence[str | None] | None = None,
-    *,
-    now: Scene | None = None,
-    prefilter: str | None = None,
-    broadphase: str | None = None,
-) -> dict[str, Any]:
+    scene: Scene, fired: Sequence[Hits], names: Sequence[str | None] | None = None, *,
+    now: Scene | None = None, prefilter: str | None = None, broadphase: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Report of shots as JSON, with all that its picture needs.
 
     Up to 24 shots are listed one by one, with their samples as runs [y, x_first, x_last] by verdict, each pixel once
@@ -255,38 +230,32 @@ def report_of(
         If hits are of another scene, or of another version of it, or if two different weapons have one name.
     """
     fired = _checked(scene, fired)
-    called = _weapon_names(fired, names)
-    shots = sum(len(hits.shots) for hits in fired)
-    each = [(hits, name, row) for hits, name in zip(fired, called, strict=True) for row in range(len(hits.shots))]
-    told = [_shot(scene, *one) for one in each] if shots <= SHOTS_MAX else []
-    view = view_of(scene, fired)
-    sieve = {}
+    called, view = _weapon_names(fired, names), view_of(scene, fired)
+    few, named = sum(len(hits.shots) for hits in fired) <= SHOTS_MAX, list(zip(called, fired, strict=True))
+    told = [_shot(scene, hits, name, row) for name, hits in named if few for row in range(len(hits.shots))]
+    more: dict[str, Any] = {}
     if prefilter is not None or broadphase is not None:
         from .prefilter_trace import prefilter_trace  # few reports need it
 
         trace = prefilter_trace(scene, view, prefilter, broadphase)
-        for (hits, _, row), shot in zip(each[: len(told)], told, strict=True):
-            shot["tested"] = trace.told(hits, row)
-        opened = [np.zeros(0, np.int64), *(trace.opened(hits) for hits in fired)]
-        sieve = {"filter": trace.to_dict(np.unique(np.concatenate(opened)))}
-    return {
-        "format": FORMAT,
-        "version": version("hitplanes"),
-        "scene": {
-            "name": scene.name,
-            "hash": scene.content_hash(),
-            "version": scene.version,
-            "bounds_xyxy": None if scene.bounds is None else list(scene.bounds),
-            "hittable": len(scene.ids(Role.HITTABLE)),
-            "occluders": len(scene.ids(Role.OCCLUDER)),
-        },
-        "view_xyxy": list(view),
-        "weapons": {name: hits.weapon.to_json() for name, hits in zip(called, fired, strict=True)},
-        "shots": told,
-        "batch": None if shots <= SHOTS_MAX else _batch(scene, fired, view),
-        **sieve,
-        **({} if now is None else {"now": present_of(scene, now, fired, view)}),
+        more["filter"] = trace.told_of(fired, told)
+    if now is not None:
+        more["now"] = present_of(scene, now, fired, view)
+    weapons, batch = {name: hits.weapon.to_json() for name, hits in named}, None if few else _batch(scene, fired, view)
+    return {**_head(scene, view), "weapons": weapons, "shots": told, "batch": batch, **more}
+
+
+def _head(scene: Scene, view: Box) -> dict[str, Any]:
+    """What a report says of its scene and of itself, as JSON."""
+    told = {
+        "name": scene.name,
+        "hash": scene.content_hash(),
+        "version": scene.version,
+        "bounds_xyxy": None if scene.bounds is None else list(scene.bounds),
+        "hittable": len(scene.ids(Role.HITTABLE)),
+        "occluders": len(scene.ids(Role.OCCLUDER)),
     }
+    return {"format": FORMAT, "version": version("hitplanes"), "scene": told, "view_xyxy": list(view)}
 
 
 def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
@@ -382,6 +351,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
     accept, blocked_by = int(shots.accept[row]), int(shots.blocked_by[row])
     owners = [owner for owner in shots.exclude[row].tolist() if owner >= 0]
     margins, samples = _margins(hits, row), hits.samples_at(row)
+    sight = not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
     return {
         "shot": int(shots.number[row]),
         "weapon": weapon,
@@ -408,7 +378,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
             for entry in hits.blockers(row)
         ],
         "samples": _sample_runs(samples),
-        **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if _needs_sight(hits) else {}),
+        **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
         **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
@@ -453,21 +423,16 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
             "pellets": row.pellets,
             "first_xy": list(row.first_xy),
             "distance2": row.distance2,
-            **({} if share is None else {"shares": _shares(share)}),
+            **(
+                {}
+                if share is None
+                else {"shares": {k: round(v, 6) for k, v in share._asdict().items() if v is not None}}
+            ),
             **margins.get(row.object, {}),
             "runs": pixels[row.round, row.object].runs().tolist(),
         }
         for row, share in zip(rows, shares, strict=True)
     ]
-
-
-def _needs_sight(hits: Hits) -> bool:
-    return not isinstance(hits, RayHits) and parts_of(hits.weapon)[2].line_of_sight is not None
-
-
-def _shares(share: Share) -> dict[str, float]:
-    """Shares of a row as JSON; without `exposed` if the weapon needs no line of sight."""
-    return {name: round(value, 6) for name, value in share._asdict().items() if value is not None}
 
 
 def _sample_runs(samples: Samples) -> dict[str, list[list[int]]]:

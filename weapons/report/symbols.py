@@ -37,17 +37,10 @@ SKETCH = {
 }
 """Colours of what may be drawn of a pre-filter: volumes of items, volumes of shots, cells."""
 
-MARK_GROUND = (70, 74, 82)
-"""Colour of the ground of a mark in a legend."""
-
-TINT = 40
-"""Opacity of a mark's ground, which shows all samples, even those too small for a shape each."""
-
-EYE_MIN = 8
-"""Least size of a block with an eye, px; the eye sets a hit off from the object in grey."""
-
-SHAPE_MIN = 6
-"""Least size of a shape on the page, px; smaller samples share one."""
+MARK_GROUND = (70, 74, 82)  # colour of the ground of a mark in a legend
+TINT = 40  # opacity of a mark's ground, which shows all samples, even those too small for a shape each
+EYE_MIN = 8  # least size of a block with an eye, px; the eye sets a hit off from the object in grey
+SHAPE_MIN = 6  # least size of a shape on the page, px; smaller samples share one
 
 
 def tiled_glyph(verdict: str, factor: int, shape: tuple[int, ...]) -> Bools:
@@ -77,22 +70,15 @@ def glyph(verdict: str, size: int) -> Bools:
     return np.asarray(shapes[verdict] & (x <= last) & (y <= last), np.bool_)
 
 
-CASING = 1.5
-"""Width of the dark border of a stroke, px; it makes light lines visible on light ground."""
+CASING = 1.5  # width of the dark border of a stroke, px; it makes light lines visible on light ground
 
 DARK, DARK_ALPHA = (14, 16, 20), 190
 
-BRUSH = 24.0
-"""Reach of a stroke, px, above which all pixels of its box are tested, not only those along its line."""
+BRUSH = 24.0  # reach of a stroke, px, above which all pixels of its box are tested, not only those along its line
 
 
 class Strokes:
-    """Strokes of one colour with a dark ground; crossing strokes do not cover each other.
-
-    Parameters
-    ----------
-    shape : (h, w) of the picture
-    """
+    """Strokes of one colour with a dark ground, on a picture (h, w); crossing strokes do not cover each other."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.shape = shape
@@ -220,38 +206,23 @@ SIGNS: dict[str, tuple[tuple[int, int, int], int, bool]] = {
 ENDS = {"hits": "ends: last hit", "budget": "ends: budget", "occluder": "ends: occluder"}
 """Symbol of each reason why a ray ended; a ray that comes to its range has an open head."""
 
-FINE = 1.4
-"""Width of thin lines, px."""
-
-DASH = 6.0
-"""Length of dashes, px."""
-
-HEAD = 13.0
-"""Length of the head of an arrow, px."""
+FINE = 1.4  # width of thin lines, px
+DASH = 6.0  # length of dashes, px
+HEAD = 13.0  # length of the head of an arrow, px
 
 DOT, RING, CROSS, BAR = 3.4, 4.2, 5.5, 8.0
 """Radius of the dot at an entry and of the ring at an exit, half sizes of the cross and the bar at an end, px."""
 
-NEAR_MISS = 16
-"""Largest miss that is drawn, px of the world; larger ones are only in the text."""
-
-SEVERAL, CROWDED = 24, 120
-"""Numbers of rays above which all rays of a picture are drawn thinner, and thinnest."""
-
-BADGE = 8.5
-"""Radius of the disc of a number, px."""
-
-NORMAL = 17.0
-"""Length of a normal, px."""
+NEAR_MISS = 16  # largest miss that is drawn, px of the world; larger ones are only in the text
+SEVERAL, CROWDED = 24, 120  # numbers of rays above which all rays of a picture are drawn thinner, and thinnest
+BADGE = 8.5  # radius of the disc of a number, px
+NORMAL = 17.0  # length of a normal, px
 
 
 class Signs:
-    """Ray symbols on one picture, in px of it; they are collected, then laid over it in order.
+    """Ray symbols on one picture (h, w), in px of it; they are collected, then laid over it in order.
 
-    Parameters
-    ----------
-    shape : (h, w) of the picture
-    rays : number of rays; many are drawn thinner, and very many without the dashes beyond their ends
+    Many rays are drawn thinner, and very many without the dashes beyond their ends.
     """
 
     def __init__(self, shape: tuple[int, int], rays: int = 1) -> None:

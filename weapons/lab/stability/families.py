@@ -354,11 +354,11 @@ POINTS = 16  # that are tested against each polygon
 TRIANGLE_CORNERS = 7  # of a polygon
 
 
-def stars(rng: Rng, n: int, low: float = 0.4) -> Floats:
+def stars(rng: Rng, n: int) -> Floats:
     """Make simple polygons (n, k, 2) of size about 1, star-shaped around the origin."""
     step = rng.uniform(0.55, 1, (n, TRIANGLE_CORNERS))
     quarters = 4 * (np.cumsum(step, axis=1) - step) / step.sum(axis=1)[:, None]
-    return np.asarray(unit_circle(quarters) * rng.uniform(low, 1, (n, TRIANGLE_CORNERS, 1)))
+    return np.asarray(unit_circle(quarters) * rng.uniform(0.4, 1, (n, TRIANGLE_CORNERS, 1)))
 
 
 def _on_sides(rng: Rng, rings: Floats) -> Floats:

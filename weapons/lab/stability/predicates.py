@@ -370,8 +370,7 @@ def _beam_pixels(unit: Array, times: Array, radius: Array, cells: Array, places:
     return _by_weapon(keys, lambda k: Beam(k[0] / SUB, 2 * k[1] / SUB), cells + places, places, unit)
 
 
-ROUND = ("needles", "parallel", "shared")
-"""Families that need sides, which circles lack."""
+ROUND = ("needles", "parallel", "shared")  # families that need sides, which circles lack
 
 CLOSED, HULLS, FIRED = (10**6, 1000, 25_000, 1), (5 * 10**4, 300, 5000, 5), (10**4, 200, 1000, 30)
 """Rows, quick, block and cost of predicates with a closed form, with corners, and with a whole scene."""

@@ -28,8 +28,7 @@ from hitplanes.planes.files.scene_folder import cleared, own_folder
 
 from ...replay.stream import Progress
 from ..peers import PEERS, installed, of_peer
-from ..study.figures import FAINT, HATCH, INK, PAPER, looking_alike, save_figure
-from ..study.study import markdown_table
+from ..study.study import FAINT, HATCH, INK, PAPER, looking_alike, markdown_table, save_figure
 from .families import FAMILIES
 from .predicates import PREDICATES, Method, Predicate
 
@@ -128,15 +127,8 @@ class Study:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `stability.json`."""
-        return {
-            "format": FORMAT,
-            "seed": self.seed,
-            "quick": self.quick,
-            "complete": self.complete,
-            "versions": self.versions,
-            "families": FAMILIES,
-            "cells": [asdict(cell) for cell in self.cells],
-        }
+        told = {name: getattr(self, name) for name in ("seed", "quick", "complete", "versions")}
+        return {"format": FORMAT, **told, "families": FAMILIES, "cells": [asdict(cell) for cell in self.cells]}
 
 
 def load_study(path: Path) -> Study:
@@ -155,8 +147,7 @@ def load_study(path: Path) -> Study:
 
 
 EMPTY = "#f3f5f7"
-WIDTH, LEFT, RIGHT = 11.0, 1.75, 0.85
-"""Widths of the picture and of its margins, inches."""
+WIDTH, LEFT, RIGHT = 11.0, 1.75, 0.85  # widths of the picture and of its margins, inches
 ROW, GAP, NAMES, HEADING, SCALE = 0.255, 0.42, 1.1, 0.62, 0.85
 """Heights of a row, a block's title, the columns' names, the picture's title, and the scale, inches."""
 LIGHTEST = 0.12  # start of the colour scale; lighter colours look like none

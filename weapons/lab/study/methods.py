@@ -194,9 +194,7 @@ def _traced(call: Callable[[], Any]) -> tuple[int, int]:
         tracemalloc.stop()
 
 
-Target = tuple[int, Bools, tuple[int, int]]
-"""An object's id, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
-
+Target = tuple[int, Bools, tuple[int, int]]  # an object's id, its mask (h, w), and the pixel of the world at [0, 0]
 SHOTS_MAX = 10**6  # of a study; all decisions of a method are in memory
 TRIES = 1000  # most tries per shot, before the scene is an error for lack of room
 

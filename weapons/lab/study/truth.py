@@ -25,8 +25,7 @@ import numpy.typing as npt
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
-Target = tuple[int, Bools, tuple[int, int]]
-"""An object's number, its mask (h, w), and the pixel (x, y) of the world at [0, 0]."""
+Target = tuple[int, Bools, tuple[int, int]]  # an object's number, its mask (h, w), and the pixel of the world at [0, 0]
 
 PX, HALF, ONE = 256, 128, 2**30
 FINE = 2**320  # roots are truncated to multiples of 1 / FINE

@@ -1,12 +1,7 @@
-"""JSON Schemas of scene files, shots and reports, generated from the tables that validate them, and a report's table.
-
-`python -m hitplanes.weapons.cli.schemas` writes the schemas to `weapons/schemas/`, which is part of the package.
-"""
+"""The file of a report: the table that validates it, and its reader."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +26,6 @@ from hitplanes.planes.common.tables import (
     Number,
     Numbers,
     Optional,
-    Ref,
     Rows,
     Text,
     Value,
@@ -41,21 +35,14 @@ from hitplanes.planes.common.tables import (
     Word,
     json_of,
 )
-from hitplanes.planes.files.png import read_text, write_text
-from hitplanes.planes.files.scene_folder import OBJECT, SCENE
+from hitplanes.planes.files.png import read_text
 
 from ..explain.samples import REASONS
-from ..kinds.areas import KINDS, AreaWeapon
-from ..kinds.rays import RayWeapon
-from ..kinds.weapon import Weapon
 from ..rays.contacts import Reason
-from ..replay.shot_log import SHOT, WeaponJson
+from ..replay.shot_log import WeaponJson
 from ..report.report import FORMAT
 
-FOLDER = Path(__file__).parent.parent / "schemas"
-
-FARTHEST = POSITION_MAX + 2 * REACH_MAX
-"""Largest coordinate of a pixel of a pattern, px."""
+FARTHEST = POSITION_MAX + 2 * REACH_MAX  # largest coordinate of a pixel of a pattern, px
 
 COUNT = Whole(0, 2**62)
 PIXEL = Wholes((2,), -FARTHEST, FARTHEST)
@@ -142,18 +129,11 @@ NOW = _all({
     "gone": Rows(_all(dict(ITEM))), "new": Rows(_all(dict(ITEM))),
     "shots": Rows(Optional(Rows(_all({**ITEM, "pixels": COUNT})))),
 })  # fmt: skip
-REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))
-"""Table that validates a report."""
+REPORT = Keys({**KEYS, "filter": FILTER, "now": NOW}, tuple(KEYS))  # table that validates a report
 
 
 def read_report(path: Path) -> dict[str, Any]:
-    """Read and validate a report.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the row and the field.
-    """
+    """Read and validate a report; an InputError names the file, the row and the field."""
     path = path_of("report", path)
     with within(str(path)):
         found = json_of(read_text(path))
@@ -165,45 +145,3 @@ def read_report(path: Path) -> dict[str, Any]:
         if not (0 <= x_max - x <= 2 * VIEW_MAX and 0 <= y_max - y <= 2 * VIEW_MAX):
             raise InputError(f"view_xyxy: expected a box of at most {2 * VIEW_MAX} px a side, got {found['view_xyxy']}")
         return dict(found)
-
-
-def schemas() -> dict[str, dict[str, Any]]:
-    """Return the JSON Schemas "scene", "shot" and "report" by name."""
-    weapons = {
-        "weapon": {"anyOf": [Ref("single").schema(), _kind("rounds")]},
-        "single": {"anyOf": [Ref("pellet").schema(), _kind("spread"), _kind("sweep")]},
-        "pellet": {"anyOf": [Ref("ray").schema(), *_kinds(AreaWeapon)]},
-        "ray": {"anyOf": _kinds(RayWeapon)},
-    }
-    shot, objects = SHOT.schema(), {"anyOf": [keys.schema() for keys in OBJECT.values()]}
-    return {
-        "scene": _document("A scene of hitplanes", SCENE, {"object": objects, "shot": shot, **weapons}),
-        "shot": _document("A shot, a line of a log of shots", SHOT, weapons),
-        "report": _document("What shots hit, and why", REPORT, weapons),
-    }
-
-
-def write_schemas(folder: Path = FOLDER) -> None:
-    """Write every schema to a folder."""
-    for name, schema in schemas().items():
-        write_text(folder / f"{name}.json", json.dumps(schema, indent=1) + "\n")
-
-
-def _document(title: str, table: Keys, definitions: dict[str, Any]) -> dict[str, Any]:
-    dialect = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": dialect, "title": title, **table.schema(), **({"$defs": definitions} if definitions else {})}
-
-
-def _kinds(base: type[Weapon]) -> list[dict[str, Any]]:
-    return [_kind(name) for name, kind in KINDS.items() if issubclass(kind, base)]
-
-
-def _kind(name: str) -> dict[str, Any]:
-    """Return the schema of one kind of weapon."""
-    kind: type[Weapon] = KINDS[name]
-    needed = [field.name for field in fields(kind) if field.default is MISSING]
-    return Keys({"kind": Const(name), **kind.table}, ("kind", *needed)).schema()
-
-
-if __name__ == "__main__":
-    write_schemas()
