@@ -388,7 +388,7 @@ def test_a_removed_mask_that_comes_back(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.fixture(scope="module")
 def in_whole_parts() -> list[tuple[Placements, Scene, str, Hits]]:
     """Volleys, what they are fired at, how, and what they hit."""
-    battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 4))]
+    battles = [(battle.volley, battle.scene()) for battle in map(some_battle, range(0, 240, 8))]
     ways = [(v, s, how) for v, s in battles for how in ("direct", "built", "spans")]
     return [(volley, scene, how, volley.fired(scene, strategy=how)) for volley, scene, how in ways]
 

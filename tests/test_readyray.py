@@ -85,7 +85,7 @@ def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
 
 
 @pytest.mark.parametrize("weapon", [Pistol(150), Pistol(90, falloff="smooth"), Rifle(120, max_hits=1)], ids=repr)
-@pytest.mark.parametrize("exclude", [None, 3, [1, 4]])
+@pytest.mark.parametrize("exclude", [None, pytest.param(3, marks=pytest.mark.long), [1, 4]])
 @pytest.mark.parametrize("bounded", [True, False])
 def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: bool) -> None:
     """Many shots at a scene that stands still: in numpy they come to jump, if no object is refused."""
@@ -93,7 +93,7 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
     ready, rows, alone = prepare(scene, weapon, exclude=exclude), 0, 0
     assert type(ready) is ReadyRay
     for step in range(3):
-        for k in range(60):
+        for k in range(40):
             at = tuple((rng.integers(-60 * 256, 300 * 256, 2) / 256).tolist())
             shot = [{}, {"aim": float(rng.uniform(-720, 720))}, {"toward": (100, 60.5)}, {"aim": 45, "shot": 9}][k % 4]
             got = ready.fire(at, **shot)
@@ -101,7 +101,7 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
             same(got, fire(scene, weapon, at, exclude=exclude, strategy="walk", **shot))
             rows += len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
-    assert 40 < rows < 180 and alone > 150
+    assert 25 < rows < 120 and alone > 100
 
 
 @pytest.fixture
