@@ -108,6 +108,19 @@ def test_long_rays(jit: bool, width: float, reach: int) -> None:
         assert len(as_walked(scene, weapon, at=np.zeros((6, 2)), aim=degrees)) > 5 or width > reach
 
 
+def test_many_rays_in_a_wide_world(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Items are looked up in cells of the world, also by rays that begin outside of all cells."""
+    rng, scene = np.random.default_rng(6), Scene()
+    for where in rng.integers(0, 2000, (400, 2)).tolist():
+        scene.add(rng.random((12, 12)) < 0.7, where, role="occluder" if rng.random() < 0.1 else "hittable")
+    at, aim = rng.uniform(-300, 2300, (300, 2)), rng.uniform(0, 360, 300)
+    for weapon in (Laser(90), Laser(90, width=7), Rifle(120, max_hits=2), Projectile(100, 3)):
+        for pairs in (1, 2**30):
+            for module in ("planes.bits.cells", "weapons.rays.tracks", *(["planes.jit.tracks"] if jit else [])):
+                monkeypatch.setattr(f"hitplanes.{module}.BRUTE_PAIRS", pairs)
+            assert len(as_walked(scene, weapon, at=at, aim=aim)) > 20
+
+
 def test_the_limits_of_the_kernel() -> None:
     """It serves rays up to them, and no others."""
     jit, stack = pytest.importorskip("hitplanes.planes.jit.tracks"), Scene().items.stack()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
+from ..bits.cells import BRUTE_PAIRS, cells_of, is_sparse
 from ..common.checks import Ints
 from ..common.limits import HALF, SUB
 from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
 from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
-from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, rows_by
+from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
 from .cache import compiled
 from .rays import BOUNDS, LATE, PAIRS, near_of, part_of, run_of, times_in
 from .scene import root_of
@@ -206,15 +207,34 @@ def _comes_before(found, one, other):
 
 
 @njit
-def _entered_by(items, meets, exclude, who, origin, ray, wide, bounds, near, found):
+def _listed(grid, begin, listed, ray, origin, reach, near):
+    """Copy the items that are listed in the cell of the corner of a ray's box; return how many."""
+    x, y, dx, dy, _, _ = ray
+    left, top = (min(x, x + dx) - reach + SUB - 1) >> 8, (min(y, y + dy) - reach + SUB - 1) >> 8
+    cell = cell_at(left + origin[0], top + origin[1], grid[0], grid[1], grid[2], grid[3], grid[4])
+    if cell < 0:
+        return 0
+    for i in range(begin[cell], begin[cell + 1]):
+        near[i - begin[cell]] = listed[i]
+    return begin[cell + 1] - begin[cell]
+
+
+@njit
+def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found):
     """Write rank and bounds of the times of the accepted items whose boxes a ray enters; return how many."""
-    box, _, _, _, categories, owner = items
+    (box, _, _, _, categories, owner), (grid, begin, listed), reach = items, cells, max(wide[0], HALF)
+    if len(listed) > 0:
+        some = _listed(grid, begin, listed, ray, origin, reach, near)
+    else:
+        some = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
     count = 0
-    for i in range(near_of(box, origin[0], origin[1], ray, bounds, near, max(wide[0], HALF))):
+    for i in range(some):
         at = near[i]
         if len(meets) and refuses(at, categories, owner, meets, exclude, who):
             continue
         left, top, right, low = part_of(box, at, origin[0], origin[1], bounds)
+        if left > right or top > low:
+            continue
         found[RANK, count] = at
         found[ENTER, count], found[LAST, count] = _bounds(left, top, right, low, ray, wide)
         count += found[ENTER, count] <= found[LAST, count]
@@ -308,15 +328,16 @@ def _sort(found, order, count):
 
 TRACKS = types.Tuple((types.int64, types.int64, types.int64))(
     types.int64, types.int64, types.int64, ROWS_OUT, PAIRS, PAIRS, types.int64, PAIRS, types.int64,
-    types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
+    types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
+    types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
 )  # fmt: skip
 
 
 # house: hit rule of rays
 @njit
-def _follow(who, ray, wide, origin, items, bounds, most, meets, exclude, near, found, ends):
+def _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends):
     """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
-    count = _entered_by(items, meets, exclude, who, origin, ray, wide, bounds, near, found)
+    count = _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found)
     count = _meet(items, origin, ray, wide, bounds, most, found, count)
     count, rank, time, y, x = _blocked(items, origin, bounds, found, count)
     _sort(found, near, count)
@@ -337,7 +358,7 @@ def _follow(who, ray, wide, origin, items, bounds, most, meets, exclude, near, f
 
 
 @compiled(TRACKS)
-def _tracks(begin, end, row, out, start, step, radius, sides, most, items, meets, exclude, bounds, ends):
+def _tracks(begin, end, row, out, start, step, radius, sides, most, items, cells, meets, exclude, bounds, ends):
     """Write what rays hit, in order, to columns (ray, rank, count, x, y, entry), and their ends.
 
     Returns
@@ -350,7 +371,7 @@ def _tracks(begin, end, row, out, start, step, radius, sides, most, items, meets
         origin = (x + HALF) >> 8, (y + HALF) >> 8
         ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
         wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
-        count = _follow(who, ray, wide, origin, items, bounds, most, meets, exclude, near, found, ends)
+        count = _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends)
         if row + count > out.shape[1]:
             return who, row, 0
         for i in range(count):
@@ -359,6 +380,15 @@ def _tracks(begin, end, row, out, start, step, radius, sides, most, items, meets
             out[3, row], out[4, row], out[5, row] = found[X, at], found[Y, at], found[ENTRY, at]
             row += 1
     return end, row, 0
+
+
+def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
+    """The items listed by cells of the corners of the rays' boxes, if that spares most comparisons; else nothing."""
+    size = (np.abs(lines.step).max(axis=0, initial=0) + 2 * max(lines.radius, HALF)) // SUB + 2
+    if len(lines) * len(stack) <= BRUTE_PAIRS or not is_sparse(stack.sizes, size):
+        return (0, 0, 0, 0, 0), NONE, NONE
+    listed = cells_of(stack.box_xyxy, np.concatenate([[0, 0], size]), int(size.max()).bit_length())
+    return tuple(listed[:5]), listed.begin, listed.listed
 
 
 def tracks(
@@ -391,7 +421,7 @@ def tracks(
     whose = (NONE, NOBODY) if meets is None or exclude is None else (meets, exclude)
     found = rows_by(
         _tracks, 6, len(lines), TRACK_PAIRS / (TRACK_RAY + len(stack)), lines.start, lines.step, radius, sides,
-        most or 0, items, *whose, EVERYWHERE if bounds is None else bounds, ends,
+        most or 0, items, _cells(stack, lines), *whose, EVERYWHERE if bounds is None else bounds, ends,
     )  # fmt: skip
     assert found is not None
     return found, ends

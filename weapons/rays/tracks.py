@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hitplanes.planes.bits.cells import BRUTE_PAIRS, met_boxes
+from hitplanes.planes.bits.cells import BRUTE_PAIRS, is_sparse, met_boxes
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
@@ -104,7 +104,9 @@ def tracks(
     what rays hit, in order, as (ray, rank, count, x, y, entry) (6, P); and their ends, as (reason, time, y, x, rank,
     alone) (6, R); a compiled kernel returns None for rays that are too long or too wide for it
     """
-    step, found = max(1, min(RAYS_AT_ONCE, BRUTE_PAIRS // max(len(stack), 1))), []
+    step, found, size = RAYS_AT_ONCE, [], np.abs(lines.step).max(axis=0, initial=0) // SUB + 2 * lines.radius // SUB + 2
+    if not len(stack) or not is_sparse(stack.sizes, size):  # all boxes are compared
+        step = max(1, min(step, BRUTE_PAIRS // max(len(stack), 1)))
     for begin in range(0, max(len(lines), 1), step):
         some = slice(begin, begin + step)
         whose = (meets[some], exclude[some]) if meets is not None and exclude is not None else None
