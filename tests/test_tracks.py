@@ -181,5 +181,8 @@ def test_roots_and_shares_of_the_kernel_are_exact() -> None:
         length2 = rng.randint(1, 2 ** rng.randint(1, 50))
         scale = rng.randint(1, max(length2 // 2, 1))
         time = rng.choice([0, scale, rng.randint(0, scale), scale // 2])
-        for sign in (1, -1):
-            assert jit._share(sign * time, length2, scale) == sign * time * length2 // scale
+        parts, share = rng.randint(3, 99), rng.randint(1, 2**40)
+        whole = rng.randint(0, parts), parts * share, parts * rng.randint(share, 2**43)  # quotients are whole numbers
+        for time_, scale_, length2_ in ((time, scale, length2), (whole[0] * share, whole[1], whole[2])):
+            for sign in (1, -1):
+                assert jit._share(sign * time_, length2_, scale_) == sign * time_ * length2_ // scale_
