@@ -9,12 +9,13 @@ touch may tell otherwise: those shots are left out by the reference's `doubtful`
 
 from collections.abc import Sequence
 from fractions import Fraction
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 from oracle_projectile import Thing, Vector, doubtful, flight, impacts, last_miss
 
-from hitplanes import InputError, Projectile, RayHits, Reason, Scene, fire
+from hitplanes import InputError, Projectile, RayHits, Reason, Scene, fire, use_jit
 
 SUB = 256
 ONE = np.ones((1, 1), np.bool_)
@@ -81,6 +82,13 @@ def fired(scene: Scene, weapon: Projectile, shots: Sequence[tuple[Vector, Vector
     at, toward = np.array(shots).reshape(-1, 2, 2).transpose(1, 0, 2) / SUB + shift
     hits = fire(scene, weapon, at, toward=toward, accept=1, blocked_by=1)
     assert isinstance(hits, RayHits)
+    assert hits == fire(scene, weapon, at, toward=toward, accept=1, blocked_by=1, strategy="walk")
+    if find_spec("numba"):
+        use_jit()
+        try:
+            assert hits == fire(scene, weapon, at, toward=toward, accept=1, blocked_by=1)
+        finally:
+            use_jit(None)
     return hits
 
 

@@ -71,6 +71,12 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     whole = fired(battle, scene=scene)
     assert sorted(set(whole.stop.shot.tolist())) == list(range(9))
     walks: tuple[dict[str, Any], ...] = ({"strategy": "walk"}, {"prefilter": "none"})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hitplanes.weapons.rays.ray_call.RAYS_AT_ONCE", 3 * chunk)
+        patch.setattr("hitplanes.weapons.rays.tracks.BRUTE_PAIRS", chunk * 8)
+        patch.setattr("hitplanes.weapons.rays.tracks.CHUNK_SAMPLES", chunk)
+        patch.setattr("hitplanes.weapons.rays.ray_hits.CHUNK_CELLS", chunk)
+        same(whole, fired(battle, scene=scene))
     for options in (*walks, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
         calls: list[int] = []
         with pytest.MonkeyPatch.context() as patch:

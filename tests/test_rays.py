@@ -9,6 +9,7 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
+from importlib.util import find_spec
 from itertools import pairwise
 from typing import Any
 
@@ -36,8 +37,8 @@ from ray_battles import (
     stop_of,
 )
 
-from hitplanes import Hits, InputError, Laser, Scene, Sprite, Sweep, Verdict, Weapon, fire
-from hitplanes.planes.grid import rasterize
+from hitplanes import Hits, InputError, Laser, Scene, Sprite, Sweep, Verdict, Weapon, fire, use_jit
+from hitplanes.planes.grid import fixed_point, rasterize
 from hitplanes.weapons.rays import ray_call, ray_walk
 
 PASS_COLUMNS = (
@@ -146,6 +147,17 @@ def check_samples(battle: Battle, hits: Hits, walks: list[list[tuple[Ray, Walk]]
         assert hits.verdicts[which].tolist() == counts and int(hits.fired[which]) == len(samples.xy)
 
 
+def other_forms(battle: Battle) -> Iterator[Hits]:
+    """The library's answers by the reference, and by compiled kernels."""
+    yield battle.fired(strategy="walk")
+    if find_spec("numba"):
+        use_jit()
+        try:
+            yield battle.fired()
+        finally:
+            use_jit(None)
+
+
 def check(battle: Battle, samples: bool = True) -> list[list[tuple[Ray, Walk]]]:
     """The library's answer is the oracle's."""
     try:
@@ -158,6 +170,8 @@ def check(battle: Battle, samples: bool = True) -> list[list[tuple[Ray, Walk]]]:
         assert any({row, item} <= numbers for row, item in inside.args), (message, inside.args)
         return []
     hits = battle.fired()
+    for other in other_forms(battle):
+        assert other == hits
     check_columns(hits, walks, battle.gun.falloff)
     if samples:
         check_samples(battle, hits, walks)
@@ -843,7 +857,7 @@ def test_roots_of_far_and_wide_rays_are_exact() -> None:
         side = math.isqrt(radius * radius * length2)
         v = [rng.randint(-side, side) for _ in range(20)]
         v += [rng.choice([-1, 1]) * max(side - rng.randint(0, 2 ** rng.randint(0, 40)), 0) for _ in range(20)]
-        found = rasterize._far_roots(radius, np.array(v), np.full(len(v), length2))
+        found = fixed_point.far_roots(radius, np.array(v), np.full(len(v), length2))
         assert found.tolist() == [math.isqrt(radius * radius * length2 - one * one) for one in v]
 
 
@@ -853,7 +867,7 @@ def test_roots_just_below_a_whole_number_are_exact() -> None:
         v, root = rng.randint(2**27, 2**28) << 16, (rng.randint(1, 8) << 31) + 1
         length2, rest = divmod(v * v + root * root - 1, 2**32)
         assert rest == 0
-        assert rasterize._far_roots(2**16, np.array([v]), np.array([length2])).tolist() == [root - 1]
+        assert fixed_point.far_roots(2**16, np.array([v]), np.array([length2])).tolist() == [root - 1]
 
 
 def lattice_rays(rng: random.Random, count: int) -> list[tuple[Pixel, Pixel]]:

@@ -22,6 +22,9 @@ ENTRIES_A_BOX = 64
 BRUTE_PAIRS = 2**21
 """Most pairs of boxes that are compared one by one; listing 1000 boxes in cells and reading them takes as long."""
 
+SPARSE = 0.1
+"""Part of all boxes that a cell may list, if reading its list shall be faster than comparing all."""
+
 FEW_PAIRS = 2**14
 """Most pairs of boxes that are compared as int64; converting so few to smaller types takes longer."""
 
@@ -53,6 +56,17 @@ class Cells(NamedTuple):
     def nbytes(self) -> int:
         """Bytes of the lists."""
         return self.begin.nbytes + self.listed.nbytes
+
+
+def is_sparse(sizes: tuple[npt.NDArray[Any], npt.NDArray[Any]], size_wh: Ints) -> bool:
+    """Whether a cell that boxes of some size are looked up in lists less than SPARSE of all boxes.
+
+    Parameters
+    ----------
+    sizes : mean size of the boxes, and size of the box around all
+    """
+    mean_wh, world_wh = sizes
+    return bool(np.minimum((2 * size_wh + mean_wh) / np.maximum(world_wh, 1), 1).prod() < SPARSE)
 
 
 def cells_of(boxes_xyxy: Ints, reach_xyxy: Ints, bits: int) -> Cells:

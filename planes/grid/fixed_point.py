@@ -89,6 +89,21 @@ def isqrt(values: Ints) -> Ints:
     return np.where((above * above <= values) & (above > root), above, root)
 
 
+def far_roots(radius: int, v: Ints, length2: Ints) -> Ints:
+    """Roots of radius^2 length^2 - v^2, from 0 to 2**90, rounded down.
+
+    The float root is so near that the remainder of the square fits int64, and is exact although the squares wrap
+    around. Below 2**31 the remainder gives the square itself; above, one Newton step gives the root or 1 more.
+    """
+    side = radius * np.sqrt(length2)
+    root = np.rint(np.sqrt(np.maximum((side - v) * (side + v), 0))).astype(np.int64)
+    left = radius**2 * length2 - v * v - root * root
+    small = root < 2**31
+    step = left // np.maximum(2 * root, 1)
+    newton = root + step - (left - 2 * root * step - step * step < 0)
+    return np.where(small, isqrt(np.where(small, root * root + left, 0)), newton)
+
+
 def unit(degrees: object) -> tuple[Ints, Ints]:
     """(cos, sin) times 2**30 of angles in degrees, correctly rounded.
 

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
-from .fixed_point import UNIT, isqrt, turned
+from .fixed_point import UNIT, far_roots, isqrt, turned
 from .spans import Spans, each_pixel, ragged
 
 Runs = tuple[Ints, Ints, Ints]
@@ -359,14 +359,22 @@ class Lines:
     def __len__(self) -> int:
         return len(self.start)
 
-    def take(self, rows: Ints | Bools) -> Lines:
-        """Select segments by rows or by a mask."""
-        return Lines(self.start[rows], self.step[rows], self.radius, self.common)
+    def take(self, rows: Ints | Bools | slice) -> Lines:
+        """Select segments by rows or by a mask, with their sides if these are known."""
+        some = Lines(self.start[rows], self.step[rows], self.radius, self.common)
+        vars(some).update({name: vars(self)[name][rows] for name in ("sides", "wide_sides") if name in vars(self)})
+        return some
 
     @cached_property
     def steep(self) -> Bools:
         """Whether each segment goes farther along y than along x."""
         return np.asarray(np.abs(self.step[:, 1]) > np.abs(self.step[:, 0]))
+
+    @cached_property
+    def flat(self) -> tuple[Ints, Ints, Ints, Ints]:
+        """Starts and steps, (n,) each, along the longer axis and across it."""
+        (x, y), (dx, dy), steep = self.start.T, self.step.T, self.steep
+        return np.where(steep, y, x), np.where(steep, x, y), np.where(steep, dy, dx), np.where(steep, dx, dy)
 
     @cached_property
     def length2(self) -> Ints:
@@ -397,19 +405,50 @@ class Lines:
     @cached_property
     def wide_sides(self) -> Ints:
         """The same bound for all cells, including those that only the axis touches."""
-        return sides_of(max(self.radius, DIAGONAL), self.step)
+        return self.sides if self.radius >= DIAGONAL else sides_of(DIAGONAL, self.step)
 
     def candidates(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
         """Cells of each segment within its own inclusive box (n, 4), as (segment, x, y), sorted by segment.
 
         For thick segments these include some cells that are not touched; `times` gives them an empty interval.
         """
-        steep = self.steep[:, None]
-        start, step = (np.where(steep, v[:, ::-1], v) for v in (self.start, self.step))
-        flat = Lines(start, step, self.radius, self.common)
-        line, u, v = flat._along(np.where(steep, boxes_xyxy[:, [1, 0, 3, 2]], boxes_xyxy))
+        line, row, first, last = self.runs(boxes_xyxy)
+        run, u = each_pixel(first, last)
+        line, v = line[run], row[run]
         swapped = self.steep[line]
         return line, np.where(swapped, v, u), np.where(swapped, u, v)
+
+    def runs(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+        """The cells of `candidates` as runs along the longer axis of each segment: (segment, row, first, last)."""
+        u, v, along, aside = self.flat
+        left, top, right, low = np.where(self.steep, boxes_xyxy.T[[1, 0, 3, 2]], boxes_xyxy.T)
+        reach = max(self.radius, DIAGONAL) if self.radius else HALF
+        least, most = np.minimum(u, u + along) - reach, np.maximum(u, u + along) + reach
+        left, right = np.maximum(left, -(-least // SUB)), np.minimum(right, most // SUB)
+        # Floats have room for the rows between two columns; the runs are exact.
+        slope = aside / np.where(along == 0, 1, along)
+        sides = (np.clip(side, least, most) for side in (SUB * left - HALF, SUB * right + HALF))
+        ends = [v + (side - u) * slope for side in sides]
+        half = np.maximum(reach, self.wide_sides / np.maximum(np.abs(along), 1)) if self.radius else reach
+        first = np.maximum(np.floor((np.minimum(*ends) - half - 1) / SUB).astype(np.int64), top)
+        last = np.minimum(np.ceil((np.maximum(*ends) + half + 1) / SUB).astype(np.int64), low)
+        line, row = _ragged_rows(first, np.where(left <= right, last, first - 1))
+        first, last = (self._thick_runs if self.radius else _thin_runs)(u, v, along, aside, line, row)
+        first, last = np.maximum(first, left[line]), np.minimum(last, right[line])
+        some = np.flatnonzero(first <= last)
+        return line[some], row[some], first[some], last[some]
+
+    def _thick_runs(self, u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
+        """Cells at most `wide_sides` from the infinite axes of segments, in rows."""
+        side, per, level = self.wide_sides, np.maximum(np.abs(aside), 1), aside == 0
+        middle = (u * per - v * along * np.sign(aside))[line] + row * (SUB * along * np.where(aside < 0, -1, 1))[line]
+        cell = (SUB * per)[line]
+        first, last = -((side[line] - middle) // cell), (middle + side[line]) // cell
+        if level.any():
+            beside = np.abs((SUB * row - v[line]) * along[line]) > side[line]
+            first, last = np.where(level[line], -WIDEST, first), np.where(level[line], WIDEST, last)
+            first = np.where(level[line] & beside, WIDEST, first)
+        return first, last
 
     def times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """Times at which segments enter and leave cells; a cell that is not touched is left before it is entered."""
@@ -456,43 +495,6 @@ class Lines:
         across = np.maximum(np.abs(step), 1)[:, ::-1]
         return np.asarray(np.where((sign != 0) & ((ahead - HALF) * across == entry[:, None]), -sign, 0))
 
-    def _along(self, boxes_xyxy: Ints) -> tuple[Ints, Ints, Ints]:
-        """`candidates` of segments that are not steep, row by row."""
-        start, step = self.start[:, 1], self.step[:, 1]
-        reach = self.radius + HALF
-        low, high = np.minimum(start, start + step) - reach, np.maximum(start, start + step) + reach
-        first = np.maximum(-(-low // SUB), boxes_xyxy[:, 1])
-        last = np.minimum(high // SUB, boxes_xyxy[:, 3])
-        line, place = ragged(np.maximum(last - first + 1, 0))
-        y = first[line] + place
-        x_first, x_last = (self._thick_runs if self.radius else self._thin_runs)(line, y)
-        x_first, x_last = np.maximum(x_first, boxes_xyxy[line, 0]), np.minimum(x_last, boxes_xyxy[line, 2])
-        run, x = each_pixel(x_first, np.maximum(x_last, x_first - 1))
-        return line[run], x, y[run]
-
-    def _thin_runs(self, line: Ints, y: Ints) -> tuple[Ints, Ints]:
-        """First and last cell of segments in rows y."""
-        (x0, y0), (dx, dy) = self.start[line].T, self.step[line].T
-        low, high = np.minimum(y0, y0 + dy), np.maximum(y0, y0 + dy)
-        per, slope = np.maximum(np.abs(dy), 1), dx * np.sign(dy)
-        enter = x0 * per + (np.maximum(low, SUB * y - HALF) - y0) * slope
-        leave = x0 * per + (np.minimum(high, SUB * y + HALF) - y0) * slope
-        enter, leave = np.where(dy == 0, x0, enter), np.where(dy == 0, x0 + dx, leave)
-        low, high = np.minimum(enter, leave), np.maximum(enter, leave)
-        return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
-
-    def _thick_runs(self, line: Ints, y: Ints) -> tuple[Ints, Ints]:
-        """Cells around thick segments in rows y: no fewer than there are."""
-        (x0, y0), (dx, dy) = self.start[line].T, self.step[line].T
-        reach = max(self.radius, DIAGONAL)
-        low, high = np.minimum(x0, x0 + dx) - reach, np.maximum(x0, x0 + dx) + reach
-        # |(p - start) x step| <= reach * length bounds p along x, unless the segment is level.
-        side, per = self.wide_sides[line], np.maximum(np.abs(dy), 1)
-        cross = (SUB * y - y0) * dx * np.where(dy < 0, -1, 1)
-        low = np.where(dy != 0, np.maximum(low, x0 - ((side - cross) // per)), low)
-        high = np.where(dy != 0, np.minimum(high, x0 + ((cross + side) // per)), high)
-        return -(-low // SUB), high // SUB
-
     def _thin_times(self, line: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         step = self.step[line]
         sign, length = np.sign(step), np.abs(step)
@@ -525,24 +527,23 @@ class Lines:
         if most < ROOM:
             return isqrt(self.radius**2 * length2 - v * v)
         if most < FAR:
-            return _far_roots(self.radius, v, length2)
+            return far_roots(self.radius, v, length2)
         squares: npt.NDArray[np.object_] = self.radius**2 * length2.astype(object) - v.astype(object) ** 2
         return np.array([math.isqrt(square) for square in squares.tolist()], np.int64)
 
 
-def _far_roots(radius: int, v: Ints, length2: Ints) -> Ints:
-    """Roots of radius^2 length^2 - v^2, from 0 to FAR, rounded down.
-
-    The float root is so near that the remainder of the square fits int64, and is exact although the squares wrap
-    around. Below 2**31 the remainder gives the square itself; above, one Newton step gives the root or 1 more.
-    """
-    side = radius * np.sqrt(length2)
-    root = np.rint(np.sqrt(np.maximum((side - v) * (side + v), 0))).astype(np.int64)
-    left = radius**2 * length2 - v * v - root * root
-    small = root < 2**31
-    step = left // np.maximum(2 * root, 1)
-    newton = root + step - (left - 2 * root * step - step * step < 0)
-    return np.where(small, isqrt(np.where(small, root * root + left, 0)), newton)
+def _thin_runs(u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
+    """First and last cell of thin segments in rows; the last is less in a row that is not touched."""
+    per, slope, level = np.maximum(np.abs(aside), 1), along * np.sign(aside), aside == 0
+    enter = np.maximum(SUB * row - HALF, np.minimum(v, v + aside)[line])
+    leave = np.minimum(SUB * row + HALF, np.maximum(v, v + aside)[line])
+    none, base, slope = enter > leave, (u * per - v * slope)[line], slope[line]
+    enter, leave = base + enter * slope, base + leave * slope
+    if level.any():
+        leave += np.where(level, along, 0)[line]
+    cell = (SUB * per)[line]
+    first, last = -(((cell >> 1) - np.minimum(enter, leave)) // cell), (np.maximum(enter, leave) + (cell >> 1)) // cell
+    return first, np.where(none, first - 1, last)
 
 
 def cells(start_256: Ints, end_256: Ints, radius_256: int = 0) -> tuple[Ints, Ints, Ints, Ints, Ints]:

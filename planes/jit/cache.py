@@ -1,12 +1,10 @@
-"""The cache of compiled kernels on disk, valid while the sources of both packages are unchanged; arrays by address.
+"""The cache of compiled kernels on disk, valid while the sources of both packages are unchanged.
 
 numba's own cache does not serve, for three reasons:
 
 - It checks only the kernel's own file, but kernels call kernels, and contain constants, of other files.
 - A damaged entry raises an error in the call.
 - It loads pickles, which can run any code, from folders that others may write to.
-
-The caller of a kernel that takes an address must keep the array alive; nothing checks its bounds.
 """
 
 from __future__ import annotations
@@ -26,14 +24,11 @@ from typing import Any
 from uuid import uuid4
 
 import numba
-import numpy as np
-from llvmlite import ir
-from numba import carray, njit, types
+from numba import njit
 from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
-from numba.extending import intrinsic
 from numba.misc.appdirs import AppDirs
 
 from ..common.backend import tell
@@ -177,37 +172,3 @@ def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]],
         return dispatcher
 
     return made
-
-
-@intrinsic
-def pointer(_: Any, address: Any) -> Any:
-    """An address as a pointer."""
-
-    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
-
-    return types.voidptr(types.int64), made
-
-
-@njit(inline="always")
-def ints_at(address):
-    """Array of int64 from an address on."""
-    return carray(pointer(address), (2**40,), np.int64)
-
-
-@njit(inline="always")
-def words_at(address):
-    """Array of uint64 from an address on."""
-    return carray(pointer(address), (2**40,), np.uint64)
-
-
-@njit(inline="always")
-def flags_at(address):
-    """Array of booleans from an address on."""
-    return carray(pointer(address), (2**40,), np.bool_)
-
-
-def address(array: Any) -> int:
-    """Address of an array's first value."""
-    assert array.flags.c_contiguous
-    return int(array.__array_interface__["data"][0])

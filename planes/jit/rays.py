@@ -227,7 +227,7 @@ def _spell(low, high, sign, across, entry, leave):
 
 
 @njit
-def _times(left, top, right, low, ray):
+def times_in(left, top, right, low, ray):
     """Times at which a ray enters and leaves a box of pixels; leave < entry if it does not touch the box."""
     x, y, dx, dy, across_x, across_y = ray
     entry, leave = _spell(SUB * left - HALF - x, SUB * right + HALF - x, dx, across_x, np.int64(0), across_x * across_y)
@@ -235,18 +235,18 @@ def _times(left, top, right, low, ray):
 
 
 @njit
-def _part(box, at, origin_x, origin_y, bounds):
+def part_of(box, at, origin_x, origin_y, bounds):
     """The part of an item's box within the bounds, relative to a pixel."""
     left, top = max(box[at, 0], bounds[0]) - origin_x, max(box[at, 1], bounds[1]) - origin_y
     return left, top, min(box[at, 2], bounds[2]) - origin_x, min(box[at, 3], bounds[3]) - origin_y
 
 
 @njit
-def _near(box, origin_x, origin_y, ray, bounds, near):
-    """Write the items whose boxes meet the box of a ray to `near`; return how many."""
-    x, y, dx, dy = ray[0] + HALF, ray[1] + HALF, ray[2], ray[3]
-    left, right = ((min(x, x + dx) - 1) >> 8) + origin_x, (max(x, x + dx) >> 8) + origin_x
-    top, low = ((min(y, y + dy) - 1) >> 8) + origin_y, (max(y, y + dy) >> 8) + origin_y
+def near_of(box, origin_x, origin_y, ray, bounds, near, reach):
+    """Write the items with pixels whose centres may lie within `reach` of a ray to `near`; return how many."""
+    x, y, dx, dy, around = ray[0] + reach, ray[1] + reach, ray[2], ray[3], 2 * reach - SUB + 1
+    left, right = ((min(x, x + dx) - around) >> 8) + origin_x, (max(x, x + dx) >> 8) + origin_x
+    top, low = ((min(y, y + dy) - around) >> 8) + origin_y, (max(y, y + dy) >> 8) + origin_y
     left, top, right, low = max(left, bounds[0]), max(top, bounds[1]), min(right, bounds[2]), min(low, bounds[3])
     count = 0
     for at in range(len(box)):
@@ -257,7 +257,7 @@ def _near(box, origin_x, origin_y, ray, bounds, near):
 
 
 @njit
-def _run(row, begin, step, u, along):
+def run_of(row, begin, step, u, along):
     """First and last cell of a row that a ray touches, along its longer axis; (1, 0) if it touches none."""
     first = max(min(begin, begin + step), SUB * row - HALF) - begin
     last = min(max(begin, begin + step), SUB * row + HALF) - begin
@@ -293,13 +293,13 @@ def _in(part, mask, ray, entry, leave):
     best, best_x, best_y = np.int64(LATE), np.int64(0), np.int64(0)
     for k in range(v_most - v_least + 1):
         row = v_least + k if step >= 0 else v_most - k
-        first, last = _run(row, v, step, u, along)
+        first, last = run_of(row, v, step, u, along)
         first, last = max(first, u_least), min(last, u_most)
         for j in range(last - first + 1):
             column = first + j if along > 0 else last - j
             at_x, at_y = (row, column) if steep else (column, row)
             if masks[begin + (at_y - first_y) * width + at_x - first_x]:
-                time, _ = _times(at_x, at_y, at_x, at_y, ray)
+                time, _ = times_in(at_x, at_y, at_x, at_y, ray)
                 if time < best:
                     best, best_x, best_y = time, at_x, at_y
                 break
@@ -329,12 +329,12 @@ def _front(x, y, near, count, box, offset, masks, occluder, origin_x, origin_y, 
 def _entered(box, categories, owner, meets, exclude, who, origin_x, origin_y, ray, bounds, near, times):
     """Write the accepted items whose boxes a ray enters, and the times of entry; return how many."""
     count = 0
-    for i in range(_near(box, origin_x, origin_y, ray, bounds, near)):
+    for i in range(near_of(box, origin_x, origin_y, ray, bounds, near, HALF)):
         at = near[i]
         if len(meets) and refuses(at, categories, owner, meets, exclude, who):
             continue
-        left, top, right, low = _part(box, at, origin_x, origin_y, bounds)
-        near[count], (times[count], leave) = at, _times(left, top, right, low, ray)
+        left, top, right, low = part_of(box, at, origin_x, origin_y, bounds)
+        near[count], (times[count], leave) = at, times_in(left, top, right, low, ray)
         count += times[count] <= leave
     return count
 
@@ -355,8 +355,8 @@ def _earliest(box, offset, masks, origin_x, origin_y, ray, bounds, near, times, 
         if times[next_] > best:
             break
         times[next_], at = LATE, near[next_]
-        part = _part(box, at, origin_x, origin_y, bounds)
-        entry, leave = _times(part[0], part[1], part[2], part[3], ray)
+        part = part_of(box, at, origin_x, origin_y, bounds)
+        entry, leave = times_in(part[0], part[1], part[2], part[3], ray)
         mask = masks, offset[at], box[at, 2] - box[at, 0] + 1, box[at, 0] - origin_x, box[at, 1] - origin_y
         found, found_x, found_y = _in(part, mask, ray, entry, leave)
         if found < best:
@@ -379,7 +379,7 @@ def touched(x, y, dx, dy, box, offset, masks, occluder, categories, owner, meets
     front, blocked, first_x, first_y = np.int64(-1), False, np.int64(0), np.int64(0)
     for k in range(9):  # of cells that are entered at once an occluder's comes first, then by (y, x)
         at_x, at_y = column + k % 3 - 1, row + k // 3 - 1
-        entry, leave = _times(at_x, at_y, at_x, at_y, ray)
+        entry, leave = times_in(at_x, at_y, at_x, at_y, ray)
         if entry != best or entry > leave or blocked:
             continue
         at, blocks = _front(at_x, at_y, near, count, box, offset, masks, occluder, origin_x, origin_y, bounds)

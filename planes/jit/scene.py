@@ -187,7 +187,7 @@ def _ceil(value, per):
 
 
 @njit
-def _root(value):
+def root_of(value):
     """Square root of a whole number, rounded down."""
     root = np.int64(np.sqrt(np.float64(value)))
     while root * root > value:
@@ -327,7 +327,7 @@ def _add_disc(x, y, radius, top, first, last):
     """Extend runs in rows from `top` on to the centres at most `radius` from a point."""
     for row in range(_ceil(y - radius, SUB), (y + radius) // SUB + 1):
         level = SUB * row - y
-        half = _root(radius * radius - level * level)
+        half = root_of(radius * radius - level * level)
         begin, end = -((half - x) >> 8), (x + half) >> 8
         if begin <= end:
             first[row - top], last[row - top] = min(first[row - top], begin), max(last[row - top], end)
@@ -409,7 +409,7 @@ def _cones(reach, direction, c_half, s_half):
     wide = s_half != 0 or c_half < 0
     half = np.empty(reach // SUB + 1, np.int64)
     for row in range(len(half) if wide else 0):
-        half[row] = _root(reach * reach - (SUB * row) ** 2) >> 8
+        half[row] = root_of(reach * reach - (SUB * row) ** 2) >> 8
     parts = np.empty(((3 if c_half < 0 else 2) if wide else 1, 2, len(y)), np.int64)
     for k in range(count):
         c, s = direction[k]

@@ -14,7 +14,9 @@ import threading
 from typing import Any
 
 import numpy as np
-from numba import carray, types
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.extending import intrinsic
 
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.cells import Cells
@@ -25,7 +27,7 @@ from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import WEIGHT_FULL
 from hitplanes.planes.jit.areas import KEY, NOBODY, RANK, SAMPLES, X, Y, match
 from hitplanes.planes.jit.bit_rows import EVERYWHERE, FEW_ROWS, cell_at
-from hitplanes.planes.jit.cache import address, compiled, flags_at, ints_at, pointer, words_at
+from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -67,6 +69,40 @@ ROW = 5
 FOUND_AT, ROW_BYTES = 8 * FOUND, 8 * ROW
 read = struct.Struct("5q").unpack_from
 NO_SUMS, NO_STRIPS, ZERO = np.zeros(0, np.uint32), np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
+
+
+@intrinsic
+def pointer(_: Any, address: Any) -> Any:
+    """An address as a pointer."""
+
+    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
+
+    return types.voidptr(types.int64), made
+
+
+@njit(inline="always")
+def ints_at(address):
+    """Array of int64 from an address on."""
+    return carray(pointer(address), (2**40,), np.int64)
+
+
+@njit(inline="always")
+def words_at(address):
+    """Array of uint64 from an address on."""
+    return carray(pointer(address), (2**40,), np.uint64)
+
+
+@njit(inline="always")
+def flags_at(address):
+    """Array of booleans from an address on."""
+    return carray(pointer(address), (2**40,), np.bool_)
+
+
+def address(array: Any) -> int:
+    """Address of an array's first value."""
+    assert array.flags.c_contiguous
+    return int(array.__array_interface__["data"][0])
 
 
 # house: way of areas

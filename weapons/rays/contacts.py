@@ -25,7 +25,7 @@ from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
 from hitplanes.planes.grid.fixed_point import pixel, scaled, snap, turned, unit
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
-from hitplanes.planes.grid.spans import Box, Columns, merged_runs, pieces, ragged
+from hitplanes.planes.grid.spans import Box, Columns, begins, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack, clipped
 
 from ..fire.plan import Plan
@@ -172,6 +172,25 @@ class Contacts:
         return cls(*(np.concatenate([getattr(part, name) for part in every]) for name in names))
 
 
+@dataclass(frozen=True, eq=False)
+class Touches(Columns):
+    """Columns of the objects that rays hit, sorted by (ray, entry, y, x, rank), with the first cell of each.
+
+    Parameters
+    ----------
+    ray, rank : (P,) the ray, and the place of the object in the stack
+    count : (P,) number of cells of the object that the ray walked
+    x, y, entry : (P,) the first of them, relative to the pixel of the ray's start, and when the ray enters it
+    """
+
+    ray: Ints
+    rank: Ints
+    count: Ints
+    x: Ints
+    y: Ints
+    entry: Ints
+
+
 def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box | None, origin_xy: Ints) -> Contacts:
     """Cells in which rays touch the pixels of items.
 
@@ -185,9 +204,8 @@ def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box
     boxes_xyxy = stack.box_xyxy[rank] - shift
     inside = boxes_xyxy if bounds is None else clipped(stack.box_xyxy[rank], bounds) - shift
     size = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
-    most = size.prod(axis=1) if lines.radius else 2 * size.sum(axis=1)
     found = []
-    for part in pieces(most, CHUNK_SAMPLES) if len(rank) else ():
+    for part in pieces(cells_most(lines, size), CHUNK_SAMPLES) if len(rank) else ():
         here = np.arange(part.start, part.stop)
         own = lines.take(here)
         pair, x, y = own.candidates(inside[here])
@@ -204,25 +222,31 @@ def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box
     return Contacts.joined(found)
 
 
+def cells_most(lines: Lines, size_wh: Ints) -> Ints:
+    """Most cells of boxes of some sizes (n, 2) that are looked at for a line."""
+    return np.asarray(np.minimum(size_wh.prod(axis=1), size_wh.max(axis=1) * (3 * lines.radius // SUB + 3)))
+
+
 def first_of_each(begin: Ints, group: Ints, keys: Sequence[Ints]) -> Ints:
     """Index of the least element of each group by keys, the most important first; no group is empty."""
-    return _extreme_of_each(begin, group, keys, np.minimum, np.iinfo(np.int64).max)
+    return _extreme_of_each(begin, group, keys, np.minimum)
 
 
 def last_of_each(begin: Ints, group: Ints, keys: Sequence[Ints]) -> Ints:
     """Index of the greatest element of each group by keys, the most important first; no group is empty."""
-    return _extreme_of_each(begin, group, keys, np.maximum, np.iinfo(np.int64).min)
+    return _extreme_of_each(begin, group, keys, np.maximum)
 
 
-def _extreme_of_each(begin: Ints, group: Ints, keys: Sequence[Ints], better: np.ufunc, worst: int) -> Ints:
-    still = np.ones(len(group), np.bool_)
+def _extreme_of_each(begin: Ints, group: Ints, keys: Sequence[Ints], better: np.ufunc) -> Ints:
+    index = np.arange(len(group))
     for key in keys:
-        if not len(begin):
+        if len(index) == len(begin):  # one of each group is left
             break
-        best = better.reduceat(np.where(still, key, worst), begin)
-        still &= key == best[group]
-    index = np.flatnonzero(still)
-    return np.asarray(index[np.searchsorted(group[index], np.arange(len(begin)))])
+        value = key[index]
+        best = np.flatnonzero(value == better.reduceat(value, begin)[group])
+        index, group = index[best], group[best]
+        begin = np.flatnonzero(begins(group))
+    return index[begin]
 
 
 def stretches(group: Ints, entry: Ints, leave: Ints) -> tuple[Ints, Ints, Ints]:
@@ -379,11 +403,11 @@ def terminations_of(met: Contacts, lines: Lines, stack: Stack, cost: Ints, ray: 
     objects = np.ones(len(met), np.bool_)
     plan.run("stops", "where each ray ends", ends.nbytes)
     if stack.has_occluders:
-        _end_at_occluders(ends, met, stack)
+        end_at_occluders(ends, met, stack)
         objects = ~stack.occluder[met.rank]
         plan.run("occluders", "the first on the way of each ray", objects.nbytes)
     if ray.hits_most is not None:
-        _end_at_hits(ends, met.take(np.flatnonzero(objects)), ray.hits_most)
+        end_at_hits(ends, met.take(np.flatnonzero(objects)), ray.hits_most)
     if ray.budget_256 is not None:
         _end_at_budget(ends, met.take(np.flatnonzero(objects & (cost[met.rank] > 0))), lines, cost, ray.budget_256)
     at_items = (ends.reason == Reason.OCCLUDER) | (ends.reason == Reason.HITS)
@@ -405,7 +429,7 @@ def endless(n: int) -> Terminations:
     )
 
 
-def _end_at_occluders(ends: Terminations, met: Contacts, stack: Stack) -> None:
+def end_at_occluders(ends: Terminations, met: Contacts, stack: Stack) -> None:
     """End rays at the first occluder that they touch."""
     blocking = np.flatnonzero(stack.occluder[met.rank])
     _end(ends, met, *_earliest(met, blocking, met.first[blocking]), Reason.OCCLUDER)
@@ -426,7 +450,7 @@ def _end(ends: Terminations, met: Contacts, pairs: Ints, cell: Ints, reason: Rea
     ends.time[ray], ends.y[ray], ends.x[ray] = met.entry[cell], met.y[cell], met.x[cell]
 
 
-def _end_at_hits(ends: Terminations, met: Contacts, most: int) -> None:
+def end_at_hits(ends: Terminations, met: Contacts, most: int) -> None:
     """End rays where they enter the last object that they may hit, if no occluder comes before."""
     met = met.only(ends.walked(met))
     cell = met.first

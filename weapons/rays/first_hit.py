@@ -31,7 +31,7 @@ from ..fire.hits import Rows
 from ..fire.prefilter import may_refuse, refused
 from ..kinds.placements import ONES, Shots
 from ..kinds.rays import RayWeapon
-from .contacts import Contacts, Rays, Reason, Terminations, endless, reasons_at
+from .contacts import Contacts, Rays, Reason, Terminations, Touches, endless, reasons_at
 from .ray_hits import Passes, Stops, Summed, Walk, groups_of, rows_of_passes, weights_at
 from .ray_walk import Range, lines_of
 
@@ -85,11 +85,14 @@ class FirstHits:
     def _passes_and_stops(self) -> tuple[Passes, Stops]:
         """Passes and stops of rays that walked the cells in which they end, and no others."""
         ends, stopped = self.ends, np.flatnonzero(self.ends.rank >= 0)
-        lines, time = lines_of(self.rays, self.ray), ends.time[stopped]
+        lines, time, rank = lines_of(self.rays, self.ray), ends.time[stopped], ends.rank[stopped]
         ends.fraction[stopped] = time / lines.scale[stopped]
         one = np.ones(len(stopped), np.int64)
-        met = Contacts(stopped, ends.rank[stopped], one, ends.x[stopped], ends.y[stopped], time, time)
-        walk = Walk(self.rays, lines, met, ends, lines.take(stopped), self.stack, self.ray.fades)
+        hit = Touches(stopped, rank, one, ends.x[stopped], ends.y[stopped], time)
+        met = Contacts(stopped, rank, one, hit.x, hit.y, time, time)
+        hit = hit.take(~self.stack.occluder[rank])
+        traced = met, lines.take(stopped)
+        walk = Walk(self.rays, lines, hit, ends, self.stack, None, self.ray.fades, traced)
         return walk.passes, walk.stops
 
 

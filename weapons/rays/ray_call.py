@@ -15,20 +15,19 @@ import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
-from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse
-from ..fire.strategy import RAY_WAYS, RayChoice, chosen_candidates, chosen_ray_way, way_of_rest
+from ..fire.strategy import RAY_WAYS, RAYS_ASKED, RayChoice, chosen_candidates, chosen_ray_way, way_of_rest
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
-from .contacts import Contacts, Parts, Rays, Terminations, rays_of
+from .contacts import Parts, Rays, Terminations, Touches, rays_of
 from .first_hit import ENGINES, FirstHits
-from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes
-from .ray_walk import Range, expected_cells, trace
+from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes, walked_of
+from .ray_walk import Range, expected_cells, has_track, trace, tracked
 
 RAYS_AT_ONCE = 2**14
 """Most rays of a chunk; the columns of so many fit the processor's cache."""
@@ -94,11 +93,12 @@ def _planned(
     prefilter, broadphase, strategy = how
     chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, count)
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
-    walks = chosen.way == "walk"
-    candidates = choose(count if walks else 0)
+    walks, asked = chosen.way == "walk", how[:2] != ("auto", "auto") or RAYS_ASKED.get(strategy, strategy) == "walk"
+    track = not asked and has_track(ray)
+    candidates = choose(count if walks and not track else 0)
     field = scene.derived.distance_field() if chosen.way == "march" else None
     plan.run("plan", candidates.why if walks else chosen.why)
-    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field), chosen, choose
+    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track), chosen, choose
 
 
 def first_ends(
@@ -134,21 +134,22 @@ def _leave_out_unused(
     plan: Plan, scene: Scene, through: Range, shots: Shots, ray: RayWeapon, how: tuple[str, RayChoice]
 ) -> None:
     """Add the stages that this scene and this weapon did not need to the plan; `how` is what was asked and chosen."""
-    filtered = plan.has_run("pre-filter")
-    plan.leave_out_all(_unused, through.candidates.why_unindexed if filtered else None, ray, *how)
+    unindexed = through.candidates.why_unindexed if plan.has_run("pre-filter") else None
+    plan.leave_out_all(_unused, unindexed, plan.has_run("walk"), ray, *how)
     choosy = may_refuse(through.stack, shots)
     leave_out_absent(plan, scene, through.stack, weighted=ray.fades is not None, choosy=choosy)
     leave_out_imagery(plan, scene)
 
 
-def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: RayChoice) -> Iterator[tuple[str, str]]:
+def _unused(
+    why_unindexed: str | None, walked: bool, ray: RayWeapon, strategy: str, chosen: RayChoice
+) -> Iterator[tuple[str, str]]:
     """Stages that rays did not need, and why; `why_unindexed` is None unless some rays went through the pre-filter."""
-    idle = "no ray was left to walk"
+    idle = "a part of the walk" if walked else "no ray was left to walk"
     for name in ("pre-filter", "walk", "stops"):
         yield name, idle
     yield "broad phase", why_unindexed or idle
-    if ends_at_first(ray):
-        yield "passes", "told when they are asked for, as the stops are"
+    yield "passes", "told when they are asked for, as the stops are"
     for name in RAY_WAYS:
         if name not in (chosen.way, "walk") and (is_thin_first(ray) or name == strategy):
             yield name, chosen.why
@@ -160,25 +161,22 @@ def _unused(why_unindexed: str | None, ray: RayWeapon, strategy: str, chosen: Ra
 def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose) -> Terminations:
     """Ends of rays that end at their first hit; what one way leaves over is found by the next."""
     if way == "walk":
-        return Terminations.joined([ends for _, _, ends, _, _ in _walked(rays, ray, shots, through)])
+        return Terminations.joined([walk.ends for walk in _walks(rays, ray, shots, through)])
     ends, left = ENGINES[way](rays, ray, shots, through)
     if len(left):
         rest = way_of_rest(way, through.stack, len(left))
-        through = replace(through, candidates=choose(len(left) if rest == "walk" else 0))
+        through = replace(through, candidates=choose(len(left) if rest == "walk" and not through.tracked else 0))
         through.plan.run("plan", "")
         ends.put(left, _first_ends(rays.take(left), ray, shots, through, rest, choose))
     return ends
 
 
-def _walked(
-    rays: Rays, ray: RayWeapon, shots: Shots, through: Range
-) -> Iterator[tuple[Rays, Contacts, Terminations, Lines, Lines]]:
-    """Follow rays to their ends, in chunks that are expected to touch at most CHUNK_CELLS cells.
-
-    Yields
-    ------
-    the rays of a chunk, and what `trace` returns for them
-    """
+def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator[Walk]:
+    """Follow rays to their ends, in chunks that are expected to touch at most CHUNK_CELLS cells."""
+    walk = tracked(rays, ray, shots, through)
+    if walk is not None:
+        yield walk
+        return
     begin = cells = 0
     most = WALKED_AT_ONCE
     if through.candidates.prefilter.name == "none":
@@ -188,7 +186,13 @@ def _walked(
         some = rays.take(slice(begin, begin + step))
         met, ends, lines, relative = trace(some, ray, shots, through)
         through.plan.run("walk", "")
-        yield some, met, ends, lines, relative
+        walked, _ = walked_of(met, ends, through.stack)
+        first = (column[walked.first] for column in (walked.x, walked.y, walked.entry))
+        hit = Touches(walked.ray, walked.rank, walked.count, *first)
+        walk = Walk(some, lines, hit, ends, through.stack, through.bounds, ray.fades, (met, relative))
+        told = "cells of each ray on each object; the rest when it is asked for"
+        through.plan.run("passes", told, walked.nbytes)
+        yield walk
         begin, cells = begin + step, cells + len(met.x)
         step = max(1, min(most, CHUNK_GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))
 
@@ -208,13 +212,14 @@ def _followed(
     """
     walks: list[Walk | Made] = []
     summed, pixels, plan = [], [], through.plan
-    for some, met, ends, lines, relative in _walked(rays, ray, shots, through):
-        walk = Walk(some, lines, met, ends, relative, through.stack, ray.fades)
-        plan.run("passes", "cells of each ray on each object; the rest when it is asked for", walk.walked.nbytes)
+    for walk in _walks(rays, ray, shots, through):
         summed.append(walk.summed)
         pixels.append(pixels_of(walk, rays))
         plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
-        room -= len(met.x)
+        if walk.traced is None:
+            walks += walk.parts()
+            continue
+        room -= len(walk.traced[0].x)
         walks.append(walk if room >= 0 else Made(walk.passes, walk.stops))
         if room < 0:
             plan.run("passes", "", walk.passes.nbytes)

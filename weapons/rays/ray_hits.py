@@ -11,10 +11,10 @@ import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.checks import Floats, InputError, Ints
-from hitplanes.planes.common.limits import HALF, ITEMS_MAX, SUB, WEIGHT_FULL
+from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.grid.spans import Box, Spans, pieces
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -24,7 +24,7 @@ from ..fire.plan import Plan
 from ..kinds.areas import ray_parts_of
 from ..kinds.placements import ShotColumns, Shots
 from ..kinds.weapon import Weapon, smoothed
-from .contacts import Contacts, Parts, Rays, Reason, Terminations, last_of_each, stretches
+from .contacts import Contacts, Parts, Rays, Reason, Terminations, Touches, find_contacts, last_of_each, stretches
 
 if TYPE_CHECKING:
     from ..explain.owners import Pellet
@@ -109,70 +109,114 @@ class Walk:
 
     rays: Rays  # (R,)
     lines: Lines  # (R,) of the rays
-    met: Contacts  # with objects and occluders, also beyond the ends
+    hit: Touches  # with the objects that they hit
     ends: Terminations  # (R,) where the rays end
-    relative: Lines  # the line of each pair of `met`, relative to the motion of its item
     stack: Stack  # the items at the version that was fired at
+    bounds: Box | None  # of the scene
     falloff: str | None  # of the weapon, or None
+    traced: tuple[Contacts, Lines] | None = None
+    """Contacts with objects and occluders, also beyond the ends, and the line of each pair, relative to the motion of
+    its item; None if items do not move, so that the contacts can be found again."""
 
-    @cached_property
-    def _chosen(self) -> tuple[Contacts, Ints]:
-        """Walked cells of objects, in the order of the passes, and the pairs of `met` that they belong to."""
-        stack, met = self.stack, self.met
-        chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
-        objects = met.take(chosen)
-        keep = self.ends.walked(objects)
-        chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]
-        walked = objects.only(keep)
-        cell = walked.first
-        order = np.lexsort((walked.rank, walked.x[cell], walked.y[cell], walked.entry[cell], walked.ray))
-        return walked.take(order), chosen[order]
+    def _contacts(self) -> tuple[Contacts, Lines]:
+        """Contacts with the objects that were hit, at least, and the line of each pair."""
+        if self.traced:
+            return self.traced
+        ray = self.hit.ray
+        lines, origin = self.lines.take(ray), self.rays.origin_xy[ray]
+        return find_contacts(lines, ray, self.hit.rank, self.stack, self.bounds, origin), lines
+
+    def _walked(self) -> tuple[Contacts, Ints, Lines]:
+        """Walked cells of objects, in the order of the passes; their pairs; and the lines of all pairs."""
+        met, lines = self._contacts()
+        walked, chosen = walked_of(met, self.ends, self.stack)
+        return walked, chosen, lines
 
     @property
     def walked(self) -> Contacts:
         """Walked cells of objects, in the order of the passes."""
-        return self._chosen[0]
+        return self._walked()[0]
 
     @cached_property
     def summed(self) -> Summed:
         """What rows are summed up from."""
-        rays, walked = self.rays, self.walked
-        ray, cell = walked.ray, walked.first
-        entry, scale = walked.entry[cell], self.lines.scale[ray]
+        rays, hit = self.rays, self.hit
+        ray, scale = hit.ray, self.lines.scale[hit.ray]
         return Summed(
-            rays.shot[ray], rays.round[ray], rays.pellet[ray], self.stack.ids[walked.rank],
-            np.arange(len(ray)) - np.searchsorted(ray, ray), entry / scale * self.lines.length[ray],
-            weights_at(entry, scale, self.falloff), walked.count,
-            np.stack([walked.x[cell], walked.y[cell]], axis=1) + rays.origin_xy[ray],
+            rays.shot[ray], rays.round[ray], rays.pellet[ray], self.stack.ids[hit.rank],
+            np.arange(len(ray)) - np.searchsorted(ray, ray), hit.entry / scale * self.lines.length[ray],
+            weights_at(hit.entry, scale, self.falloff), hit.count,
+            np.stack([hit.x, hit.y], axis=1) + rays.origin_xy[ray],
         )  # fmt: skip
 
     @cached_property
     def passes(self) -> Passes:
         """Passes of the rays through objects."""
-        (walked, chosen), of, ends = self._chosen, self.summed, self.ends
-        ray, rank, cell = walked.ray, walked.rank, walked.first
+        (walked, chosen, relative), of, ends = self._walked(), self.summed, self.ends
+        hit, ray = self.hit, self.hit.ray
         out = last_of_each(walked.begin, walked.pair, (walked.leave, walked.entry, walked.y, walked.x))
         scale, length = self.lines.scale[ray], self.lines.length[ray]
-        first = walked.entry[cell] / scale
+        first = hit.entry / scale
         last = np.maximum(np.minimum(walked.leave[out] / scale, ends.fraction[ray]), first)
-        sides = self.relative.entered_by(chosen, walked.x[cell], walked.y[cell])
+        sides = relative.entered_by(chosen, hit.x, hit.y)
         return Passes(
             of.shot, of.round, of.pellet, of.object, of.order, of.entry_xy,
             np.stack([walked.x[out], walked.y[out]], axis=1) + self.rays.origin_xy[ray],
             first, last, of.entry_px, last * length,
             _material(walked, ends, self.lines) * length,
-            normals_at(self.stack, rank, of.entry_xy, sides),
+            normals_at(self.stack, hit.rank, of.entry_xy, sides),
             of.weight, points_at(self.rays, ray, first), of.samples, np.zeros_like(ray),
         )  # fmt: skip
 
     @cached_property
     def stops(self) -> Stops:
         """Stops of the rays."""
-        return stops_of(self.met, self.ends, self.rays, self.lines, self.relative, self.stack)
+        if self.traced:
+            met, lines = self.traced
+            return stops_of(met.ray, met.rank, self.ends, self.rays, self.lines, lines, self.stack)
+        ray = np.flatnonzero(self.ends.rank >= 0)
+        return stops_of(ray, self.ends.rank[ray], self.ends, self.rays, self.lines, self.lines.take(ray), self.stack)
+
+    def parts(self) -> list[Walk]:
+        """The same rays in parts of about CHUNK_CELLS cells of objects, which can be found again."""
+        hit = self.hit
+        if int(hit.count.sum()) <= CHUNK_CELLS:
+            return [self]
+        each, found = np.bincount(hit.ray, hit.count, len(self.rays)).astype(np.int64), []
+        for part in pieces(each, CHUNK_CELLS):
+            pairs = slice(*np.searchsorted(hit.ray, (part.start, part.stop)))
+            some = hit.take(pairs)
+            some.ray[:] -= part.start
+            found.append(
+                replace(
+                    self, rays=self.rays.take(part), lines=self.lines.take(part), hit=some, ends=self.ends.take(part)
+                )
+            )
+        return found
 
 
-def stops_of(met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack) -> Stops:
-    """Stops of rays; the parameters are those of `Walk`."""
+def walked_of(met: Contacts, ends: Terminations, stack: Stack) -> tuple[Contacts, Ints]:
+    """Cells of objects that rays walked, in the order of the passes, and the pairs of `met` that they belong to."""
+    chosen = np.flatnonzero(~stack.occluder[met.rank]) if stack.has_occluders else np.arange(len(met))
+    objects = met.take(chosen)
+    keep = ends.walked(objects)
+    chosen = chosen[np.bincount(objects.pair[keep], minlength=len(objects)) > 0]
+    walked = objects.only(keep)
+    cell = walked.first
+    order = np.lexsort((walked.rank, walked.x[cell], walked.y[cell], walked.entry[cell], walked.ray))
+    return walked.take(order), chosen[order]
+
+
+def stops_of(
+    ray: Ints, rank: Ints, ends: Terminations, rays: Rays, lines: Lines, relative: Lines, stack: Stack
+) -> Stops:
+    """Stops of rays.
+
+    Parameters
+    ----------
+    ray, rank, relative : pairs of a ray and an item that it touches, with those in which rays end, and the line of
+        each, relative to the item's motion
+    """
     ends_at_once = (ends.reason == Reason.BUDGET) & (ends.rank < 0)
     cell_xy = pixel(rays.start_256 + rays.step_256 * ~ends_at_once[:, None])
     item, normal = np.full(len(rays), -1), np.zeros((len(rays), 2), np.int64)
@@ -182,7 +226,7 @@ def stops_of(met: Contacts, ends: Terminations, rays: Rays, lines: Lines, relati
     item[stopped] = stack.ids[ends.rank[stopped]]
     hard = np.flatnonzero(ends.reason[stopped] != Reason.BUDGET)
     row, (x, y) = stopped[hard], here[hard].T
-    key = met.ray * max(len(stack), 1) + met.rank
+    key = ray * max(len(stack), 1) + rank
     order = np.argsort(key)
     pair = order[np.searchsorted(key[order], row * max(len(stack), 1) + ends.rank[row])] if len(row) else row
     normal[row] = normals_at(stack, ends.rank[row], cell_xy[row], relative.entered_by(pair, x, y))
@@ -439,6 +483,12 @@ def pixels_of(walk: Walk, rays: Rays) -> Ints:
 def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays) -> Rows:
     """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
+    if pellets_fired == 1:  # each pass is a row
+        x, y = (passes.entry_xy - rays.origin_xy[passes.shot * rounds + passes.round]).T
+        return Rows(
+            passes.shot.copy(), passes.round, passes.object, passes.samples, passes.samples, passes.weight,
+            np.ones(len(x), np.int64), passes.entry_xy, x * x + y * y,
+        )  # fmt: skip
     group = groups_of(passes, rounds)
     order = row_order(group, passes.entry_px, passes.pellet, passes.order)
     begins = np.flatnonzero(np.diff(group[order], prepend=-1))

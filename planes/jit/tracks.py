@@ -1,0 +1,427 @@
+"""Compiled kernel of rays that go on: what each hits, how many pixels of it, and where the ray ends."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from ..bits.cells import BRUTE_PAIRS, cells_of, is_sparse
+from ..common.checks import Ints
+from ..common.limits import HALF, SUB
+from ..grid.rasterize import DIAGONAL, FAR, Lines
+from ..grid.spans import Box
+from ..scene.items import Stack
+from .areas import NOBODY, NONE, OWNERS, refuses
+from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
+from .cache import compiled
+from .rays import BOUNDS, LATE, PAIRS, near_of, part_of, run_of, times_in
+from .scene import root_of
+
+RANK, COUNT, ENTRY, Y, X, ENTER, LAST, FOUND = range(8)
+"""Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels."""
+
+NO_STOP = LATE, 0, 0, True, True
+
+FARTHEST, LONG = 2**29, 2**50
+"""Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `_share` do."""
+
+TRACK_PAIRS, TRACK_RAY = 135_000, 2000
+"""Like PART_PAIRS and RAY_PAIRS, for rays that go on."""
+
+
+@njit
+def _share(time, length2, scale):
+    """The part time / scale of a squared length below 2**50, rounded down; products wrap, their difference fits."""
+    whole = np.int64(np.floor(float(time) / float(scale) * float(length2)))
+    return whole + (time * length2 - whole * scale) // scale
+
+
+@njit
+def _half_chord(radius, v, length2):
+    """Root of radius^2 length^2 - v^2, rounded down; see `grid.fixed_point.far_roots`."""
+    side = radius * np.sqrt(float(length2))
+    root = np.int64(np.rint(np.sqrt(max((side - v) * (side + v), 0.0))))
+    left = radius * radius * length2 - v * v - root * root
+    if root < 2**31:
+        return root_of(root * root + left)
+    step = left // (2 * root)
+    return root + step - (left - 2 * root * step - step * step < 0)
+
+
+@njit
+def _entry_of(at_x, at_y, u, v, ray, wide):
+    """Time at which a ray enters a pixel, see `grid.rasterize.Lines.times`; LATE if it does not touch it.
+
+    Parameters
+    ----------
+    u, v : products of the ray with the vector from its start to the pixel, along it and across
+    """
+    x, y, _, _, across_x, across_y = ray
+    radius, side, _, length2 = wide
+    best, within = np.int64(LATE), (np.int64(0), np.int64(-1))
+    if radius < DIAGONAL:
+        within = times_in(at_x, at_y, at_x, at_y, ray)
+        if radius == 0:
+            return within[0] if within[0] <= within[1] else best
+    if abs(v) <= side and (length2 > 0 or (SUB * at_x - x) ** 2 + (SUB * at_y - y) ** 2 <= radius * radius):
+        root = _half_chord(radius, v, length2)
+        if max(u - root, 0) <= min(u + root, length2):
+            best = max(u - root, 0)
+    if within[0] <= within[1]:
+        entry = -_share(-within[0], length2, across_x * across_y)
+        if entry <= _share(within[1], length2, across_x * across_y):
+            best = min(best, entry)
+    return best
+
+
+@njit
+def _walked(at_x, at_y, u, v, ray, wide, stop):
+    """Whether a ray enters a pixel before its stop, and when."""
+    time, stop_x, stop_y, alone, takes = stop
+    if wide[0] > 0 and u - wide[2] - 2 > time:
+        return False, np.int64(LATE)
+    entry = _entry_of(at_x, at_y, u, v, ray, wide)
+    if entry < time or entry == LATE:
+        return entry < time, entry
+    here = takes and at_x == stop_x and at_y == stop_y
+    before = not alone and (at_y < stop_y or (at_y == stop_y and at_x < stop_x))
+    return entry == time and (here or before), entry
+
+
+@njit
+def _wide_run(row, u, along, v, step, wide, per):
+    """First and last cell of a row that a wide ray may touch, along its longer axis; `per` is 1 / step, or 0."""
+    reach = max(wide[0], DIAGONAL)
+    low, high = float(min(u, u + along) - reach), float(max(u, u + along) + reach)
+    if step != 0:
+        cross = (SUB * row - v) * along
+        middle, half = u + cross * per, wide[2] * abs(per)
+        low, high = max(low, middle - half), min(high, middle + half)
+    return np.int64(np.ceil((low - 1) / SUB)), np.int64(np.floor((high + 1) / SUB))
+
+
+@njit
+def _rows(least, most, u, along, v, step, wide):
+    """First and last row that a ray may touch between two columns, along its longer axis; floats have room."""
+    reach = max(wide[0], DIAGONAL) if wide[0] > 0 else HALF
+    if along == 0:
+        return (v - reach) // SUB, (v + reach) // SUB + 1
+    low, high = min(u, u + along) - reach, max(u, u + along) + reach
+    near, far = min(max(SUB * least - HALF, low), high), max(min(SUB * most + HALF, high), low)
+    slope = step / along
+    one, other = v + (near - u) * slope, v + (far - u) * slope
+    half = max(float(HALF), wide[2] / abs(along)) + 1
+    return np.int64(np.floor((min(one, other) - half) / SUB)), np.int64(np.ceil((max(one, other) + half) / SUB))
+
+
+@njit
+def _touches(part, mask, ray, wide, stop):
+    """Number of pixels of an item that a ray enters before a stop, and time and cell of the first of them.
+
+    Parameters
+    ----------
+    wide : radius of the ray; its `sides` and `wide_sides`, see `grid.rasterize.Lines`; and its squared length
+    stop : time and cell of the stop, whether the cell is the only one at that time, and whether the item is hit in it
+    """
+    x, y, dx, dy, across_x, across_y = ray
+    masks, begin, width, first_x, first_y = mask
+    steep = abs(dy) > abs(dx)
+    u, along, v, step, across = (y, dy, x, dx, across_x) if steep else (x, dx, y, dy, across_y)
+    u_least, u_most, v_least, v_most, stride = part[0], part[2], part[1], part[3], np.int64(1)
+    if steep:
+        u_least, u_most, v_least, v_most, stride = part[1], part[3], part[0], part[2], width
+    top, low = _rows(u_least, u_most, u, along, v, step, wide)
+    per = 1 / step if step != 0 else 0.0
+    first_of = np.int64(0), np.int64(LATE), np.int64(0), np.int64(0)
+    for row in range(max(top, v_least), min(low, v_most) + 1):
+        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
+        first, last = max(first, u_least), min(last, u_most)
+        if first > last:
+            continue
+        left, upper = (row, first) if steep else (first, row)
+        pixel = begin + (upper - first_y) * width + left - first_x
+        ahead = (SUB * row - v) * (1 if step > 0 else -1)
+        if wide[0] == 0 and step != 0 and (ahead - HALF) * across > first_of[1] and (ahead + HALF) * across < stop[0]:
+            count = first_of[0]
+            for k in range(last - first + 1):
+                count += masks[pixel + k * stride]
+            first_of = count, first_of[1], first_of[2], first_of[3]
+        else:
+            first_of = _in_run(left, upper, last - first + 1, masks, pixel, stride, steep, ray, wide, stop, first_of)
+    return first_of
+
+
+@njit
+def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, first_of):
+    """What `_touches` found so far, with the pixels of one run of cells."""
+    x, y, dx, dy, _, _ = ray
+    radius, side, reach, length2 = wide
+    count, best, best_x, best_y = first_of
+    px, py = SUB * left - x, SUB * top - y
+    u, v = px * dx + py * dy, px * dy - py * dx
+    along, aside = (SUB * dy, -SUB * dx) if steep else (SUB * dx, SUB * dy)
+    surely = radius > 0 and length2 > 0
+    for k in range(length):
+        if masks[pixel + k * stride]:
+            if surely and abs(v) <= side and max(best + reach + 2, -1) < u < min(stop[0], length2):
+                count += 1
+            else:
+                at_x, at_y = (left, top + k) if steep else (left + k, top)
+                walked, entry = _walked(at_x, at_y, u, v, ray, wide, stop)
+                count += walked
+                sooner = entry == best and (at_y < best_y or (at_y == best_y and at_x < best_x))
+                if walked and (entry < best or sooner):
+                    best, best_x, best_y = entry, at_x, at_y
+        u, v = u + along, v + aside
+    return count, best, best_x, best_y
+
+
+@njit
+def _bounds(left, top, right, low, ray, wide):
+    """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
+    if wide[0] == 0:
+        return times_in(left, top, right, low, ray)
+    x, y, dx, dy, _, _ = ray
+    reach, length2 = wide[2], wide[3]
+    left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
+    u_least, u_most = (
+        min(left * dx, right * dx) + min(top * dy, low * dy),
+        max(left * dx, right * dx) + max(top * dy, low * dy),
+    )
+    v_least, v_most = (
+        min(left * dy, right * dy) - max(top * dx, low * dx),
+        max(left * dy, right * dy) - min(top * dx, low * dx),
+    )
+    if v_least > reach or v_most < -reach or u_least - reach - 2 > length2 or u_most + reach + 2 < 0:
+        return np.int64(1), np.int64(0)
+    return max(u_least - reach - 2, 0), u_most + reach + 2
+
+
+@njit
+def _comes_before(found, one, other):
+    """Whether a ray enters an item before another: by (time, y, x, rank)."""
+    for column in (ENTRY, Y, X):
+        if found[column, one] != found[column, other]:
+            return found[column, one] < found[column, other]
+    return found[RANK, one] < found[RANK, other]
+
+
+@njit
+def _listed(grid, begin, listed, ray, origin, reach, near):
+    """Copy the items that are listed in the cell of the corner of a ray's box; return how many."""
+    x, y, dx, dy, _, _ = ray
+    left, top = (min(x, x + dx) - reach + SUB - 1) >> 8, (min(y, y + dy) - reach + SUB - 1) >> 8
+    cell = cell_at(left + origin[0], top + origin[1], grid[0], grid[1], grid[2], grid[3], grid[4])
+    if cell < 0:
+        return 0
+    for i in range(begin[cell], begin[cell + 1]):
+        near[i - begin[cell]] = listed[i]
+    return begin[cell + 1] - begin[cell]
+
+
+@njit
+def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found):
+    """Write rank and bounds of the times of the accepted items whose boxes a ray enters; return how many."""
+    (box, _, _, _, categories, owner), (grid, begin, listed), reach = items, cells, max(wide[0], HALF)
+    if len(listed) > 0:
+        some = _listed(grid, begin, listed, ray, origin, reach, near)
+    else:
+        some = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
+    count = 0
+    for i in range(some):
+        at = near[i]
+        if len(meets) and refuses(at, categories, owner, meets, exclude, who):
+            continue
+        left, top, right, low = part_of(box, at, origin[0], origin[1], bounds)
+        if left > right or top > low:
+            continue
+        found[RANK, count] = at
+        found[ENTER, count], found[LAST, count] = _bounds(left, top, right, low, ray, wide)
+        count += found[ENTER, count] <= found[LAST, count]
+    return count
+
+
+@njit
+def _of_item(items, at, origin, ray, wide, bounds, stop):
+    """`_touches` of an item within the bounds."""
+    box, offset, masks, _, _, _ = items
+    mask = masks, offset[at], box[at, 2] - box[at, 0] + 1, box[at, 0] - origin[0], box[at, 1] - origin[1]
+    return _touches(part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop)
+
+
+@njit
+def _meet(items, origin, ray, wide, bounds, most, found, count):
+    """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
+    occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[FOUND]
+    ranks, enters, lasts = found[RANK, :count].copy(), found[ENTER, :count].copy(), found[LAST, :count].copy()
+    for i in np.argsort(enters):
+        if enters[i] > limit:
+            break
+        at = ranks[i]
+        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, NO_STOP)
+        if pixels == 0:
+            continue
+        found[RANK, met], found[COUNT, met], found[LAST, met] = at, pixels, lasts[i]
+        found[ENTRY, met], found[Y, met], found[X, met] = entry, y, x
+        met += 1
+        if occluder[at]:
+            limit = min(limit, entry)
+        elif most > 0:  # `last` has the earliest entries of objects, in order
+            place = min(objects, most - 1)
+            if objects < most or entry < last[place]:
+                while place > 0 and last[place - 1] > entry:
+                    last[place] = last[place - 1]
+                    place -= 1
+                last[place] = entry
+            objects += 1
+            if objects >= most:
+                limit = min(limit, last[most - 1])
+    return met
+
+
+@njit
+def _covers(items, at, x, y, bounds):
+    """Whether an item has a pixel, within the bounds."""
+    box, offset, masks, _, _, _ = items
+    if not (max(box[at, 0], bounds[0]) <= x <= min(box[at, 2], bounds[2])):
+        return False
+    if not (max(box[at, 1], bounds[1]) <= y <= min(box[at, 3], bounds[3])):
+        return False
+    return masks[offset[at] + (y - box[at, 1]) * (box[at, 2] - box[at, 0] + 1) + x - box[at, 0]]
+
+
+@njit
+def _blocked(items, origin, bounds, found, count):
+    """Drop what a ray touches at or behind the first occluder; return how many objects are left, and the occluder."""
+    occluder, wall = items[3], -1
+    for i in range(count):
+        if occluder[found[RANK, i]] and (wall < 0 or _comes_before(found, i, wall)):
+            wall = i
+    if wall < 0:
+        return count, np.int64(-1), np.int64(LATE), np.int64(0), np.int64(0)
+    rank, time, y, x = found[RANK, wall], found[ENTRY, wall], found[Y, wall], found[X, wall]
+    kept = 0
+    for i in range(count):
+        at, entry = found[RANK, i], found[ENTRY, i]
+        if occluder[at] or entry > time:
+            continue
+        if entry == time:  # of the cells that are entered then, the ray walks the occluder's alone
+            if at > rank or not _covers(items, at, x + origin[0], y + origin[1], bounds):
+                continue
+            found[Y, i], found[X, i] = y, x
+        for column in (RANK, COUNT, ENTRY, Y, X, LAST):
+            found[column, kept] = found[column, i]
+        kept += 1
+    return kept, rank, time, y, x
+
+
+@njit
+def _sort(found, order, count):
+    """Order the items by the walk of the ray; each is near its place."""
+    for i in range(count):
+        place = i
+        while place > 0 and _comes_before(found, i, order[place - 1]):
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = i
+
+
+TRACKS = types.Tuple((types.int64, types.int64, types.int64))(
+    types.int64, types.int64, types.int64, ROWS_OUT, PAIRS, PAIRS, types.int64, PAIRS, types.int64,
+    types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
+    types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
+)  # fmt: skip
+
+
+# house: hit rule of rays
+@njit
+def _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends):
+    """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
+    count = _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found)
+    count = _meet(items, origin, ray, wide, bounds, most, found, count)
+    count, rank, time, y, x = _blocked(items, origin, bounds, found, count)
+    _sort(found, near, count)
+    reason, alone = np.int64(rank >= 0), rank >= 0
+    if 0 < most <= count:
+        at, count = near[most - 1], most
+        alone = alone and found[ENTRY, at] == time
+        reason, rank, time, y, x = np.int64(2), found[RANK, at], found[ENTRY, at], found[Y, at], found[X, at]
+    ends[0, who], ends[1, who], ends[2, who], ends[3, who], ends[4, who], ends[5, who] = reason, time, y, x, rank, alone
+    for i in range(count):
+        at = near[i]
+        if found[ENTRY, at] == time and found[Y, at] == y and found[X, at] == x:
+            found[COUNT, at] = 1  # all other pixels of the item come after the first
+        elif found[LAST, at] >= time:
+            stop = time, x, y, alone, found[RANK, at] <= rank
+            found[COUNT, at] = _of_item(items, found[RANK, at], origin, ray, wide, bounds, stop)[0]
+    return count
+
+
+@compiled(TRACKS)
+def _tracks(begin, end, row, out, start, step, radius, sides, most, items, cells, meets, exclude, bounds, ends):
+    """Write what rays hit, in order, to columns (ray, rank, count, x, y, entry), and their ends.
+
+    Returns
+    -------
+    the ray that there is no room for, or `end`; the number of rows; and 0
+    """
+    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((8, len(items[0]) + 1), np.int64)
+    for who in range(begin, end):
+        x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
+        origin = (x + HALF) >> 8, (y + HALF) >> 8
+        ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
+        wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
+        count = _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends)
+        if row + count > out.shape[1]:
+            return who, row, 0
+        for i in range(count):
+            at = near[i]
+            out[0, row], out[1, row], out[2, row] = who, found[RANK, at], found[COUNT, at]
+            out[3, row], out[4, row], out[5, row] = found[X, at], found[Y, at], found[ENTRY, at]
+            row += 1
+    return end, row, 0
+
+
+def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
+    """The items listed by cells of the corners of the rays' boxes, if that spares most comparisons; else nothing."""
+    size = (np.abs(lines.step).max(axis=0, initial=0) + 2 * max(lines.radius, HALF)) // SUB + 2
+    if len(lines) * len(stack) <= BRUTE_PAIRS or not is_sparse(stack.sizes, size):
+        return (0, 0, 0, 0, 0), NONE, NONE
+    listed = cells_of(stack.box_xyxy, np.concatenate([[0, 0], size]), int(size.max()).bit_length())
+    return tuple(listed[:5]), listed.begin, listed.listed
+
+
+def tracks(
+    stack: Stack,
+    bounds: Box | None,
+    lines: Lines,
+    most: int | None,
+    meets: Ints | None = None,
+    exclude: Ints | None = None,
+) -> tuple[Ints, Ints] | None:
+    """Follow rays to their ends, as `trace` does, and count the pixels of what they hit.
+
+    Parameters
+    ----------
+    lines : (R,) the rays, from where they begin in the world
+    most : number of objects that a ray may hit, or None
+    meets, exclude : see `bits.raycast.first_touched`
+
+    Returns
+    -------
+    what rays hit and their ends, see `weapons.rays.tracks`; None if they are so long or so wide that int64 overflows
+    """
+    longest, radius = int(np.abs(lines.step).max(initial=0)), lines.radius
+    far = 2 * longest * longest
+    if longest + radius > FARTHEST or radius * radius * far >= FAR or (0 < radius < DIAGONAL and far >= LONG):
+        return None
+    sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
+    ends = np.zeros((6, len(lines)), np.int64)
+    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
+    whose = (NONE, NOBODY) if meets is None or exclude is None else (meets, exclude)
+    found = rows_by(
+        _tracks, 6, len(lines), TRACK_PAIRS / (TRACK_RAY + len(stack)), lines.start, lines.step, radius, sides,
+        most or 0, items, _cells(stack, lines), *whose, EVERYWHERE if bounds is None else bounds, ends,
+    )  # fmt: skip
+    assert found is not None
+    return found, ends

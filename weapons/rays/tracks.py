@@ -1,0 +1,362 @@
+"""Tracks of rays that go on: what each ray hits, how many cells of it, and where the ray ends, without all its cells.
+
+The rows of an answer need no more. Cells, with the times at which a ray enters and leaves them, are found again when
+passes are read. `jit.tracks` has the compiled kernel; `ray_walk.trace` is the reference, and serves budgets, items that
+move during a ray, and weapons that do not hit what their rays start in.
+
+1. Items whose boxes a ray enters, in the order of entry.
+2. The first cell of each item, and the number of its cells. Rays that may end early look at few items at a time.
+3. Ends, and the cells of those items that a ray is still in when it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hitplanes.planes.bits.cells import BRUTE_PAIRS, is_sparse, met_boxes
+from hitplanes.planes.common.checks import Bools, Ints
+from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
+from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
+from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
+from hitplanes.planes.scene.items import Stack, clipped
+
+from .contacts import (
+    NEVER,
+    Contacts,
+    Terminations,
+    cells_most,
+    end_at_hits,
+    end_at_occluders,
+    endless,
+    find_contacts,
+    first_of_each,
+)
+
+RAYS_AT_ONCE = 1024
+"""Most rays that are followed at a time; the columns of their pairs fit the processor's cache."""
+
+FEW, GROWTH = 4, 2
+"""Boxes of each ray in the first round, and the ratio of the numbers of two rounds in a row."""
+
+
+@dataclass(frozen=True, eq=False)
+class Near(Columns):
+    """Pairs of a ray and an item whose box it enters, sorted by (ray, least).
+
+    Parameters
+    ----------
+    ray, rank : (P,) the ray, and the place of the item in the stack
+    box_xyxy : (P, 4) box of the item within the bounds, relative to the pixel of the ray's start
+    least, most : (P,) bounds of the times at which the ray enters cells of the item
+    """
+
+    ray: Ints
+    rank: Ints
+    box_xyxy: Ints
+    least: Ints
+    most: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Firsts(Columns):
+    """Pairs of a ray and an item that it touches.
+
+    Parameters
+    ----------
+    ray, rank : (P,) the ray, and the place of the item in the stack
+    count : (P,) number of cells of the item on the whole ray
+    x, y, entry : (P,) the first of them by (entry, y, x), relative to the pixel of the ray's start, and its time
+    most : (P,) bound of the times of all of them
+    """
+
+    ray: Ints
+    rank: Ints
+    count: Ints
+    x: Ints
+    y: Ints
+    entry: Ints
+    most: Ints
+
+
+# house: hit rule of rays
+def tracks(
+    stack: Stack,
+    bounds: Box | None,
+    lines: Lines,
+    most: int | None,
+    meets: Ints | None = None,
+    exclude: Ints | None = None,
+) -> tuple[Ints, Ints] | None:
+    """Follow rays to their ends, as `trace` does, and count the cells of what they hit.
+
+    Parameters
+    ----------
+    lines : (R,) the rays, in the world
+    most : number of objects that a ray may hit, or None
+    meets, exclude : (R,) filter of items that a ray meets, and (R, K) owners whose items are skipped; or None, both
+
+    Returns
+    -------
+    what rays hit, in order, as (ray, rank, count, x, y, entry) (6, P); and their ends, as (reason, time, y, x, rank,
+    alone) (6, R); a compiled kernel returns None for rays that are too long or too wide for it
+    """
+    step, found, size = RAYS_AT_ONCE, [], np.abs(lines.step).max(axis=0, initial=0) // SUB + 2 * lines.radius // SUB + 2
+    if not len(stack) or not is_sparse(stack.sizes, size):  # all boxes are compared
+        step = max(1, min(step, BRUTE_PAIRS // max(len(stack), 1)))
+    for begin in range(0, max(len(lines), 1), step):
+        some = slice(begin, begin + step)
+        whose = (meets[some], exclude[some]) if meets is not None and exclude is not None else None
+        found.append(_tracks(stack, bounds, lines.take(some), most, whose))
+        found[-1][0][0] += begin
+    if len(found) == 1:
+        return found[0]
+    hit, ends = (np.concatenate(columns, axis=1) for columns in zip(*found, strict=True))
+    return hit, ends
+
+
+def _tracks(
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, whose: tuple[Ints, Ints] | None
+) -> tuple[Ints, Ints]:
+    """Tracks of some rays."""
+    origin = pixel(lines.start)
+    own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
+    near = _near(stack, bounds, lines, own, origin, whose)
+    firsts, ends = NO_FIRSTS, endless(len(lines))
+    for some in _rounds(near, len(lines), most, stack):
+        now = some[near.least[some] <= ends.time[near.ray[some]]]
+        if len(now):
+            firsts = Firsts.joined([firsts, _firsts_of(near.take(now), own, origin, stack)])
+            ends = _ends(firsts, len(lines), most, origin, bounds, stack)
+    hit = _hit(firsts, ends, stack)
+    last = (hit.entry == ends.time[hit.ray]) & (hit.x == ends.x[hit.ray]) & (hit.y == ends.y[hit.ray])
+    hit.count[last] = 1  # all other cells of the item come after the first
+    last = np.flatnonzero((hit.most >= ends.time[hit.ray]) & ~last)
+    if len(last):
+        ray = hit.ray[last]
+        cells = find_contacts(own.take(ray), ray, hit.rank[last], stack, bounds, origin[ray])
+        hit.count[last] = cells.only(ends.walked(cells)).count
+    columns = ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone.astype(np.int64)
+    return np.stack([hit.ray, hit.rank, hit.count, hit.x, hit.y, hit.entry]), np.stack(columns)
+
+
+def _near(
+    stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, whose: tuple[Ints, Ints] | None
+) -> Near:
+    """Accepted items whose boxes rays enter; `own` are the lines relative to their pixels of origin."""
+    reach, end = max(lines.radius, HALF), lines.start + lines.step
+    low, high = np.minimum(lines.start, end) - reach, np.maximum(lines.start, end) + reach
+    ray, rank = met_boxes(np.concatenate([-(-low // SUB), high // SUB], axis=1), stack.box_xyxy)
+    if whose is not None:
+        meets, exclude = whose
+        accepted = (stack.categories[rank] & meets[ray]) != 0
+        accepted &= ~(stack.owner[rank][:, None] == exclude[ray]).any(axis=1)
+        ray, rank = ray[accepted], rank[accepted]
+    some = _crossing(lines, ray, rank, stack.box_xyxy)
+    ray, rank = ray[some], rank[some]
+    box = stack.box_xyxy[rank] if bounds is None else clipped(stack.box_xyxy[rank], bounds)
+    box = box - np.concatenate([origin, origin], axis=1)[ray]
+    least, most = _bounds(own, ray, box)
+    some = np.flatnonzero((least <= most) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
+    some = some[np.lexsort((least[some], ray[some]))]
+    return Near(ray[some], rank[some], box[some], least[some], most[some])
+
+
+def _crossing(lines: Lines, ray: Ints, rank: Ints, boxes_xyxy: Ints) -> Ints:
+    """Numbers of the pairs of a ray and an item whose box meets the infinite axis of the ray, or its sides."""
+    left, top, right, low = HALF * boxes_xyxy.T
+    (x, y), (dx, dy) = lines.start.T, lines.step.T
+    wide, high = np.abs(dx), np.abs(dy)
+    reach = lines.wide_sides if lines.radius else HALF * (wide + high)
+    across = ((left + right)[rank] - x[ray]) * dy[ray] - ((top + low)[rank] - y[ray]) * dx[ray]
+    return np.flatnonzero(
+        np.abs(across) <= (right - left)[rank] * high[ray] + (low - top)[rank] * wide[ray] + reach[ray]
+    )
+
+
+def _bounds(own: Lines, ray: Ints, box: Ints) -> tuple[Ints, Ints]:
+    """Bounds of the times at which rays enter cells of boxes; the second is less if a ray touches none."""
+    (x, y), (dx, dy) = own.start[ray].T, own.step[ray].T
+    left, top, right, low = (SUB * box - np.stack([x, y, x, y], axis=1)).T
+    if own.radius:
+        u = [np.minimum(left * dx, right * dx) + np.minimum(top * dy, low * dy)]
+        u.append(np.maximum(left * dx, right * dx) + np.maximum(top * dy, low * dy))
+        aside = np.minimum(left * dy, right * dy) - np.maximum(top * dx, low * dx)
+        other = np.maximum(left * dy, right * dy) - np.minimum(top * dx, low * dx)
+        reach, length2 = own.wide_sides[ray], own.length2[ray]
+        least, most = u[0] - reach - 2, u[1] + reach + 2
+        missed = (aside > reach) | (other < -reach) | (least > length2) | (most < 0)
+        return least, np.where(missed, least - 1, most)
+    across_x, across_y = np.maximum(np.abs(dy), 1), np.maximum(np.abs(dx), 1)
+    entry, leave = np.zeros(len(ray), np.int64), across_x * across_y
+    for first, last, step, across in ((left, right, dx, across_x), (top, low, dy, across_y)):
+        near, far = (
+            (np.where(step < 0, -last, first) - HALF) * across,
+            (np.where(step < 0, -first, last) + HALF) * across,
+        )
+        beside = (step == 0) & ((near > 0) | (far < 0))
+        entry = np.where(step == 0, entry, np.maximum(entry, near))
+        leave = np.where(step == 0, np.where(beside, -1, leave), np.minimum(leave, far))
+    return entry, leave
+
+
+def _rounds(near: Near, rays: int, most: int | None, stack: Stack) -> Iterator[Ints]:
+    """Numbers of the pairs that are looked at one after another: occluders, and the next few objects of each ray.
+
+    Of rays that go through all objects, or meet few boxes, all objects are next.
+    """
+    early = len(near) > FEW * rays
+    object_ = np.arange(len(near))
+    if early and stack.has_occluders:
+        blocks = stack.occluder[near.rank]
+        yield np.flatnonzero(blocks)
+        object_ = np.flatnonzero(~blocks)
+    if not early or most is None:
+        yield object_
+        return
+    ray = near.ray[object_]
+    place = np.arange(len(ray)) - np.searchsorted(ray, ray)
+    first, size, last = 0, max(FEW, most), int(place.max(initial=-1))
+    while first <= last:
+        yield object_[(place >= first) & (place < first + size)]
+        first, size = first + size, size * GROWTH
+
+
+def _firsts_of(near: Near, own: Lines, origin: Ints, stack: Stack) -> Firsts:
+    """The first cells of items, and the numbers of their cells."""
+    side = near.box_xyxy[:, 2:] - near.box_xyxy[:, :2] + 1
+    parts = pieces(cells_most(own, side), CHUNK_SAMPLES) if len(near) else []
+    return Firsts.joined([_firsts(near.take(part), own, origin, stack) for part in parts]) if parts else NO_FIRSTS
+
+
+NO_FIRSTS = Firsts(*[np.zeros(0, np.int64)] * 7)
+
+
+def _firsts(near: Near, own: Lines, origin: Ints, stack: Stack) -> Firsts:
+    """`_firsts_of` for a part of the pairs."""
+    lines = own.take(near.ray)
+    pair, row, first, last = lines.runs(near.box_xyxy)
+    run, place = _pixels(near, lines, origin, stack, (pair, row, first), last - first + 1)
+    cells = np.bincount(pair, np.bincount(run, minlength=len(pair)), len(near)).astype(np.int64)
+    some, entry, count = (_thick_entries if own.radius else _thin_entries)(lines, (pair, row, first), run, place, cells)
+    run, place = run[some], place[some]
+    of = pair[run]
+    begin = np.flatnonzero(begins(of))
+    met = of[begin]
+    soonest = np.zeros(len(near), np.int64)
+    if len(begin):
+        soonest[met] = np.minimum.reduceat(entry, begin)
+    tied = np.flatnonzero(entry == soonest[of])
+    run, of = run[tied], of[tied]
+    u, v, steep = first[run] + place[tied], row[run], lines.steep[of]
+    x, y, new = np.where(steep, v, u), np.where(steep, u, v), begins(of)
+    cell = first_of_each(np.flatnonzero(new), np.cumsum(new) - 1, (y, x))
+    return Firsts(near.ray[met], near.rank[met], count[met], x[cell], y[cell], soonest[met], near.most[met])
+
+
+Runs = tuple[Ints, Ints, Ints]
+"""Runs of cells (n,) along the longer axes of rays: pair, row, and first cell."""
+
+
+def _pixels(near: Near, lines: Lines, origin: Ints, stack: Stack, runs: Runs, length: Ints) -> tuple[Ints, Ints]:
+    """Pixels of items in runs, as (run, place in it)."""
+    pair, row, first = runs
+    width, corner = stack.width[near.rank], stack.box_xyxy[near.rank, :2] - origin[near.ray]
+    along, across = np.where(lines.steep, width, 1), np.where(lines.steep, 1, width)
+    begin = (stack.offset[near.rank] - corner[:, 1] * width - corner[:, 0])[pair] + first * along[pair]
+    begin += row * across[pair]
+    start = np.cumsum(length) - length
+    texel = np.repeat(along[pair], length)
+    if len(begin):  # the steps from pixel to pixel, and from run to run
+        texel[start[1:]] = begin[1:] - (begin + (length - 1) * along[pair])[:-1]
+        texel[0] = begin[0]
+    on = np.flatnonzero(stack.masks[np.cumsum(texel, out=texel)])
+    run = np.repeat(np.arange(len(length)), length)[on]
+    return run, on - start[run]
+
+
+def _thin_entries(lines: Lines, runs: Runs, run: Ints, place: Ints, cells: Ints) -> tuple[slice, Ints, Ints]:
+    """Pixels that may be the first of their pairs, when rays enter them, and the number of cells of each pair.
+
+    Parameters
+    ----------
+    run, place : (k,) the pixels: the run, and the place in it
+    cells : (P,) number of pixels of each pair
+    """
+    pair, row, first = runs
+    u, v, along, aside = lines.flat
+    ahead, per = np.sign(along), np.maximum(np.abs(aside), 1)
+    by_row = (SUB * row - v[pair]) * np.sign(aside)[pair] - HALF
+    by_row = np.maximum(by_row * np.maximum(np.abs(along), 1)[pair], 0)
+    by_column, step = ((SUB * first - u[pair]) * ahead[pair] - HALF) * per[pair], (SUB * ahead * per)[pair]
+    entry = step[run]
+    entry *= place
+    entry += by_column[run]
+    return slice(None), np.maximum(entry, by_row[run], out=entry), cells
+
+
+def _thick_entries(lines: Lines, runs: Runs, run: Ints, place: Ints, cells: Ints) -> tuple[Ints, Ints, Ints]:
+    """`_thin_entries` of thick rays.
+
+    Beside a ray, between its ends, all cells are touched that are near enough to its axis. A ray enters a cell at most
+    `reach` before the time at which its own centre passes it, so few of these cells may be the first.
+    """
+    (pair, row, first), (u, v, along, aside), reach = runs, lines.flat, lines.wide_sides
+    passes, step = (SUB * first - u[pair]) * along[pair] + (SUB * row - v[pair]) * aside[pair], (SUB * along)[pair]
+    length = np.zeros(len(pair), np.int64)
+    length[run] = place  # the last pixel of each run
+    last, end = passes + length * step, lines.length2[pair]
+    surely = (np.minimum(passes, last) >= 0) & (np.maximum(passes, last) <= end) & (end > 0)
+    surely &= lines.radius >= DIAGONAL
+    time = step[run]
+    time *= place
+    time += np.where(surely, passes, NEVER)[run]
+    latest, begin = np.full(len(cells), NEVER), np.flatnonzero(begins(pair[run]))
+    if len(begin):
+        latest[pair[run[begin]]] = np.minimum.reduceat(time, begin)
+    some = np.flatnonzero(time <= np.where(surely, (latest + reach + 1)[pair], np.iinfo(np.int64).max)[run])
+    there, column, line = pair[run[some]], first[run[some]] + place[some], row[run[some]]
+    steep = lines.steep[there]
+    entry, leave = lines.times(there, np.where(steep, line, column), np.where(steep, column, line))
+    missed = np.bincount(there[entry > leave], minlength=len(cells))  # a cell that is touched surely is not missed
+    touched = np.flatnonzero(entry <= leave)
+    return some[touched], entry[touched], cells - missed
+
+
+def _ends(firsts: Firsts, rays: int, most: int | None, origin: Ints, bounds: Box | None, stack: Stack) -> Terminations:
+    """Ends of rays, without `fraction`; the cells of items that rays enter as they end become the last cells."""
+    one, ends = np.ones(len(firsts), np.int64), endless(rays)
+    met = Contacts(firsts.ray, firsts.rank, one, firsts.x, firsts.y, firsts.entry, firsts.entry)
+    if stack.has_occluders:
+        end_at_occluders(ends, met, stack)
+        here = np.flatnonzero((firsts.entry == ends.time[firsts.ray]) & (firsts.rank < ends.rank[firsts.ray]))
+        ray = firsts.ray[here]
+        here = here[_covers(stack, firsts.rank[here], ends.x[ray], ends.y[ray], origin[ray], bounds)]
+        ray = firsts.ray[here]
+        firsts.x[here], firsts.y[here] = ends.x[ray], ends.y[ray]  # of the cells entered then, it walks that one alone
+        met = met.take(np.flatnonzero(~stack.occluder[firsts.rank]))
+    if most is not None:
+        end_at_hits(ends, met, most)
+    return ends
+
+
+def _hit(firsts: Firsts, ends: Terminations, stack: Stack) -> Firsts:
+    """Objects that rays hit before their ends, in order."""
+    reached = ends.reaches(firsts.ray, firsts.entry, firsts.y, firsts.x, firsts.rank)
+    if stack.has_occluders:
+        reached &= ~stack.occluder[firsts.rank]
+    hit = firsts.take(np.flatnonzero(reached))
+    return hit.take(np.lexsort((hit.rank, hit.x, hit.y, hit.entry, hit.ray)))
+
+
+def _covers(stack: Stack, rank: Ints, x: Ints, y: Ints, origin: Ints, bounds: Box | None) -> Bools:
+    """Whether items have pixels (n,), given relative to the pixels of origin (n, 2), within the bounds."""
+    x, y = x + origin[:, 0], y + origin[:, 1]
+    full = stack.box_xyxy[rank]
+    box = full if bounds is None else clipped(full, bounds)
+    on = (box[:, 0] <= x) & (x <= box[:, 2]) & (box[:, 1] <= y) & (y <= box[:, 3])
+    texel = stack.offset[rank] + (y - full[:, 1]) * stack.width[rank] + x - full[:, 0]
+    return on & stack.masks[np.where(on, texel, 0)]
