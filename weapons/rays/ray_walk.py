@@ -63,8 +63,7 @@ class Range:
     """The items that rays are tested against, and the records of the work.
 
     `field` is that of a scene within bounds, for rays that march. `looked` is set only for a report; `whole` follows
-    rays in one stretch, beyond their ends. With `tracked`, rays
-    need not walk cell by cell; then all boxes are compared.
+    rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell by cell; then all boxes are compared.
     """
 
     items: Items
@@ -121,6 +120,7 @@ def has_track(ray: RayWeapon) -> bool:
     return ray.inside == "hit" and ray.budget_256 is None and steps_of(ray) is None
 
 
+# house: way of rays
 def tracked(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
     """Follow rays to their ends by the accelerated form of `trace`; None if it does not serve."""
     stack, plan = through.stack, through.plan
