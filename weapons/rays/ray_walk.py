@@ -63,7 +63,7 @@ class Range:
     """The items that rays are tested against, and the records of the work.
 
     `field` is that of a scene within bounds, for rays that march. `looked` is set only for a report; `whole` follows
-    rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell by cell; then all boxes are compared.
+    rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell by cell, and all boxes are compared.
     """
 
     items: Items
