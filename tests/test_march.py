@@ -400,7 +400,7 @@ def test_the_plan_tells_what_was_lost_without_a_field() -> None:
     assert field is not None
     told = []
     for _ in range(2):
-        plan = fire(scene, Pistol(90), (2.25, 4)).plan
+        plan = fire(scene, Pistol(90), [(2.25, 4)]).plan
         told.append(next(stage.why for stage in plan.left_out if stage.name == "march"))
         lost = f"which would take 720 us to make: {field.regret / 1e3:.0f} us lost so far"
         assert told[-1].endswith(lost) and told[-1].startswith("about ")

@@ -119,7 +119,9 @@ else:
 
 
 def test_the_command_says_in_one_line_what_to_install(tmp_path: Path) -> None:
-    code = "from hitplanes.weapons.cli.command import main\nraise SystemExit(main(['new', 'range']))"
+    write_png(tmp_path / "can.png", np.full((9, 9, 4), 255, np.uint8))
+    code = "from hitplanes.weapons.cli.command import main\n"
+    code += "raise SystemExit(main(['new', '--from-image', 'can.png', 'range']))"
     done = run(BLOCKED + code, tmp_path)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
     assert "pip install opencv-python-headless" in done.stderr
