@@ -5,6 +5,7 @@ scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any, Unpack, overload
 
 import numpy as np
@@ -159,9 +160,10 @@ def _ready(
         return None  # also of True, which would find what is kept for 1
 
     def make() -> Ready[Hits]:
-        return late.prepare.prepare(scene, weapon, accept=accepts, blocked_by=blocks, exclude=owner, seed=seed)
+        own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
+        return late.prepare.prepare(scene, own, accept=accepts, blocked_by=blocks, exclude=owner, seed=seed)
 
-    return scene.derived.when_asked_again((weapon, accepts, blocks, owner, seed), make)
+    return scene.derived.when_asked_again((weapon.text, accepts, blocks, owner, seed), make)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:
