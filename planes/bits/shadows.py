@@ -26,7 +26,7 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..grid.spans import Box, Spans, begins, each_pixel, merged_runs, ragged
+from ..grid.spans import Box, Spans, begins, each_pixel, merged_runs, ragged, sorted_once
 from ..scene.items import clipped
 from . import cells
 from .bit_rows import WORD, Words
@@ -130,7 +130,7 @@ def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     """Sorted pairs (row, blocker) of origins (n, 2) that lie on a blocker."""
     row, blocker = ways_met(np.tile(origin_xy, 2), origin_xy, blockers)
     place, rects = blockers.rects_of(blocker, origin_xy[row])
-    begun = np.unique(place[_holds_origin(rects)])
+    begun = sorted_once(place[_holds_origin(rects)])
     return row[begun], blocker[begun]
 
 
@@ -334,7 +334,7 @@ def _hidden(
 
 def _begun_apart(pair: Ints, rects: Ints) -> tuple[Ints, Ints, list[tuple[int, Ints]]]:
     """Rectangles (m, 4) of pairs, without those of blockers that the way begins in, which follow as (pair, rects)."""
-    begun = np.unique(pair[_holds_origin(rects)])
+    begun = sorted_once(pair[_holds_origin(rects)])
     apart = np.isin(pair, begun)
     return pair[~apart], rects[~apart], [(k, rects[pair == k]) for k in begun.tolist()]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
-from ..grid.spans import meets, pieces, ragged
+from ..grid.spans import meets, pieces, ragged, sorted_once
 from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
 
 
@@ -50,7 +50,7 @@ class Tree:
 
     def refit(self, places: Ints) -> int:
         """Update the nodes above changed outer boxes; return the number of rows read and written."""
-        leaf = np.unique(np.searchsorted(self.starts, places, side="right") - 1)
+        leaf = sorted_once(np.searchsorted(self.starts, places, side="right") - 1)
         group, place = ragged(self.starts[leaf + 1] - self.starts[leaf])
         first = np.flatnonzero(np.diff(group, prepend=-1))
         hulls = _hulls(self.outer[self.starts[leaf][group] + place], first)
@@ -58,7 +58,7 @@ class Tree:
         written = len(group) + len(leaf)
         self._worn[leaf] = _girths(hulls) / 2 - self._slack > self._new[leaf]
         for upper, lower in zip(self.levels[-2::-1], self.levels[:0:-1], strict=True):
-            leaf = np.unique(leaf >> 2)
+            leaf = sorted_once(leaf >> 2)
             children = lower[(leaf[:, None] << 2) + np.arange(4)]
             upper[leaf] = _hulls(children.reshape(-1, children.shape[-1]), np.arange(0, 4 * len(leaf), 4))
             written += len(leaf)

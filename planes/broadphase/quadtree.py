@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, InputError, Ints, integer
 from ..common.limits import CHUNK_SAMPLES, QUADTREE_CAPACITY, QUADTREE_DEPTH
-from ..grid.spans import pieces, ragged
+from ..grid.spans import pieces, ragged, sorted_once
 from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, piled, sorted_pairs
 
 Nodes = dict[str, npt.NDArray[Any]]  # rows of nodes, one array per field of FIELDS
@@ -239,7 +239,7 @@ class Quadtree(BroadPhase):
         for (_, node, straddle), sign in ((before, -1), (after, 1)):
             np.add.at(nodes["total"], node, sign)
             np.add.at(nodes["straddle"], node[straddle], sign)
-        touched = np.unique(np.concatenate((before[1], after[1])))
+        touched = sorted_once(np.concatenate((before[1], after[1])))
         self.written += len(touched)
         leaves = touched[nodes["child"][touched] < 0]
         node, box = self._entries(leaves)

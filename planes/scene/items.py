@@ -22,7 +22,7 @@ from ..common.checks import Bools, Floats, InputError, Ints, choice
 from ..common.limits import BOXES_MAX, CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
-from ..grid.spans import Box
+from ..grid.spans import Box, sorted_once
 from .derived import NEVER
 from .poses import Looks
 from .sprite import Sprite
@@ -56,12 +56,12 @@ class Stack:
 
     def placed(self, box_xyxy: Ints) -> Stack:
         """A stack of the same items in the same order at other places; both share the other columns."""
-        return self._with(("sizes",), box_xyxy=box_xyxy)
+        return self._with(("sizes",), box_xyxy=box_xyxy)  # boxes keep their sizes, and pixels their numbers
 
     def reformed(self, forms: int, box_xyxy: Ints, offset: Ints, masks: Bools, categories: Ints, owner: Ints) -> Stack:
         """A stack of the same ids in the same order with other masks, categories or owners."""
         return self._with(
-            ("sizes", "width", "has_unmet"), forms=forms, box_xyxy=box_xyxy, offset=offset, masks=masks,
+            ("sizes", "width", "numbers", "has_unmet"), forms=forms, box_xyxy=box_xyxy, offset=offset, masks=masks,
             categories=categories, owner=owner,
         )  # fmt: skip
 
@@ -121,6 +121,12 @@ class Stack:
     def width(self) -> Ints:
         """Width of each mask, px."""
         return self.box_xyxy[:, 2] - self.box_xyxy[:, 0] + 1
+
+    @cached_property
+    def numbers(self) -> Ints:
+        """Number (n + 1,) of the first pixel of each box, if those of all boxes are counted; the last is their sum."""
+        height = self.box_xyxy[:, 3] - self.box_xyxy[:, 1] + 1
+        return np.concatenate([[0], np.cumsum(self.width * height)])
 
     @cached_property
     def sizes(self) -> tuple[Floats, Floats]:
@@ -394,7 +400,7 @@ class Items:
     def changed_ids(self, version: int) -> Ints | None:
         """Sorted ids of the items that changed after a version; None if that is forgotten."""
         changes = self.changes(version)
-        return None if changes is None else np.unique(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
+        return None if changes is None else sorted_once(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
 
     def changes(self, version: int) -> list[Change] | None:
         """Changes after a version, the last first; None if that is forgotten."""

@@ -17,7 +17,7 @@ from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.grid.spans import Spans, merged_runs
+from hitplanes.planes.grid.spans import Spans, merged_runs, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -518,9 +518,10 @@ def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_sh
 
 def _distinct(met: SpanHits, group: Ints, order: Ints, groups: int) -> tuple[Ints, Ints]:
     """Pellets that hit, and pixels counted once, of each group."""
-    pairs = np.unique(np.stack([group, met.placement[order]]), axis=1)
+    of = int(met.placement.max(initial=0)) + 1
+    pellets = np.bincount(sorted_once(group * of + met.placement[order]) // of, minlength=groups)
     y = met.y[order] - met.y.min(initial=0)
     rows = int(y.max(initial=0)) + 1
     which, x_first, x_last = merged_runs(group * rows + y, met.x_first[order], met.x_last[order])
     pixels = np.bincount(group[which], x_last - x_first + 1, groups).astype(np.int64)
-    return np.bincount(pairs[0], minlength=groups), pixels
+    return pellets, pixels

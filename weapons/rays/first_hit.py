@@ -32,7 +32,7 @@ from ..fire.prefilter import may_refuse, refused
 from ..kinds.placements import ONES, Shots
 from ..kinds.rays import RayWeapon
 from .contacts import Contacts, Rays, Reason, Terminations, Touches, endless, reasons_at
-from .ray_hits import Passes, Stops, Summed, Walk, groups_of, rows_of_passes, weights_at
+from .ray_hits import Passes, Stops, Summed, Walk, numbered, rows_of_passes, weights_at
 from .ray_walk import Range, lines_of
 
 
@@ -68,8 +68,9 @@ class FirstHits:
             rays.shot[hit], rays.round[hit], rays.pellet[hit], self.stack.ids[ends.rank[hit]], one - 1,
             ends.time[hit] / scale * lines.length[hit], weights_at(ends.time[hit], scale, self.ray.fades), one, xy,
         )  # fmt: skip
-        group = groups_of(first, int(rays.round.max(initial=0)) + 1)
-        return rows_of_passes(first, np.concatenate([group[:, None], xy], axis=1), rays)
+        rounds = int(rays.round.max(initial=0)) + 1
+        pixels = numbered(rays, rounds, hit, ends.rank[hit], ends.x[hit], ends.y[hit], self.stack)
+        return rows_of_passes(first, pixels, rays, self.stack)
 
     @property
     def passes(self) -> Passes:

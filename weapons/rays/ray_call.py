@@ -214,15 +214,18 @@ def _followed(
     summed, pixels, plan = [], [], through.plan
     for walk in _walks(rays, ray, shots, through):
         summed.append(walk.summed)
-        pixels.append(pixels_of(walk, rays))
-        plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
+        parts = walk.parts() if walk.traced is None else [walk]
+        for part in parts:
+            pixels.append(pixels_of(part, rays))
+            plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
         if walk.traced is None:
-            walks += walk.parts()
+            walks += parts
             continue
         room -= len(walk.traced[0].x)
         walks.append(walk if room >= 0 else Made(walk.passes, walk.stops))
         if room < 0:
             plan.run("passes", "", walk.passes.nbytes)
-    rows = rows_of_passes(Summed(*map(np.concatenate, zip(*summed, strict=True))), np.concatenate(pixels), rays)
+    passes = Summed(*map(np.concatenate, zip(*summed, strict=True)))
+    rows = rows_of_passes(passes, np.concatenate(pixels), rays, through.stack)
     plan.run("rows", "", rows.nbytes)
     return walks, rows, room

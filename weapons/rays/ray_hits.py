@@ -14,7 +14,7 @@ from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Box, Spans, pieces
+from hitplanes.planes.grid.spans import Box, Spans, pieces, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -470,18 +470,29 @@ def _rows_of(rows: Rows, passes: Passes) -> Ints:
 
 
 def pixels_of(walk: Walk, rays: Rays) -> Ints:
-    """Pixels that rays hit, as rows (group, x, y); none if no shot has several pellets; `rays` are all of the shots."""
+    """Numbers of the pixels that a walk of some of the rays hits, each once; none if no shot has several pellets."""
     if not rays.pellet.any():
-        return np.zeros((0, 3), np.int64)
-    cells = walk.walked
-    group = groups_of(walk.summed, int(rays.round.max(initial=0)) + 1)[cells.pair]
-    x, y = (np.stack([cells.x, cells.y], axis=1) + walk.rays.origin_xy[cells.ray[cells.pair]]).T
-    found = np.stack([group, x, y], axis=1)
-    return found if len(walk.rays) == len(rays) else np.unique(found, axis=0)
+        return np.zeros(0, np.int64)
+    cells, rounds = walk.walked, int(rays.round.max(initial=0)) + 1
+    pair = cells.pair
+    return sorted_once(numbered(walk.rays, rounds, cells.ray[pair], cells.rank[pair], cells.x, cells.y, walk.stack))
 
 
-def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays) -> Rows:
-    """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`."""
+def numbered(rays: Rays, rounds: int, ray: Ints, rank: Ints, x: Ints, y: Ints, stack: Stack) -> Ints:
+    """Numbers of pixels (n,) of items, given relative to the starts of rays; each round of each shot counts anew."""
+    left, top = (stack.box_xyxy[rank, :2] - rays.origin_xy[ray]).T
+    number: Ints = _first_number(rays, rounds, ray, rank, stack) + (y - top) * stack.width[rank] + x - left
+    return number
+
+
+def _first_number(rays: Rays, rounds: int, ray: Ints, rank: Ints, stack: Stack) -> Ints:
+    """Numbers of the first pixels of the boxes of items."""
+    number: Ints = (rays.shot[ray] * rounds + rays.round[ray]) * stack.numbers[-1] + stack.numbers[rank]
+    return number
+
+
+def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Rows:
+    """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`, once or more."""
     rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
     if pellets_fired == 1:  # each pass is a row
         x, y = (passes.entry_xy - rays.origin_xy[passes.shot * rounds + passes.round]).T
@@ -498,18 +509,16 @@ def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays) -> Rows:
     samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
     weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
     pellets = np.bincount(number, minlength=len(best))
-    distinct = samples if (pellets == 1).all() else _counted_once(pixels, group[best])
+    distinct, ray = samples, (passes.shot * rounds + passes.round)[best] * pellets_fired + passes.pellet[best]
+    if (pellets > 1).any():
+        rank = stack.rank_of[passes.object[best]]
+        begin = _first_number(rays, rounds, ray, rank, stack)
+        ends = begin + stack.numbers[rank + 1] - stack.numbers[rank]
+        distinct = np.diff(np.searchsorted(sorted_once(pixels), [begin, ends]), axis=0)[0]
     ray_of = passes.shot[best], passes.round[best]
     sort = row_order(*ray_of, passes.entry_px[best], passes.pellet[best], passes.order[best])
     best = best[sort]
-    ray = (passes.shot[best] * rounds + passes.round[best]) * pellets_fired + passes.pellet[best]
     return Rows(
         passes.shot[best], passes.round[best], passes.object[best], samples[sort], distinct[sort], weight[sort],
-        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - rays.origin_xy[ray]) ** 2).sum(axis=1),
+        pellets[sort], passes.entry_xy[best], ((passes.entry_xy[best] - rays.origin_xy[ray[sort]]) ** 2).sum(axis=1),
     )  # fmt: skip
-
-
-def _counted_once(pixels: Ints, groups: Ints) -> Ints:
-    """Number of distinct pixels of each group, for sorted groups."""
-    group = np.unique(pixels, axis=0)[:, 0]
-    return np.bincount(np.searchsorted(groups, group), minlength=len(groups))
