@@ -157,7 +157,7 @@ OF_TRACKS = [
     (RAYFIRE, "chosen_candidates", "plan", 100),
     (RAYFIRE, "leave_out_absent", "plan", 200),
     (RAYFIRE, "rays_of", "rays", 10**3),
-    (tracks, "_near", "walk", 10**4),
+    (tracks, "near_items", "walk", 10**4),
     (tracks, "_firsts", "walk", 10**5),
     (tracks, "end_at_occluders", "walk", 10**6),
     (tracks, "end_at_hits", "walk", 10**7),

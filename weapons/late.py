@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .explain import owners as owners
     from .explain import ray_margins as ray_margins
     from .explain import ray_samples as ray_samples
+    from .explain import ray_verdicts as ray_verdicts
     from .explain import samples as samples
     from .fire import shelter as shelter
     from .prepared import prepare as prepare
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from .replay import shot_log as shot_log
 
 _PLACES = (
-    "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.samples", "fire.shelter",
-    "prepared.prepare", "rays.ray_call", "replay.shot_log",
+    "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
+    "fire.shelter", "prepared.prepare", "rays.ray_call", "replay.shot_log",
 )  # fmt: skip
 
 

@@ -47,11 +47,17 @@ class Miss(NamedTuple):
     object_xy: tuple[float, float]
 
 
+def key_of_cells(ray: Ints, x: Ints, y: Ints) -> Ints:
+    """One number for each cell of each ray; cells are given relative to the pixels of their rays' starts."""
+    half = 1 << (REACH_BITS - 1)
+    return np.asarray((((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half)
+
+
 class _Keyed:
     """Index of cells of rays by (ray, x, y); a moving item may put cells beside a projectile's own path."""
 
     def __init__(self, ray: Ints, x: Ints, y: Ints) -> None:
-        self._keys = self._key(ray, x, y)
+        self._keys = key_of_cells(ray, x, y)
         self._order = np.argsort(self._keys)
 
     def __len__(self) -> int:
@@ -59,17 +65,12 @@ class _Keyed:
 
     def places(self, ray: Ints, x: Ints, y: Ints) -> tuple[Ints, Ints]:
         """Indices of the wanted cells that exist, and their places among the wanted ones."""
-        wanted = self._key(ray, x, y)
+        wanted = key_of_cells(ray, x, y)
         if not len(self):
             return wanted[:0], wanted[:0]
         at = self._order[np.minimum(np.searchsorted(self._keys, wanted, sorter=self._order), len(self) - 1)]
         found = np.flatnonzero(self._keys[at] == wanted)
         return at[found], found
-
-    @staticmethod
-    def _key(ray: Ints, x: Ints, y: Ints) -> Ints:
-        half = 1 << (REACH_BITS - 1)
-        return np.asarray((((ray << REACH_BITS) + y + half) << REACH_BITS) + x + half)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ position, aim -> start and step, 1/256 px -> what is touched first -> a row, or 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -18,12 +17,13 @@ import numpy as np
 from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
 from hitplanes.planes.bits.raycast import Cast, Touched
 from hitplanes.planes.common.backend import cached_attribute
-from hitplanes.planes.common.checks import Bools
+from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from .. import late
 from ..fire.hits import HitRow
 from ..fire.strategy import chosen_ray_way
 from ..kinds.areas import ray_parts_of
@@ -31,7 +31,7 @@ from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from ..rays.contacts import rays_of
 from ..rays.first_hit import PREPARED, FirstHits, ends_of_touched
-from ..rays.ray_hits import Passes, RayHits, Stops, weights_at
+from ..rays.ray_hits import RayHits, Told, weights_at
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
@@ -61,8 +61,11 @@ class OneRay(OneShot, RayHits):
         return FirstHits(rays, parts[2], ends, stack)
 
     @cached_attribute
-    def _later(self) -> tuple[Callable[[], Passes], Callable[[], Stops]]:
-        return lambda: self._first.passes, lambda: self._first.stops
+    def _later(self) -> Told:
+        def verdicts() -> Ints:
+            return late.ray_verdicts.verdicts_of([(0, self._first)], self.shots, self._present.bounds)
+
+        return Told(lambda: self._first.passes, lambda: self._first.stops, verdicts)
 
 
 class ReadyRay(Ready[RayHits]):

@@ -75,16 +75,16 @@ class FirstHits:
     @property
     def passes(self) -> Passes:
         """Pass of each ray that hit an object; it ends in the cell of the hit."""
-        return self._passes_and_stops[0]
+        return self.walk.passes
 
     @property
     def stops(self) -> Stops:
         """Where each ray ended."""
-        return self._passes_and_stops[1]
+        return self.walk.stops
 
     @cached_property
-    def _passes_and_stops(self) -> tuple[Passes, Stops]:
-        """Passes and stops of rays that walked the cells in which they end, and no others."""
+    def walk(self) -> Walk:
+        """The rays, as if they walked the cells in which they end, and no others."""
         ends, stopped = self.ends, np.flatnonzero(self.ends.rank >= 0)
         lines, time, rank = lines_of(self.rays, self.ray), ends.time[stopped], ends.rank[stopped]
         ends.fraction[stopped] = time / lines.scale[stopped]
@@ -93,8 +93,7 @@ class FirstHits:
         met = Contacts(stopped, rank, one, hit.x, hit.y, time, time)
         hit = hit.take(~self.stack.occluder[rank])
         traced = met, lines.take(stopped)
-        walk = Walk(self.rays, lines, hit, ends, self.stack, None, self.ray.fades, traced)
-        return walk.passes, walk.stops
+        return Walk(self.rays, lines, hit, ends, self.stack, None, self.ray.fades, traced)
 
 
 def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:

@@ -17,6 +17,7 @@ from hitplanes.planes.common.backend import keep_arena
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.scene.scene import Scene
 
+from .. import late
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse
@@ -27,7 +28,7 @@ from ..kinds.weapon import Weapon
 from .contacts import Parts, Rays, Terminations, Touches, rays_of
 from .first_hit import ENGINES, FirstHits
 from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes, walked_of
-from .ray_walk import Range, expected_cells, has_track, trace, tracked
+from .ray_walk import Range, expected_cells, has_track, has_whole_walk, trace, tracked
 
 RAYS_AT_ONCE = 2**14
 """Most rays of a chunk; the columns of so many fit the processor's cache."""
@@ -78,7 +79,8 @@ def fired_rays(
             found += [(begin, walk) for walk in followed]
         if begin:
             rows[-1].shot[:] += begin
-    hits = RayHits(Rows.joined(rows), _told(found), each * len(shots), scene, through.stack, weapon, shots, plan)
+    told = _told(found, shots, ray, through)
+    hits = RayHits(Rows.joined(rows), told, each * len(shots), scene, through.stack, weapon, shots, plan)
     plan.run("rows", "")
     _leave_out_unused(plan, scene, through, shots, ray, (how[2], chosen))
     plan.run("plan", "")
@@ -118,11 +120,15 @@ def first_ends(
     return ends_of
 
 
-def _told(found: list[tuple[int, Walk | Made | FirstHits]]) -> Told:
-    """Functions that join the passes and the stops of chunks of shots, given with the number of their first shot."""
-    return (
+def _told(found: list[tuple[int, Walk | Made | FirstHits]], shots: Shots, ray: RayWeapon, through: Range) -> Told:
+    """Functions that tell more of chunks of shots, which are given with the number of their first shot."""
+    bounds = through.bounds
+    walks = [(first, part) for first, part in found if not isinstance(part, Made)]
+    counted = len(walks) == len(found) and has_whole_walk(ray, through.items, through.stack)
+    return Told(
         lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
         lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
+        (lambda: late.ray_verdicts.verdicts_of(walks, shots, bounds)) if counted else None,
     )
 
 
@@ -214,7 +220,7 @@ def _followed(
     summed, pixels, plan = [], [], through.plan
     for walk in _walks(rays, ray, shots, through):
         summed.append(walk.summed)
-        parts = walk.parts() if walk.traced is None else [walk]
+        parts = walk.parts()
         for part in parts:
             pixels.append(pixels_of(part, rays))
             plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)

@@ -134,8 +134,11 @@ class Walk:
 
     @property
     def walked(self) -> Contacts:
-        """Walked cells of objects, in the order of the passes."""
-        return self._walked()[0]
+        """Walked cells of objects, in any order."""
+        met, _ = self._contacts()
+        if self.stack.has_occluders and self.traced:
+            met = met.take(np.flatnonzero(~self.stack.occluder[met.rank]))
+        return met.only(self.ends.walked(met))
 
     @cached_property
     def summed(self) -> Summed:
@@ -179,20 +182,24 @@ class Walk:
 
     def parts(self) -> list[Walk]:
         """The same rays in parts of about CHUNK_CELLS cells of objects, which can be found again."""
-        hit = self.hit
-        if int(hit.count.sum()) <= CHUNK_CELLS:
+        if self.traced or int(self.hit.count.sum()) <= CHUNK_CELLS:
             return [self]
-        each, found = np.bincount(hit.ray, hit.count, len(self.rays)).astype(np.int64), []
-        for part in pieces(each, CHUNK_CELLS):
-            pairs = slice(*np.searchsorted(hit.ray, (part.start, part.stop)))
-            some = hit.take(pairs)
-            some.ray[:] -= part.start
-            found.append(
-                replace(
-                    self, rays=self.rays.take(part), lines=self.lines.take(part), hit=some, ends=self.ends.take(part)
-                )
-            )
-        return found
+        each = np.bincount(self.hit.ray, self.hit.count, len(self.rays)).astype(np.int64)
+        return [self.of_rays(np.arange(part.start, part.stop)) for part in pieces(each, CHUNK_CELLS)]
+
+    def of_rays(self, rays: Ints) -> Walk:
+        """Some of the rays (n,), sorted."""
+        number = np.full(len(self.rays), -1)
+        number[rays] = np.arange(len(rays))
+        hit, traced = self.hit.take(number[self.hit.ray] >= 0), None
+        hit.ray[:] = number[hit.ray]
+        if self.traced:
+            met, lines = self.traced
+            pairs = np.flatnonzero(number[met.ray] >= 0)
+            traced = met.take(pairs), lines.take(pairs)
+            traced[0].ray[:] = number[traced[0].ray]
+        own = self.rays.take(rays), self.lines.take(rays), hit, self.ends.take(rays)
+        return Walk(*own, self.stack, self.bounds, self.falloff, traced)
 
 
 def walked_of(met: Contacts, ends: Terminations, stack: Stack) -> tuple[Contacts, Ints]:
@@ -281,7 +288,14 @@ def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
 
 
 C = TypeVar("C", Passes, Stops)
-Told = tuple[Callable[[], Passes], Callable[[], Stops]]  # functions that make the passes and the stops of rays
+
+
+class Told(NamedTuple):
+    """Functions that tell more of rays: their passes and stops, and the verdicts of shots, if they can be counted."""
+
+    passes: Callable[[], Passes]
+    stops: Callable[[], Stops]
+    verdicts: Callable[[], Ints] | None = None
 
 
 class RayHits(Hits):
@@ -306,13 +320,13 @@ class RayHits(Hits):
     @cached_property
     def passes(self) -> Passes:
         """Passes of all rays through objects."""
-        passes = self._later[0]()
+        passes = self._later.passes()
         return _unwritable(replace(passes, row=_rows_of(self._rows, passes)))
 
     @cached_property
     def stop(self) -> Stops:
         """Stop of each ray, and its reason."""
-        return _unwritable(self._later[1]())
+        return _unwritable(self._later.stops())
 
     def _kind(self) -> type[Hits]:
         return RayHits
@@ -417,7 +431,8 @@ class RayHits(Hits):
     @cached_property
     def verdicts(self) -> Ints:
         """Number of cells of each shot by verdict, counted when first asked for."""
-        verdicts = late.ray_samples.counted_verdicts(self.scene_of, self._parts, self.shots)
+        told = self._later.verdicts
+        verdicts = told() if told else late.ray_samples.counted_verdicts(self.scene_of, self._parts, self.shots)
         verdicts.flags.writeable = False
         return verdicts
 
@@ -425,7 +440,7 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
-        told: Told = (
+        told = Told(
             lambda: Passes.gathered([part.passes for part in rays], rows),
             lambda: Stops.gathered([part.stop for part in rays], rows),
         )

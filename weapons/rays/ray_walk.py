@@ -120,6 +120,11 @@ def has_track(ray: RayWeapon) -> bool:
     return ray.inside == "hit" and ray.budget_256 is None and steps_of(ray) is None
 
 
+def has_whole_walk(ray: RayWeapon, items: Items, stack: Stack) -> bool:
+    """Whether a weapon's rays hit what they meet in all cells before their ends, at times of their own."""
+    return ray.inside != "ignore_until_exit" and steps_of(ray) is None and not is_moving(ray, items, stack)
+
+
 # house: way of rays
 def tracked(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
     """Follow rays to their ends by the accelerated form of `trace`; None if it does not serve."""

@@ -124,7 +124,7 @@ def _tracks(
     """Tracks of some rays."""
     origin = pixel(lines.start)
     own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
-    near = _near(stack, bounds, lines, own, origin, whose)
+    near = near_items(stack, bounds, lines, own, origin, whose)
     firsts, ends = NO_FIRSTS, endless(len(lines))
     for some in _rounds(near, len(lines), most, stack):
         now = some[near.least[some] <= ends.time[near.ray[some]]]
@@ -143,7 +143,7 @@ def _tracks(
     return np.stack([hit.ray, hit.rank, hit.count, hit.x, hit.y, hit.entry]), np.stack(columns)
 
 
-def _near(
+def near_items(
     stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, whose: tuple[Ints, Ints] | None
 ) -> Near:
     """Accepted items whose boxes rays enter; `own` are the lines relative to their pixels of origin."""
@@ -159,7 +159,7 @@ def _near(
     ray, rank = ray[some], rank[some]
     box = stack.box_xyxy[rank] if bounds is None else clipped(stack.box_xyxy[rank], bounds)
     box = box - np.concatenate([origin, origin], axis=1)[ray]
-    least, most = _bounds(own, ray, box)
+    least, most = times_in(own, ray, box)
     some = np.flatnonzero((least <= most) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
     some = some[np.lexsort((least[some], ray[some]))]
     return Near(ray[some], rank[some], box[some], least[some], most[some])
@@ -177,7 +177,7 @@ def _crossing(lines: Lines, ray: Ints, rank: Ints, boxes_xyxy: Ints) -> Ints:
     )
 
 
-def _bounds(own: Lines, ray: Ints, box: Ints) -> tuple[Ints, Ints]:
+def times_in(own: Lines, ray: Ints, box: Ints) -> tuple[Ints, Ints]:
     """Bounds of the times at which rays enter cells of boxes; the second is less if a ray touches none."""
     (x, y), (dx, dy) = own.start[ray].T, own.step[ray].T
     left, top, right, low = (SUB * box - np.stack([x, y, x, y], axis=1)).T
@@ -334,7 +334,7 @@ def _ends(firsts: Firsts, rays: int, most: int | None, origin: Ints, bounds: Box
         end_at_occluders(ends, met, stack)
         here = np.flatnonzero((firsts.entry == ends.time[firsts.ray]) & (firsts.rank < ends.rank[firsts.ray]))
         ray = firsts.ray[here]
-        here = here[_covers(stack, firsts.rank[here], ends.x[ray], ends.y[ray], origin[ray], bounds)]
+        here = here[covers(stack, firsts.rank[here], ends.x[ray], ends.y[ray], origin[ray], bounds)]
         ray = firsts.ray[here]
         firsts.x[here], firsts.y[here] = ends.x[ray], ends.y[ray]  # of the cells entered then, it walks that one alone
         met = met.take(np.flatnonzero(~stack.occluder[firsts.rank]))
@@ -352,7 +352,7 @@ def _hit(firsts: Firsts, ends: Terminations, stack: Stack) -> Firsts:
     return hit.take(np.lexsort((hit.rank, hit.x, hit.y, hit.entry, hit.ray)))
 
 
-def _covers(stack: Stack, rank: Ints, x: Ints, y: Ints, origin: Ints, bounds: Box | None) -> Bools:
+def covers(stack: Stack, rank: Ints, x: Ints, y: Ints, origin: Ints, bounds: Box | None) -> Bools:
     """Whether items have pixels (n,), given relative to the pixels of origin (n, 2), within the bounds."""
     x, y = x + origin[:, 0], y + origin[:, 1]
     full = stack.box_xyxy[rank]
