@@ -263,3 +263,12 @@ def test_cells_with_occluders_come_first_of_those_entered_at_once(
     hits = fire(scene, Pistol(12), **how)
     assert told(monkeypatch, hits) == listed(hits)
     assert hits.verdicts[0, :2].tolist() == ([13, 1] if blocked_by == "all" else [15, 1])
+
+
+def test_the_filter_of_each_shot_says_which_cells_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene((20, 20))
+    scene.add(np.ones((1, 1), np.bool_), (5, 5), layer=1)
+    scene.add(np.ones((1, 1), np.bool_), (5, 5), role="occluder")
+    monkeypatch.setattr("hitplanes.weapons.rays.ray_call.RAYS_AT_ONCE", 1)
+    hits = fire(scene, Pistol(12), [(0, 0)] * 3, aim=45, blocked_by=[0, 1, 0])
+    assert hits.verdicts[:, 0].tolist() == [15, 13, 15]

@@ -276,18 +276,13 @@ def _met(walk: Walk, shots: Shots, first_shot: int, bounds: Box | None) -> Ints:
     skipped = _skipped(walk, shots, first_shot, bounds)
     listed = _several_in_cells(walk)
     listed[skipped >> 2 * REACH_BITS] = True
-    rays, begin = np.flatnonzero(listed), 0
+    rays = np.flatnonzero(listed)
     if not len(rays):
         return counts.T
-    hit = [np.zeros(0, np.int64)]
-    for part in walk.of_rays(rays).parts():
-        cells = part.walked
-        ray = rays[begin : begin + len(part.rays)][cells.ray[cells.pair]]
-        hit.append(sorted_once(key_of_cells(ray, cells.x, cells.y)))
-        begin += len(part.rays)
+    cells = walk.of_rays(rays).walked
+    hits = sorted_once(key_of_cells(rays[cells.ray[cells.pair]], cells.x, cells.y))
     ended = rays[stopped[rays]]
     stops = key_of_cells(ended, ends.x[ended], ends.y[ended])
-    hits = np.concatenate(hit)
     for row, keys in enumerate((hits, _absent(stops, hits), _absent(_absent(skipped, hits), stops))):
         counts[row, rays] = np.bincount(keys >> 2 * REACH_BITS, minlength=n)[rays]
     return counts.T
