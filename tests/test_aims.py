@@ -39,6 +39,11 @@ WEAPONS: dict[str, AreaWeapon] = {
     "triangle far off": Polygon([(500, -3), (530, 2.3), (515.004, 90)]),
     "points on an edge": Polygon([(0, 0), (20, 0), (40, 0), (40, 30), (0, 30)]),
     "anticlockwise": Polygon([(0, 0), (0, 30), (40, 30), (40, 0)]),
+    "stencil": Stencil([".##", "###", ".#."]),
+    "stencil of even sides with holes": Stencil(["##.###" * 5, "#....#" * 5, ".#.###" * 5, "######" * 5]),
+    "stencil about a corner": Stencil(["#" * 30] * 9, pivot_xy=(-0.5, -0.5)),
+    "stencil about a place aside": Stencil(["#.#", "...", "#.#"], pivot_xy=(31.3, -17.71)),
+    "stencil of one pixel": Stencil(["#"]),
 }
 SPECIAL = [0, 45, 90, 135, 180, 225, 270, 315, 17, 163, 1e-6, 90.0001, 359.99999, 26.565051177077990, 30, 60]
 
@@ -68,6 +73,24 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> N
             across = spans.pixels() @ np.array([a, b])
             assert (low, high) == (across.min(), across.max())
     assert begin == len(bits.words) and not bits.words[:64].any()
+
+
+@given(st.lists(st.text("#.", min_size=7, max_size=7), min_size=1, max_size=9), st.tuples(*[st.floats(-20, 20)] * 2))
+def test_masks_are_turned_by_their_runs_as_by_their_pixels(mask: list[str], pivot: tuple[float, float]) -> None:
+    weapon = Stencil([*mask, "#......"], pivot_xy=pivot)
+    aims = directions(len(mask), 9)
+    runs = weapon.runs(aims)
+    assert runs is not None
+    for i, (c, s) in enumerate(aims.tolist()):
+        own = runs.shape == i
+        parts = [(first[own], last[own]) for first, last in runs.parts]
+        assert rasterize.RowRuns(runs.shape[own], runs.y[own], parts).spans() == weapon.spans(c, s)
+
+
+def test_stencils_that_may_be_too_large_are_turned_one_by_one() -> None:
+    weapon, aims = Stencil(["##"], pivot_xy=(9000, 0)), directions(2)
+    assert weapon.runs(aims) is None
+    assert np.array_equal(patterns_of(weapon, aims).bits.box_xyxy[0], weapon.spans(*aims[0].tolist()).box_xyxy)  # type: ignore[attr-defined]
 
 
 def test_strips_are_kept_for_long_patterns_alone() -> None:

@@ -32,9 +32,9 @@ from ..common.limits import (
     VARIANT_BYTES,
     VARIANT_CACHE_BYTES,
 )
-from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
-from ..grid.rasterize import ellipse, polygon
-from ..grid.spans import Spans
+from ..grid.fixed_point import over_one, pixel, quarter_turns, quarters, rounded_div, turned
+from ..grid.rasterize import WIDEST, RowRuns, ellipse, polygon
+from ..grid.spans import Spans, begins, each_pixel, merged_runs, ragged
 from .sprite import (
     UIDS,
     Known,
@@ -420,6 +420,69 @@ def _cropped(held: Bools, pivots_256: Sequence[Sequence[int]], forms: Sequence[T
         part, x, y = _quarter_turned(part, pivot[0] - SUB * left, pivot[1] - SUB * top, form.quarter)
         made.append(Variant(form, frozen(part), x, y, area))
     return made
+
+
+def turned_runs(mask: Bools, pivot_256: tuple[int, int], direction: Ints) -> RowRuns:
+    """Runs of a mask that is turned to directions (n, 2), as `variants_of` turns it, from the pixel of its pivot.
+
+    A pixel is set if its centre, turned back, lies in the closed rectangle of a run of the mask: between its ends,
+    `left <= dx c + dy s <= right`, and between its sides, `top <= dy c - dx s <= low`.
+    """
+    quarter, c, s = np.array([quarters(*one) for one in direction.tolist()], np.int64).T
+    sources = [_quarter_turned(mask, *pivot_256, turns) for turns in range(4)]
+    pivots = np.array([pivot for _, *pivot in sources], np.int64)
+    spans = [Spans.from_mask(np.asarray(source)) for source, *_ in sources]
+    counts = np.array([len(one) for one in spans])
+    edges = np.concatenate([np.stack([one.x_first, one.x_last + 1, one.y, one.y + 1]) for one in spans], axis=1)
+    aim, place = ragged(counts[quarter])
+    c, s, pivot = c[aim], s[aim], pivots[quarter][aim]
+    left, right, top, low = (
+        SUB * edges[:, place + (np.cumsum(counts) - counts)[quarter][aim]] - HALF - pivot.T.repeat(2, 0)
+    )
+    ends = left * s, right * s
+    first_row = (np.minimum(*ends) + top * c >> TRIG_BITS) + pivot[:, 1] >> 8
+    last_row = (np.maximum(*ends) + low * c >> TRIG_BITS) + pivot[:, 1] >> 8
+    run, row = each_pixel(first_row, last_row)
+    c, s, (x, y) = c[run], s[run], pivot[run].T
+    down = SUB * row - y
+    first, last = _between(c, (left[run] << TRIG_BITS) - down * s + x * c, (right[run] << TRIG_BITS) - down * s + x * c)
+    sides = (down * c - (low[run] << TRIG_BITS) + x * s, down * c - (top[run] << TRIG_BITS) + x * s)
+    from_, to = _between(s, *sides)
+    corner = pixel(-pivots)[quarter][aim[run]]
+    return _in_rows(
+        aim[run], row + corner[:, 1], np.maximum(first, from_) + corner[:, 0], np.minimum(last, to) + corner[:, 0]
+    )
+
+
+def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
+    """First and last whole number k with low <= k * 256 * per_256 <= high; all, or none, if that is 0."""
+    per, back = SUB * np.maximum(np.abs(per_256), 1), per_256 < 0
+    low, high = np.where(back, -high, low), np.where(back, -low, high)
+    first, last = -(-low // per), high // per
+    level, held = per_256 == 0, (low <= 0) & (high >= 0)
+    return np.where(level, np.where(held, -WIDEST, WIDEST), first), np.where(
+        level, np.where(held, WIDEST, -WIDEST), last
+    )
+
+
+def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
+    """Unite the runs of each row of each shape."""
+    some = np.flatnonzero(first <= last)
+    shape, y, first, last = shape[some], y[some], first[some], last[some]
+    top = int(y.min(initial=0))
+    rows = int(y.max(initial=0)) - top + 1
+    which, first, last = merged_runs(shape * rows + (y - top), first, last)
+    shape, y = shape[which], y[which]
+    new = begins(shape * rows + (y - top))
+    row, begin = np.cumsum(new) - 1, np.flatnonzero(new)
+    place = np.arange(len(row)) - begin[row]
+    parts = []
+    for number in range(int(place.max(initial=0)) + 1):
+        here = place == number
+        ends = np.full(len(begin), WIDEST), np.full(len(begin), -WIDEST)
+        ends[0][row[here]], ends[1][row[here]] = first[here], last[here]
+        parts.append(ends)
+    return RowRuns(shape[begin], y[begin], parts)
 
 
 def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:

@@ -77,11 +77,11 @@ class Space:
             found += len(ask((x, y), (x + 0.3 * (fx - x), y + 0.3 * (fy - y)), 3, filter_))
         return found
 
-    def piercing_rays(self, work: Volleys, units: int) -> int:
-        """All shapes on a segment."""
+    def piercing_rays(self, work: Volleys, units: int, radius: float = 0) -> int:
+        """All shapes on a segment, or at most `radius` away."""
         ask, filter_, found = self.space.segment_query, self.all, 0
         for start, end in zip(work.lists["places"][:units], work.lists["ray ends"], strict=False):
-            found += len(ask(start, end, 0, filter_))
+            found += len(ask(start, end, radius, filter_))
         return found
 
     def rays(self, work: Volleys, units: int) -> int:

@@ -144,16 +144,16 @@ class Masks:
         return rows
 
     def filtered(
-        self, xs: Sequence[int], ys: Sequence[int], pattern: Placed, accept: int, passed: Sequence[int]
+        self, xs: Sequence[int], ys: Sequence[int], patterns: Iterable[Placed], accept: int, passed: Iterable[int]
     ) -> list[Row]:
-        """A pattern that passes over what is of no accepted category, and over one owner a shot."""
+        """Any pattern, that passes over what is of no accepted category, and over one owner a shot."""
         rows: list[Row] = []
         rects, masks, ids, blocked = self.rects, self.masks, self.ids, self.blocked
         categories = self.categories
-        mask, dx, dy, w, h = pattern
-        box = pygame.Rect(0, 0, w, h)
-        for shot, (x, y, owner) in enumerate(zip(xs, ys, passed, strict=False)):
-            box.topleft = left, top = x + dx, y + dy
+        box = pygame.Rect(0, 0, 1, 1)
+        for shot, (x, y, (mask, dx, dy, w, h), owner) in enumerate(zip(xs, ys, patterns, passed, strict=False)):
+            left, top = x + dx, y + dy
+            box.update(left, top, w, h)
             found = box.collidelistall(rects)
             if found:
                 rest = mask.copy()

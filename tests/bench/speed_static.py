@@ -212,7 +212,7 @@ def choosy(settings: Settings, objects: int) -> Iterator[Cell]:
             yield work
 
     def filtered(work: Volleys, units: int) -> Any:
-        return masks.filtered(*first(work, units), disc, 3, work.lists["passed"])
+        return masks.filtered(*first(work, units), repeat(disc), 3, work.lists["passed"])
 
     sides = [*ours(settings, scene, Disc(40), accept=3), Side("A pygame", filtered, list)]
     works = islice(([work] for work in with_owners()), settings.rounds + 1)

@@ -1,16 +1,19 @@
-"""Every kind of weapon, and all that is asked of it: cells that no peer answers, beside each other."""
+"""Every kind of weapon, and all that is asked of it, beside the peer that can answer it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import count
+from functools import cached_property, partial
+from itertools import count, repeat
 from typing import Any
 
 import numpy as np
 from speed_clock import Cell, Side, race
+from speed_engines import EASIER, Space
+from speed_peers import Masks, Placed, first, rendered
 from speed_static import Settings, hit_rows, modes, touched
-from speed_world import SEED, WORLD, scene_of, shotgun
+from speed_world import SEED, WORLD, Volleys, items_of, pattern_mask, placed_pellets, scene_of, shotgun
 
 from hitplanes import (
     Beam,
@@ -29,6 +32,7 @@ from hitplanes import (
     Weapon,
     fire,
 )  # fmt: skip
+from hitplanes.planes.common.checks import Floats
 from hitplanes.weapons.kinds.areas import AreaWeapon
 
 WEAPONS: dict[str, Weapon] = {
@@ -59,9 +63,10 @@ def weapons(settings: Settings) -> Iterator[Cell]:
     """Each weapon and each question, among each number of objects up to 1000."""
     for objects in [m for m in settings.objects if m <= 1000]:
         scene = scene_of(objects)
+        peers = Peers(scene, objects)
         for name, weapon in WEAPONS.items():
             for asked, how in questions(weapon).items():
-                yield cell(settings, scene, objects, (name, asked), how)
+                yield cell(settings, scene, peers, (name, asked), how)
 
 
 def questions(weapon: Weapon) -> dict[str, dict[str, Any]]:
@@ -80,27 +85,80 @@ def questions(weapon: Weapon) -> dict[str, dict[str, Any]]:
     return found
 
 
-def cell(settings: Settings, scene: Scene, objects: int, what: tuple[str, str], how: dict[str, Any]) -> Cell:
-    """One weapon and one question, in each mode."""
-    weapon, rng, shots = how["weapon"], np.random.default_rng(objects), max(settings.shots // PART, 1)
+def cell(settings: Settings, scene: Scene, peers: Peers, what: tuple[str, str], how: dict[str, Any]) -> Cell:
+    """One weapon and one question, in each mode, and the peer."""
+    weapon, rng, shots = how["weapon"], np.random.default_rng(peers.objects), max(settings.shots // PART, 1)
     options, fresh = {"accept": how["accept"]} if "accept" in how else {}, "fresh" in how
-
     turns = count()
 
-    def works() -> Iterator[list[tuple[Any, Any]]]:
+    def works() -> Iterator[list[Volleys]]:
         """Places and aims of each round, and of one before for warming up."""
         again = rng.uniform(0, 360, AIMS)
         for _ in range(settings.rounds + 1):
-            aim = rng.uniform(0, 360, shots) if fresh else rng.choice(again, shots)
-            yield [(rng.uniform(0, WORLD, (shots, 2)), aim)]
+            aim, at = (
+                rng.uniform(0, 360, shots) if fresh else rng.choice(again, shots),
+                rng.uniform(0, WORLD, (shots, 2)),
+            )
+            yield [peers.work(weapon, at, aim, fresh)]
 
-    def answer(work: tuple[Any, Any], units: int) -> Any:
-        aim = work[1][:units] + 1e-3 * next(turns) if fresh else work[1][:units]  # new for each side, too
-        hits = touched(fire(scene, weapon, work[0][:units], aim=aim, seed=SEED, **options))
+    def answer(work: Volleys, units: int) -> Any:
+        assert work.aim is not None
+        aim = work.aim[:units] + 1e-3 * next(turns) if fresh else work.aim[:units]  # new for each side, too
+        hits = touched(fire(scene, weapon, work.at[:units], aim=aim, seed=SEED, **options))
         if "verdicts" in how:
             hits.verdict_counts()
         return hits
 
     rows = None if fresh else hit_rows
     sides = [Side(mode, answer, rows, ready=ready, whole=True) for mode, ready in modes(settings).items()]
-    return race(Cell("weapons", ", ".join(what), objects), sides, works(), shots, settings.seconds)
+    sides += peers.sides(weapon, what[1])
+    return race(Cell("weapons", ", ".join(what), peers.objects), sides, works(), shots, settings.seconds)
+
+
+class Peers:
+    """The peers of one scene: pygame-ce's masks for patterns, which are rendered before the clock; pymunk for rays."""
+
+    def __init__(self, scene: Scene, objects: int) -> None:
+        items = items_of(scene)
+        self.objects, self.masks, self.space = objects, Masks(items), Space(items)
+
+    def work(self, weapon: Weapon, at: Floats, aim: Floats, fresh: bool) -> Volleys:
+        """Shots as both like them."""
+        work = Volleys(at, aim, pellets=placed_pellets(weapon, at))
+        if isinstance(weapon, AreaWeapon) and not fresh:
+            placed = {angle: rendered(pattern_mask(weapon, angle)) for angle in set(aim.tolist())}
+            work.lists["patterns"] = [placed[angle] for angle in aim.tolist()]
+        elif not isinstance(weapon, AreaWeapon | Spread):
+            length: Any = getattr(weapon, "range", None) or getattr(weapon, "speed", None)
+            angle = np.radians(aim)
+            ends = at + length * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            work.lists["ray ends"] = list(map(tuple, ends.tolist()))
+        return work
+
+    def sides(self, weapon: Weapon, asked: str) -> list[Side]:
+        """Who can answer a question; none if nobody can."""
+        radius = getattr(weapon, "width", 0) / 2 or getattr(weapon, "radius", 0)
+        if isinstance(weapon, Spread):
+            return [Side("A pygame", self._scattered, list)] if asked == "rows" else []
+        if isinstance(weapon, AreaWeapon):
+            answer = {"rows": self._areas, "pierce": partial(self._areas, pierce=True), "filter": self._filtered}.get(
+                asked
+            )
+            return [Side("A pygame", answer, list)] if answer else []
+        if asked not in ("rows", "new aims"):
+            return []
+        ray = self.space.rays if isinstance(weapon, Pistol) else partial(self.space.piercing_rays, radius=radius)
+        return [Side("pymunk", ray, easier=EASIER)]
+
+    def _areas(self, work: Volleys, units: int, pierce: bool = False) -> Any:
+        return self.masks.areas(*first(work, units), work.lists["patterns"], pierce)
+
+    def _filtered(self, work: Volleys, units: int) -> Any:
+        return self.masks.filtered(*first(work, units), work.lists["patterns"], 3, repeat(-1))
+
+    def _scattered(self, work: Volleys, units: int) -> Any:
+        return self.masks.scattered(*first(work, units), work.lists["pellets"], self._pellet)
+
+    @cached_property
+    def _pellet(self) -> Placed:
+        return rendered(pattern_mask(Disc(2)))

@@ -20,8 +20,8 @@ from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned
 from hitplanes.planes.grid.rasterize import RowRuns, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.scene.scene import Scene
-from hitplanes.planes.scene.sprite import Sprite, rows_of
-from hitplanes.planes.scene.variants import Transform, variant_of
+from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
+from hitplanes.planes.scene.variants import Transform, turned_runs, variant_of
 
 from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
 from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
@@ -302,6 +302,11 @@ class Stencil(AreaWeapon):
         variant = variant_of(self._sprite, Transform(quarter=quarter, c=c, s=s))
         x, y = pixel(np.array([-variant.pivot_x, -variant.pivot_y])).tolist()
         return Spans.from_mask(variant.mask, (x, y))
+
+    def runs(self, direction: Ints) -> RowRuns | None:
+        """The turned masks, along directions (n, 2); None if they may be too large."""
+        side, frame = 2 * -(-self.reach_256 // SUB) + 3, self._sprite.frames[0]
+        return turned_runs(frame.mask, frame_pivot(self._sprite, frame), direction) if fits(side, side) else None
 
 
 Pellet = TypeVar("Pellet", bound=AreaWeapon | RayWeapon, covariant=True)
