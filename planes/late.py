@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from .broadphase import boxes as boxes
     from .files import scene_folder as scene_folder
     from .scene import carving as carving
+    from .scene import render as render
     from .volumes import fit as fit
     from .volumes import overlap as overlap
     from .volumes import volumes as volumes
 
 _PLACES = (
     "bits.distance_field", "bits.label_plane", "bits.shadows", "bits.tiles", "bits.visible", "broadphase.boxes",
-    "files.scene_folder", "scene.carving", "volumes.fit", "volumes.overlap", "volumes.volumes",
+    "files.scene_folder", "scene.carving", "scene.render", "volumes.fit", "volumes.overlap", "volumes.volumes",
 )  # fmt: skip
 
 

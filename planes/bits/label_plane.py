@@ -223,12 +223,6 @@ def _dirt(before: Ints, after: Ints, plane: Box) -> tuple[Ints, int]:
     return np.concatenate([around[one], old[~one & (was > 0)], new[~one & (now > 0)]]), int(was.sum() + now.sum())
 
 
-def area(boxes_xyxy: Ints) -> int:
-    """Sum of the pixels of inclusive boxes."""
-    sides = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
-    return int((sides[:, 0] * sides[:, 1]).sum())
-
-
 def _areas(boxes_xyxy: Ints) -> Ints:
     """Pixels of each inclusive box; 0 for an empty one."""
     sides = np.maximum(boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1, 0)

@@ -115,6 +115,12 @@ def merged_runs(row: Ints, x_first: Ints, x_last: Ints) -> tuple[Ints, Ints, Int
     return order[begins], x_first[begins], (reach - shift)[ends]
 
 
+def area(boxes_xyxy: Ints) -> int:
+    """Sum of the pixels of inclusive boxes."""
+    sides = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2] + 1
+    return int((sides[:, 0] * sides[:, 1]).sum())
+
+
 @dataclass(frozen=True, eq=False)
 class Spans:
     """A set of pixels as runs x_first .. x_last in rows y; runs are maximal, disjoint, sorted by (y, x_first).

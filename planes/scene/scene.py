@@ -33,7 +33,6 @@ from ..grid.spans import Box
 from .derived import Derived
 from .items import ROLES, Items, Role
 from .poses import are_rows, one_place, points, scale_pair
-from .render import Planes, plane_objects, plane_size
 from .sprite import Sprite, as_sprite
 from .variants import transform_of
 
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from ..files.scene_folder import FileObject
     from ..volumes.volumes import Volumes
     from .carving import HitPixels
+    from .render import Planes
 
 
 Read = TypeVar("Read", bound=np.generic)
@@ -101,7 +101,7 @@ class Scene:
         """
         given = dict(zip(FIELDS, (background, hittable, movers, occluders, hud), strict=True))
         arrays = {field: array_of(field, plane) for field, plane in given.items() if plane is not None}
-        sizes = {plane_size(field, array) for field, array in arrays.items()}
+        sizes = {late.render.plane_size(field, array) for field, array in arrays.items()}
         if len(sizes) != 1:
             raise InputError(f"planes: expected one or more, all of one size, got {sorted(sizes)}")
         scene = cls(next(iter(sizes)), origin_xy)
@@ -109,7 +109,7 @@ class Scene:
         for field, array in arrays.items():
             role = ROLES[FIELDS.index(field)]
             in_picture = role is Role.HUD
-            for name, sprite, left, top in plane_objects(field, role.value, array):
+            for name, sprite, left, top in late.render.plane_objects(field, role.value, array):
                 scene.add(sprite, (left, top) if in_picture else (x + left, y + top), role=role, name=name)
         return scene
 
@@ -422,7 +422,7 @@ class Scene:
             at = (0, 0, x_max - x, y_max - y) if role is Role.HUD else box
             out[field] = late.label_plane.label_plane(self.items.stack_of(role), at)
             out[field].flags.writeable = False
-        return Planes((x, y), **out)
+        return late.render.Planes((x, y), **out)
 
     def content_hash(self) -> str:
         """Hash of everything that decides hits; scenes of equal hash answer every shot alike."""

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hitplanes.planes.bits.label_plane import area
 from hitplanes.planes.bits.span_walk import (
     HIT,
     LIVE,
@@ -22,7 +21,7 @@ from hitplanes.planes.bits.span_walk import (
 )
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES
-from hitplanes.planes.grid.spans import Box, merged_runs, pieces
+from hitplanes.planes.grid.spans import Box, area, merged_runs, pieces
 from hitplanes.planes.scene.items import Stack, clipped
 from hitplanes.planes.scene.scene import Scene
 
