@@ -137,7 +137,7 @@ def some_shots(rng: np.random.Generator, scene: Scene, most: int = 40) -> tuple[
 
 
 @pytest.mark.parametrize("limits", PARTS)
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 5))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 3))])
 def test_every_way_is_that_of_the_runs(kernels: str, seed: int, limits: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if kernels == "jit" and limits == "in integers":
         pytest.skip("compiled kernels count all shots")

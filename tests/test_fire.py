@@ -49,7 +49,7 @@ Row = tuple[int, int, int, int, int, int, int, Pixel, int]
 ONE = 2**30
 FAR = 10**9
 SCENES_IN_PART = 100
-PARTS, LONG_PARTS = 1, 81
+PARTS, LONG_PARTS = 1, 40
 PREFILTERS = ("box", "circle", "oriented box", "1 boxes", "3 boxes", "polygon", "swept")
 
 

@@ -51,7 +51,7 @@ STOP_COLUMNS = (
 PREFILTERS = ("box", "circle", "oriented box", "1 boxes", "3 boxes", "polygon", "swept")
 FAR = 10**9
 SCENES_IN_PART = 100
-PARTS, LONG_PARTS = 2, 170
+PARTS, LONG_PARTS = 2, 80
 
 worlds = st.randoms(use_true_random=False)
 

@@ -21,7 +21,8 @@ from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.files.scene_folder import load_scene
 from hitplanes.planes.scene.items import Role
-from hitplanes.planes.scene.scene import Planes, Scene
+from hitplanes.planes.scene.render import Planes
+from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
 DOT = np.ones((1, 1), np.bool_)
