@@ -55,7 +55,7 @@ def directions(seed: int, count: int = 40) -> Any:
 
 @pytest.mark.parametrize("name", WEAPONS)
 def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> None:
-    weapon, direction = WEAPONS[name], directions(3 + jit)  # those of a seed are kept
+    weapon, direction = WEAPONS[name], directions(3 + jit, 12)  # those of a seed are kept
     patterns = patterns_of(weapon, direction)
     assert isinstance(patterns, AimedPatterns) and len(patterns) == len(direction) > FEW_AIMS
     bits, begin = patterns.bits, 64

@@ -58,6 +58,9 @@ SINGLE = ["circles", "aabbs", "obbs", "polygons", "capsules"]
 KINDS = [*SINGLE, "box sets", "concave"]
 PAIRS = pytest.mark.parametrize(("one", "other"), list(product(KINDS, KINDS)))
 
+ROWS = 160
+"""Pairs of each two kinds."""
+
 
 def test_the_table_has_fifteen_pairs_both_ways_round() -> None:
     assert len(TABLE) == 25 and len({frozenset(pair) for pair in TABLE}) == 15
@@ -65,14 +68,14 @@ def test_the_table_has_fifteen_pairs_both_ways_round() -> None:
 
 def two(one: str, other: str, seed: int = 7) -> tuple[Any, Any]:
     rng = np.random.default_rng(seed)
-    return ordinary(one, 300, rng), ordinary(other, 300, rng)
+    return ordinary(one, ROWS, rng), ordinary(other, ROWS, rng)
 
 
 @PAIRS
 def test_symmetric(one: str, other: str) -> None:
     a, b = two(one, other)
     found = overlap(a, b)
-    assert found.dtype == np.bool_ and found.shape == (300,) and 0 < found.sum() < 300
+    assert found.dtype == np.bool_ and found.shape == (ROWS,) and 0 < found.sum() < ROWS
     assert (overlap(b, a) == found).all() and overlap(a, a).all()
 
 
@@ -110,8 +113,8 @@ def test_conservative_is_right_where_nothing_is_near(one: str, other: str) -> No
 def test_rows_broadcast(one: str, other: str) -> None:
     a, b = two(one, other)
     for k in (5, 17):
-        assert (overlap(a.take([k]), b) == overlap(a.take([k] * 300), b)).all()
-        assert (overlap(a, b.take([k])) == overlap(a, b.take([k] * 300))).all()
+        assert (overlap(a.take([k]), b) == overlap(a.take([k] * ROWS), b)).all()
+        assert (overlap(a, b.take([k])) == overlap(a, b.take([k] * ROWS))).all()
     assert overlap(a.take([]), b.take([])).shape == (0,) == overlap(a.take([]), b.take([5])).shape
     assert overlap(a.take([3]), b.take([4])).shape == (1,)
 
@@ -166,7 +169,7 @@ def test_closed_and_general_forms_agree(one: str, other: str) -> None:
     """A circle is a capsule without length; a box is a turned box, a polygon, and a set of one."""
     a, b = two(one, other, 8)
     solid = np.flatnonzero((a.bounds().min < a.bounds().max).all(axis=1))
-    for rows in (np.arange(300), solid):
+    for rows in (np.arange(ROWS), solid):
         for same in same_as(one, a.take(rows)):
             assert (overlap(same, b.take(rows)) == overlap(a, b)[rows]).all()
 
@@ -313,10 +316,10 @@ def test_spheres_and_cubes() -> None:
 def test_separating_axis_is_a_witness() -> None:
     rng = np.random.default_rng(2)
     for one, two in product(("aabbs", "polygons"), ("obbs", "polygons")):
-        a, b = ordinary(one, 300, rng), ordinary(two, 300, rng)
+        a, b = ordinary(one, ROWS, rng), ordinary(two, ROWS, rng)
         line = separating_axis(a, b)
         apart = ~np.isnan(line[:, 0])
-        assert not overlap(a, b)[apart].any() and 0 < apart.sum() < 300
+        assert not overlap(a, b)[apart].any() and 0 < apart.sum() < ROWS
         assert (apart == ~overlap(a, b)).all()
         for i in np.flatnonzero(apart).tolist():
             sides = [orient2d(line[i, :2], line[i, 2:], v.take([i]).core().points) for v in (a, b)]

@@ -466,23 +466,22 @@ def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
 
 
 def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
-    """Unite the runs of each row of each shape."""
+    """Unite the runs of each row of each shape, which has all rows from its first to its last."""
     some = np.flatnonzero(first <= last)
     shape, y, first, last = shape[some], y[some], first[some], last[some]
     top = int(y.min(initial=0))
-    rows = int(y.max(initial=0)) - top + 1
-    which, first, last = merged_runs(shape * rows + (y - top), first, last)
-    shape, y = shape[which], y[which]
-    new = begins(shape * rows + (y - top))
-    row, begin = np.cumsum(new) - 1, np.flatnonzero(new)
-    place = np.arange(len(row)) - begin[row]
-    parts = []
-    for number in range(int(place.max(initial=0)) + 1):
+    line = shape * (int(y.max(initial=0)) - top + 1) + (y - top)
+    which, first, last = merged_runs(line, first, last)
+    shape, y, line = shape[which], y[which], line[which]
+    begin = np.flatnonzero(begins(shape))
+    own, row = each_pixel(y[begin], y[np.append(begin[1:], len(y)) - 1])
+    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(np.diff(begin, append=len(y)))
+    place = np.arange(len(line)) - np.searchsorted(line, line)
+    parts = [(np.full(len(row), WIDEST), np.full(len(row), -WIDEST)) for _ in range(int(place.max(initial=0)) + 1)]
+    for number, ends in enumerate(parts):
         here = place == number
-        ends = np.full(len(begin), WIDEST), np.full(len(begin), -WIDEST)
-        ends[0][row[here]], ends[1][row[here]] = first[here], last[here]
-        parts.append(ends)
-    return RowRuns(shape[begin], y[begin], parts)
+        ends[0][at[here]], ends[1][at[here]] = first[here], last[here]
+    return RowRuns(shape[begin][own], row, parts)
 
 
 def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:
