@@ -132,7 +132,6 @@ STALE_CALLS: dict[str, Callable[[RayHits], object]] = {
     "blockers": lambda hits: hits.blockers(),
     "nearest_miss": lambda hits: hits.nearest_miss(),
     "margins": lambda hits: hits.margins(),
-    "verdicts": lambda hits: hits.verdicts,
     "scene_of": lambda hits: hits.scene_of(0),
 }
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import pickle
 import random
+from copy import copy
 from typing import Any
 
 import numpy as np
 import pytest
 
 from hitplanes import (
+    History,
     Hits,
     InputError,
     Laser,
@@ -221,12 +224,21 @@ def test_verdicts_tell_of_the_scene_of_then() -> None:
     duck = scene.add(np.ones((5, 5), np.bool_), (20, 5))
     hits, again = (fire(scene, Laser(50), (0, 7), aim=0) for _ in range(2))
     expected = again.verdicts
+    ready, history, copied = prepare(scene, Laser(50)), History(scene), copy(hits)
+    prepared = ready.fire((0, 7), aim=0)
+    history.record(0)
     scene.move([wall, duck], [(0, 0), (0, 0)])
-    assert np.array_equal(hits.verdicts, expected)
+    history.record(1)
+    for answer in (hits, copied, pickle.loads(pickle.dumps(hits)), prepared):
+        assert np.array_equal(answer.verdicts, expected)
+    of_ticks = fire(history, Laser(50), [(0, 7)] * 3, aim=0, tick=[1, 0, 1])
+    scene.move(duck, (90, 90))
+    assert of_ticks.verdicts[1].tolist() == expected[0].tolist() != of_ticks.verdicts[0].tolist()
+    assert np.array_equal(copy(of_ticks).verdicts, of_ticks.verdicts)
     assert hits.verdict_counts() == {"empty": 34, "hit": 5, "occluded": 1, "filtered": 0, "outside": 0, "beyond": 11}
     steps = fire(scene, Projectile(50, 1, steps=3), (30, 7), aim=0)
     scene.move(wall, (9, 9))
-    with pytest.raises(InputError, match="expected the scene at version 3, got version 4"):
+    with pytest.raises(InputError, match="expected the scene at version 4, got version 5"):
         steps.verdicts  # noqa: B018
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
+from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
@@ -331,8 +332,15 @@ class RayHits(Hits):
     def _kind(self) -> type[Hits]:
         return RayHits
 
+    @property
+    def _count(self) -> Callable[[], Ints] | None:
+        """Function that counts verdicts without the scene; None if it is needed, or these are copied."""
+        told: Told | None = getattr(self, "_later", None)
+        return told.verdicts if told else None
+
     def _answers(self) -> dict[str, Any]:
-        return {"rays": self.rays, "passes": self.passes, "stop": self.stop}
+        counted = {"verdicts": self.verdicts} if self._count or "verdicts" in vars(self) else {}
+        return {"rays": self.rays, "passes": self.passes, "stop": self.stop, **counted}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hits):
@@ -431,8 +439,8 @@ class RayHits(Hits):
     @cached_property
     def verdicts(self) -> Ints:
         """Number of cells of each shot by verdict, counted when first asked for."""
-        told = self._later.verdicts
-        verdicts = told() if told else late.ray_samples.counted_verdicts(self.scene_of, self._parts, self.shots)
+        count = self._count
+        verdicts = count() if count else late.ray_samples.counted_verdicts(self.scene_of, self._parts, self.shots)
         verdicts.flags.writeable = False
         return verdicts
 
@@ -440,9 +448,17 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
+
+        def verdicts() -> Ints:
+            found = np.zeros((len(shots), len(Verdict)), np.int64)
+            for part, own in zip(rays, rows, strict=True):
+                found[own] = part.verdicts
+            return found
+
         told = Told(
             lambda: Passes.gathered([part.passes for part in rays], rows),
             lambda: Stops.gathered([part.stop for part in rays], rows),
+            verdicts if all(part._count for part in rays) else None,
         )
         number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
         of = *parts[0]._then(0), parts[0].weapon, shots, plan
