@@ -65,18 +65,18 @@ def draw(found: Mapping[str, Any]) -> Figure:
     modes = ["numpy", "jit"] if found["settings"]["jit"] else ["numpy"]
     counts = sorted({cell["objects"] for cell in found["cells"] if cell["section"] == "weapons"})
     with looking_alike():
-        figure = Figure(figsize=(5.9 * len(modes) + 0.8, 4.1 * len(counts) + 0.7), layout="constrained")
+        figure = Figure(figsize=(4.5 * len(modes) + 0.8, 2.9 * len(counts) + 0.7), layout="constrained")
         figure.suptitle(
             "left: how many times as long a peer takes (pygame-ce's masks for patterns; for rays pymunk, an easier "
             "question)\nright: how many times as long a shot takes as one that asks for rows alone",
-            x=0.01, ha="left", fontsize=10,
+            x=0.01, ha="left", fontsize=8,
         )  # fmt: skip
         every = figure.subplots(len(counts), len(modes), squeeze=False)
         for row, objects in zip(every, counts, strict=True):
             cells = cells_of(found, objects)
             for plot, mode in zip(row, modes, strict=True):
                 _draw_panel(plot, cells, mode)
-                plot.set_title(f"{objects} objects, {mode}", loc="left", weight="bold", size=10)
+                plot.set_title(f"{objects} objects, {mode}", loc="left", weight="bold", size=8)
     return figure
 
 
@@ -91,10 +91,10 @@ def _draw_panel(plot: Axes, cells: Cells, mode: str) -> None:
     for (y, x), value in np.ndenumerate(ratios):
         if not math.isnan(value):
             dark = abs(heat[y, x]) > 0.7 * DECADES
-            plot.text(x, y, shown(value), ha="center", va="center", size=7.5, color="white" if dark else "black")
+            plot.text(x, y, shown(value), ha="center", va="center", size=6, color="white" if dark else "black")
     heads = [*BESIDE, "", *ALONE]
-    plot.set_xticks(range(len(heads)), [HEADS.get(head, head) for head in heads], size=7, rotation=50, ha="left")
-    plot.set_yticks(range(len(weapons)), weapons, size=8)
+    plot.set_xticks(range(len(heads)), [HEADS.get(head, head) for head in heads], size=6, rotation=50, ha="left")
+    plot.set_yticks(range(len(weapons)), weapons, size=6.5)
     plot.tick_params(length=0, top=False, bottom=False, labeltop=True, labelbottom=False, left=False)
     plot.grid(visible=False)
     for side in plot.spines.values():
