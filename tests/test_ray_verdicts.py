@@ -70,7 +70,7 @@ def test_cells_are_counted_as_they_are_listed(radius: int) -> None:
     rng = np.random.default_rng(radius)
     for _ in range(4):
         lines = lines_of(rng, 300, radius)
-        extent = ray_verdicts._extents(lines)
+        extent = lines.box_xyxy
         box = np.sort(rng.integers(-9, 10, (300, 2, 2)), axis=1).reshape(-1, 4)
         cut = np.concatenate([np.maximum(box[:, :2], extent[:, :2]), np.minimum(box[:, 2:], extent[:, 2:])], axis=1)
         ends = some_ends(rng, lines)
@@ -95,14 +95,14 @@ def test_cells_of_small_rays_by_hand(start: tuple[float, float], end: tuple[floa
     at, to = np.array([start]), np.array([end])
     origin = np.floor(at + 0.5)
     lines = Lines(np.int64(256 * (at - origin)), np.int64(256 * (to - at)), 0)
-    assert cells_in(lines, ray_verdicts._extents(lines)).tolist() == [cells]
+    assert cells_in(lines, lines.box_xyxy).tolist() == [cells]
 
 
 def test_lines_of_great_length_are_counted() -> None:
     """Those along a diagonal touch 3 n + 1 cells, and of steps without a common divisor one for each border."""
     n = 2**21
     lines = Lines(np.zeros((3, 2), np.int64), 256 * np.array([[n, n], [-n, n - 1], [n, 0]]), 0)
-    assert cells_in(lines, ray_verdicts._extents(lines)).tolist() == [3 * n + 1, 2 * n, n + 1]
+    assert cells_in(lines, lines.box_xyxy).tolist() == [3 * n + 1, 2 * n, n + 1]
 
 
 WEAPONS: tuple[Any, ...] = (

@@ -377,6 +377,13 @@ class Lines:
         return np.where(steep, y, x), np.where(steep, x, y), np.where(steep, dy, dx), np.where(steep, dx, dy)
 
     @cached_property
+    def box_xyxy(self) -> Ints:
+        """Inclusive boxes (n, 4) of pixels around all cells of each segment."""
+        end, reach = self.start + self.step, max(self.radius, HALF)
+        low, high = np.minimum(self.start, end) - reach, np.maximum(self.start, end) + reach
+        return np.concatenate([-(-low // SUB), high // SUB], axis=1)
+
+    @cached_property
     def length2(self) -> Ints:
         """Squared lengths, (1/256 px)^2."""
         dx, dy = self.step.T

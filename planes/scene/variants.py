@@ -460,9 +460,8 @@ def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
     low, high = np.where(back, -high, low), np.where(back, -low, high)
     first, last = -(-low // per), high // per
     level, held = per_256 == 0, (low <= 0) & (high >= 0)
-    return np.where(level, np.where(held, -WIDEST, WIDEST), first), np.where(
-        level, np.where(held, WIDEST, -WIDEST), last
-    )
+    first[level], last[level] = np.where(held, -WIDEST, WIDEST)[level], WIDEST
+    return first, last
 
 
 def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:

@@ -22,7 +22,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.plan import Plan
 from ..fire.prefilter import Candidates, refused
 from ..kinds.placements import Shots
-from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, rays_of, steps_of
+from ..rays.contacts import Contacts, Parts, Rays, Reason, Terminations, cells_hit, rays_of, steps_of
 from ..rays.ray_walk import Range, touching, trace
 from .samples import Behind, Blocked, Samples, WhyNot, unmet
 
@@ -92,8 +92,7 @@ class RayDetail:
     @cached_property
     def walked(self) -> Contacts:
         """Contacts in which rays hit objects."""
-        objects = self.met.take(np.flatnonzero(~self.stack.occluder[self.met.rank]))
-        return objects.only(self.ends.walked(objects))
+        return cells_hit(self.met, self.ends, self.stack)
 
     @cached_property
     def entered(self) -> Floats:

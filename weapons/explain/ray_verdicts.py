@@ -25,14 +25,11 @@ from hitplanes.planes.scene.items import clipped
 
 from ..fire.prefilter import may_refuse, refused
 from ..kinds.placements import Shots
-from ..rays.contacts import Reason, Terminations, find_contacts
+from ..rays.contacts import NEVER, Reason, Terminations, find_contacts
 from ..rays.first_hit import FirstHits
 from ..rays.ray_hits import Walk
 from ..rays.tracks import RAYS_AT_ONCE, covers, near_items, times_in
 from .ray_samples import REACH_BITS, key_of_cells
-
-LATE = 2**62
-"""A time after the end of every ray."""
 
 SLACK = 2.0**-24
 """Tolerance of times as fractions of rays, by which cells are listed that need not be."""
@@ -73,12 +70,12 @@ def _verdicts_of_rays(walk: Walk, shots: Shots, first_shot: int, bounds: Box | N
     """Number of cells (R, 6) of rays by verdict."""
     lines, ends, origin = walk.lines, walk.ends, walk.rays.origin_xy
     counts = np.zeros((len(lines), len(Verdict)), np.int64)
-    extent = box = _extents(lines)
-    inside = total = cells_in(lines, extent)
+    box = lines.box_xyxy
+    inside = total = cells_in(lines, box)
     if bounds is not None:
         shift = np.tile(origin, 2)
-        box = clipped(extent + shift, bounds) - shift
-        leaving = np.flatnonzero((box != extent).any(axis=1))
+        box = clipped(box + shift, bounds) - shift
+        leaving = np.flatnonzero((box != lines.box_xyxy).any(axis=1))
         inside = total.copy()
         inside[leaving] = cells_in(lines.take(leaving), box[leaving])
     reached, ended = inside.copy(), np.flatnonzero(ends.reason != Reason.RANGE)
@@ -88,13 +85,6 @@ def _verdicts_of_rays(walk: Walk, shots: Shots, first_shot: int, bounds: Box | N
     counts[:, Verdict.EMPTY] = reached - met.sum(axis=1)
     counts[:, Verdict.OUTSIDE], counts[:, Verdict.BEYOND] = total - inside, inside - reached
     return counts
-
-
-def _extents(lines: Lines) -> Ints:
-    """Inclusive boxes (n, 4) of pixels around all cells of lines."""
-    end, reach = lines.start + lines.step, max(lines.radius, HALF)
-    low, high = np.minimum(lines.start, end) - reach, np.maximum(lines.start, end) + reach
-    return np.concatenate([-(-low // SUB), high // SUB], axis=1)
 
 
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
@@ -109,7 +99,7 @@ def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> 
         return _wide_cells_in(lines, box_xyxy, ends)
     borders = Borders.of(lines)
     time = borders.last if ends is None else np.minimum(ends.time - 1, borders.last)
-    cut = np.flatnonzero((box_xyxy != _extents(lines)).any(axis=1))
+    cut = np.flatnonzero((box_xyxy != lines.box_xyxy).any(axis=1))
     count = borders.cells_by(time)
     count[cut] = borders.take(cut).cells_in(box_xyxy[cut], time[cut])
     return count if ends is None else count + _last_cells(lines, box_xyxy, ends)
@@ -139,8 +129,8 @@ class Borders(Columns):
     base, sign : (n, 2) cell before the first border, and whether the next ones are to the right and down, or the others
     last : (n,) time at the end
     still : (n,) whether there is no step along x, or none along y
-    phase, period : (n,) time at which a line crosses two borders at once for the first time, LATE if it never does, and
-        time from then to the next
+    phase, period : (n,) time at which a line crosses two borders at once for the first time, or NEVER, and time from
+        then to the next
     """
 
     first: Ints
@@ -192,7 +182,7 @@ class Borders(Columns):
     def _up_to(self, x: Ints, y: Ints, time: Ints) -> Ints:
         """Number of cells entered by a time, after at most `x` borders along x, and `y` along y."""
         most = np.stack([x, y], axis=1)
-        left = np.where(most < self.crossed(self.last), (self.first + SUB * most) * self.across, LATE)
+        left = np.where(most < self.crossed(self.last), (self.first + SUB * most) * self.across, NEVER)
         out = left.min(axis=1)
         at_once = (left[:, 0] != left[:, 1]) & (out >= self.phase) & ((out - self.phase) % self.period == 0)
         count = np.where(time < out, self.cells_by(time), self.cells_by(out - 1) + (at_once & (out <= time)))
@@ -216,7 +206,7 @@ def _at_once(first: Ints, length: Ints) -> tuple[Ints, Ints]:
     m = np.where(p & 1, first[:, 0], first[:, 1]) % SUB * inverse % SUB
     both = ((m * p - first[:, 0]) % SUB == 0) & ((m * q - first[:, 1]) % SUB == 0)
     unit = common * p * q
-    return np.where(both, unit * m, LATE), unit * SUB
+    return np.where(both, unit * m, NEVER), unit * SUB
 
 
 def _wide_cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
@@ -224,10 +214,8 @@ def _wide_cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> I
     if ends is not None:  # nothing beyond the end
         fraction = np.minimum(ends.time, lines.length2) / np.maximum(lines.length2, 1)
         short = Lines(lines.start, np.rint(lines.step * fraction[:, None]).astype(np.int64), lines.radius + SUB)
-        around = _extents(short)
-        box_xyxy = np.concatenate(
-            [np.maximum(box_xyxy[:, :2], around[:, :2]), np.minimum(box_xyxy[:, 2:], around[:, 2:])], axis=1
-        )
+        low, high = np.maximum(box_xyxy, short.box_xyxy)[:, :2], np.minimum(box_xyxy, short.box_xyxy)[:, 2:]
+        box_xyxy = np.concatenate([low, high], axis=1)
     size = np.maximum(box_xyxy[:, 2:] - box_xyxy[:, :2] + 1, 0)
     parts = pieces(size.min(axis=1) + 2 * lines.radius // SUB, CHUNK_SAMPLES) if len(lines) else []
     found = [np.zeros(0, np.int64)]

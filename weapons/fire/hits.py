@@ -446,10 +446,9 @@ class Hits:
         ----------
         parts, rows : hits of each tick, and the numbers of its shots
         """
-        order = np.argsort(np.concatenate(rows))
         found = cls(
             cls._gathered_rows(parts, rows),
-            lambda: np.concatenate([part.verdicts for part in parts])[order],
+            lambda: cls._gathered_verdicts(parts, rows),
             *parts[0]._then(0),
             parts[0].weapon,
             shots,
@@ -461,6 +460,10 @@ class Hits:
     @staticmethod
     def _gathered_rows(parts: Sequence[Hits], rows: Sequence[Ints]) -> Rows:
         return Rows.gathered([part._rows for part in parts], rows)
+
+    @staticmethod
+    def _gathered_verdicts(parts: Sequence[Hits], rows: Sequence[Ints]) -> Ints:
+        return np.concatenate([part.verdicts for part in parts])[np.argsort(np.concatenate(rows))]
 
     def _remember(self, parts: Sequence[Hits], rows: Sequence[Ints]) -> None:
         """Keep the scene of each shot."""

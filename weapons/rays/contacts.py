@@ -53,6 +53,11 @@ class Rays(Columns):
     round: Ints
     pellet: Ints
 
+    @property
+    def rounds(self) -> int:
+        """Number of rounds of the shot that has most."""
+        return int(self.round.max(initial=0)) + 1
+
 
 Parts = tuple[Rounds[Any] | None, Spread[Any] | Sweep | None, RayWeapon]
 
@@ -331,6 +336,12 @@ class Reason(IntEnum):
     OCCLUDER = 1
     HITS = 2
     BUDGET = 3
+
+
+def cells_hit(met: Contacts, ends: Terminations, stack: Stack) -> Contacts:
+    """Cells of objects that rays walked before their ends."""
+    keep = ends.walked(met)
+    return met.only(keep & ~stack.occluder[met.rank][met.pair] if stack.has_occluders else keep)
 
 
 def reasons_at(stack: Stack, rank: Ints) -> Ints:

@@ -68,8 +68,7 @@ class FirstHits:
             rays.shot[hit], rays.round[hit], rays.pellet[hit], self.stack.ids[ends.rank[hit]], one - 1,
             ends.time[hit] / scale * lines.length[hit], weights_at(ends.time[hit], scale, self.ray.fades), one, xy,
         )  # fmt: skip
-        rounds = int(rays.round.max(initial=0)) + 1
-        pixels = numbered(rays, rounds, hit, ends.rank[hit], ends.x[hit], ends.y[hit], self.stack)
+        pixels = numbered(rays, rays.rounds, hit, ends.rank[hit], ends.x[hit], ends.y[hit], self.stack)
         return rows_of_passes(first, pixels, rays, self.stack)
 
     @property

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
-from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
@@ -25,7 +24,18 @@ from ..fire.plan import Plan
 from ..kinds.areas import ray_parts_of
 from ..kinds.placements import ShotColumns, Shots
 from ..kinds.weapon import Weapon, smoothed
-from .contacts import Contacts, Parts, Rays, Reason, Terminations, Touches, find_contacts, last_of_each, stretches
+from .contacts import (
+    Contacts,
+    Parts,
+    Rays,
+    Reason,
+    Terminations,
+    Touches,
+    cells_hit,
+    find_contacts,
+    last_of_each,
+    stretches,
+)
 
 if TYPE_CHECKING:
     from ..explain.owners import Pellet
@@ -136,10 +146,7 @@ class Walk:
     @property
     def walked(self) -> Contacts:
         """Walked cells of objects, in any order."""
-        met, _ = self._contacts()
-        if self.stack.has_occluders and self.traced:
-            met = met.take(np.flatnonzero(~self.stack.occluder[met.rank]))
-        return met.only(self.ends.walked(met))
+        return cells_hit(self._contacts()[0], self.ends, self.stack)
 
     @cached_property
     def summed(self) -> Summed:
@@ -448,17 +455,10 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
-
-        def verdicts() -> Ints:
-            found = np.zeros((len(shots), len(Verdict)), np.int64)
-            for part, own in zip(rays, rows, strict=True):
-                found[own] = part.verdicts
-            return found
-
         told = Told(
             lambda: Passes.gathered([part.passes for part in rays], rows),
             lambda: Stops.gathered([part.stop for part in rays], rows),
-            verdicts if all(part._count for part in rays) else None,
+            (lambda: cls._gathered_verdicts(parts, rows)) if all(part._count for part in rays) else None,
         )
         number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
         of = *parts[0]._then(0), parts[0].weapon, shots, plan
@@ -504,9 +504,11 @@ def pixels_of(walk: Walk, rays: Rays) -> Ints:
     """Numbers of the pixels that a walk of some of the rays hits, each once; none if no shot has several pellets."""
     if not rays.pellet.any():
         return np.zeros(0, np.int64)
-    cells, rounds = walk.walked, int(rays.round.max(initial=0)) + 1
+    cells = walk.walked
     pair = cells.pair
-    return sorted_once(numbered(walk.rays, rounds, cells.ray[pair], cells.rank[pair], cells.x, cells.y, walk.stack))
+    return sorted_once(
+        numbered(walk.rays, rays.rounds, cells.ray[pair], cells.rank[pair], cells.x, cells.y, walk.stack)
+    )
 
 
 def numbered(rays: Rays, rounds: int, ray: Ints, rank: Ints, x: Ints, y: Ints, stack: Stack) -> Ints:
@@ -524,7 +526,7 @@ def _first_number(rays: Rays, rounds: int, ray: Ints, rank: Ints, stack: Stack) 
 
 def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Rows:
     """Sum the passes of all rays of whole shots up to rows; `pixels` are those of `pixels_of`, once or more."""
-    rounds, pellets_fired = (int(column.max(initial=0)) + 1 for column in (rays.round, rays.pellet))
+    rounds, pellets_fired = rays.rounds, int(rays.pellet.max(initial=0)) + 1
     if pellets_fired == 1:  # each pass is a row
         x, y = (passes.entry_xy - rays.origin_xy[passes.shot * rounds + passes.round]).T
         return Rows(
@@ -540,7 +542,8 @@ def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Ro
     samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
     weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
     pellets = np.bincount(number, minlength=len(best))
-    distinct, ray = samples, (passes.shot * rounds + passes.round)[best] * pellets_fired + passes.pellet[best]
+    ray = (passes.shot * rounds + passes.round)[best] * pellets_fired + passes.pellet[best]
+    distinct = samples
     if (pellets > 1).any():
         rank = stack.rank_of[passes.object[best]]
         begin = _first_number(rays, rounds, ray, rank, stack)

@@ -147,9 +147,7 @@ def near_items(
     stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, whose: tuple[Ints, Ints] | None
 ) -> Near:
     """Accepted items whose boxes rays enter; `own` are the lines relative to their pixels of origin."""
-    reach, end = max(lines.radius, HALF), lines.start + lines.step
-    low, high = np.minimum(lines.start, end) - reach, np.maximum(lines.start, end) + reach
-    ray, rank = met_boxes(np.concatenate([-(-low // SUB), high // SUB], axis=1), stack.box_xyxy)
+    ray, rank = met_boxes(lines.box_xyxy, stack.box_xyxy)
     if whose is not None:
         meets, exclude = whose
         accepted = (stack.categories[rank] & meets[ray]) != 0
