@@ -20,6 +20,8 @@ sys.path.append(str(Path(__file__).parent / "bench"))
 
 import calibrate  # noqa: E402
 import speed  # noqa: E402
+import speed_heat  # noqa: E402
+import speed_weapons  # noqa: E402
 from speed_clock import Cell, DisagreementError, Side, Times, race  # noqa: E402
 from speed_peers import Baked, Masks  # noqa: E402
 from speed_targets import TARGETS, judged  # noqa: E402
@@ -66,6 +68,11 @@ def test_the_other_sections_run(monkeypatch: Any) -> None:
         "special", "weapons", "single", "preparation", "rewind", "huge", "planner", "floors",
     }  # fmt: skip
     assert all(cell["sides"] for cell in found["cells"])
+    panel = speed_heat.draw(found).axes[0]
+    assert [label.get_text() for label in panel.get_yticklabels()] == list(speed_weapons.WEAPONS)
+    cells = [cell for cell in found["cells"] if cell["section"] == "weapons"]
+    with_peer = sum(bool(cell["sides"].keys() & set(speed_heat.PEERS)) for cell in cells)
+    assert len(panel.texts) == with_peer + sum(not cell["what"].endswith(", rows") for cell in cells) > 60
 
 
 class Ready:

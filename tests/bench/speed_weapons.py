@@ -140,6 +140,8 @@ class Peers:
         radius = getattr(weapon, "width", 0) / 2 or getattr(weapon, "radius", 0)
         if isinstance(weapon, Spread):
             return [Side("A pygame", self._scattered, list)] if asked == "rows" else []
+        if isinstance(weapon, Point) and asked == "rows":
+            return [Side("A pygame", self._points, list)]
         if isinstance(weapon, AreaWeapon):
             answer = {"rows": self._areas, "pierce": partial(self._areas, pierce=True), "filter": self._filtered}.get(
                 asked
@@ -149,6 +151,9 @@ class Peers:
             return []
         ray = self.space.rays if isinstance(weapon, Pistol) else partial(self.space.piercing_rays, radius=radius)
         return [Side("pymunk", ray, easier=EASIER)]
+
+    def _points(self, work: Volleys, units: int) -> Any:
+        return self.masks.points(*first(work, units))
 
     def _areas(self, work: Volleys, units: int, pierce: bool = False) -> Any:
         return self.masks.areas(*first(work, units), work.lists["patterns"], pierce)
