@@ -455,13 +455,12 @@ def turned_runs(mask: Bools, pivot_256: tuple[int, int], direction: Ints) -> Row
 
 
 def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """First and last whole number k with low <= k * 256 * per_256 <= high; all, or none, if that is 0."""
+    """First and last whole number k with low <= k * 256 * per_256 <= high.
+
+    If that is 0 the mask is not turned, and no bound is nearer to 0 than 2**37: they hold all k of a mask, or none.
+    """
     per, back = SUB * np.maximum(np.abs(per_256), 1), per_256 < 0
-    low, high = np.where(back, -high, low), np.where(back, -low, high)
-    first, last = -(-low // per), high // per
-    level, held = per_256 == 0, (low <= 0) & (high >= 0)
-    first[level], last[level] = np.where(held, -WIDEST, WIDEST)[level], WIDEST
-    return first, last
+    return -(-np.where(back, -high, low) // per), np.where(back, -low, high) // per
 
 
 def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
