@@ -93,6 +93,17 @@ def test_stencils_that_may_be_too_large_are_turned_one_by_one() -> None:
     assert np.array_equal(patterns_of(weapon, aims).bits.box_xyxy[0], weapon.spans(*aims[0].tolist()).box_xyxy)  # type: ignore[attr-defined]
 
 
+def test_stencils_without_pixels_hit_nothing_at_any_aim(jit: bool) -> None:
+    weapon, aims = Stencil(["..", ".."]), np.linspace(0, 350, 30 + jit)
+    scene = Scene()
+    scene.add(np.ones((9, 9), np.bool_), (5, 5))
+    hits = fire(scene, weapon, [(5, 5)] * len(aims), aim=aims)
+    assert len(hits) == 0 and not hits.verdicts.any()
+    some = Stencil(["#.", ".."], pivot_xy=(-0.3, -0.3))  # a pixel that covers no centre at some aims
+    for shot, row in zip(aims.tolist(), fire(scene, some, [(5, 5)] * len(aims), aim=aims).fired.tolist(), strict=True):
+        assert row == fire(scene, some, (5, 5), aim=shot, strategy="spans").fired[0]
+
+
 def test_strips_are_kept_for_long_patterns_alone() -> None:
     kept = {name for name, weapon in WEAPONS.items() if len(patterns_of(weapon, directions(5)).bits.strips)}  # type: ignore[attr-defined]
     assert {"long box", "beam"} <= kept and not kept & {"disc", "pixel"}

@@ -472,8 +472,9 @@ def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
     which, first, last = merged_runs(line, first, last)
     shape, y, line = shape[which], y[which], line[which]
     begin = np.flatnonzero(begins(shape))
-    own, row = each_pixel(y[begin], y[np.append(begin[1:], len(y)) - 1])
-    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(np.diff(begin, append=len(y)))
+    end = np.append(begin[1:], len(y))[: len(begin)]
+    own, row = each_pixel(y[begin], y[end - 1])
+    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(end - begin)
     place = np.arange(len(line)) - np.searchsorted(line, line)
     parts = [(np.full(len(row), WIDEST), np.full(len(row), -WIDEST)) for _ in range(int(place.max(initial=0)) + 1)]
     for number, ends in enumerate(parts):

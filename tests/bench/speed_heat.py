@@ -68,7 +68,8 @@ def draw(found: Mapping[str, Any]) -> Figure:
         figure = Figure(figsize=(4.5 * len(modes) + 0.8, 2.9 * len(counts) + 0.7), layout="constrained")
         figure.suptitle(
             "left: how many times as long a peer takes (pygame-ce's masks for patterns; for rays pymunk, an easier "
-            "question)\nright: how many times as long a shot takes as one that asks for rows alone; blue is fast, red is slow",
+            "question)\nright: how many times as long a shot takes as one that asks for rows alone; blue is fast, "
+            "red is slow",
             x=0.01, ha="left", fontsize=8,
         )  # fmt: skip
         every = figure.subplots(len(counts), len(modes), squeeze=False)
