@@ -402,7 +402,7 @@ def test_the_plan_tells_what_was_lost_without_a_field() -> None:
     for _ in range(2):
         plan = fire(scene, Pistol(90), [(2.25, 4)]).plan
         told.append(next(stage.why for stage in plan.left_out if stage.name == "march"))
-        lost = f"which would take 720 us to make: {field.regret / 1e3:.0f} us lost so far"
+        lost = f"which would take 945 us to make: {field.regret / 1e3:.0f} us lost so far"
         assert told[-1].endswith(lost) and told[-1].startswith("about ")
     assert told[0] != told[1]
 

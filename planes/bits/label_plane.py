@@ -165,6 +165,11 @@ class LabelPlane(Derivative):
                 self._follow(items)
         return self._cost
 
+    @property
+    def dirty_boxes(self) -> int:
+        """Boxes of items that changed, which the next read draws anew."""
+        return sum(map(len, self._dirty))
+
     def _follow(self, items: Items) -> None:
         """Note the boxes that changes since the last call make dirty; if they are unknown or too many, give up."""
         known = self.labels is not None and self.labels.dtype == _kind(items)

@@ -25,6 +25,7 @@ class Costs(NamedTuple):
     labels_call: float  # by the label plane
     labels_item: float  # made: each item
     labels_pixel: float  # made: each pixel
+    labels_box: float  # made: each box of an item that changed, in a plane that was drawn before
     integers_call: float  # counted in integers, which have no compiled form
     integers_placement: float
     integers_pair: float  # a placement and a tile near it
@@ -53,7 +54,7 @@ class Costs(NamedTuple):
 NUMPY = Costs(
     tiles_call=210000, tiles_placement=103, tiles_pair=3.79,
     visible_call=218000, visible_placement=148, visible_made=172000, visible_item=2200,
-    labels_call=82500, labels_item=8820, labels_pixel=0.0799,
+    labels_call=82500, labels_item=8820, labels_pixel=0.0799, labels_box=18400,
     integers_call=118000, integers_placement=323, integers_pair=2490, integers_bit=0.113,
     box_pair=0.765, bvh_call=91300, bvh_placement=564, bvh_moved=1480, bvh_item=766,
     walk_call=602000, walk_ray=996, walk_item=7.31, walk_met=20200,
@@ -64,7 +65,7 @@ NUMPY = Costs(
 COMPILED = Costs(
     tiles_call=120000, tiles_placement=121, tiles_pair=0.376,
     visible_call=78800, visible_placement=46.8, visible_made=126000, visible_item=1160,
-    labels_call=33900, labels_item=532, labels_pixel=0.0741,
+    labels_call=33900, labels_item=532, labels_pixel=0.0741, labels_box=1480,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
     box_pair=0.354, bvh_call=87200, bvh_placement=548, bvh_moved=1320, bvh_item=767,
     walk_call=556000, walk_ray=923, walk_item=10.7, walk_met=20000,

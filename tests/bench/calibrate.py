@@ -108,7 +108,21 @@ def of_areas(rounds: int) -> dict[str, float]:
     found |= fitted("visible_made visible_item", [(*row[:2], row[3]) for row in made(disc, "visible", rounds, "tiles")])
     found |= fitted("labels_call", [(1, ns) for *_, ns in timed(Point(), "labels", rounds, (1,))])
     drawn = [row[1:] for size_wh in (SIZE_WH, (480, 270)) for row in made(Point(), "labels", rounds, "tiles", size_wh)]
-    return found | fitted("labels_item labels_pixel", drawn)
+    return found | fitted("labels_item labels_pixel", drawn) | {"labels_box": redrawn(rounds)}
+
+
+def redrawn(rounds: int) -> float:
+    """Time to redraw the box of an item that moved, of a label plane."""
+    scene = scene_of(ITEMS[1])
+    plane, moved = scene.derived.label_plane(), scene.ids()[: ITEMS[0]]
+    assert plane is not None  # the scene has bounds
+
+    def follow() -> float:
+        scene.move(moved, scene.items.position_256[moved] / 256 + 1)
+        scene.items.stack()
+        return time_of(partial(plane.read, scene.items))
+
+    return min(follow() for _ in range(rounds)) / len(moved)
 
 
 def of_integers(rounds: int) -> dict[str, float]:

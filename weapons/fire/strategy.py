@@ -27,6 +27,7 @@ from .spans import QueryContext
 
 if TYPE_CHECKING:
     from hitplanes.planes.bits.distance_field import DistanceField
+    from hitplanes.planes.bits.label_plane import LabelPlane
 
 BROADPHASES = ("auto", *STRUCTURES)
 
@@ -101,10 +102,17 @@ def _labels_refuse(request: Request) -> str:
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    now, plane = costs(), request.scene.derived.label_plane()
+    plane = request.scene.derived.label_plane()
     assert plane is not None  # else it refuses
-    drawn = len(request.stack) * now.labels_item if plane.labels is None else 0.0
-    return now.labels_call, plane.cost(request.scene.items) * now.labels_pixel + drawn
+    return costs().labels_call, _drawing_ns(plane, request.scene, request.stack)
+
+
+def _drawing_ns(plane: LabelPlane, scene: Scene, stack: Stack) -> float:
+    """Time to draw what is not drawn of a label plane: all of it, or the boxes of items that changed."""
+    now, pixels = costs(), plane.cost(scene.items)
+    if plane.labels is None:
+        return pixels * now.labels_pixel + len(stack) * now.labels_item
+    return plane.dirty_boxes * now.labels_box
 
 
 def _integers_refuse(request: Request) -> str:
@@ -270,7 +278,7 @@ def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, save
     """March if the distance field is made, or if calls have lost as much time without it as it takes to make."""
     if field.is_made(scene.items):
         return other._replace(way="march")
-    build = field.labels.cost(scene.items) * costs().labels_pixel + field.labels.size * costs().field_pixel
+    build = _drawing_ns(field.labels, scene, scene.items.stack()) + field.labels.size * costs().field_pixel
     pays = field.worth_building(saved_ns, build)
     why = f"{other.why}, which would take {build / 1e3:.0f} us to make: {field.regret / 1e3:.0f} us lost so far"
     return RayChoice("march" if pays else other.way, why, pending=not pays)
