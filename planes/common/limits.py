@@ -48,7 +48,7 @@ MARGIN_PX = 8  # how far `margins` shifts a shot to look for a flip, px
 FRAGILE_PX = 1  # a verdict is fragile if a shift of this length changes it, px
 VARIANT_CACHE_BYTES = 64 * 2**20  # size of the cache of turned and scaled masks, bytes
 
-MAPPED_PIXELS = 2**14
+MAPPED_PIXELS = 2**16
 """Pixels of turned and scaled masks that are made at a time: their numbers stay in the cache of the processor."""
 
 VARIANT_BYTES = 1536  # overhead of a cached mask beside its pixels, bytes

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from ..volumes.volumes import Volumes
 
 
+STACK_ROW_BYTES = 65
+"""Bytes of a row of a stack: seven numbers and whether it is an occluder."""
+
+
 @dataclass(frozen=True, eq=False)
 class Stack:
     """The items of one version of a scene that decide hits, front to back, as columns."""
@@ -80,8 +84,7 @@ class Stack:
     @property
     def nbytes(self) -> int:
         """Bytes of the columns, without the masks, which belong to the scene."""
-        columns = (self.ids, self.occluder, self.categories, self.owner, self.box_xyxy, self.offset)
-        return sum(column.nbytes for column in columns)
+        return STACK_ROW_BYTES * len(self.ids)
 
     @cached_property
     def rank_of(self) -> Ints:
@@ -146,6 +149,13 @@ def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
     """Clip inclusive boxes (n, 4) to a box; those outside get x_max < x_min or y_max < y_min."""
     low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
     return np.concatenate([low, high], axis=1)
+
+
+def _is_there(boxes: Ints | Box) -> bool:
+    """Whether any of some boxes (n, 4), or a single box, holds a pixel."""
+    if isinstance(boxes, tuple):
+        return boxes[0] <= boxes[2]
+    return bool((boxes[:, 0] <= boxes[:, 2]).any())
 
 
 class Role(Enum):
@@ -392,8 +402,8 @@ class Items:
         seen, decided = self._decided
         if seen != self.version:
             changes = self.changes(seen)
-            boxes = ((version, np.vstack([before, after])) for version, _, before, after in changes or ())
-            last = next((version for version, box in boxes if (box[:, 0] <= box[:, 2]).any()), decided)
+            boxes = ((version, box) for version, _, *both in changes or () for box in both)
+            last = next((version for version, box in boxes if _is_there(box)), decided)
             self._decided = self.version, self.version if changes is None else last
         return self._decided[1]
 
@@ -547,17 +557,16 @@ class Items:
         """Enter the masks of items into the atlas and the columns."""
         for item, variant in zip(ids, variants, strict=True):
             self.variants[item] = variant
-        take = self.atlas.take
-        rows = [(take(mask), mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
-        columns = np.array(rows, np.int64).reshape(-1, 6)
-        self.offset[ids], self.mask[ids] = columns[:, 0], columns[:, 1]
-        self.pivot_256[ids], self.size_wh[ids] = columns[:, 2:4], columns[:, 4:]
+        self.offset[ids] = self.atlas.take(variants)
+        rows = [(mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
+        columns = np.array(rows, np.int64).reshape(-1, 5)
+        self.mask[ids], self.pivot_256[ids], self.size_wh[ids] = columns[:, 0], columns[:, 1:3], columns[:, 3:]
 
     def _compact(self) -> None:
         """Rebuild the atlas with only the masks in use."""
         atlas, offset = MaskAtlas(), self.offset.copy()
-        for item in np.flatnonzero(self.alive[: self.count]).tolist():
-            offset[item] = atlas.take(self.variants[item])
+        alive = np.flatnonzero(self.alive[: self.count])
+        offset[alive] = atlas.take([self.variants[item] for item in alive.tolist()])
         self.atlas, self.offset = atlas, offset
 
     def _reserve(self, count: int) -> None:

@@ -12,7 +12,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import accumulate, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,13 +146,19 @@ class MaskAtlas:
     offsets: dict[int, int] = field(default_factory=dict)
     users: dict[int, int] = field(default_factory=dict)
 
-    def take(self, variant: Variant) -> int:
-        """Count one more user of a mask, store it if it is new, and return its offset."""
-        users = self.users[variant.uid] = self.users.get(variant.uid, 0) + 1
-        if users == 1:
-            self.live += variant.mask.size
-        offset = self.offsets.get(variant.uid)
-        return self._append(variant) if offset is None else offset
+    def take(self, variants: Sequence[Variant]) -> list[int]:
+        """Count one more user of each mask, store those that are new, and return their offsets."""
+        new: dict[int, Bools] = {}
+        for variant in variants:
+            uid = variant.uid
+            users = self.users[uid] = self.users.get(uid, 0) + 1
+            if users == 1:
+                self.live += variant.mask.size
+            if uid not in self.offsets:
+                new[uid] = variant.mask.reshape(-1)
+        if new:
+            self._append(new)
+        return [self.offsets[variant.uid] for variant in variants]
 
     def drop(self, variant: Variant) -> None:
         """Count one user less of a mask."""
@@ -166,15 +172,17 @@ class MaskAtlas:
         """Whether more than half of the array, beyond some slack, is unused."""
         return self.used > 2 * self.live + ATLAS_SLACK_BYTES
 
-    def _append(self, variant: Variant) -> int:
-        begin, end = self.used, self.used + variant.mask.size
-        if end > len(self.flat):
-            grown = np.zeros(max(end, 2 * len(self.flat)), np.bool_)
-            grown[:begin] = self.flat[:begin]
+    def _append(self, masks: dict[int, Bools]) -> None:
+        """Store flat masks, by their numbers."""
+        sizes = [mask.size for mask in masks.values()]
+        ends = list(accumulate(sizes, initial=self.used))
+        if ends[-1] > len(self.flat):
+            grown = np.zeros(max(ends[-1], 2 * len(self.flat)), np.bool_)
+            grown[: self.used] = self.flat[: self.used]
             self.flat = grown  # a stack that was handed out keeps the old array
-        self.flat[begin:end] = variant.mask.reshape(-1)
-        self.offsets[variant.uid], self.used = begin, end
-        return begin
+        np.concatenate(list(masks.values()), out=self.flat[self.used : ends[-1]])
+        self.offsets.update(zip(masks, ends, strict=False))
+        self.used = ends[-1]
 
 
 def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> tuple[Image, int, int]:
@@ -376,9 +384,13 @@ def resample(
     for axis, (parts, limit) in enumerate(zip(unit, (columns - 1, rows - 1), strict=True)):
         along = (first[:, axis] + parts)[:, None] + step[:, axis, 0, None] * np.arange(width)
         over = step[:, axis, 1, None] * np.arange(height)
-        place = (over[:, :, None] + along[:, None]).view(np.uint64)
-        square = place // np.uint64(parts)  # negative numbers become very large
-        border = border | (square * np.uint64(parts) == place)
+        place = (over[:, :, None] + along[:, None]).view(np.uint64)  # negative numbers become very large
+        if parts & parts - 1:
+            square = place // np.uint64(parts)
+            border = border | (square * np.uint64(parts) == place)
+        else:  # a power of two, as it is without a scale, is ten times as fast
+            square = place >> np.uint64(parts.bit_length() - 1)
+            border = border | (place & np.uint64(parts - 1) == 0)
         places.append(place.view(np.int64))
         squares.append(np.minimum(square, np.uint64(limit), out=square).view(np.int64))
     source: Ints = squares[0] + squares[1] * columns
