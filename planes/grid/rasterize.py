@@ -108,7 +108,14 @@ class RowRuns(NamedTuple):
 
     def spans(self) -> Spans:
         """The pixels of a single shape."""
-        return _union([(self.y, first, last) for first, last in self.parts])
+        (first, last), *more = self.parts
+        for begin, end in more:
+            apart = np.maximum(first, begin) > np.minimum(last, end) + 1
+            if (apart & (first <= last) & (begin <= end)).any():
+                return _union([(self.y, *part) for part in self.parts])
+            first, last = np.minimum(first, begin), np.maximum(last, end)
+        filled = first <= last
+        return Spans(self.y[filled], first[filled], last[filled])
 
 
 def convex_polygons(points: Ints) -> RowRuns | None:

@@ -11,7 +11,7 @@ from weakref import ref
 
 import numpy as np
 
-from hitplanes.planes.common.backend import LruCache, kernels_of
+from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
@@ -53,6 +53,7 @@ class AreaWeapon(Weapon):
         "inside": Word(INSIDE),
     }
     directed: ClassVar[bool] = False
+    compiled: ClassVar[bool] = True  # whether `runs` has a compiled form, which pays for a single direction, too
     pierce: bool = field(default=False, kw_only=True)
     falloff: str | None = field(default=None, kw_only=True)
     line_of_sight: str | None = field(default=None, kw_only=True)
@@ -275,6 +276,7 @@ class Stencil(AreaWeapon):
 
     kind: ClassVar[str] = "stencil"
     directed: ClassVar[bool] = True
+    compiled: ClassVar[bool] = False
     table: ClassVar[dict[str, Value]] = AreaWeapon.table | {
         "mask": Mask(),
         "pivot_xy": Optional(Numbers((2,), MASK_SIDE_MAX)),
@@ -459,10 +461,11 @@ def pattern_of(weapon: AreaWeapon, c: int, s: int) -> Pattern:
 def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
     """Patterns of a weapon along distinct directions (n, 2): of many only the bit rows are made, if its kind can.
 
-    A few are made one by one, because other calls may need some of them again.
+    Without compiled kernels a few are made one by one, because that is faster, and other calls may need some again.
     """
     far = weapon.falloff is not None and weapon.reach_256 > SUB * FADING_MOST
-    if len(direction) <= FEW_AIMS or type(weapon).runs is AreaWeapon.runs or far:
+    few = len(direction) <= FEW_AIMS and not (jit_is_on() and weapon.compiled)
+    if few or type(weapon).runs is AreaWeapon.runs or far:
         return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
 
     def make(c: int, s: int) -> Pattern:

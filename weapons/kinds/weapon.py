@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
@@ -125,6 +126,15 @@ class Pattern:
     def strip(self) -> Strip:
         """The strip between two parallel lines that its pixels lie in."""
         return strip_of(self.spans)
+
+    @cached_property
+    def normal(self) -> tuple[int, int] | None:
+        """Normal of its strip; None if strips would not pay, taken over all directions that it may be turned to."""
+        a, b, low, high = self.strip
+        x, y, x_max, y_max = self.spans.box_xyxy or (0, 0, 0, 0)
+        side, along = (x_max - x + y_max - y) * 2 / math.pi, math.hypot(a, b) * 2 / math.pi  # the means of them
+        pays = len(strips_of(np.array([[along, along, low, high]]), np.array([[0, 0, side, side]])))
+        return (a, b) if pays else None
 
     @property
     def table(self) -> PatternTable:
@@ -261,6 +271,13 @@ class PatternTable:
         return self.patterns.bits if isinstance(self.patterns, AimedPatterns) else pattern_bits_of(self.patterns)
 
     @property
+    def words(self) -> Words:
+        """Bit rows (columns of words, rows) of the only pattern, as `columns_of` makes them."""
+        if isinstance(self.patterns, AimedPatterns):
+            return self.bits.words[WORD:].reshape(-1, self.bits.rows.item(0))
+        return _pattern_words(self.patterns[0])
+
+    @property
     def runs(self) -> int:
         """Number of spans of all patterns."""
         return sum(len(p.spans) for p in self.patterns)
@@ -360,8 +377,9 @@ class AimedPatterns(Sequence[Pattern]):
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
-        straight, made, lay = self._make(ONE, 0), [], kernels_of(bit_rows).bits_of_runs
-        normals, at_once = _normals(straight, self._direction), max(ROWS_AT_ONCE // self._side, 1)
+        normal, made, lay = self._make(ONE, 0).normal, [], kernels_of(bit_rows).bits_of_runs
+        normals = turned(np.array([normal]), *self._direction.T) if normal else np.zeros((0, 2), np.int64)
+        at_once = max(ROWS_AT_ONCE // self._side, 1)
         for first in range(0, len(self), at_once):
             now = slice(first, first + at_once)
             runs = self._runs(self._direction[now])
@@ -392,17 +410,6 @@ def _sums_around(falloff: str, reach_256: int) -> Sums:
     sums = np.zeros((len(side), len(side) + 1), np.uint32)
     np.cumsum(weights.reshape(len(side), -1), axis=1, dtype=np.uint32, out=sums[:, 1:])
     return sums
-
-
-def _normals(straight: Pattern, direction: Ints) -> Ints:
-    """Normals (n, 2) of the strips of patterns: that of the straight one, turned; none if strips do not pay."""
-    a, b, low, high = straight.strip
-    x, y, x_max, y_max = straight.spans.box_xyxy or (0, 0, 0, 0)
-    normals, (c, s) = turned(np.array([[a, b]]), *direction.T), np.abs(direction.T)
-    wide, tall = x_max - x, y_max - y
-    sides = np.stack([wide * c + tall * s, wide * s + tall * c], axis=1) // ONE
-    strips = np.concatenate([normals, np.broadcast_to([low, high], normals.shape)], axis=1)
-    return normals if len(strips_of(strips, np.concatenate([np.zeros_like(sides), sides], axis=1))) else normals[:0]
 
 
 def _joined(columns: Sequence[npt.NDArray[Kind]]) -> npt.NDArray[Kind]:

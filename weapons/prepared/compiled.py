@@ -32,7 +32,7 @@ from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
-from ..kinds.weapon import Weapon, columns_of
+from ..kinds.weapon import Weapon
 from .one_shot import Answer, Filter, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 
@@ -253,6 +253,6 @@ class PositionCache:
 
 def _numbers(one: Round) -> Ints:
     """Fields of a round, as `_shot` reads them."""
-    words = columns_of(one.spans)
-    head = (*(one.spans.box_xyxy or (0, 0, -1, -1)), WORD, words.shape[1], words.size)
+    words = one.pattern.words
+    head = *one.pattern.box_xyxy[0].tolist(), WORD, words.shape[1], words.size
     return np.concatenate([np.array(head, np.int64), np.zeros(WORD, np.int64), words.reshape(-1).view(np.int64)])

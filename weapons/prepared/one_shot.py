@@ -13,7 +13,7 @@ from hitplanes.planes.bits.visible import View
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
-from hitplanes.planes.grid.fixed_point import snap, unit_toward
+from hitplanes.planes.grid.fixed_point import snap, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
@@ -23,8 +23,8 @@ from ..fire.plan import Plan, absent, unaimed, undrawn
 from ..fire.prefilter import Candidates, may_refuse
 from ..fire.spans import QueryContext, SpanHits, direct
 from ..kinds.areas import parts_of, pierces
-from ..kinds.placements import Placements, Shots, accepted_of, blocking_of, checked_shots, placements_for
-from ..kinds.weapon import Weapon
+from ..kinds.placements import STRAIGHT, Placements, Shots, accepted_of, blocking_of, checked_shots, placements_for
+from ..kinds.weapon import Pattern, PatternTable, Weapon
 
 REACH_MOST = 500
 """Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
@@ -34,12 +34,12 @@ TURNED_PX = 2
 
 
 class Round(NamedTuple):
-    """A round of a shot at the origin: its pixel (x, y), its number, and its pixels relative to (x, y)."""
+    """A round of a shot at the origin: its pixel (x, y), its number, and one pattern, relative to (x, y)."""
 
     x: int
     y: int
     number: int
-    spans: Spans
+    pattern: PatternTable
 
 
 def reach_of(weapon: Weapon) -> int | None:
@@ -61,25 +61,30 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
     if offset_256 is not None:
         shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
     placements = placements_for(weapon, shots)
-    pellets, patterns = placements.pellets, placements.table.patterns
-    found: list[Round] = []
-    for number, (x, y) in enumerate(placements.turn_xy.tolist()):
-        rows = slice(number * pellets, (number + 1) * pellets)
-        placed = zip(placements.pattern[rows].tolist(), placements.xy[rows].tolist(), strict=True)
-        spans = _union([patterns[k].spans.translated(px - x, py - y) for k, (px, py) in placed])
-        if len(spans):
-            found.append(Round(x, y, number, spans))
-    return found
+    rounds = [
+        Round(x, y, number, _pattern_of_round(placements, number))
+        for number, (x, y) in enumerate(placements.turn_xy.tolist())
+    ]
+    return [one for one in rounds if one.pattern.box_xyxy[0, 0] <= one.pattern.box_xyxy[0, 2]]
 
 
-def _union(sets: list[Spans]) -> Spans:
-    """Pixels of all pellets of a round."""
-    if len(sets) == 1:
-        return sets[0]
-    return Spans.from_runs(
-        *(np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
-    )
+def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
+    """Pixels of all pellets of a round, relative to its own pixel, as one pattern."""
+    table, pellets = placements.table, placements.pellets
+    if pellets == len(table) == 1:
+        return table
+    rows = slice(number * pellets, (number + 1) * pellets)
+    patterns = [table.patterns[k] for k in placements.pattern[rows].tolist()]
+    if pellets == 1:
+        only: Pattern = patterns[0]
+        return only.table
+    offsets = (placements.xy[rows] - placements.turn_xy[number]).tolist()
+    sets = [pattern.spans.translated(x, y) for pattern, (x, y) in zip(patterns, offsets, strict=True)]
+    runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
+    return Pattern(Spans.from_runs(*runs), None).table
 
+
+ORIGIN: Ints = np.zeros((1, 2), np.int64)
 
 Told = tuple[object, object, object]
 """Arguments of a shot: aim, toward, and its number."""
@@ -96,6 +101,11 @@ class Filter:
     def view(self, pierce: bool) -> View:
         """View of the items that its shots accept."""
         return View(pierce, self.meets, tuple(sorted(set(self.exclude[0].tolist()) - {-1})))
+
+    def shot_at_origin(self, aim: float | None, number: int) -> Shots:
+        """Batch of one shot, whose aim and number are checked."""
+        direction = STRAIGHT if aim is None else unit_of(float(aim))
+        return Shots(ORIGIN, direction, None, self.meets, self.exclude, number, self.seed, 0, aim)
 
     def shots(self, weapon: Weapon, at: object, told: Told) -> Shots:
         """Batch of one shot."""

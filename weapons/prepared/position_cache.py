@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, big_pattern, hit_by_one, integers_ns
+from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, hit_by_one, integers_ns
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
 from hitplanes.planes.common.limits import POSITION_MAX, WEIGHT_FULL
@@ -143,7 +143,7 @@ class PositionCache:
     # house: row order
     def look(self, one: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
-        pattern, made, number, tell = big_pattern(one.spans), self.made, one.number, self._tell
+        pattern, made, number, tell = one.pattern.bigs[0], self.made, one.number, self._tell
         stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
         first_x, first_y, wide, high = pattern.x, pattern.y, pattern.wide - 1, pattern.high - 1
         tiles = self._bigs.setdefault(stride, BigTiles(stride))

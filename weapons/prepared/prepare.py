@@ -191,9 +191,9 @@ class ReadyPattern(Ready[Hits]):
             self._grow(AIM_BYTES)
         return looks
 
-    def _made_looks(self, key: object, aim: object, offset: tuple[int, int] | None, number: int) -> Looks:
+    def _made_looks(self, key: object, aim: Any, offset: tuple[int, int] | None, number: int) -> Looks:
         """Make the looks of a shot; those of a shot without arguments are stored for the fastest path."""
-        shots = self._filter.shots(self.weapon, (0, 0), (aim, None, number))
+        shots = self._filter.shot_at_origin(aim, number)
         looks: Looks = []
         for one in rounds_of(self.weapon, shots, offset):
             look, size = self._squares.look(one)
