@@ -23,6 +23,7 @@ from hitplanes import (
     InputError,
     Laser,
     Pistol,
+    Point,
     RayHits,
     Rifle,
     Rounds,
@@ -408,7 +409,7 @@ def test_the_plan_tells_what_was_lost_without_a_field() -> None:
 
 
 def test_few_are_left_to_walk() -> None:
-    """Only those that refuse what lies in front of something; the others walk not one cell."""
+    """Only those that refuse what lies in front of something, and others do not; the others walk not one cell."""
     scene = Scene((60, 60))
     for x in (20, 40, 41):
         scene.add(np.ones((5, 5), np.bool_), (x, 20))
@@ -418,10 +419,36 @@ def test_few_are_left_to_walk() -> None:
     assert plan.has_left_out("walk") and plan.has_left_out("pre-filter") and not plan.has_run("walk")
     hits = fire(scene, Pistol(None), at[::5], toward=toward[::5], exclude=0, strategy="march")
     assert hits.object.tolist() == [1, 1] and hits.plan.has_left_out("walk")
-    hits = fire(scene, Pistol(None), toward[:1], toward=at[:1], exclude=2, strategy="march")
-    assert hits.object.tolist() == [1] and hits.plan.has_run("cast") and not hits.plan.has_run("walk")
-    hits = fire(scene, Pistol(None), toward[:1] * 99, toward=at[:1] * 99, exclude=2, strategy="march")
-    assert hits.object.tolist() == [1] * 99 and hits.plan.has_run("walk") and not hits.plan.has_run("cast")
+    hits = fire(scene, Pistol(None), toward[:1] * 2, toward=at[:1] * 2, exclude=2, strategy="march")
+    assert hits.object.tolist() == [1, 1] and hits.plan.has_left_out("walk") and hits.plan.has_left_out("cast")
+    hits = fire(scene, Pistol(None), toward[:1] * 2, toward=at[:1] * 2, exclude=[2, -1], strategy="march")
+    assert hits.object.tolist() == [1, 2] and hits.plan.has_run("cast") and not hits.plan.has_run("walk")
+    others = [2] * 98 + [-1]
+    hits = fire(scene, Pistol(None), toward[:1] * 99, toward=at[:1] * 99, exclude=others, strategy="march")
+    assert hits.object.tolist() == [1] * 98 + [2] and hits.plan.has_run("walk") and not hits.plan.has_run("cast")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_each_filter_marches_through_a_plane_of_its_own(seed: int, jit: bool) -> None:
+    """What rays refuse is not in it, and behind it lies what it hid; so it is as fast as where nothing is refused."""
+    rng = np.random.default_rng(seed)
+    scene = Scene((40, 30), categories=("red", "blue"))
+    for k in range(300 + jit):
+        role, categories = "occluder" if k % 2 == 0 else "hittable", ["red", "blue"][k // 2 % 2 :]
+        at, layer = rng.integers(0, 40, 2), int(rng.integers(0, 3))
+        scene.add(np.ones(rng.integers(1, 3, 2), np.bool_), at, role=role, categories=categories, layer=layer)
+    at, aim = rng.uniform(-2, 42, (400, 2)), rng.uniform(0, 360, 400)
+    at[::2], aim[::2] = np.floor(at[::2]) + 0.5, np.floor(aim[::2] / 90) * 90 + 45  # through corners
+    filters: list[dict[str, Any]] = [
+        {"accept": ["red"]}, {"blocked_by": ["red"]}, {"accept": [], "exclude": 3}, {"exclude": [[1, 4, 9]]},
+    ]  # fmt: skip
+    for how in filters:
+        found = fire(scene, Pistol(90), at, aim=aim, **how, strategy="march")
+        slow = fire(scene, Pistol(90), at, aim=aim, **how, strategy="walk")
+        assert found == slow and found.plan.has_run("march") and not found.plan.has_run("filter")
+        assert [found.stops_at(k) for k in range(400)] == [slow.stops_at(k) for k in range(400)]
+        points = fire(scene, Point(), at, **how, strategy="labels")
+        assert points == fire(scene, Point(), at, **how, strategy="spans") and points.plan.has_run("label plane")
 
 
 @example(1)

@@ -238,7 +238,8 @@ def test_the_time_of_each_stage_is_its_own(name: str, past: bool, monkeypatch: p
             return inner(*args, **values)
 
         monkeypatch.setattr(owner, function, counted)
-    hits = fire(scene, weapon, SHOTS, accept=["default"], exclude=5, **how)
+    owners = [5, 5, 4, 4, 5, 5, 4, 4, 5] if work[: len(OF_MARCH)] == OF_MARCH else 5  # if all are one, none is refused
+    hits = fire(scene, weapon, SHOTS, accept=["default"], exclude=owners, **how)
     took = {stage.name: stage.ns for stage in hits.plan.ran if stage.ns}
     assert took == spent and hits.plan.ns == clock.ns > 0
     assert all(spent.values())

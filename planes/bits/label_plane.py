@@ -20,7 +20,7 @@ from ..common.checks import Bools, InputError, Ints, Labels
 from ..common.limits import HALF, ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX, SUB
 from ..grid.fixed_point import pixel
 from ..grid.spans import Box, meets
-from ..scene.derived import Derivative
+from ..scene.derived import OF_ALL, Derivative, View
 from ..scene.items import Items, Stack, clipped
 from .cells import within
 
@@ -138,7 +138,7 @@ def label_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
 
 
 class LabelPlane(Derivative):
-    """The label plane of a box of the world, kept up to date from the journal.
+    """The label plane of the items that a view accepts in a box of the world, kept up to date from the journal.
 
     Parameters
     ----------
@@ -146,10 +146,10 @@ class LabelPlane(Derivative):
     redrawn : pixels of the old and new boxes that the last read drew
     """
 
-    def __init__(self, box_xyxy: Box) -> None:
+    def __init__(self, box_xyxy: Box, view: View = OF_ALL[False]) -> None:
         super().__init__()
         _check_plane(box_xyxy)
-        self.box_xyxy = box_xyxy
+        self.box_xyxy, self.view = box_xyxy, view
         self.size = (box_xyxy[2] - box_xyxy[0] + 1) * (box_xyxy[3] - box_xyxy[1] + 1)
         self.labels: Labels | None = None
         self.redrawn = 0
@@ -192,7 +192,8 @@ class LabelPlane(Derivative):
                 labels, dirty = np.empty((y_max - y + 1, x_max - x + 1), _kind(items)), [np.array([self.box_xyxy])]
             if dirty:
                 stack, kernels = items.stack(), kernels_of(sys.modules[__name__])
-                kernels.paint(labels, *self.box_xyxy[:2], np.concatenate(dirty), places_of(stack), stack.masks)
+                places = places_of(stack)[self.view.accepts(stack)]
+                kernels.paint(labels, *self.box_xyxy[:2], np.concatenate(dirty), places, stack.masks)
                 self._cells, self._looks = None, 0
             self.labels, self._dirty, self._cost = labels, [], 0
             return labels

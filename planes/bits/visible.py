@@ -7,15 +7,12 @@ on their positions: they are computed once for a version of a scene, or only for
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Ints
-from ..common.limits import EVERYTHING
 from ..grid.spans import Box
-from ..scene.derived import NEVER, Derivative
+from ..scene.derived import NEVER, Derivative, View
 from ..scene.items import Items, Stack
 from . import bit_rows, cells
 from .bit_rows import WORD, Words
@@ -68,23 +65,6 @@ PAIRS_MOST = 2**20
 
 SHOT_BITS = 4
 """Cells of shot positions have sides of 2**SHOT_BITS px; larger ones list more boxes that no pattern meets."""
-
-
-class View(NamedTuple):
-    """What shots see: whether they pierce, the filter of items that they meet, and the owners whose items they skip."""
-
-    pierce: bool
-    meets: int
-    exclude: tuple[int, ...]
-
-    def accepts(self, stack: Stack) -> Bools:
-        """Which items (M,) of a stack such shots accept."""
-        if self.meets == EVERYTHING and not (self.exclude or stack.has_unmet):
-            return np.ones(len(stack), np.bool_)
-        there = (stack.categories & self.meets) != 0
-        for owner in self.exclude:
-            there &= stack.owner != owner
-        return np.asarray(there)
 
 
 class VisibleSet:

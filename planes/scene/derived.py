@@ -15,26 +15,50 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
 
 from .. import late
 from ..common.backend import LruCache
-from ..common.checks import choice
-from ..common.limits import STRUCTURES
+from ..common.checks import Bools, choice
+from ..common.limits import EVERYTHING, STRUCTURES
 from ..grid.spans import Box
 
 if TYPE_CHECKING:
     from ..bits.distance_field import DistanceField
     from ..bits.label_plane import LabelPlane
-    from ..bits.visible import View, Visible
+    from ..bits.visible import Visible
     from ..broadphase.boxes import Index
-    from .items import Change, Items
+    from .items import Change, Items, Stack
 
 Made = TypeVar("Made")
 
 NEVER = -1  # a version before all others
 VIEWS_MOST = 8  # most visible sets of a scene, one for each view
+PLANES_MOST = 4  # most label planes of a scene, and most distance fields; each takes some bytes a pixel
 AGAIN_MOST = 8  # most things of a scene that are made when they are asked for a second time
+
+
+class View(NamedTuple):
+    """What shots see: whether they pierce, the filter of items that they meet, and the owners whose items they skip."""
+
+    pierce: bool
+    meets: int
+    exclude: tuple[int, ...]
+
+    def accepts(self, stack: Stack) -> Bools:
+        """Which items (M,) of a stack such shots accept."""
+        if self.meets == EVERYTHING and not (self.exclude or stack.has_unmet):
+            return np.ones(len(stack), np.bool_)
+        there = (stack.categories & self.meets) != 0
+        for owner in self.exclude:
+            there &= stack.owner != owner
+        return np.asarray(there)
+
+
+OF_ALL = View(False, EVERYTHING, ()), View(True, EVERYTHING, ())
+"""Views of shots that accept everything: without and with pierce."""
 
 
 class Derivative:
@@ -69,8 +93,8 @@ class Derived:
     def __init__(self, bounds: Box | None) -> None:
         self._bounds = bounds
         self._visible: LruCache[View, Visible] = LruCache(VIEWS_MOST, lambda _: 1)
-        self._label_plane: LabelPlane | None = None
-        self._distance_field: DistanceField | None = None
+        self._planes: LruCache[View, LabelPlane] = LruCache(PLANES_MOST, lambda _: 1)
+        self._fields: LruCache[View, DistanceField] = LruCache(PLANES_MOST, lambda _: 1)
         self._indexes: dict[str, Index] = {}
         self._again: LruCache[Hashable, list[Any]] = LruCache(AGAIN_MOST, lambda _: 1)
 
@@ -87,18 +111,19 @@ class Derived:
         """What is visible of the objects for shots of a view; those of the last few views are kept."""
         return self._visible.get(view, lambda: late.visible.Visible(view, self._bounds))
 
-    def label_plane(self) -> LabelPlane | None:
-        """The label plane of the scene; None if it has no bounds, or too large ones."""
-        if self._label_plane is None and self._bounds is not None and late.label_plane.plane_fits(self._bounds):
-            self._label_plane = late.label_plane.LabelPlane(self._bounds)
-        return self._label_plane
+    def label_plane(self, view: View = OF_ALL[False]) -> LabelPlane | None:
+        """The label plane of what a view accepts; None if the scene has no bounds, or too large ones."""
+        bounds = self._bounds
+        if bounds is None or not late.label_plane.plane_fits(bounds):
+            return None
+        return self._planes.get(view, lambda: late.label_plane.LabelPlane(bounds, view))
 
-    def distance_field(self) -> DistanceField | None:
-        """The distance field by which rays march; None if there is no label plane."""
-        labels = self.label_plane()
-        if self._distance_field is None and labels is not None:
-            self._distance_field = late.distance_field.DistanceField(labels)
-        return self._distance_field
+    def distance_field(self, view: View = OF_ALL[False]) -> DistanceField | None:
+        """The distance field by which rays of a view march; None if there is no label plane."""
+        labels = self.label_plane(view)
+        if labels is None:
+            return None
+        return self._fields.get(view, lambda: late.distance_field.DistanceField(labels))
 
     def index(self, structure: str) -> Index:
         """The broad phase of the items that decide hits: "none", "grid", "quadtree" or "bvh"."""

@@ -23,11 +23,12 @@ from hitplanes.planes.bits.cells import met_boxes
 from hitplanes.planes.bits.front_to_back import NO_FLAGS, OrderedTiles, RoundHits, Rule
 from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
 from hitplanes.planes.bits.tiles import Ground, hit_by_few
-from hitplanes.planes.bits.visible import SHOT_BITS, View
+from hitplanes.planes.bits.visible import SHOT_BITS
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
-from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES, EVERYTHING
+from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
 from hitplanes.planes.grid.fixed_point import ONE
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -37,7 +38,7 @@ from ..kinds.placements import Placements, Shots, placements_for, placements_of
 from ..kinds.weapon import Weapon, fits, fits_at_reach
 from .hits import Rows, rows_of_span_hits
 from .plan import Plan
-from .prefilter import Candidates, may_refuse, refused
+from .prefilter import Candidates, may_refuse, refused, view_of
 from .spans import QueryContext, direct, inside, near_pairs
 
 if TYPE_CHECKING:
@@ -48,9 +49,6 @@ PLACEMENTS_AT_ONCE = 2**15
 
 NEAR_AT_ONCE = 2**12
 """Most placements whose near items are listed at a time, if a pre-filter is named; in a crowd each has a hundred."""
-
-OF_ALL = View(False, EVERYTHING, ()), View(True, EVERYTHING, ())
-"""Views of shots that accept everything: without and with pierce."""
 
 
 class Traits(NamedTuple):
@@ -112,16 +110,6 @@ def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtere
     view, placements = view_of(traits.pierces, shots), traits.placements * len(shots)
     blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view) if traits.sight else None
     return Request(scene, weapon, shots, stack, traits, view, filtered, placements, blockers)
-
-
-def view_of(pierce: bool, shots: Shots) -> View | None:
-    """View of a batch: what all its shots accept; None if they accept different items."""
-    if not shots.choosy or not len(shots):
-        return OF_ALL[pierce]
-    meets, exclude = shots.meets, shots.exclude
-    if (meets != meets[0]).any() or (exclude != exclude[0]).any():
-        return None
-    return View(pierce, int(meets[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
 
 
 # house: way of areas
@@ -323,8 +311,9 @@ def _rows_of(placements: Placements, found: RoundHits, ids: Ints) -> Rows:
 # house: way of areas
 def by_labels(request: Request, context: QueryContext) -> list[Rows]:
     """Rows of one-pixel shots, by the label of each pixel."""
-    plane, plan, parts = request.scene.derived.label_plane(), context.plan, []
-    assert plane is not None  # the strategy has asked
+    assert request.view is not None  # the strategy has asked
+    plane, plan, parts = request.scene.derived.label_plane(request.view), context.plan, []
+    assert plane is not None  # so here
     labels, objects = plane.read(request.scene.items), request.stack.is_object
     plan.run("label plane", f"{plane.redrawn} px drawn anew", plane.redrawn * labels.itemsize)
     for begin in range(0, len(request.shots), PLACEMENTS_AT_ONCE):

@@ -33,6 +33,7 @@ from hitplanes.planes.common.limits import (
 )
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import meets
+from hitplanes.planes.scene.derived import OF_ALL, View
 from hitplanes.planes.scene.items import Items, Stack, boxes_in
 
 from ..kinds.placements import Placements, Shots
@@ -104,6 +105,16 @@ def pairs_of(boxes_xyxy: Ints, shot: Ints, shots: Shots, stack: Stack) -> Pairs:
 def may_refuse(stack: Stack, shots: Shots) -> bool:
     """Whether any shot may refuse any item."""
     return shots.choosy or stack.has_unmet
+
+
+def view_of(pierce: bool, shots: Shots) -> View | None:
+    """View of a batch: what all its shots accept; None if they accept different items."""
+    if not shots.choosy or not len(shots):
+        return OF_ALL[pierce]
+    meets, exclude = shots.meets, shots.exclude
+    if (meets != meets[0]).any() or (exclude != exclude[0]).any():
+        return None
+    return View(pierce, int(meets[0]), tuple(sorted(set(exclude[0].tolist()) - {-1})))
 
 
 def kinds(stack: Stack, rank: Ints, refuses: Bools | None) -> Kinds:

@@ -17,7 +17,7 @@ from .prefilter import refused
 if TYPE_CHECKING:
     from hitplanes.planes.bits.shadows import Blockers, Shelter
     from hitplanes.planes.bits.span_walk import Runs
-    from hitplanes.planes.bits.visible import View
+    from hitplanes.planes.scene.derived import View
 
 
 def blockers_of(scene: Scene, stack: Stack, sight: str, inside: str, view: View | None) -> Blockers | None:

@@ -16,11 +16,12 @@ from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
 from hitplanes.planes.common.costs import costs
 from hitplanes.planes.common.limits import STRUCTURES
+from hitplanes.planes.scene.derived import OF_ALL, View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.rays import RayWeapon, is_thin_first
-from .areas import OF_ALL, Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
+from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
 from .spans import QueryContext
@@ -94,15 +95,15 @@ def _labels_refuse(request: Request) -> str:
         return "shots are not one pixel"
     if request.blockers is not None:
         return SIGHTED
-    if request.view != OF_ALL[False] or request.stack.has_unmet:
-        return "shots refuse items, or pierce"
+    if request.view is None or request.view.pierce:
+        return "shots accept different items, or pierce"
     if request.filtered:
         return "a pre-filter is asked for"
     return "" if request.scene.derived.label_plane() is not None else "the scene has no bounds that fit one plane"
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    plane = request.scene.derived.label_plane()
+    plane = request.scene.derived.label_plane(request.view or OF_ALL[False])
     assert plane is not None  # else it refuses
     return costs().labels_call, _drawing_ns(plane, request.scene, request.stack)
 
@@ -236,14 +237,17 @@ class RayChoice(NamedTuple):
 
 
 def chosen_ray_way(
-    strategy: str, asked: bool, ray: RayWeapon, scene: Scene, stack: Stack, rays: int, prepared: bool = False
-) -> RayChoice:
+    strategy: str, asked: bool, ray: RayWeapon, scene: Scene, stack: Stack, view: View | None, rays: int,
+    prepared: bool = False,
+) -> RayChoice:  # fmt: skip
     """Choose the way of so many rays of a weapon.
 
     Parameters
     ----------
     strategy : argument of `fire`; a way that cannot serve is passed over, and any other name counts as "auto"
     asked : whether the caller named a pre-filter or a broad phase, which only the walk uses
+    view : what all rays accept; None if they accept different items: then they pass what they refuse cell by cell, and
+        compiled kernels cast faster
 
     Raises
     ------
@@ -261,7 +265,8 @@ def chosen_ray_way(
         return RayChoice("walk", f"{why}every ray walks")
     walk, cast, march = _ray_costs(rays, stack, prepared).values()
     why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
-    field, saved_ns = scene.derived.distance_field(), min(cast, walk) - march
+    marches = view is not None or not jit_is_on()
+    field, saved_ns = scene.derived.distance_field(view or OF_ALL[False]) if marches else None, min(cast, walk) - march
     if field is not None:
         why += f", {march / 1e3:.0f} us by march"
     other = RayChoice("cast" if cast < walk else "walk", why)

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hitplanes.planes.bits.span_walk import OF_PATTERNS
-from hitplanes.planes.bits.visible import View
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
 from hitplanes.planes.grid.fixed_point import snap, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Box, Spans
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
 

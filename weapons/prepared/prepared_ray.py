@@ -1,7 +1,7 @@
 """Prepared weapon of one thin ray that ends at its first hit: each shot is cast at the items, or marches.
 
-The way is chosen as `fire` chooses it (see `fire.strategy`). A ray that marches is cast if it comes to an item that
-the filter refuses, or to several pixels at once.
+The way is chosen as `fire` chooses it (see `fire.strategy`). A ray that marches is cast if it comes to several pixels
+at once.
 
 position, aim -> start and step, 1/256 px -> what is touched first -> a row, or none
 """
@@ -17,7 +17,7 @@ import numpy as np
 from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
 from hitplanes.planes.bits.raycast import Cast, Touched
 from hitplanes.planes.common.backend import cached_attribute
-from hitplanes.planes.common.checks import Bools, Ints
+from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
 from hitplanes.planes.scene.items import Stack
@@ -76,11 +76,10 @@ class ReadyRay(Ready[RayHits]):
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
         super().__init__(scene, weapon, kept)
-        self._ray, self._length, self._fades = ray, ray.length_256, ray.fades
+        self._ray, self._length, self._fades, self._view = ray, ray.length_256, ray.fades, kept.view(pierce=False)
         self._items, self._version, self._arrangement = scene.items, -1, -1
         self._lock = threading.Lock()
         self._stack: Stack
-        self._accepts: Bools | None
         self._first: Cast
         self._present: Present
         self._objects: memoryview
@@ -109,8 +108,8 @@ class ReadyRay(Ready[RayHits]):
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
         """What a ray touches first, by the way chosen now; the next rays go the same way unless it is pending."""
-        chosen = chosen_ray_way("auto", False, self._ray, self.scene, self._stack, 1, prepared=True)
-        given = self.scene, self._stack, self._accepts
+        chosen = chosen_ray_way("auto", False, self._ray, self.scene, self._stack, self._view, 1, prepared=True)
+        given = self.scene, self._stack, self._view
         first = cast = PREPARED["cast"](*given)
         if chosen.way == "march":
             march = PREPARED["march"](*given)
@@ -151,8 +150,7 @@ class ReadyRay(Ready[RayHits]):
                 return
             stack = self._stack = self._items.stack()
             if stack.forms != self._arrangement:
-                accepts = self._filter.view(pierce=False).accepts(stack)
-                self._accepts, self._arrangement = None if accepts.all() else accepts, stack.forms
+                self._arrangement = stack.forms
                 self._objects = np.where(stack.occluder, -1, stack.ids).data
             self._first = self._unsettled
             self._present = self._snapshot(version, stack)

@@ -2,9 +2,9 @@
 
 - The cast tests a thin ray against the boxes and pixels of all items. It leaves to the walk a ray of no length, and one
   that starts inside an item which its weapon does not hit there.
-- The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item. A
-  ray passes what its filter refuses cell by cell. It is left over if something else lies behind what it refuses, or
-  is touched at the same moment, or if the ray has no length.
+- The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item.
+  Both hold what all rays of the call accept. Rays that accept different items pass what they refuse cell by cell. One
+  is left over if something else lies behind what it refuses, or is touched at the same moment, or if it has no length.
 
 Rows are made at once; passes and stops when they are asked for. A ray walked one cell of the object that ended it.
 """
@@ -24,6 +24,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints, Labels
 from hitplanes.planes.common.limits import HALF, SUB
 from hitplanes.planes.grid.spans import meets
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -129,11 +130,12 @@ def _undecided(entry: Ints, ray: RayWeapon) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class _Planes:
-    """The planes of a scene as marching rays read them, and the filter of their shots."""
+    """The planes of a scene as marching rays read them, which hold what a view accepts, and the shots of the rays."""
 
     rays: Rays
     shots: Shots
     through: Range
+    view: View
     corner_xy: Ints
     labels: Labels
     distances: Clearance
@@ -178,7 +180,8 @@ class _Planes:
 
     def _has_occluder(self, cells: Ints) -> Bools:
         """Whether any occluder covers cells (n,)."""
-        stack, walls = self.through.stack, np.flatnonzero(self.through.stack.occluder)
+        stack = self.through.stack
+        walls = np.flatnonzero(stack.occluder & self.view.accepts(stack))
         xy, box = np.stack(self.place(cells), axis=1) + self.corner_xy, stack.box_xyxy[walls]
         pixel, wall = np.nonzero(meets(np.concatenate([xy, xy], axis=1)[:, None], box))
         x, y = (xy[pixel] - box[wall, :2]).T
@@ -190,8 +193,8 @@ class _Planes:
 def ends_by_march(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
     """Find the ends of rays, without `fraction`, by marching them; and the rays left to another way."""
     assert through.field is not None  # a scene without one is not marched through
-    corner_xy, choosy = through.field.corner_xy, may_refuse(through.stack, shots)
-    planes = _Planes(rays, shots, through, corner_xy, *_read(through, through.field))
+    corner_xy, choosy, view = through.field.corner_xy, through.choosy, through.field.labels.view
+    planes = _Planes(rays, shots, through, view, corner_xy, *_read(through, through.field))
     start_256 = rays.start_256 - SUB * corner_xy
     if choosy:
         entry, cell, several = distance_field.first_taken(planes.distances, start_256, rays.step_256, planes.passed)
@@ -244,15 +247,16 @@ ENGINES: dict[str, Callable[[Rays, RayWeapon, Shots, Range], tuple[Terminations,
 """Functions that find the ends of rays, by the names of `strategy.RAY_WAYS`."""
 
 
-def caster(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
-    """Function that casts one ray at the accepted items of a mask (M,), or at all."""
-    cast: Cast = kernels_of(raycast).caster(stack, scene.bounds, accepts)
+def caster(scene: Scene, stack: Stack, view: View) -> Cast:
+    """Function that casts one ray at the items that a view accepts."""
+    accepts = view.accepts(stack)
+    cast: Cast = kernels_of(raycast).caster(stack, scene.bounds, None if accepts.all() else accepts)
     return cast
 
 
-def marcher(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
-    """Like `caster`, by march; a ray that is refused, or comes to several cells at once, is UNDECIDED."""
-    field = scene.derived.distance_field()
+def marcher(scene: Scene, stack: Stack, view: View) -> Cast:
+    """Like `caster`, by march; a ray that comes to several cells at once is UNDECIDED."""
+    field = scene.derived.distance_field(view)
     assert field is not None
     plane = field.labels.read(scene.items)
     distances, (left, top) = field.read(scene.items, plane), field.corner_xy.tolist()
@@ -264,9 +268,7 @@ def marcher(scene: Scene, stack: Stack, accepts: Bools | None) -> Cast:
         if entry < 0 or several:
             return NOTHING if entry == NOTHING else UNDECIDED, 0, 0, -1
         row, column = divmod(cell, shape[1])
-        rank = ranks[labels[(row - PAD) * width + column - PAD] >> 1]
-        decided = accepts is None or accepts[rank]
-        return (entry, column + left, row + top, rank) if decided else (UNDECIDED, 0, 0, -1)
+        return entry, column + left, row + top, ranks[labels[(row - PAD) * width + column - PAD] >> 1]
 
     return march
 

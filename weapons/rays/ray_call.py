@@ -15,12 +15,13 @@ import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
+from hitplanes.planes.scene.derived import OF_ALL, View
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
-from ..fire.prefilter import Candidates, may_refuse
+from ..fire.prefilter import Candidates, may_refuse, view_of
 from ..fire.strategy import RAY_WAYS, RAYS_ASKED, RayChoice, chosen_candidates, chosen_ray_way, way_of_rest
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
@@ -58,7 +59,7 @@ def fired_rays(
     ray = parts[2]
     burst, several, _ = parts
     each = (burst.count if burst else 1) * (several.count if several else 1)
-    through, chosen, choose = _planned(scene, ray, each * len(shots), how, plan)
+    through, chosen, choose = _planned(scene, ray, view_of(False, shots), each * len(shots), how, plan)
     step = max(1, RAYS_AT_ONCE // each)
     rows: list[Rows] = []
     found: list[tuple[int, Walk | Made | FirstHits]] = []
@@ -88,30 +89,34 @@ def fired_rays(
 
 
 def _planned(
-    scene: Scene, ray: RayWeapon, count: int, how: tuple[str, str, str], plan: Plan
+    scene: Scene, ray: RayWeapon, view: View | None, count: int, how: tuple[str, str, str], plan: Plan
 ) -> tuple[Range, RayChoice, Choose]:
-    """Choose the way of so many rays, and what goes before it; `how` is (prefilter, broadphase, strategy) of `fire`."""
+    """Choose the way of so many rays of a view, and what goes before it.
+
+    `view` is None if they accept different items; `how` is (prefilter, broadphase, strategy) of `fire`.
+    """
     stack = read_stack(scene, plan)
     prefilter, broadphase, strategy = how
-    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, count)
+    chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, view, count)
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
     walks, asked = chosen.way == "walk", how[:2] != ("auto", "auto") or RAYS_ASKED.get(strategy, strategy) == "walk"
     track = not asked and has_track(ray)
     candidates = choose(count if walks and not track else 0)
-    field = scene.derived.distance_field() if chosen.way == "march" else None
+    field = scene.derived.distance_field(view or OF_ALL[False]) if chosen.way == "march" else None
     plan.run("plan", candidates.why if walks else chosen.why)
-    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track), chosen, choose
+    through = Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track, choosy=view is None)
+    return through, chosen, choose
 
 
 def first_ends(
-    scene: Scene, ray: RayWeapon, count: int, strategy: str = "auto"
+    scene: Scene, ray: RayWeapon, view: View | None, count: int
 ) -> Callable[[Shots], tuple[Rays, Terminations]]:
-    """Function that finds the ends of the rays of shots of one ray each, planned for so many rays in all.
+    """Function that finds the ends of the rays of shots of one ray each, planned for so many rays of a view in all.
 
     Rays end at the first thing that they meet. Rows, passes and stops are not made.
     """
     keep_arena()
-    through, chosen, choose = _planned(scene, ray, count, ("auto", "auto", strategy), Plan())
+    through, chosen, choose = _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan())
 
     def ends_of(shots: Shots) -> tuple[Rays, Terminations]:
         rays = rays_of((None, None, ray), shots)

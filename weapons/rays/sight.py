@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, array_of, real, reals
 from hitplanes.planes.common.limits import ALL, REACH_MAX, SUB
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import category_bits, check_owners, moments_of, present_of
+from ..fire.prefilter import view_of
 from ..kinds.placements import Shots, places_256, unaimed_shots
 from ..kinds.rays import Pistol
 from .contacts import Rays, Reason, Terminations
@@ -63,12 +63,9 @@ def sees(
         If an argument is invalid; the text names the argument and the row.
     """
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
-    if isinstance(scene, Scene) and scene.items.stack().occluder.all():
-        shots = _shots("eyes", eyes, scene, ALL, blocked_by, exclude)  # rays that refuse nothing march faster
-    strategy = "cast" if shots.choosy and jit_is_on() else "auto"  # a march stops at all that does not block
     targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
-    for pair, _, ends in _ends(scene, tick, Pistol(None), seen.shape, _gazes(shots, targets_256), strategy):
+    for pair, _, ends in _ends(scene, tick, Pistol(None), shots, seen.shape, _gazes(shots, targets_256)):
         seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
     return seen
 
@@ -121,7 +118,7 @@ def scan(
     shots, ray = _shots("at", at, scene, accept, blocked_by, exclude), Pistol(real("range", range, 0, REACH_MAX))
     shape, aimed = _beams(shots, angles)
     distance = np.full(shape, np.inf)
-    for beam, rays, ends in _ends(scene, tick, ray, shape, aimed):
+    for beam, rays, ends in _ends(scene, tick, ray, shots, shape, aimed):
         met = np.flatnonzero(ends.rank >= 0)
         lines = lines_of(rays, ray).take(met)
         distance.reshape(-1)[beam[met]] = ends.time[met] / lines.scale * lines.length
@@ -160,14 +157,14 @@ def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
 
 
 def _ends(
-    scene: Scene | History, tick: object, ray: Pistol, shape: tuple[int, ...], aimed: Aimed, strategy: str = "auto"
+    scene: Scene | History, tick: object, ray: Pistol, shots: Shots, shape: tuple[int, ...], aimed: Aimed
 ) -> Iterator[tuple[Ints, Rays, Terminations]]:
-    """Follow the rays of a table (N, M), whose rows are places: cells (n,), their rays, and the ends of these."""
-    places, each = shape
+    """Follow the rays of a table (N, M), whose rows are the places of shots: cells (n,), their rays, and their ends."""
+    (places, each), view = shape, view_of(False, shots)
     for moment, rows in moments_of(scene, tick, places):
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
-        ends_of = first_ends(moment, ray, len(cells), strategy)
+        ends_of = first_ends(moment, ray, view, len(cells))
         for begin in range(0, len(cells), RAYS_AT_ONCE):
-            some, shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
+            some, aimed_shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
             if len(some):
-                yield some, *ends_of(shots)
+                yield some, *ends_of(aimed_shots)
