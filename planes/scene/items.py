@@ -155,7 +155,9 @@ def _is_there(boxes: Ints | Box) -> bool:
     """Whether any of some boxes (n, 4), or a single box, holds a pixel."""
     if isinstance(boxes, tuple):
         return boxes[0] <= boxes[2]
-    return bool((boxes[:, 0] <= boxes[:, 2]).any())
+    if not len(boxes):
+        return False
+    return bool(boxes[0, 0] <= boxes[0, 2] or (boxes[:, 0] <= boxes[:, 2]).any())  # the first tells most often
 
 
 class Role(Enum):
