@@ -566,7 +566,7 @@ print(*(name for name in set(sys.modules) - before if name.split(".")[0] in ("hi
 START = "from hitplanes import Disc, Pistol, Scene, fire; scene = Scene((99, 99)); fire"
 SHOT = "scene.add([[True] * 9] * 9, (20, 20)); assert fire(scene, {}, (20, 20), strategy='direct')"
 OF_SCENES = (
-    "bits.bit_rows bits.cells bits.front_to_back bits.label_plane bits.span_walk bits.tiles bits.visible"
+    "bits.bit_rows bits.cells bits.front_to_back bits.span_walk bits.tiles"
     " common.backend common.checks common.costs common.limits common.tables grid.fixed_point"
     " grid.rasterize grid.spans late scene.derived scene.items scene.poses scene.scene"
     " scene.sprite scene.variants"
@@ -595,6 +595,7 @@ def test_what_is_loaded_by_importing_and_by_a_shot() -> None:
     assert loaded(START, SHOT.format("Disc(3)")) == set()
     of_ray = {f"hitplanes.weapons.{name}" for name in OF_A_RAY.split()} | {
         "hitplanes.planes.bits.distance_field",
+        "hitplanes.planes.bits.label_plane",
         "hitplanes.planes.bits.raycast",
         "hitplanes.weapons.rays",
     }

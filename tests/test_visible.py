@@ -107,18 +107,18 @@ def test_few_placements_do_without_lists(jit: bool, corner: tuple[int, int]) -> 
 def test_many_placements_are_worth_lists_and_those_that_are_there_cost_nothing() -> None:
     visible_set = VisibleSet(*what(crowd()))
     small, large = np.array([-3, -3, 3, 3]), np.array([-40, -40, 40, 40])
-    cells, made = visible_set.cells_for(small, WITHOUT_MOST + 1)
-    assert made == cells.nbytes > 0 and visible_set.cells_for(small, 1) == (cells, 0)
+    cells, made = visible_set.cells_for(small[None], WITHOUT_MOST + 1)
+    assert made == cells.nbytes > 0 and visible_set.cells_for(small[None], 1) == (cells, 0)
     for _ in range(2):
-        assert visible_set.cells_for(large, WITHOUT_MOST) == (None, 0)
-    assert visible_set.cells_for(large, WITHOUT_MOST + 1)[1] > 0
+        assert visible_set.cells_for(large[None], WITHOUT_MOST) == (None, 0)
+    assert visible_set.cells_for(large[None], WITHOUT_MOST + 1)[1] > 0
 
 
 def test_pairs_of_placements_and_tiles_that_are_compared_are_not_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     visible_set = VisibleSet(*what(crowd()))
     monkeypatch.setattr(visible, "PAIRS_MOST", 2 * len(visible_set.seen.rank))
     reach = np.array([-3, -3, 3, 3])
-    assert visible_set.cells_for(reach, 2)[1] == 0 and visible_set.cells_for(reach, 3)[1] > 0
+    assert visible_set.cells_for(reach[None], 2)[1] == 0 and visible_set.cells_for(reach[None], 3)[1] > 0
 
 
 def what(scene: Scene) -> Any:
@@ -127,7 +127,7 @@ def what(scene: Scene) -> Any:
 
 def test_nothing_can_be_seen_of_no_objects(jit: bool) -> None:
     visible_set = VisibleSet(*what(Scene()))
-    assert visible_set.cells_for(np.array([-3, -3, 3, 3]), 1) == (None, 0) and not len(visible_set.seen.rank)
+    assert visible_set.cells_for(np.array([[-3, -3, 3, 3]]), 1) == (None, 0) and not len(visible_set.seen.rank)
     assert not fire(Scene(), Disc(3), (0, 0), strategy="visible")
 
 

@@ -198,6 +198,12 @@ class LabelPlane(Derivative):
             self.labels, self._dirty, self._cost = labels, [], 0
             return labels
 
+    def front(self, labels: Labels, at_256: Ints, objects: Bools) -> Front:
+        """Objects in front at positions (N, 2), by labels that were read; see `front_at`."""
+        kernels, cells = kernels_of(sys.modules[__name__]), self.cells(len(at_256))
+        front: Front = kernels.front_at(labels, cells, self.box_xyxy, at_256, objects)
+        return front
+
     def cells(self, looks: int) -> Bools | None:
         """The coarse map, once enough pixels were looked up since the last change to pay for it; else None.
 

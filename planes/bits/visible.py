@@ -92,8 +92,12 @@ class VisibleSet:
         boxes = self.seen.box_xyxy
         return self._cells.get(tuple(reach_xyxy.tolist()), lambda: cells.cells_of(boxes, reach_xyxy, SHOT_BITS))
 
-    def cells_for(self, reach_xyxy: Ints, placements: int) -> tuple[Cells | None, int]:
-        """Cells for a number of placements, and the bytes newly made; None for a few, which look at all tiles."""
+    def cells_for(self, boxes_xyxy: Ints, placements: int) -> tuple[Cells | None, int]:
+        """Cells for placements of patterns with boxes (n, 4), and the bytes newly made; None for few placements.
+
+        Those look at all tiles.
+        """
+        reach_xyxy = _reach(boxes_xyxy)
         reach = tuple(reach_xyxy.tolist())
         if reach in self._cells.values:
             return self.cells(reach_xyxy), 0
@@ -107,6 +111,14 @@ class VisibleSet:
         """Bytes of the visible tiles."""
         seen = self.seen
         return sum(int(column.nbytes) for column in (seen.rank, seen.box_xyxy, seen.begin, seen.words))
+
+
+def _reach(boxes_xyxy: Ints) -> Ints:
+    """Box around all patterns; around several it is rounded outward, so that its cells serve the next call, too."""
+    if len(boxes_xyxy) == 1:
+        return np.asarray(boxes_xyxy[0])
+    low, high = boxes_xyxy[:, :2].min(axis=0), boxes_xyxy[:, 2:].max(axis=0)
+    return np.concatenate([low >> SHOT_BITS << SHOT_BITS, -(-high >> SHOT_BITS << SHOT_BITS)])
 
 
 class Visible(Derivative):

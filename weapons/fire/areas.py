@@ -17,13 +17,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hitplanes.planes.bits import front_to_back, label_plane
+from hitplanes.planes.bits import front_to_back
 from hitplanes.planes.bits.bit_rows import NO_SUMS, PatternBits, Placed
 from hitplanes.planes.bits.cells import met_boxes
 from hitplanes.planes.bits.front_to_back import NO_FLAGS, OrderedTiles, RoundHits, Rule
 from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
 from hitplanes.planes.bits.tiles import Ground, hit_by_few
-from hitplanes.planes.bits.visible import SHOT_BITS
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
@@ -240,7 +239,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     plan.run("visible set", "what can be seen of all objects", 0 if kept else visible_set.nbytes)
     for begin, _, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
         windows = _windows(placements, plan)
-        listed, made = visible_set.cells_for(_reach(windows.box_xyxy), len(placements))
+        listed, made = visible_set.cells_for(windows.box_xyxy, len(placements))
         text = "all tiles" if listed is None else f"cells of {1 << listed.bits} px"
         plan.run("pre-filter", text + ", strips" * bool(len(windows.strips)), made)
         found = kernels_of(front_to_back).front_to_back(
@@ -249,14 +248,6 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
         parts.append(_rows_of(placements, found, request.stack.ids).later(begin))
         plan.run("samples", "counted by bit rows", parts[-1].nbytes)
     return parts
-
-
-def _reach(boxes_xyxy: Ints) -> Ints:
-    """Box around all patterns; around several it is rounded outward, so that its cells serve the next call, too."""
-    if len(boxes_xyxy) == 1:
-        return np.asarray(boxes_xyxy[0])
-    low, high = boxes_xyxy[:, :2].min(axis=0), boxes_xyxy[:, 2:].max(axis=0)
-    return np.concatenate([low >> SHOT_BITS << SHOT_BITS, -(-high >> SHOT_BITS << SHOT_BITS)])
 
 
 def _parts(request: Request, first: int, most: int, candidates: Candidates) -> Iterator[tuple[int, Shots, Placements]]:
@@ -323,7 +314,7 @@ def by_labels(request: Request, context: QueryContext) -> list[Rows]:
     plan.run("label plane", f"{plane.redrawn} px drawn anew", plane.redrawn * labels.itemsize)
     for begin in range(0, len(request.shots), PLACEMENTS_AT_ONCE):
         at_256 = request.shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
-        front = kernels_of(label_plane).front_at(labels, plane.cells(len(at_256)), plane.box_xyxy, at_256, objects)
+        front = plane.front(labels, at_256, objects)
         rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
         plan.run("samples", "one label for each", rows.nbytes)
         parts.append(rows.later(begin))
