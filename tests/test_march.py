@@ -157,6 +157,9 @@ def single(rng: random.Random, count: int) -> Battle:
     if rng.random() < 0.6:  # nothing is refused
         shots = [replace(shot, accept=ALL, exclude=()) for shot in shots]
         bodies = [replace(body, categories=body.categories or 1) for body in bodies]
+    elif rng.random() < 0.8:  # all refuse the same
+        filters = {name: getattr(shots[0], name) for name in ("accept", "blocked_by", "exclude")}
+        shots = [replace(shot, **filters) for shot in shots]
     bounds = rng.choice([(0, 0, 11, 9), (2, 1, 7, 8), (-20, -20, 40, 40)])
     return replace(battle, gun=gun, shots=shots, bodies=bodies, bounds=bounds)
 
@@ -225,10 +228,14 @@ def test_a_refused_occluder_does_not_come_first_at_a_corner(kernels: ModuleType)
     """It lies under an object of the lower side, and makes that side no better than the upper one."""
     sides = [body((1, 0)), body((0, 1), layer=2), body((0, 1), occluder=True, categories=2)]
     shots = [Shot((-3.0, -3.0), (6.0, 6.0), blocked_by=bits, number=k) for k, bits in enumerate((1, 3, ALL))]
-    battle = Battle(Gun("pistol"), shots, sides, (-9, -9, 9, 9))
-    hits = battle.fired(strategy="march")
-    check_columns(hits, battle.walks(), None)
-    assert hits.object.tolist() == [0, 1, 1]
+    found = []
+    for shot in shots:
+        battle = Battle(Gun("pistol"), [shot, replace(shot, number=9)], sides, (-9, -9, 9, 9))
+        hits = battle.fired(strategy="march")
+        check_columns(hits, battle.walks(), None)
+        assert hits.plan.has_run("march")
+        found.append(hits.object.tolist())
+    assert found == [[0, 0], [1, 1], [1, 1]]
 
 
 def test_rays_of_any_reach(kernels: ModuleType) -> None:
@@ -408,8 +415,8 @@ def test_the_plan_tells_what_was_lost_without_a_field() -> None:
     assert told[0] != told[1]
 
 
-def test_few_are_left_to_walk() -> None:
-    """Only those that refuse what lies in front of something, and others do not; the others walk not one cell."""
+def test_rays_that_accept_different_items_do_not_march() -> None:
+    """Others walk not one cell, whatever they refuse, also what lies in front of something."""
     scene = Scene((60, 60))
     for x in (20, 40, 41):
         scene.add(np.ones((5, 5), np.bool_), (x, 20))
@@ -422,10 +429,9 @@ def test_few_are_left_to_walk() -> None:
     hits = fire(scene, Pistol(None), toward[:1] * 2, toward=at[:1] * 2, exclude=2, strategy="march")
     assert hits.object.tolist() == [1, 1] and hits.plan.has_left_out("walk") and hits.plan.has_left_out("cast")
     hits = fire(scene, Pistol(None), toward[:1] * 2, toward=at[:1] * 2, exclude=[2, -1], strategy="march")
-    assert hits.object.tolist() == [1, 2] and hits.plan.has_run("cast") and not hits.plan.has_run("walk")
-    others = [2] * 98 + [-1]
-    hits = fire(scene, Pistol(None), toward[:1] * 99, toward=at[:1] * 99, exclude=others, strategy="march")
-    assert hits.object.tolist() == [1] * 98 + [2] and hits.plan.has_run("walk") and not hits.plan.has_run("cast")
+    assert hits.object.tolist() == [1, 2] and not hits.plan.has_run("march")
+    whys = {stage.name: stage.why for stage in hits.plan.left_out}
+    assert whys["march"].startswith("march is passed over: rays accept different items; ")
 
 
 @pytest.mark.parametrize("seed", range(4))

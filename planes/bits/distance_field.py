@@ -16,7 +16,7 @@ and each step looks at the cell on the other side.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -59,7 +59,6 @@ ONE_BY_ONE = 4
 """Most rays of a call that are followed one by one from the start."""
 
 Clearance = npt.NDArray[np.uint8]
-Passed = Callable[[Ints, Ints], Bools]
 
 
 def distances_of(taken: Bools) -> Clearance:
@@ -91,17 +90,13 @@ def _spread(distance: Clearance) -> None:
             np.minimum(here, farther, out=here)
 
 
-def first_taken(
-    distances: Clearance, start_256: Ints, step_256: Ints, passed: Passed | None = None
-) -> tuple[Ints, Ints, Bools]:
+def first_taken(distances: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
     """The first cell of each ray that is taken.
 
     Parameters
     ----------
     distances : (H, W) of `distances_of`
     start_256, step_256 : (R, 2) rays, relative to the middle of pixel [0, 0] of `distances`, up to 2**48
-    passed : function of rays and taken cells: whether the ray goes on as if the cell were free; it may always return
-        False. The compiled kernel has none
 
     Returns
     -------
@@ -112,7 +107,7 @@ def first_taken(
         starts, those on both sides of a border, or this cell, the one beside a corner along y, and the one behind
     """
     count = len(start_256)
-    if count <= ONE_BY_ONE and passed is None:
+    if count <= ONE_BY_ONE:
         return _each(distances, start_256, step_256)
     entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
     start, step = np.ascontiguousarray(start_256.T), np.ascontiguousarray(step_256.T)
@@ -124,23 +119,17 @@ def first_taken(
     if len(between):
         others = np.delete(np.arange(len(n)), between)
         rays, n, columns = rays[others], n[others], columns[:, others]
-    found.append(_follow(flat, rays, n, columns, cell, several, passed))
+    found.append(_follow(flat, rays, n, columns, cell, several))
     hit_rays = np.concatenate(found)
     entry[hit_rays] = _entries(cell[hit_rays], distances.shape[1], start[:, hit_rays], step[:, hit_rays])
     return entry, cell, several
 
 
-def _follow(
-    flat: Clearance, rays: Ints, n: Floats, columns: Floats, cell: Ints, several: Bools, passed: Passed | None
-) -> Ints:
+def _follow(flat: Clearance, rays: Ints, n: Floats, columns: Floats, cell: Ints, several: Bools) -> Ints:
     """March rays, one jump each in turn, until all are done; return those that hit, and fill `cell` and `several`."""
     found: list[Ints] = []
-    few = FEW if passed is None else 0
-    while len(n) > few:
+    while len(n) > FEW:
         k, at_corner, jump = _looked(flat, columns, n)
-        if passed is not None:
-            at = np.flatnonzero((jump == 0) & ~at_corner)
-            jump[at] = passed(rays[at], k[at])
         n += jump
         np.minimum(n, columns[6], out=n)
         live = n < columns[6]

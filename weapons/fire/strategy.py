@@ -205,16 +205,20 @@ def _ray_costs(rays: int, stack: Stack, prepared: bool = False) -> dict[str, flo
     return {"walk": walk, "cast": now.cast_call + cast, "march": now.march_call + rays * now.march_ray}
 
 
-def _not_cast(ray: RayWeapon, _: Scene) -> str:
+def _not_cast(ray: RayWeapon, *_: object) -> str:
     return "" if is_thin_first(ray) else "only thin rays that end at their first hit do"
 
 
-def _not_marched(ray: RayWeapon, scene: Scene) -> str:
-    return _not_cast(ray, scene) or ("" if scene.derived.distance_field() else "no bounds that fit one plane")
+def _not_marched(ray: RayWeapon, scene: Scene, view: View | None) -> str:
+    if why := _not_cast(ray):
+        return why
+    if view is None:
+        return "rays accept different items"
+    return "" if scene.derived.distance_field(view) else "no bounds that fit one plane"
 
 
-RAY_WAYS: dict[str, Callable[[RayWeapon, Scene], str]] = {
-    "walk": lambda _, __: "", "cast": _not_cast, "march": _not_marched
+RAY_WAYS: dict[str, Callable[[RayWeapon, Scene, View | None], str]] = {
+    "walk": lambda *_: "", "cast": _not_cast, "march": _not_marched
 }  # fmt: skip
 """Why each way of rays cannot serve a weapon at a scene, or "". The walk is the reference, and follows any ray.
 
@@ -246,8 +250,7 @@ def chosen_ray_way(
     ----------
     strategy : argument of `fire`; a way that cannot serve is passed over, and any other name counts as "auto"
     asked : whether the caller named a pre-filter or a broad phase, which only the walk uses
-    view : what all rays accept; None if they accept different items: then they pass what they refuse cell by cell, and
-        compiled kernels cast faster
+    view : what all rays accept; None if they accept different items, and so cannot march
 
     Raises
     ------
@@ -257,7 +260,7 @@ def chosen_ray_way(
     choice("strategy", strategy, STRATEGIES)
     name = RAYS_ASKED.get(strategy, strategy)
     forced = RAY_WAYS.get(name)
-    passed_over = forced(ray, scene) if forced else ""
+    passed_over = forced(ray, scene, view) if forced else ""
     if forced and not passed_over:
         return RayChoice(name, "asked for")
     why = f"{name} is passed over: {passed_over}; " if passed_over else ""
@@ -265,8 +268,7 @@ def chosen_ray_way(
         return RayChoice("walk", f"{why}every ray walks")
     walk, cast, march = _ray_costs(rays, stack, prepared).values()
     why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
-    marches = view is not None or not jit_is_on()
-    field, saved_ns = scene.derived.distance_field(view or OF_ALL[False]) if marches else None, min(cast, walk) - march
+    field, saved_ns = None if view is None else scene.derived.distance_field(view), min(cast, walk) - march
     if field is not None:
         why += f", {march / 1e3:.0f} us by march"
     other = RayChoice("cast" if cast < walk else "walk", why)

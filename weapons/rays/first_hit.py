@@ -3,8 +3,7 @@
 - The cast tests a thin ray against the boxes and pixels of all items. It leaves to the walk a ray of no length, and one
   that starts inside an item which its weapon does not hit there.
 - The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item.
-  Both hold what all rays of the call accept. Rays that accept different items pass what they refuse cell by cell. One
-  is left over if something else lies behind what it refuses, or is touched at the same moment, or if it has no length.
+  Both hold what all rays of the call accept. A ray of no length is left over.
 
 Rows are made at once; passes and stops when they are asked for. A ray walked one cell of the object that ended it.
 """
@@ -29,7 +28,7 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Rows
-from ..fire.prefilter import may_refuse, refused
+from ..fire.prefilter import may_refuse
 from ..kinds.placements import ONES, Shots
 from ..kinds.rays import RayWeapon
 from .contacts import Contacts, Rays, Reason, Terminations, Touches, endless, reasons_at
@@ -130,11 +129,9 @@ def _undecided(entry: Ints, ray: RayWeapon) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class _Planes:
-    """The planes of a scene as marching rays read them, which hold what a view accepts, and the shots of the rays."""
+    """The planes of a scene as marching rays read them, which hold what a view accepts."""
 
-    rays: Rays
-    shots: Shots
-    through: Range
+    stack: Stack
     view: View
     corner_xy: Ints
     labels: Labels
@@ -149,24 +146,11 @@ class _Planes:
         """Rank of the front-most item of taken cells, and their labels."""
         x, y = self.place(cell)
         code = self.labels.reshape(-1).take((y - PAD) * self.labels.shape[1] + (x - PAD))
-        return self.through.stack.rank_by_code.take(code >> 1), code
+        return self.stack.rank_by_code.take(code >> 1), code
 
-    def refuses(self, ray: Ints, rank: Ints) -> Bools:
-        """Whether rays refuse items."""
-        plan = self.through.plan
-        plan.run("march", "")
-        found = refused(self.through.stack, rank, self.shots, self.rays.shot[ray])
-        plan.run("filter", "categories and owners", found.nbytes)
-        return found
-
-    def passed(self, ray: Ints, cell: Ints) -> Bools:
-        """Whether rays refuse all items of taken cells."""
-        rank, code = self.front(cell)
-        return np.asarray(self.refuses(ray, rank) & (code & 1 == 0))
-
-    def first_of(self, cells: Ints) -> tuple[Ints, Bools]:
-        """First of the cells (n, 4) that rays enter at the same moment, and whether several of them are taken."""
-        stack, taken = self.through.stack, self.distances.reshape(-1)[cells] == 0
+    def first_of(self, cells: Ints) -> Ints:
+        """First of the cells (n, 4) that rays enter at the same moment."""
+        stack, taken = self.stack, self.distances.reshape(-1)[cells] == 0
         blocked = np.zeros_like(taken)
         if stack.has_occluders:
             rank, code = self.front(cells[taken])
@@ -174,13 +158,11 @@ class _Planes:
             behind = np.flatnonzero(~blocks & (code & 1 == 1))
             blocks[behind] = self._has_occluder(cells[taken][behind])
             blocked[taken] = blocks
-        last = np.where(taken, cells, -1).max(axis=1, keepdims=True)
-        best = first_at_once(taken, blocked, cells)
-        return cells[np.arange(len(cells)), best], (taken & (cells != last)).any(axis=1)
+        return np.asarray(cells[np.arange(len(cells)), first_at_once(taken, blocked, cells)])
 
     def _has_occluder(self, cells: Ints) -> Bools:
         """Whether any occluder covers cells (n,)."""
-        stack = self.through.stack
+        stack = self.stack
         walls = np.flatnonzero(stack.occluder & self.view.accepts(stack))
         xy, box = np.stack(self.place(cells), axis=1) + self.corner_xy, stack.box_xyxy[walls]
         pixel, wall = np.nonzero(meets(np.concatenate([xy, xy], axis=1)[:, None], box))
@@ -193,26 +175,20 @@ class _Planes:
 def ends_by_march(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
     """Find the ends of rays, without `fraction`, by marching them; and the rays left to another way."""
     assert through.field is not None  # a scene without one is not marched through
-    corner_xy, choosy, view = through.field.corner_xy, through.choosy, through.field.labels.view
-    planes = _Planes(rays, shots, through, view, corner_xy, *_read(through, through.field))
+    corner_xy = through.field.corner_xy
+    planes = _Planes(through.stack, through.field.labels.view, corner_xy, *_read(through, through.field))
     start_256 = rays.start_256 - SUB * corner_xy
-    if choosy:
-        entry, cell, several = distance_field.first_taken(planes.distances, start_256, rays.step_256, planes.passed)
-    else:
-        entry, cell, several = kernels_of(distance_field).first_taken(planes.distances, start_256, rays.step_256)
-    left, met, at = _undecided(entry, ray), np.flatnonzero(entry >= 0), np.flatnonzero(several)
+    entry, cell, several = kernels_of(distance_field).first_taken(planes.distances, start_256, rays.step_256)
+    met, at = np.flatnonzero(entry >= 0), np.flatnonzero(several)
     if len(at):
         starts, width = entry[at] == 0, planes.distances.shape[1]
-        cell[at], several[at] = planes.first_of(_at_once(cell[at], starts, start_256[at], rays.step_256[at], width))
-        left |= several & choosy
+        cell[at] = planes.first_of(_at_once(cell[at], starts, start_256[at], rays.step_256[at], width))
     rank, _ = planes.front(cell[met])
-    if choosy:
-        left[met] |= planes.refuses(met, rank)
     x, y = planes.place(cell[met])
     found = Touched(entry[met], x + corner_xy[0], y + corner_xy[1], rank)
     ends = _ended(met, found, rays.origin_xy, through.stack)
     through.plan.run("march", "each ray to the first cell that is taken", ends.nbytes)
-    return ends, np.flatnonzero(left)
+    return ends, np.flatnonzero(_undecided(entry, ray))
 
 
 def _read(through: Range, field: DistanceField) -> tuple[Labels, Clearance]:

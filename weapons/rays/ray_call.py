@@ -15,7 +15,7 @@ import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
-from hitplanes.planes.scene.derived import OF_ALL, View
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
@@ -102,10 +102,9 @@ def _planned(
     walks, asked = chosen.way == "walk", how[:2] != ("auto", "auto") or RAYS_ASKED.get(strategy, strategy) == "walk"
     track = not asked and has_track(ray)
     candidates = choose(count if walks and not track else 0)
-    field = scene.derived.distance_field(view or OF_ALL[False]) if chosen.way == "march" else None
+    field = scene.derived.distance_field(view) if view and chosen.way == "march" else None
     plan.run("plan", candidates.why if walks else chosen.why)
-    through = Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track, choosy=view is None)
-    return through, chosen, choose
+    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track), chosen, choose
 
 
 def first_ends(

@@ -62,9 +62,9 @@ class Looked:
 class Range:
     """The items that rays are tested against, and the records of the work.
 
-    `field` is that of a scene within bounds, for rays that march; it holds what all of them accept, unless they are
-    `choosy`: each accepts items of its own. `looked` is set only for a report; `whole` follows
-    rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell by cell, and all boxes are compared.
+    `field` is that of a scene within bounds, for rays that march; it holds what all of them accept. `looked` is set
+    only for a report; `whole` follows rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell
+    by cell, and all boxes are compared.
     """
 
     items: Items
@@ -76,7 +76,6 @@ class Range:
     whole: bool = False
     field: DistanceField | None = None
     tracked: bool = False
-    choosy: bool = False
 
 
 # house: way of rays
