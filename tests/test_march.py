@@ -36,6 +36,8 @@ from hitplanes import (
 )
 from hitplanes.planes.bits import distance_field
 from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.scene import derived
+from hitplanes.planes.scene.derived import View
 from hitplanes.weapons.fire.plan import Plan
 from hitplanes.weapons.rays import ray_call
 
@@ -455,6 +457,24 @@ def test_each_filter_marches_through_a_plane_of_its_own(seed: int, jit: bool) ->
         assert [found.stops_at(k) for k in range(400)] == [slow.stops_at(k) for k in range(400)]
         points = fire(scene, Point(), at, **how, strategy="labels")
         assert points == fire(scene, Point(), at, **how, strategy="spans") and points.plan.has_run("label plane")
+
+
+def test_planes_of_the_last_filters_are_kept_and_a_large_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(derived, "PLANES_BYTES", 5 * 3 * 90 * 70)
+    scene = Scene((90, 70))
+    views = [View(False, 1 << k, ()) for k in range(4)]
+    fields = [scene.derived.distance_field(view) for view in views[:3]]
+    assert all(scene.derived.distance_field(view) is field for view, field in zip(views, fields, strict=False))
+    assert all(field is not None and field.labels is scene.derived.label_plane(field.labels.view) for field in fields)
+    scene.derived.distance_field(views[3])
+    assert (
+        scene.derived.distance_field(views[1]) is fields[1] and scene.derived.distance_field(views[0]) is not fields[0]
+    )
+    monkeypatch.setattr(derived, "PLANES_BYTES", 9)
+    large = Scene((90, 70))
+    only = large.derived.distance_field(views[0])
+    assert only is large.derived.distance_field(views[0]) is not None
+    assert large.derived.distance_field(views[1]) is not only is not large.derived.distance_field(views[0])
 
 
 @example(1)

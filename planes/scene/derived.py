@@ -36,7 +36,8 @@ Made = TypeVar("Made")
 
 NEVER = -1  # a version before all others
 VIEWS_MOST = 8  # most visible sets of a scene, one for each view
-PLANES_MOST = 4  # most label planes of a scene, and most distance fields; each takes some bytes a pixel
+PLANES_BYTES = 2**26  # most memory of the label planes and distance fields of a scene; a larger one is kept alone
+PIXEL_BYTES = 5  # of a label and a distance, at most
 AGAIN_MOST = 8  # most things of a scene that are made when they are asked for a second time
 
 
@@ -93,8 +94,10 @@ class Derived:
     def __init__(self, bounds: Box | None) -> None:
         self._bounds = bounds
         self._visible: LruCache[View, Visible] = LruCache(VIEWS_MOST, lambda _: 1)
-        self._planes: LruCache[View, LabelPlane] = LruCache(PLANES_MOST, lambda _: 1)
-        self._fields: LruCache[View, DistanceField] = LruCache(PLANES_MOST, lambda _: 1)
+        self._planes: LruCache[View, LabelPlane] = LruCache(PLANES_BYTES, lambda plane: PIXEL_BYTES * plane.size)
+        self._fields: LruCache[View, DistanceField] = LruCache(
+            PLANES_BYTES, lambda field: PIXEL_BYTES * field.labels.size
+        )
         self._indexes: dict[str, Index] = {}
         self._again: LruCache[Hashable, list[Any]] = LruCache(AGAIN_MOST, lambda _: 1)
 
