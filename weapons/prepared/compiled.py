@@ -25,8 +25,9 @@ from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import WEIGHT_FULL
+from hitplanes.planes.jit import bit_rows
 from hitplanes.planes.jit.areas import KEY, NOBODY, RANK, SAMPLES, X, Y, match
-from hitplanes.planes.jit.bit_rows import EVERYWHERE, FEW_ROWS, cell_at
+from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
@@ -103,6 +104,20 @@ def address(array: Any) -> int:
     """Address of an array's first value."""
     assert array.flags.c_contiguous
     return int(array.__array_interface__["data"][0])
+
+
+NUMBERS = types.Array(types.int64, 1, "C", readonly=True)
+
+
+@compiled(types.void(types.int64[::1], *[NUMBERS] * 4, BOXES, NUMBERS, bit_rows.WORDS, FLAGS, NUMBERS, BOXES))
+def _put_addresses(here, listed, begin, item, rank, box, word_of, words, blocks, near, out):
+    """Write the addresses of the columns of the tiles to the fields of a scene, from LISTED on."""
+    addresses = (
+        listed.ctypes.data, begin.ctypes.data, item.ctypes.data, rank.ctypes.data, box.ctypes.data,
+        word_of.ctypes.data, words.ctypes.data, blocks.ctypes.data, near.ctypes.data, out.ctypes.data,
+    )  # fmt: skip
+    for k in range(len(addresses)):
+        here[LISTED + k] = addresses[k]
 
 
 # house: way of areas
@@ -201,13 +216,9 @@ class PositionCache:
     def _place(self, tiles: OrderedTiles, cells: Cells, stack: Stack, told: tuple[int, ...]) -> None:
         """Write the addresses of the tiles to the fields of the scene."""
         columns = tuple(map(np.ascontiguousarray, (cells.listed, cells.begin, stack.ids, *tiles[:5])))
-        listed, begin, item, rank, box, word_of, words, blocks = map(address, columns)
         near = np.empty(len(tiles.rank), np.int64)
-        here = (
-            *told, *cells[:5], len(tiles.rank), len(tiles.occluder), listed, begin, item, rank, box, word_of, words,
-            blocks, address(near), address(self._out),
-        )  # fmt: skip
-        self._here[:] = np.array(here, np.int64)
+        self._here[:LISTED] = *told, *cells[:5], len(tiles.rank), len(tiles.occluder)
+        _put_addresses(self._here, *columns, near, self._out)
         self._kept = columns, near  # last, because another thread may still read the old columns
 
     def look(self, one: Round) -> tuple[Look, int]:
