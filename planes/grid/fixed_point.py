@@ -136,6 +136,10 @@ def quarters(c: int, s: int) -> tuple[int, int, int]:
     return k, c, s
 
 
+FEW_ANGLES = 8
+"""Most angles that are split one by one."""
+
+
 @lru_cache(maxsize=ANGLES_KEPT)
 def quarter_turns(degrees: float) -> tuple[int, int, int]:
     """Split an angle into k quarter turns and a rest in [-45, 45), as (k mod 4, cos, sin) of the rest.
@@ -154,8 +158,8 @@ def quarter_turns(degrees: float) -> tuple[int, int, int]:
 
 def all_quarter_turns(degrees: Sequence[float]) -> list[list[int]]:
     """`quarter_turns` of angles, as three columns."""
-    if len(degrees) == 1:  # an array costs more than an angle
-        return [[part] for part in quarter_turns(degrees[0])]
+    if 0 < len(degrees) <= FEW_ANGLES:  # an array costs more
+        return [list(column) for column in zip(*map(quarter_turns, degrees), strict=True)]
     c, s = unit(degrees)
     quarter = np.zeros(len(c), np.int64)
     for _ in range(3):
