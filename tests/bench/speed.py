@@ -21,6 +21,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from speed_alone import alone
 from speed_clock import Cell, bandwidth, told
 from speed_far import cold, huge, rewind
 from speed_floors import floors
@@ -43,6 +44,7 @@ SECTIONS: dict[str, Callable[[Any], Iterator[Cell]]] = {
     "moving rays": moving_rays,
     "redrawn": redrawn,
     "single": single,
+    "alone": alone,
     "preparation": preparation,
     "rewind": rewind,
     "huge": huge,
