@@ -166,6 +166,8 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
     "beam": (Beam(200, 9), {}),
     "box": (Box(31, 8), {"exclude": 2}),
     "shotgun": (Spread(Disc(2), 6, 21.3), {"seed": 5}),
+    "a single pellet": (Spread(Disc(2), 1, 21.3), {"seed": 3}),
+    "burst of single pellets": (Rounds(Spread(Disc(1), 1, 15), 2), {}),
     "wide spread": (Spread(Box(9, 2), 6, 80), {"seed": 2**64 - 1}),
     "burst": (Rounds(Beam(60, 3), 3, (5, -70), 11), {}),
     "sub-pixel recoil": (Rounds(Disc(5), 3, (0.3, 7)), {}),

@@ -71,13 +71,12 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
 def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
     """Pixels of all pellets of a round, relative to its own pixel, as one pattern."""
     table, pellets = placements.table, placements.pellets
-    if pellets == len(table) == 1:
+    if len(table) == 1 and not placements.scattered:
         return table
     rows = slice(number * pellets, (number + 1) * pellets)
-    patterns = [table.patterns[k] for k in placements.pattern[rows].tolist()]
-    if pellets == 1:
-        only: Pattern = patterns[0]
-        return only.table
+    patterns: list[Pattern] = [table.patterns[k] for k in placements.pattern[rows].tolist()]
+    if not placements.scattered:
+        return patterns[0].table
     offsets = (placements.xy[rows] - placements.turn_xy[number]).tolist()
     sets = [pattern.spans.translated(x, y) for pattern, (x, y) in zip(patterns, offsets, strict=True)]
     runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
