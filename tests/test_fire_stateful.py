@@ -24,8 +24,10 @@ from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.label_plane import LabelPlane
 from hitplanes.planes.scene import items as items_module
 from hitplanes.planes.scene import variants as variants_module
+from hitplanes.planes.scene.derived import View
 from hitplanes.weapons.fire import areas, spans
 from hitplanes.weapons.kinds import weapon
+from hitplanes.weapons.kinds.placements import filter_of
 
 SPRITES = [
     *(some_sprite(random.Random(seed)) for seed in range(12)),
@@ -223,11 +225,13 @@ class ChangingScene(RuleBasedStateMachine):
     @rule()
     def planes_are_up_to_date(self) -> None:
         items = self._items()
-        plane = self.scene.derived.label_plane()
-        assert (plane is None) == (self.scene.bounds is None)
-        if plane is None:
-            return
-        np.testing.assert_array_equal(plane.read(self.scene.items), codes_of(items))
+        for accept, blocked_by in ((ALL, ALL), (3, 6), (0, 2)):
+            plane = self.scene.derived.label_plane(View(False, int(filter_of(accept, blocked_by)), ()))
+            assert (plane is None) == (self.scene.bounds is None)
+            if plane is None:
+                return
+            met = [item for item in items if item.categories & (blocked_by if item.occluder else accept)]
+            np.testing.assert_array_equal(plane.read(self.scene.items), codes_of(met))
         whole = self.scene.planes()
         np.testing.assert_array_equal(whole.hittable, codes_of([i for i in items if not i.occluder]) >> 1)
         np.testing.assert_array_equal(whole.occluders, codes_of([i for i in items if i.occluder]) >> 1)

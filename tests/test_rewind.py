@@ -247,7 +247,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
     scene, history = moving(4)
     before = scene.version, scene.content_hash()
     monkeypatch.setattr(scene.derived, "index", lambda structure: pytest.fail("an index of the present"))
-    monkeypatch.setattr(scene.derived, "label_plane", lambda: pytest.fail("a plane of the present"))
+    monkeypatch.setattr(scene.derived, "label_plane", lambda *_: pytest.fail("a plane of the present"))
     monkeypatch.setattr(scene.items, "stack", lambda: pytest.fail("a stack of the present"))
     for weapon in (*PATTERNS, *RAYS):
         for strategy in ("auto", "direct", "walk"):
@@ -261,7 +261,7 @@ def test_the_present_scene_is_not_touched(monkeypatch: pytest.MonkeyPatch) -> No
             )
     fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, broadphase="bvh")
     fire(history, Disc(30), [(50, 50)] * 40, tick=[20] * 40, strategy="built")
-    assert scene.derived._label_plane is None and scene.derived._indexes == {}
+    assert not scene.derived._planes.values and scene.derived._indexes == {}
     monkeypatch.undo()
     assert before == (scene.version, scene.content_hash())
 
