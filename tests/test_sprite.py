@@ -25,6 +25,7 @@ from hypothesis import strategies as st
 from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import VARIANT_BYTES
+from hitplanes.planes.grid import rasterize
 from hitplanes.planes.scene import variants
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, as_sprite, rows_of
@@ -763,3 +764,24 @@ def test_sprites_of_two_forked_processes_are_two() -> None:
 def test_a_sprite_is_not_made_of_an_array_by_its_own_name(frames: Any) -> None:
     with pytest.raises(InputError, match=r"^frames: expected a tuple of frames, got .*: Sprite.from_mask and"):
         Sprite(frames)
+
+
+def test_a_circle_has_one_mask_at_all_angles() -> None:
+    """It is made once; an ellipse and a carved circle turn."""
+    circle = Sprite.circle(9.3)
+    upright = variant_of(circle, posed(circle))
+    for angle in (0.1, 45, 90, 271.5, 359):
+        assert variant_of(circle, posed(circle, angle=angle)) is upright
+        form = posed(circle, angle=angle)
+        spans = rasterize.ellipse(circle.outline.radius, circle.outline.radius, *form.direction)  # type: ignore[union-attr]
+        assert np.array_equal(spans.to_mask()[0], upright.mask)
+        assert variant_of(circle, posed(circle, scale=(2, 2), angle=angle)) is variant_of(
+            circle, posed(circle, scale=(2, 2))
+        )
+    ellipse = posed(circle, scale=(2, 1), angle=90)
+    assert variant_of(circle, ellipse).mask.shape == variant_of(circle, posed(circle, scale=(2, 1))).mask.shape[::-1]
+    scene = Scene()
+    item = scene.add(circle, (0, 0))
+    scene.carve({item: [(5, 0), (6, 0)]})
+    scene.set(item, angle=90)
+    assert not scene.mask(item)[0][9 + 5, 9] and scene.mask(item)[0][9, 9 + 5]

@@ -52,7 +52,8 @@ def carved_sprites(items: Items, pixels: Mapping[int, object]) -> tuple[list[Spr
     """New sprites of the items of which pixels go, and how many pixels each of them loses, by its id."""
     sprites, lost = [], {}
     for row, xy in pixels.items():
-        variant, place = items.variants[row], f"pixels[{row}]"
+        variant = replace(items.variants[row], form=items.forms[row])  # a circle's is kept unturned
+        place = f"pixels[{row}]"
         hole = hole_of(place, xy, variant.mask, items.corner(row))
         if count := int(np.count_nonzero(hole.hit)):
             with within(place):

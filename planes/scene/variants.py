@@ -127,8 +127,16 @@ def variant_of(sprite: Sprite, form: Transform) -> Variant:
 
 def variants_of(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
     """Masks of transformed sprites, a form each; those that are not cached are made together."""
-    keys = [(sprite.uid, form) for sprite, form in zip(sprites, forms, strict=True)]
-    return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [forms[row] for row in rows]))
+    keys = [(sprite.uid, _unturned(sprite, form)) for sprite, form in zip(sprites, forms, strict=True)]
+    return _kept.get_all(keys, lambda rows: _made([sprites[row] for row in rows], [keys[row][1] for row in rows]))
+
+
+def _unturned(sprite: Sprite, form: Transform) -> Transform:
+    """The form itself; of a circle, whose mask is the same at every angle, one that is not turned."""
+    outline = sprite.outline
+    if outline is None or outline.radius is None or form.scale_x != form.scale_y or sprite.carvings:
+        return form
+    return form._replace(quarter=0, c=1 << TRIG_BITS, s=0)
 
 
 def keep_variant(sprite: Sprite, variant: Variant) -> None:
