@@ -192,7 +192,13 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "layer, 5000 digits": (lambda: world().add(Sprite.circle(1), layer=DIGITS), "layer: .*got a int that is too long"),
     "category, unknown": (
         lambda: world().add(Sprite.circle(1), categories=["targte"]),
-        "category: .*got 'targte' .did you mean 'target'"),
+        "categories: .*got 'targte' .did you mean 'target'"),
+    "frame, a name of frames that have none": (
+        lambda: world().set(0, frame="run"),
+        "frame: expected a number from 0 to 0, as the frames have no names, got 'run'"),
+    "accept, a wrong name of a shot": (
+        lambda: fire(world(), Disc(1), [(0, 0)] * 2, accept=[["friend"], ["freind"]]),
+        r"accept\[1\]: .*got 'freind' .did you mean 'friend'"),
     "categories, negative bits": (lambda: world().add(Sprite.circle(1), categories=-1), "categories: .*got -1"),
     "categories, true": (lambda: world().add(Sprite.circle(1), categories=True), "categories: .*got True"),
     "categories, bits of no dimension": (

@@ -748,3 +748,12 @@ def checked(weapon: Weapon, at: object, **how: Any) -> Shots:
         "shot": None,
     } | how
     return checked_shots(weapon, at, **how)
+
+
+def test_filters_of_each_shot_may_be_lists_of_names() -> None:
+    scene = Scene(categories=("a", "b"))
+    for name in ("a", "b"):
+        scene.add(Sprite.circle(3), (5, 5), categories=[name])
+    hits = fire(scene, Disc(1), [(5, 5)] * 4, accept=[["a"], ["b"], ("a", "b"), []], blocked_by=[["a"]] * 4)
+    assert list(zip(hits.shot.tolist(), hits.object.tolist(), strict=True)) == [(0, 0), (1, 1), (2, 1)]
+    assert hits.shots.accept.tolist() == [2, 4, 6, 0] and hits.shots.blocked_by.tolist() == [2] * 4

@@ -538,7 +538,7 @@ class Scene:
             return default
         if isinstance(categories, int | np.integer):
             return integer("categories", categories, 0, ALL)
-        return self.category_bits(*listed("categories", categories, "bits or a list of names"))
+        return self.category_bits(*listed("categories", categories, "bits or a list of names"), field="categories")
 
     def _bits_per_row(self, categories: object, n: int) -> Ints:
         values = array_of("categories", categories)

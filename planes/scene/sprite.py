@@ -362,6 +362,9 @@ def frame_number(sprite: Sprite, frame: object) -> int:
     """Check the number or the name of a frame, and return its number."""
     if isinstance(frame, str) and sprite.frame_names:
         return sprite.frame_names.index(choice("frame", frame, sprite.frame_names))
+    if isinstance(frame, str):
+        count = sprite.frame_count
+        raise InputError(f"frame: expected a number from 0 to {count - 1}, as the frames have no names, got {frame!r}")
     return integer("frame", frame, 0, sprite.frame_count - 1)
 
 

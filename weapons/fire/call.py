@@ -260,10 +260,14 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
 
 
 def category_bits(scene: Scene, field: str, value: object) -> object:
-    """Category bits of a name or a list of names; any other value unchanged."""
+    """Category bits of a name or a list of names, or of a list for each shot; any other value unchanged."""
     names = (value,) if isinstance(value, str) else value
-    if isinstance(names, list | tuple) and all(isinstance(name, str) for name in names):
+    if not isinstance(names, list | tuple):
+        return value
+    if all(isinstance(name, str) for name in names):
         return scene.category_bits(*names, field=field)
+    if all(isinstance(own, list | tuple) and all(isinstance(name, str) for name in own) for own in names):
+        return np.array([scene.category_bits(*own, field=f"{field}[{row}]") for row, own in enumerate(names)])
     return value
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 Angles = SupportsFloat | Sequence[SupportsFloat] | npt.NDArray[Any]
 Places = Sequence[SupportsFloat] | Sequence[Sequence[SupportsFloat]] | Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
 Wholes = SupportsIndex | Sequence[SupportsIndex] | npt.NDArray[Any]
-Categories = str | Sequence[str] | Wholes
+Categories = str | Sequence[str] | Sequence[Sequence[str]] | Wholes
 Owners = Wholes | Sequence[Sequence[SupportsIndex]]
 """What a type checker takes for numbers (N,), points (N, 2), whole numbers (N,), names or bits, and owners (N, K)."""
 
