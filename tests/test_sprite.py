@@ -785,3 +785,28 @@ def test_a_circle_has_one_mask_at_all_angles() -> None:
     scene.carve({item: [(5, 0), (6, 0)]})
     scene.set(item, angle=90)
     assert not scene.mask(item)[0][9 + 5, 9] and scene.mask(item)[0][9, 9 + 5]
+
+
+SHAPES: list[Callable[[], Sprite]] = [
+    lambda: Sprite.box(20, 7), lambda: Sprite.box(3.5, 30), lambda: Sprite.circle(6), lambda: Sprite.box(0, 9),
+    lambda: Sprite.polygon([(0, -9), (12, 5), (-7, 8)]), lambda: Sprite.polygon([(0, 0), (9, 0), (2, 2), (0, 9)]),
+    lambda: Sprite.polygon([(-9, -9), (9, -9), (9, 9), (-9, 9)], holes=[[(-3, -3), (3, -3), (3, 3)]]),
+]  # fmt: skip
+
+
+@given(st.randoms(use_true_random=False), st.integers(2, 12))
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_shapes_made_together_are_those_of_each_alone(jit: bool, rng: random.Random, count: int) -> None:
+    makers = [rng.choice(SHAPES if jit or rng.random() < 0.9 else SHAPES[:2]) for _ in range(count)]
+    poses = [
+        {"angle": rng.choice([0, 90, 45, rng.uniform(-400, 400)]), "flip": rng.choice(["none", "x", "xy"]),
+         "scale": rng.choice([(1, 1), (2, 0.5), (1.3, 1.3)])}
+        for _ in makers
+    ]  # fmt: skip
+    sprites, others = ([make() for make in makers] for _ in range(2))
+    forms = [posed(sprite, **pose) for sprite, pose in zip(sprites, poses, strict=True)]
+    together = variants_of(sprites, forms)
+    for one, other, form in zip(together, others, forms, strict=True):
+        alone = variant_of(other, form)
+        assert np.array_equal(one.mask, alone.mask) and one.area == alone.area
+        assert (one.pivot_x, one.pivot_y) == (alone.pivot_x, alone.pivot_y)

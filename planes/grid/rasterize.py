@@ -14,9 +14,10 @@ order. Coordinates of rays are relative to a whole pixel near their start.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -116,6 +117,13 @@ class RowRuns(NamedTuple):
             first, last = np.minimum(first, begin), np.maximum(last, end)
         filled = first <= last
         return Spans(self.y[filled], first[filled], last[filled])
+
+    def each(self, count: int) -> Iterator[Spans]:
+        """The pixels of each of so many shapes."""
+        edges = np.searchsorted(self.shape, np.arange(count + 1)).tolist()
+        for now in starmap(slice, pairwise(edges)):
+            parts = [(first[now], last[now]) for first, last in self.parts]
+            yield RowRuns(self.shape[now], self.y[now], parts).spans()
 
 
 def convex_polygons(points: Ints) -> RowRuns | None:

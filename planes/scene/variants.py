@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, product
 from typing import Any, NamedTuple
@@ -32,6 +32,7 @@ from ..common.limits import (
     VARIANT_BYTES,
     VARIANT_CACHE_BYTES,
 )
+from ..grid import rasterize
 from ..grid.fixed_point import over_one, pixel, quarter_turns, quarters, rounded_div, turned
 from ..grid.rasterize import WIDEST, RowRuns, ellipse, polygon
 from ..grid.spans import Spans, begins, each_pixel, merged_runs, ragged
@@ -216,12 +217,10 @@ def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> 
 
 def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
     """Make masks; frames that are scaled, or turned by more than quarter turns, are mapped together."""
-    made, mapped = {}, {}
+    made, mapped, shapes = {}, {}, {}
     for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
         if sprite.outline is not None:
-            field = next(iter(sprite.source or {}), "sprite")
-            mask, (x, y) = _shape_spans(field, sprite.outline, form).to_mask()
-            made[row] = Variant(form, frozen(mask), -SUB * x, -SUB * y, int(np.count_nonzero(mask)))
+            shapes[row] = next(iter(sprite.source or {}), "sprite"), sprite.outline, form
         elif form.plain:
             mask, pivot = _flipped_frame(sprite, form)
             made[row] = _cropped(mask[None], [pivot], [form])[0]
@@ -229,6 +228,9 @@ def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant
             mapped[row] = sprite, form
     if mapped:
         made |= zip(mapped, _mapped_frames(*zip(*mapped.values(), strict=True)), strict=True)
+    for row, spans in _spans_of_shapes(shapes):
+        mask, (x, y) = spans.to_mask()
+        made[row] = Variant(forms[row], frozen(mask), -SUB * x, -SUB * y, int(np.count_nonzero(mask)))
     for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
         if form.frame in sprite.carvings and made[row].area:
             mask, pivot = made[row].mask, (made[row].pivot_x, made[row].pivot_y)
@@ -528,18 +530,42 @@ def _flipped_pivot(size_wh: tuple[int, int], pivot_256: tuple[int, int], flip: s
     return SUB * (w - 1) - x if "x" in flip else x, SUB * (h - 1) - y if flip in ("y", "xy") else y
 
 
-def _shape_spans(field: str, outline: Outline, form: Transform) -> Spans:
-    """Flip, scale and turn the points of a shape, then fill it; `field` is for errors."""
-    c, s = form.direction
-    if outline.radius is not None:
-        a, b = (int(rounded_div(np.array(outline.radius * v), ONE)) for v in (form.scale_x, form.scale_y))
-        half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
-        _check_shape(field, outline, form, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
-        return ellipse(a, b, c, s)
-    scale = form.signs * np.array([form.scale_x, form.scale_y])
+def _spans_of_shapes(shapes: Mapping[int, tuple[str, Outline, Transform]]) -> Iterator[tuple[int, Spans]]:
+    """Fill shapes, each with its row; convex polygons of the same number of points are filled together.
+
+    The string of each is the field that errors name.
+    """
+    alike: dict[int, dict[int, Ints]] = {}
+    for row, (named, outline, form) in shapes.items():
+        if outline.radius is not None:
+            yield row, _ellipse_of(named, outline, form)
+            continue
+        rings = _rings_of(named, outline, form)
+        if len(rings) > 1 or len(shapes) == 1:
+            yield row, polygon(rings)
+        else:
+            alike.setdefault(len(rings[0]), {})[row] = rings[0]
+    for polygons in alike.values():
+        runs = kernels_of(rasterize).convex_polygons(np.stack(list(polygons.values())))
+        every = (polygon([ring]) for ring in polygons.values()) if runs is None else runs.each(len(polygons))
+        yield from zip(polygons, every, strict=True)
+
+
+def _ellipse_of(field: str, outline: Outline, form: Transform) -> Spans:
+    """Scale and turn a circle, then fill it."""
+    (c, s), radius = form.direction, outline.radius or 0
+    a, b = (int(rounded_div(np.array(radius * v), ONE)) for v in (form.scale_x, form.scale_y))
+    half = (math.isqrt((a * c) ** 2 + (b * s) ** 2), math.isqrt((a * s) ** 2 + (b * c) ** 2))
+    _check_shape(field, outline, form, *(2 * v // (SUB << TRIG_BITS) + 1 for v in half))
+    return ellipse(a, b, c, s)
+
+
+def _rings_of(field: str, outline: Outline, form: Transform) -> list[Ints]:
+    """Flip, scale and turn the points of a shape."""
+    scale, (c, s) = form.signs * np.array([form.scale_x, form.scale_y]), form.direction
     rings = [turned(rounded_div(r * scale, ONE), c, s) for r in outline.rings]
     _check_shape(field, outline, form, *size_of(rings))
-    return polygon(rings)
+    return rings
 
 
 def _check_shape(field: str, outline: Outline, form: Transform, width: int, height: int) -> None:
