@@ -572,7 +572,7 @@ BAD_OBJECTS: dict[str, tuple[dict[str, Any], str]] = {
     "layer": ({**PLACED, "layer": 1.5}, "layer: expected a whole number"),
     "layer true": ({**PLACED, "layer": True}, "layer: expected a whole number .*got True"),
     "categories": ({**PLACED, "categories": "target"}, "categories: expected a list, got 'target'"),
-    "category": ({**PLACED, "categories": ["targte"]}, "category: .*got 'targte' .did you mean 'target'"),
+    "category": ({**PLACED, "categories": ["targte"]}, "categories: .*got 'targte' .did you mean 'target'"),
     "category twice": ({**PLACED, "categories": ["target", "target"]}, "categories: expected distinct names"),
     "owner": ({**PLACED, "owner": "nobody"}, "owner: .*got 'nobody'"),
     "owner number": ({**PLACED, "owner": 7}, "owner"),
