@@ -88,7 +88,7 @@ def test_frames_have_names() -> None:
     ("change", "told"),
     [
         ("jump", r"row 0: frame: expected one of 'idle', 'run_1', 'run_2', got 'jump'"),
-        (["idle", "run1"], r"row 1: frame: expected a whole number from 0 to 0, got 'run1'"),
+        (["idle", "run1"], r"row 1: frame: expected a number from 0 to 0, as the frames have no names, got 'run1'"),
         (["idle", "run_1", "idle"], "frame: expected one for all or 2, got 3"),
         ([0, 3], r"row 1: frame: expected a whole number from 0 to 0, got 3"),
     ],
