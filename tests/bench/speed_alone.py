@@ -21,12 +21,14 @@ MOVED = 3
 def alone(settings: Settings) -> Iterator[Cell]:
     """Each weapon, each number of objects."""
     for objects in settings.single:
-        scene = scene_of(objects)
+        scenes = {mode: scene_of(objects) for mode in modes(settings)}  # what is kept for a scene is of one mode
         for name, weapon in WEAPONS.items():
             asked = ("aims again", "new aims", "all move") if "new aims" in questions(weapon) else ("again", "all move")
             for what in asked:
-                call = moved(scene, weapon) if what == "all move" else still(scene, weapon)
-                calls = {f"fire, {mode}": (call, ready) for mode, ready in modes(settings).items()}
+                kind = moved if what == "all move" else still
+                calls = {
+                    f"fire, {mode}": (kind(scenes[mode], weapon), ready) for mode, ready in modes(settings).items()
+                }
                 cell = Cell("alone", f"{name}, {what}", objects, unit="ns a call", asked=settings.calls)
                 yield timed_calls(cell, calls, list(works(settings, what == "new aims")), {})
 
