@@ -394,13 +394,9 @@ def resample(
     for axis, (parts, limit) in enumerate(zip(unit, (columns - 1, rows - 1), strict=True)):
         along = (first[:, axis] + parts)[:, None] + step[:, axis, 0, None] * np.arange(width)
         over = step[:, axis, 1, None] * np.arange(height)
-        place = (over[:, :, None] + along[:, None]).view(np.uint64)  # negative numbers become very large
-        if parts & parts - 1:
-            square = place // np.uint64(parts)
-            border = border | (square * np.uint64(parts) == place)
-        else:  # a power of two, as it is without a scale, is ten times as fast
-            square = place >> np.uint64(parts.bit_length() - 1)
-            border = border | (place & np.uint64(parts - 1) == 0)
+        place = (over[:, :, None] + along[:, None]).view(np.uint64)
+        square = place // np.uint64(parts)  # negative numbers become very large
+        border = border | (square * np.uint64(parts) == place)
         places.append(place.view(np.int64))
         squares.append(np.minimum(square, np.uint64(limit), out=square).view(np.int64))
     source: Ints = squares[0] + squares[1] * columns
