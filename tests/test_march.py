@@ -436,12 +436,13 @@ def test_rays_that_accept_different_items_do_not_march() -> None:
     assert whys["march"].startswith("march is passed over: rays accept different items; ")
 
 
+@pytest.mark.usefixtures("jit")
 @pytest.mark.parametrize("seed", range(4))
-def test_each_filter_marches_through_a_plane_of_its_own(seed: int, jit: bool) -> None:
+def test_each_filter_marches_through_a_plane_of_its_own(seed: int) -> None:
     """What rays refuse is not in it, and behind it lies what it hid; so it is as fast as where nothing is refused."""
     rng = np.random.default_rng(seed)
     scene = Scene((40, 30), categories=("red", "blue"))
-    for k in range(300 + jit):
+    for k in range(300):
         role, categories = "occluder" if k % 2 == 0 else "hittable", ["red", "blue"][k // 2 % 2 :]
         at, layer = rng.integers(0, 40, 2), int(rng.integers(0, 3))
         scene.add(np.ones(rng.integers(1, 3, 2), np.bool_), at, role=role, categories=categories, layer=layer)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 STACK_ROW_BYTES = 65
-"""Bytes of a row of a stack: seven numbers and whether it is an occluder."""
+"""Bytes of a row of a stack: eight numbers and whether it is an occluder."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,11 +80,7 @@ def traits_of(weapon: Weapon) -> Traits:
     return kept
 
 
-SOMETIMES = "round", "pixels", "weight", "pellets"
-"""Columns of rows that some shots do not need."""
-
-
-@dataclass(eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class Request:
     """What a call asks of area weapons.
 
@@ -296,12 +292,11 @@ def _rows_of(placements: Placements, found: RoundHits, ids: Ints) -> Rows:
     shot, round_ = placements.shot_of(found.turn)
     xy = np.empty((len(found.x), 2), np.int64)
     xy[:, 0], xy[:, 1] = found.x, found.y
-    columns = {"shot": shot, "object": ids[found.rank], "first_xy": xy}
-    columns |= {"samples": found.samples, "distance2": found.distance2}
-    for name, column in zip(SOMETIMES, (round_, found.pixels, found.weight, found.pellets), strict=True):
-        if column is not None:
-            columns[name] = column
-    return Rows.of(columns)
+    columns = {
+        "shot": shot, "round": round_, "object": ids[found.rank], "samples": found.samples, "pixels": found.pixels,
+        "weight": found.weight, "pellets": found.pellets, "first_xy": xy, "distance2": found.distance2,
+    }  # fmt: skip
+    return Rows.of({name: column for name, column in columns.items() if column is not None})
 
 
 # house: way of areas

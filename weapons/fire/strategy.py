@@ -16,7 +16,7 @@ from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
 from hitplanes.planes.common.costs import costs
 from hitplanes.planes.common.limits import STRUCTURES
-from hitplanes.planes.scene.derived import OF_ALL, View
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -99,12 +99,14 @@ def _labels_refuse(request: Request) -> str:
         return "shots accept different items, or pierce"
     if request.filtered:
         return "a pre-filter is asked for"
-    return "" if request.scene.derived.label_plane() is not None else "the scene has no bounds that fit one plane"
+    plane = request.scene.derived.label_plane(request.view)
+    return "" if plane is not None else "the scene has no bounds that fit one plane"
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    plane = request.scene.derived.label_plane(request.view or OF_ALL[False])
-    assert plane is not None  # else it refuses
+    assert request.view is not None  # else it refuses
+    plane = request.scene.derived.label_plane(request.view)
+    assert plane is not None  # so here
     return costs().labels_call, _drawing_ns(plane, request.scene, request.stack)
 
 

@@ -508,10 +508,9 @@ def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[Pat
         c, s = direction[0].tolist()
         direction = c, s
     if isinstance(direction, tuple):
-        straight = direction == STRAIGHT
-        return pattern_of(plain, *STRAIGHT).table if straight else PatternTable(
-            patterns_of(plain, np.array([direction]))
-        ), None
+        if direction == STRAIGHT:
+            return pattern_of(plain, *STRAIGHT).table, None
+        return PatternTable(patterns_of(plain, np.array([direction]))), None
     number, which = np.unique(direction[:, 0] * (4 * ONE) + direction[:, 1], return_inverse=True)  # |c|, |s| <= ONE
     c = (number + 2 * ONE) // (4 * ONE)
     return PatternTable(patterns_of(plain, np.stack([c, number - c * (4 * ONE)], axis=1))), which

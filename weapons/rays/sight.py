@@ -65,7 +65,7 @@ def sees(
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
     targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
-    for pair, _, ends in _ends(scene, tick, Pistol(None), shots, seen.shape, _gazes(shots, targets_256)):
+    for pair, _, ends in _ends(scene, tick, Pistol(None), shots, seen.shape[1], _gazes(shots, targets_256)):
         seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
     return seen
 
@@ -118,7 +118,7 @@ def scan(
     shots, ray = _shots("at", at, scene, accept, blocked_by, exclude), Pistol(real("range", range, 0, REACH_MAX))
     shape, aimed = _beams(shots, angles)
     distance = np.full(shape, np.inf)
-    for beam, rays, ends in _ends(scene, tick, ray, shots, shape, aimed):
+    for beam, rays, ends in _ends(scene, tick, ray, shots, shape[1], aimed):
         met = np.flatnonzero(ends.rank >= 0)
         lines = lines_of(rays, ray).take(met)
         distance.reshape(-1)[beam[met]] = ends.time[met] / lines.scale * lines.length
@@ -157,11 +157,11 @@ def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
 
 
 def _ends(
-    scene: Scene | History, tick: object, ray: Pistol, shots: Shots, shape: tuple[int, ...], aimed: Aimed
+    scene: Scene | History, tick: object, ray: Pistol, shots: Shots, each: int, aimed: Aimed
 ) -> Iterator[tuple[Ints, Rays, Terminations]]:
-    """Follow the rays of a table (N, M), whose rows are the places of shots: cells (n,), their rays, and their ends."""
-    (places, each), view = shape, view_of(False, shots)
-    for moment, rows in moments_of(scene, tick, places):
+    """Follow so many rays of each shot, a row of a table: cells (n,) of the table, their rays, and their ends."""
+    view = view_of(False, shots)
+    for moment, rows in moments_of(scene, tick, len(shots)):
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
         ends_of = first_ends(moment, ray, view, len(cells))
         for begin in range(0, len(cells), RAYS_AT_ONCE):
