@@ -60,12 +60,11 @@ def fixed_costs(monkeypatch: pytest.MonkeyPatch) -> None:
     both = {
         "visible_item": 2500, "labels_call": 300_000, "labels_item": 7500, "labels_pixel": 0.5, "labels_box": 20_000,
         "integers_call": 30_000, "integers_placement": 2000, "integers_pair": 3000, "integers_bit": 0.16,
-        "walk_call": 700_000, "walk_ray": 12_000, "walk_item": 20, "walk_met": 3000, "march_call": 190_000,
-        "march_ray": 400, "field_pixel": 5.5,
+        "march_call": 190_000, "march_ray": 400, "field_pixel": 5.5,
     }  # fmt: skip
     numpy = {
         "tiles_call": 350_000, "tiles_placement": 800, "tiles_pair": 4, "visible_call": 300_000,
-        "visible_placement": 300, "visible_made": 2_000_000, "cast_call": 270_000, "cast_ray": 75_000, "cast_pair": 30,
+        "visible_placement": 300, "visible_made": 2_000_000, "cast_call": 600_000, "cast_ray": 12_000, "cast_pair": 30,
     }  # fmt: skip
     compiled = {
         "tiles_call": 50_000, "tiles_placement": 170, "tiles_pair": 0.3, "visible_call": 45_000,

@@ -50,7 +50,7 @@ from hitplanes.weapons.fire.plan import Plan, PlanSum, Stage, plan_lines
 from hitplanes.weapons.fire.prefilter import Candidates
 from hitplanes.weapons.kinds import weapon as weapon_module
 from hitplanes.weapons.kinds.weapon import PatternTable
-from hitplanes.weapons.rays import contacts, first_hit, ray_call, ray_walk, tracks
+from hitplanes.weapons.rays import contacts, first_hit, ray_call, ray_walk, raycast
 
 ROOT = Path(__file__).parent.parent
 LEFT_OUT = runpy.run_path(str(ROOT / "fixtures" / "left_out.py"))
@@ -152,15 +152,15 @@ OF_RAYS = [
 GOES_ON = Rifle(60, max_hits=2)
 """A weapon whose rays are followed without all their cells, many at a time."""
 
-OF_TRACKS = [
+OF_CAST = [
     *OF_ALL,
     (RAYFIRE, "chosen_candidates", "plan", 100),
     (RAYFIRE, "leave_out_absent", "plan", 200),
     (RAYFIRE, "rays_of", "rays", 10**3),
-    (tracks, "near_items", "walk", 10**4),
-    (tracks, "_firsts", "walk", 10**5),
-    (tracks, "end_at_occluders", "walk", 10**6),
-    (tracks, "end_at_hits", "walk", 10**7),
+    (raycast, "near_items", "cast", 10**4),
+    (raycast, "_firsts", "cast", 10**5),
+    (raycast, "end_at_occluders", "cast", 10**6),
+    (raycast, "end_at_hits", "cast", 10**7),
     (RAYFIRE, "pixels_of", "rows", 10**8),
     (RAYFIRE, "rows_of_passes", "rows", 10**9),
 ]
@@ -204,7 +204,7 @@ CALLS: dict[str, tuple[Weapon, dict[str, Any], list[tuple[Any, str, str, int]]]]
         [*OF_DIRECT, INDEX],
     ),
     "rays": (Rifle(60, max_hits=2), {"aim": 30, "strategy": "walk", "prefilter": "circle"}, [*OF_RAYS, BOXES]),
-    "rays that go on": (GOES_ON, {"aim": 30}, OF_TRACKS),
+    "rays that go on": (GOES_ON, {"aim": 30}, OF_CAST),
     "rays that march": (Pistol(60), {"aim": 30, "strategy": "march"}, OF_MARCH),
     "rays by an index": (
         Rifle(60, max_hits=2),
@@ -374,9 +374,7 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
     made = {stage.name: stage.bytes_made for stage in hits.plan.ran}
     for stage in made.keys() - SELECTING:
         assert made[stage] - SLACK <= 1.5 * held[stage] and held[stage] <= MOST * made[stage] + SLACK, stage
-    assert (
-        sum(made.values()) / 3 < whole[0] < 3 * sum(made.values()) + AT_ONCE * ("walk" not in made or weapon is GOES_ON)
-    )
+    assert sum(made.values()) / 3 < whole[0] < 3 * sum(made.values()) + AT_ONCE * ("walk" not in made)
 
 
 def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
@@ -573,7 +571,7 @@ OF_FIRE = (
     "fire.areas fire.call fire.hits fire.plan fire.prefilter fire.spans fire.strategy kinds.areas kinds.placements"
     " kinds.rays kinds.weapon late"
 )
-OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk rays.tracks"
+OF_A_RAY = "rays.contacts rays.first_hit rays.ray_call rays.ray_hits rays.ray_walk rays.raycast"
 
 
 def loaded(before: str, code: str) -> set[str]:
@@ -594,7 +592,6 @@ def test_what_is_loaded_by_importing_and_by_a_shot() -> None:
     of_ray = {f"hitplanes.weapons.{name}" for name in OF_A_RAY.split()} | {
         "hitplanes.planes.bits.distance_field",
         "hitplanes.planes.bits.label_plane",
-        "hitplanes.planes.bits.raycast",
         "hitplanes.weapons.rays",
     }
     assert loaded(START, SHOT.format("Pistol(3)")) == of_ray

@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from test_march import answer, single, some_ray
 from test_rays import check_columns
 
-from hitplanes import Pistol, Rifle, Rounds, Scene, Spread, Sweep, Weapon, fire, prepare
-from hitplanes.planes.bits import raycast
-from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
-from hitplanes.planes.common.backend import in_parts, kernels_of
+from hitplanes import Laser, Pistol, Projectile, Rifle, Rounds, Scene, Spread, Sweep, Weapon, fire, prepare
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.scene.derived import EVERYTHING, View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.weapons.kinds.placements import filter_of
-from hitplanes.weapons.rays import ray_call
+from hitplanes.weapons.rays import one_ray, ray_call, raycast
 
 worlds = st.randoms(use_true_random=False)
 Bounds = tuple[int, int, int, int]
@@ -51,6 +52,42 @@ def some_stack(rng: random.Random) -> Stack:
     return scene.items.stack()
 
 
+First = tuple[int, int, int, int]
+NOTHING = -1, 0, 0, -1
+"""Time, cell, and rank of what a ray touches first."""
+
+
+def first_touched(
+    kernels: ModuleType,
+    stack: Stack,
+    bounds: Bounds | None,
+    rays: list[tuple[tuple[int, int], tuple[int, int]]],
+    meets: list[int] | None = None,
+    exclude: list[list[int]] | None = None,
+) -> list[First]:
+    """The ends of rays that end at their first hit, in one batch; each alone ends there, too."""
+    start, step = (np.array(column) for column in zip(*rays, strict=True))
+    whose = () if meets is None or exclude is None else (np.array(meets), np.array(exclude))
+    _, (reason, time, y, x, rank, _) = kernels.hits_and_ends(stack, bounds, Lines(start, step, 0), 1, *whose)
+    x, y = x + pixel(start)[:, 0], y + pixel(start)[:, 1]
+    columns = (np.where(reason, column, gone) for column, gone in zip((time, x, y, rank), NOTHING, strict=True))
+    found: list[First] = list(zip(*(column.tolist() for column in columns), strict=True))
+    for k, (at, by) in enumerate(rays):
+        view = View(False, EVERYTHING, ())
+        if meets is not None and exclude is not None:
+            view = View(False, meets[k], tuple(sorted({*exclude[k]} - {-1})))
+        elif stack.has_unmet:
+            continue
+        followed = kernels.follower(stack, bounds, view, 0, 1)(*at, *by)
+        if followed is None:  # too long for it
+            assert by == (0, 0) or kernels is raycast
+            continue
+        objects = [] if found[k][3] < 0 or stack.occluder[found[k][3]] else [found[k]]
+        assert [(entry, x, y, rank) for rank, _, x, y, entry in followed[1]] == objects
+        assert found[k] == NOTHING or followed[0] == found[k][0]
+    return found
+
+
 def first_by_the_oracle(
     stack: Stack,
     bounds: Bounds | None,
@@ -58,7 +95,7 @@ def first_by_the_oracle(
     by: tuple[int, int],
     bits: tuple[int, int] | None,
     exclude: list[int],
-) -> tuple[int, int, int, int]:
+) -> First:
     """Of all cells of a ray the first with an accepted item, one by one."""
     cells, _ = oracle_rays.thin_times(at, (at[0] + by[0], at[1] + by[1]))
     found = []
@@ -79,7 +116,7 @@ def first_by_the_oracle(
         if there:
             found.append((time, not any(stack.occluder[k] for k in there), y, x, there[0]))
     if not found:
-        return NOTHING, 0, 0, -1
+        return NOTHING
     time, _, y, x, rank = min(found)
     return time, x, y, rank
 
@@ -93,16 +130,11 @@ def test_what_a_ray_touches_first_is_what_the_oracle_meets_first(kernels: Module
     meets = [filter_of(*two) for two in bits]
     exclude = [[rng.choice([-1, 1, 2]) for _ in range(2)] for _ in rays]
     note(f"{bounds} {stack.box_xyxy.tolist()} {rays} {bits} {exclude}")
-    start, step = (np.array(column) for column in zip(*rays, strict=True))
-    found = kernels.first_touched(stack, bounds, start, step, np.array(meets), np.array(exclude))
-    every = kernels.first_touched(stack, bounds, start, step, None, np.array(exclude))
+    found = first_touched(kernels, stack, bounds, rays, meets, exclude)
+    every = first_touched(kernels, stack, bounds, rays)
     for k, (at, by) in enumerate(rays):
-        if by == (0, 0):
-            assert found.entry[k] == every.entry[k] == UNDECIDED
-            continue
-        expected = first_by_the_oracle(stack, bounds, at, by, bits[k], exclude[k])
-        assert tuple(int(column[k]) for column in found) == expected
-        assert tuple(int(column[k]) for column in every) == first_by_the_oracle(stack, bounds, at, by, None, [])
+        assert found[k] == first_by_the_oracle(stack, bounds, at, by, bits[k], exclude[k])
+        assert every[k] == first_by_the_oracle(stack, bounds, at, by, None, [])
 
 
 CORNERS: dict[str, tuple[list[tuple[tuple[int, int], str, int]], int]] = {
@@ -124,9 +156,9 @@ def test_what_is_entered_at_once(kernels: ModuleType, name: str, start: tuple[in
     scene = Scene(None)
     for xy, role, layer in pixels:
         scene.add(np.ones((1, 1), np.bool_), xy, role=role, layer=layer)
-    stack, none = scene.items.stack(), np.zeros((1, 0), np.int64)
-    found = kernels.first_touched(stack, None, np.array([start]), np.array([[1536, 1536]]), None, none)
-    assert stack.ids[found.rank].tolist() == [expected] and found.entry[0] == max(0, 128 - start[0]) * 1536
+    stack = scene.items.stack()
+    ((time, _, _, rank),) = first_touched(kernels, stack, None, [(start, (1536, 1536))])
+    assert stack.ids[rank] == expected and time == max(0, 128 - start[0]) * 1536
 
 
 @pytest.mark.parametrize("forth", [True, False])
@@ -137,13 +169,12 @@ def test_a_ray_along_a_border_touches_the_nearer_of_both_rows(kernels: ModuleTyp
     mask[0, 6 if forth else 2], mask[1, 3 if forth else 5] = True, True
     scene = Scene(None)
     scene.add(mask if level else mask.T, (0, 0))
-    stack, none = scene.items.stack(), np.zeros((1, 0), np.int64)
+    stack = scene.items.stack()
     left, top = stack.box_xyxy[0, :2].tolist()
-    start, step = (256 * (-20 if forth else 20), 128), (256 * 40 * (1 if forth else -1), 0)
-    at = np.array([start if level else start[::-1]]) + 256 * np.array([left, top])
-    found = kernels.first_touched(stack, None, at, np.array([step if level else step[::-1]]), None, none)
-    cell = (0 if forth else 3, 1) if level else (1, 0 if forth else 3)
-    assert (found.x[0] - left, found.y[0] - top) == cell
+    along, step = 256 * (-20 if forth else 20), 256 * 40 * (1 if forth else -1)
+    at, by = ((along, 128), (step, 0)) if level else ((128, along), (0, step))
+    ((_, x, y, _),) = first_touched(kernels, stack, None, [((at[0] + 256 * left, at[1] + 256 * top), by)])
+    assert (x - left, y - top) == ((0 if forth else 3, 1) if level else (1, 0 if forth else 3))
 
 
 def test_rays_from_anywhere(kernels: ModuleType) -> None:
@@ -152,21 +183,24 @@ def test_rays_from_anywhere(kernels: ModuleType) -> None:
     scene = Scene(None)
     for sign in (1, -1):
         scene.add(ones, (sign * far, -sign * far))
-    stack = scene.items.stack()
-    start = 256 * np.array([[far - 4_000_000, -far], [-far, far + 4_000_000], [far - 3_000_000, 3_000_000 - far]])
-    step = np.array([[2**30, 1], [-7, -(2**30)], [2**30, -(2**30)]])
-    none = np.zeros((3, 0), np.int64)
-    found = kernels.first_touched(stack, None, start, step, None, none)
-    for k in range(3):
-        seen = first_by_fractions(stack, start[k].tolist(), step[k].tolist())
-        assert tuple(int(column[k]) for column in found) == seen and seen[3] >= 0
-    assert (
-        kernels.first_touched(stack, None, start, step + 3 * np.sign(step), None, none).entry.tolist()
-        == [UNDECIDED] * 3
-    )
+    stack, half = scene.items.stack(), 2**29
+    rays = [
+        ((256 * (far - 2_000_000), 256 * -far), (half, 1)),
+        ((256 * -far, 256 * (far + 2_000_000)), (-7, -half)),
+        ((256 * (far - 1_500_000), 256 * (1_500_000 - far)), (half, -half)),
+    ]
+    found = first_touched(kernels, stack, None, rays)
+    assert found == [first_by_fractions(stack, *ray) for ray in rays] and all(one[3] >= 0 for one in found)
+    (x, y), _ = rays[0]
+    longer = (x - 256 * 3, y), (half + 256 * 3, 1)
+    if kernels is raycast:
+        assert first_touched(kernels, stack, None, [longer]) == [first_by_fractions(stack, *longer)]
+    else:
+        lines = Lines(np.array([longer[0]]), np.array([longer[1]]), 0)
+        assert kernels.hits_and_ends(stack, None, lines, 1) is None
 
 
-def first_by_fractions(stack: Stack, at: list[int], by: list[int]) -> tuple[int, int, int, int]:
+def first_by_fractions(stack: Stack, at: tuple[int, int], by: tuple[int, int]) -> First:
     """The first cell of the solid boxes of a stack that a long ray touches: only cells of their borders may be."""
     scale, found = max(abs(by[0]), 1) * max(abs(by[1]), 1), []
     for rank in range(len(stack)):
@@ -204,7 +238,7 @@ def test_a_ray_goes_through_what_it_refuses(kernels: ModuleType, way: str, accep
 
 @pytest.mark.parametrize("aim", [0.0, 90.0, 30.0])
 def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: float) -> None:
-    """The object behind them is found: compiled by itself, in numpy by the walk, as it would take long."""
+    """The object behind them is found; in numpy a ray alone is left to a batch of one, as it would take long."""
     scene, frame = Scene(None), np.ones((41, 41), np.bool_)
     frame[1:-1, 1:-1] = False
     turn = np.array([np.cos(np.radians(aim)), np.sin(np.radians(aim))])
@@ -222,7 +256,11 @@ def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: f
     last = hollow.add(np.ones((99, 3), np.bool_), (1000, 10))
     hits = fire(hollow, Pistol(2000), (-5, 10), strategy="cast")
     assert hits == fire(hollow, Pistol(2000), (-5, 10), prefilter="box") and hits.object.tolist() == [last]
-    assert hits.plan.has_run("cast") and hits.plan.has_run("walk") == (kernels is raycast)
+    assert hits.plan.has_run("cast") and not hits.plan.has_run("walk")
+    assert prepare(hollow, Pistol(2000)).fire((-5, 10)) == hits
+    if kernels is raycast:
+        stack, view = hollow.items.stack(), View(False, EVERYTHING, ())
+        assert one_ray.follower(stack, None, view)(256 * -5, 256 * 10, 256 * 2000, 0) is None
     sooner = hollow.add(np.ones((99, 3), np.bool_), (50, 10))  # some twenty boxes are entered before
     assert fire(hollow, Pistol(2000), (-5, 10), strategy="cast").object.tolist() == [sooner]
 
@@ -274,36 +312,44 @@ def test_all_weapons_that_end_at_their_first_hit_are_cast(
 def test_threads_share_rays_out(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not jit:
         pytest.skip("only compiled kernels do")
+    from hitplanes.planes.jit import bit_rows
+
     kernels = kernels_of(raycast)
     rng = np.random.default_rng(6)
     scene = Scene((200, 200))
     for _ in range(50):
         scene.add(rng.random((9, 9)) < 0.7, rng.uniform(0, 200, 2), categories=int(rng.integers(1, 4)))
-    start, step = rng.integers(0, 51200, (90, 2)), rng.integers(-51200, 51200, (90, 2))
-    accept, exclude = rng.integers(1, 4, 90), np.full((90, 1), -1)
-    alone = kernels.first_touched(scene.items.stack(), scene.bounds, start, step, accept, exclude)
+    lines = Lines(rng.integers(0, 51200, (90, 2)), rng.integers(-51200, 51200, (90, 2)), 0)
+    how = scene.items.stack(), scene.bounds, lines, 1, rng.integers(1, 4, 90), np.full((90, 1), -1)
+    alone = kernels.hits_and_ends(*how)
     parts: list[Any] = []
 
     def shared(count: int, _: float, work: Any) -> Any:
         parts.append(count)
-        return [
-            in_parts(last - first, 1e9, lambda a, b, f=first: work(f + a, f + b)) for first, last in ((0, 31), (31, 90))
-        ]
+        return [work(0, 31), work(31, 90)]
 
-    monkeypatch.setattr(kernels, "in_parts", shared)
-    again = kernels.first_touched(scene.items.stack(), scene.bounds, start, step, accept, exclude)
+    monkeypatch.setattr(bit_rows, "in_parts", shared)
+    again = kernels.hits_and_ends(*how)
     assert parts == [90] and all((a == b).all() for a, b in zip(alone, again, strict=True))
 
 
-def test_rays_are_cast_where_it_pays(kernels: ModuleType) -> None:
-    """In numpy a few; compiled as many as there are, among up to thousands of items."""
+def test_rays_are_cast_where_they_can_be(kernels: ModuleType) -> None:
+    """Any number of them, of all weapons but those that need each cell, unless a pre-filter is asked for."""
     scene, rng = Scene(None), np.random.default_rng(7)
     for _ in range(100):
         scene.add(np.ones((48, 48), np.bool_), rng.uniform(0, (1920, 1080)))
 
-    def is_cast(rays: int, **how: Any) -> bool:
-        plan = fire(scene, Pistol(1000), rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
+    def is_cast(rays: int, weapon: Weapon, **how: Any) -> bool:
+        plan = fire(scene, weapon, rng.uniform(0, 1000, (rays, 2)), aim=rng.uniform(0, 360, rays), **how).plan
+        assert plan.has_run("walk") != plan.has_run("cast")
         return plan.has_run("cast")
 
-    assert is_cast(1) and is_cast(3) and is_cast(1, strategy="cast") and not is_cast(1, prefilter="box")
-    assert is_cast(300) == (kernels is not raycast)
+    for weapon in (Pistol(1000), Laser(900, width=4), Projectile(200, 3), Sweep(Rifle(300, max_hits=2), 30, 4)):
+        assert is_cast(1, weapon) and is_cast(3, weapon) and is_cast(300, weapon)
+        assert not is_cast(2, weapon, prefilter="box") and not is_cast(2, weapon, strategy="direct")
+    for weapon in (Rifle(90, budget=3), Laser(90, inside="ignore_until_exit"), Projectile(90, 3, steps=2)):
+        assert not is_cast(2, weapon, strategy="cast")
+    hits = fire(scene, Pistol(90, inside="ignore_until_exit"), [(-500, 3), (-500, 9)])
+    assert hits.plan.has_run("cast") and not hits.plan.has_run("walk")
+    scene.set(scene.ids(), velocity_xy=(1, 0))
+    assert not is_cast(2, Projectile(200, 3)) and is_cast(2, Laser(200))

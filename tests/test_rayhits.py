@@ -73,8 +73,8 @@ def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> Non
     walks: tuple[dict[str, Any], ...] = ({"strategy": "walk"}, {"prefilter": "none"})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hitplanes.weapons.rays.ray_call.RAYS_AT_ONCE", 3 * chunk)
-        patch.setattr("hitplanes.weapons.rays.tracks.BRUTE_PAIRS", chunk * 8)
-        patch.setattr("hitplanes.weapons.rays.tracks.CHUNK_SAMPLES", chunk)
+        patch.setattr("hitplanes.weapons.rays.raycast.BRUTE_PAIRS", chunk * 8)
+        patch.setattr("hitplanes.weapons.rays.raycast.CHUNK_SAMPLES", chunk)
         patch.setattr("hitplanes.weapons.rays.ray_hits.CHUNK_CELLS", chunk)
         same(whole, fired(battle, scene=scene))
     for options in (*walks, {"broadphase": "bvh", "prefilter": rng.choice(["box", "circle"])}):
@@ -125,15 +125,24 @@ def test_a_start_inside_is_named_by_its_row_in_any_part(
 def test_a_way_that_cannot_serve_is_passed_over() -> None:
     scene = Scene((40, 40))
     scene.add([[True]], (5, 1))
-    for weapon in (Pistol(9, width=2), Sweep(Laser(9), 30, 3), Rounds(Spread(Rifle(9), 3, 2), 2), Projectile(9, 1)):
-        walked = fire(scene, weapon, (1, 1), strategy="walk")
-        for way in ("cast", "march"):
-            hits = fire(scene, weapon, (1, 1), strategy=way)
-            assert hits == walked and hits.plan.has_run("walk") and not hits.plan.has_run(way)
-            left_out = {stage.name: stage.why for stage in hits.plan.left_out}
-            assert (
-                left_out[way] == f"{way} is passed over: only thin rays that end at their first hit do; every ray walks"
-            )
+    others: dict[str, tuple[tuple[Weapon, str], ...]] = {
+        "march": (
+            *((weapon, "only thin rays that end at their first hit do; ")
+              for weapon in (Pistol(9, width=2), Sweep(Laser(9), 30, 3), Rounds(Spread(Rifle(9), 3, 2), 2))),
+            (Projectile(9, 1), "only thin rays that end at their first hit do; "),
+        ),
+        "cast": (
+            (Rifle(9, budget=4), "a budget is used up cell by cell; "),
+            (Laser(9, inside="ignore_until_exit"), "items in which rays start are not hit; "),
+            (Projectile(9, 1, steps=3), "a projectile is tested at moments of the frame; "),
+        ),
+    }  # fmt: skip
+    for way, weapons in others.items():
+        for weapon, why in weapons:
+            hits, walked = fire(scene, weapon, (1, 1), strategy=way), fire(scene, weapon, (1, 1), strategy="walk")
+            assert hits == walked and not hits.plan.has_run(way)
+            told = {stage.name: stage.why for stage in hits.plan.left_out}[way]
+            assert told.startswith(f"{way} is passed over: {why}")
     hits = fire(Scene(), Pistol(9), (1, 1), strategy="march")
     told = {stage.name: stage.why for stage in hits.plan.left_out}
     assert told["march"].startswith("march is passed over: no bounds that fit one plane; ")

@@ -58,9 +58,8 @@ COMPILED = {
     "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.cells": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
-    "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.rays",
-    "hitplanes.planes.bits.raycast": "hitplanes.planes.jit.rays",
-    "hitplanes.weapons.rays.tracks": "hitplanes.planes.jit.tracks",
+    "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.march",
+    "hitplanes.weapons.rays.raycast": "hitplanes.planes.jit.raycast",
     "hitplanes.weapons.prepared.position_cache": "hitplanes.weapons.prepared.compiled",
 }
 """Each module with numpy kernels, and the module that has the same functions compiled."""

@@ -35,17 +35,15 @@ class Costs(NamedTuple):
     bvh_placement: float
     bvh_moved: float  # made: each item that moved
     bvh_item: float  # made: each item
-    walk_call: float  # by the walk of rays
-    walk_ray: float
-    walk_item: float
-    walk_met: float  # an item in whose box a ray is expected to start
     cast_call: float  # by casting rays at items
     cast_ray: float
     cast_pair: float  # a ray and an item
     march_call: float  # by marching rays through the distance field
     march_ray: float
-    march_prepared: float  # a prepared ray
     field_pixel: float  # made: each pixel of a distance field
+    prepared_march: float  # a prepared ray that marches
+    prepared_cast: float  # a prepared ray that is cast
+    prepared_cast_item: float
     prepared_tile: float  # a tile of the stack and a prepared shot; by compiled kernels alone
     prepared_near: float  # a tile whose box meets that of a prepared shot
     thread: float  # the least work that is given to a thread of its own
@@ -57,9 +55,9 @@ NUMPY = Costs(
     labels_call=82500, labels_item=8820, labels_pixel=0.0799, labels_box=18400,
     integers_call=118000, integers_placement=323, integers_pair=2490, integers_bit=0.113,
     box_pair=0.765, bvh_call=91300, bvh_placement=564, bvh_moved=1480, bvh_item=766,
-    walk_call=602000, walk_ray=996, walk_item=7.31, walk_met=20200,
-    cast_call=211000, cast_ray=48500, cast_pair=54.3,
-    march_call=249000, march_ray=465, march_prepared=9400, field_pixel=5.28,
+    cast_call=645000, cast_ray=724, cast_pair=14.2,
+    march_call=263000, march_ray=471, field_pixel=5.35,
+    prepared_march=9360, prepared_cast=43800, prepared_cast_item=51.3,
     prepared_tile=inf, prepared_near=inf, thread=inf,
 )  # fmt: skip
 COMPILED = Costs(
@@ -68,9 +66,9 @@ COMPILED = Costs(
     labels_call=33900, labels_item=532, labels_pixel=0.0741, labels_box=1480,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
     box_pair=0.354, bvh_call=87200, bvh_placement=548, bvh_moved=1320, bvh_item=767,
-    walk_call=556000, walk_ray=923, walk_item=10.7, walk_met=20000,
-    cast_call=123000, cast_ray=643, cast_pair=1.31,
-    march_call=159000, march_ray=117, march_prepared=2740, field_pixel=1.67,
+    cast_call=146000, cast_ray=255, cast_pair=1.26,
+    march_call=172000, march_ray=122, field_pixel=1.57,
+    prepared_march=9490, prepared_cast=5030, prepared_cast_item=2.69,
     prepared_tile=1.33, prepared_near=302, thread=836000,
 )  # fmt: skip
 """Times in numpy, and with compiled kernels."""

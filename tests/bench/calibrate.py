@@ -29,7 +29,6 @@ from hitplanes.weapons.fire.strategy import expected_near
 FILE = Path(__file__).parents[2] / "planes" / "common" / "costs.py"
 SIZE_WH, RADIUS, RANGE = (1920, 1080), 24, 500
 SHOTS, ITEMS = (1, 100, 3000), (10, 100, 1000)
-WALKS, CASTS = (1, 100, 1000), (1, 30, 300)
 HANDED_OVER = 20
 """Work is given to a thread if it takes so many times as long as handing it over."""
 
@@ -37,9 +36,9 @@ Row = tuple[float, ...]
 """What a time depends on, such as 1, shots, and pairs; and the time, ns."""
 
 
-def scene_of(items: int, size_wh: tuple[int, int] = SIZE_WH) -> Scene:
+def scene_of(items: int, size_wh: tuple[int, int] = SIZE_WH, bounded: bool = True) -> Scene:
     """A scene of discs, spread evenly."""
-    scene, sprite = Scene(size_wh), Sprite.circle(RADIUS)
+    scene, sprite = Scene(size_wh if bounded else None), Sprite.circle(RADIUS)
     for at in np.random.default_rng(items).uniform((0, 0), size_wh, (items, 2)):
         scene.add(sprite, at)
     return scene
@@ -157,21 +156,24 @@ def of_boxes(rounds: int) -> dict[str, float]:
 
 
 def of_rays(rounds: int, labels_pixel: float) -> dict[str, float]:
-    """Costs of the walk, the cast, the march, and the distance field."""
-    pistol, found, rows = Pistol(RANGE), {}, []
-    for n, scene, ns in timed(pistol, "walk", rounds, WALKS):
-        rows.append((1, n, len(scene), n * expected_near(scene.items.stack(), 0), ns))
-    found |= fitted("walk_call walk_ray walk_item walk_met", rows)
-    casts = [(1, n, n * len(scene), ns) for n, scene, ns in timed(pistol, "cast", rounds, CASTS)]
+    """Costs of the cast, the march, and the distance field."""
+    pistol, found = Pistol(RANGE), {}
+    casts = [(1, n, n * len(scene), ns) for n, scene, ns in timed(pistol, "cast", rounds)]
     found |= fitted("cast_call cast_ray cast_pair", casts)
     found |= fitted("march_call march_ray", [(1, n, ns) for n, _, ns in timed(pistol, "march", rounds)])
     fields = [row[3] / row[2] for row in made(pistol, "march", rounds, "cast")]
     found["field_pixel"] = max(min(fields) - labels_pixel, 0.0)
     scene = scene_of(ITEMS[0])
     fire(scene, pistol, (1, 1), strategy="march")
-    ready, shots = prepare(scene, pistol), [tuple(at) for at in places(200).tolist()]
-    ns = least(lambda: [ready.fire(at, aim=30) for at in shots], rounds)
-    return found | {"march_prepared": ns / len(shots)}
+    found["prepared_march"] = prepared(scene, pistol, rounds)
+    alone = [(1, items, prepared(scene_of(items, bounded=False), pistol, rounds)) for items in ITEMS]
+    return found | fitted("prepared_cast prepared_cast_item", alone)
+
+
+def prepared(scene: Scene, weapon: Any, rounds: int) -> float:
+    """Time of a shot of a ready weapon; without bounds there is no field to march by."""
+    ready, shots = prepare(scene, weapon), [tuple(at) for at in places(200).tolist()]
+    return least(lambda: [ready.fire(at, aim=30) for at in shots], rounds) / len(shots)
 
 
 def of_kernels(rounds: int) -> dict[str, float]:

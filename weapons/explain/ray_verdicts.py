@@ -28,7 +28,7 @@ from ..kinds.placements import Shots
 from ..rays.contacts import NEVER, Reason, Terminations, find_contacts
 from ..rays.first_hit import FirstHits
 from ..rays.ray_hits import Walk
-from ..rays.tracks import RAYS_AT_ONCE, covers, near_items, times_in
+from ..rays.raycast import RAYS_AT_ONCE, covers, near_items, times_in
 from .ray_samples import REACH_BITS, key_of_cells
 
 SLACK = 2.0**-24

@@ -20,7 +20,7 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..kinds.rays import RayWeapon, is_thin_first
+from ..kinds.rays import RayWeapon, is_moving, is_thin_first, not_cast
 from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
@@ -195,25 +195,14 @@ def _cheapest(request: Request, passed_over: str) -> tuple[Way, str]:
     return ready, passed_over + (_tiles_refuse(request) or f"about {least / 1e3:.0f} us")
 
 
-def _ray_costs(rays: int, stack: Stack, prepared: bool = False) -> dict[str, float]:
-    """Time that each way takes for so many rays, ns, among items that are spread evenly; a prepared ray never walks."""
-    now, items = costs(), len(stack)
-    cast = rays * (now.cast_ray + items * now.cast_pair)
-    if prepared:
-        return {"walk": inf, "cast": cast, "march": now.march_prepared}
-    item_wh, world_wh = stack.sizes
-    met = min(items * float((item_wh / world_wh).prod()), items)
-    walk = now.walk_call + items * now.walk_item + rays * (now.walk_ray + met * now.walk_met)
-    return {"walk": walk, "cast": now.cast_call + cast, "march": now.march_call + rays * now.march_ray}
-
-
-def _not_cast(ray: RayWeapon, *_: object) -> str:
-    return "" if is_thin_first(ray) else "only thin rays that end at their first hit do"
+def _not_cast(ray: RayWeapon, scene: Scene, *_: object) -> str:
+    moving = is_moving(ray, scene.items, scene.items.stack())
+    return not_cast(ray) or ("items move while rays fly" if moving else "")
 
 
 def _not_marched(ray: RayWeapon, scene: Scene, view: View | None) -> str:
-    if why := _not_cast(ray):
-        return why
+    if not is_thin_first(ray):
+        return "only thin rays that end at their first hit do"
     if view is None:
         return "rays accept different items"
     return "" if scene.derived.distance_field(view) else "no bounds that fit one plane"
@@ -224,7 +213,7 @@ RAY_WAYS: dict[str, Callable[[RayWeapon, Scene, View | None], str]] = {
 }  # fmt: skip
 """Why each way of rays cannot serve a weapon at a scene, or "". The walk is the reference, and follows any ray.
 
-Engines of the same names stand in `first_hit.ENGINES`; the walk's is `ray_walk.trace`.
+The walk is `ray_walk.trace`, the cast `raycast.cast_rays`, the march `first_hit.ends_by_march`.
 """
 
 RAYS_ASKED = {"direct": "walk", "built": "march"}
@@ -266,21 +255,23 @@ def chosen_ray_way(
     if forced and not passed_over:
         return RayChoice(name, "asked for")
     why = f"{name} is passed over: {passed_over}; " if passed_over else ""
-    if asked or not len(stack) or not is_thin_first(ray):
+    if asked or not len(stack):
         return RayChoice("walk", f"{why}every ray walks")
-    walk, cast, march = _ray_costs(rays, stack, prepared).values()
-    why += f"about {cast / 1e3:.0f} us cast at items, {walk / 1e3:.0f} us walking"
-    field, saved_ns = None if view is None else scene.derived.distance_field(view), min(cast, walk) - march
-    if field is not None:
-        why += f", {march / 1e3:.0f} us by march"
-    other = RayChoice("cast" if cast < walk else "walk", why)
-    return other if field is None or saved_ns <= 0 else _rented_or_bought(other, field, scene, saved_ns)
-
-
-def way_of_rest(way: str, stack: Stack, rays: int) -> str:
-    """Way of the rays that another way left over."""
-    ns = _ray_costs(rays, stack) if way == "march" and len(stack) else {"walk": 0.0, "cast": 0.0}
-    return "cast" if ns["cast"] < ns["walk"] else "walk"
+    if not_cast := _not_cast(ray, scene):
+        return RayChoice("walk", f"{why}{not_cast}")
+    now, pairs = costs(), rays * len(stack)
+    cast = now.cast_call + rays * now.cast_ray + pairs * now.cast_pair
+    march = now.march_call + rays * now.march_ray
+    if prepared:
+        cast, march = now.prepared_cast + pairs * now.prepared_cast_item, now.prepared_march
+    why += f"about {cast / 1e3:.0f} us cast at items"
+    if _not_marched(ray, scene, view):
+        return RayChoice("cast", why)
+    assert view is not None  # else it is not marched
+    field = scene.derived.distance_field(view)
+    assert field is not None  # so here
+    other = RayChoice("cast", f"{why}, {march / 1e3:.0f} us by march")
+    return other if cast <= march else _rented_or_bought(other, field, scene, cast - march)
 
 
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:

@@ -12,6 +12,7 @@ from hitplanes.planes.common.checks import Floats, InputError
 from hitplanes.planes.common.limits import PELLETS_MAX, REACH_MAX, STEPS_MAX
 from hitplanes.planes.common.tables import Number, Optional, Value, Whole, Word
 from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.scene.items import Items, Stack
 
 from .weapon import FALLOFFS, LENGTH, Part, Weapon
 
@@ -221,3 +222,19 @@ def ends_at_first(ray: RayWeapon) -> bool:
 def is_thin_first(ray: RayWeapon) -> bool:
     """Whether rays of a weapon are thin and end at their first hit, so that they need not walk."""
     return ends_at_first(ray) and not ray.radius_256
+
+
+def is_moving(ray: RayWeapon, items: Items, stack: Stack) -> bool:
+    """Whether any item moves during the ray; only a projectile takes time, one frame."""
+    return isinstance(ray, Projectile) and bool(items.velocity_256[stack.ids].any())
+
+
+def not_cast(ray: RayWeapon) -> str:
+    """Why rays of a weapon must walk cell by cell, whatever the scene; or ""."""
+    if ray.budget_256 is not None:
+        return "a budget is used up cell by cell"
+    if ray.inside != "hit" and not ends_at_first(ray):
+        return "items in which rays start are not hit"
+    if isinstance(ray, Projectile) and (ray.steps is not None or not ray.length_256):
+        return "a projectile is tested at moments of the frame"
+    return ""

@@ -22,7 +22,7 @@ from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
 from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
 from ..kinds.placements import accepted_of, blocking_of, checked_shots
-from ..kinds.rays import is_thin_first
+from ..kinds.rays import not_cast
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Answer, Filter, Present, Told, answer_of, reach_of, rounds_of
@@ -62,10 +62,10 @@ class Ready(Generic[AnyHits]):
     Every shot compares versions. If the scene has changed, all that was looked up is discarded first, so that no answer
     is of an older scene. The choice between numpy and compiled kernels is made at the same time.
 
-    Patterns of up to 1000 px are looked up; thin rays that end at their first hit are cast (see `prepared_ray`). These
-    are left to `fire`:
+    Patterns of up to 1000 px are looked up; weapons of one ray are cast (see `prepared_ray`). These are left to `fire`:
 
-    - all other rays, larger patterns, and in numpy large patterns near which there are many items
+    - sweeps, spreads and bursts of rays, and rays that must walk (see `strategy.RAY_WAYS`)
+    - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
     - batches and bad input
 
@@ -285,7 +285,7 @@ def prepare(
     if parts is not None:
         from .prepared_ray import ReadyRay
 
-        alone = parts[0] is None and parts[1] is None and is_thin_first(parts[2])
+        alone = parts[0] is None and parts[1] is None and not not_cast(parts[2])
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)

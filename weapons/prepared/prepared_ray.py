@@ -1,9 +1,9 @@
-"""Prepared weapon of one thin ray that ends at its first hit: each shot is cast at the items, or marches.
+"""A prepared weapon of one ray: each shot is cast at the items, or marches to its first hit.
 
 The way is chosen as `fire` chooses it (see `fire.strategy`). A ray that marches is cast if it comes to several pixels
 at once.
 
-position, aim -> start and step, 1/256 px -> what is touched first -> a row, or none
+position, aim -> start and step, 1/256 px -> what the ray hits -> a row for each object
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits.distance_field import NOTHING, UNDECIDED
-from hitplanes.planes.bits.raycast import Cast, Touched
-from hitplanes.planes.common.backend import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
+from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..fire.hits import HitRow
-from ..fire.strategy import chosen_ray_way
+from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
+from ..rays import raycast
 from ..rays.contacts import rays_of
-from ..rays.first_hit import PREPARED, FirstHits, ends_of_touched
-from ..rays.ray_hits import RayHits, Told, weights_at
+from ..rays.first_hit import marcher
+from ..rays.ray_hits import RayHits, Told, Walk, weights_at
+from ..rays.raycast import Follow, Followed
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
@@ -40,11 +41,9 @@ Pair = tuple[float, float]
 
 
 class OneRay(OneShot, RayHits):
-    """Answer of one prepared ray: a list of at most one row; all else is made when it is asked for."""
+    """Answer of one prepared ray: a list of its rows; all else is made when it is asked for."""
 
-    __slots__ = ("_found", "_told")  # set at each shot
-
-    _found: tuple[int, ...]
+    __slots__ = ("_told",)  # set at each shot
 
     @cached_attribute
     def _weighted(self) -> bool:
@@ -52,26 +51,28 @@ class OneRay(OneShot, RayHits):
         return parts is not None and parts[2].fades is not None
 
     @cached_property
-    def _first(self) -> FirstHits:
-        """First hits of the ray as a batch of one."""
-        parts = ray_parts_of(self.weapon)
+    def _walk(self) -> Walk:
+        """The ray as a batch of one, followed anew in the snapshot of the scene."""
+        parts, stack, bounds = ray_parts_of(self.weapon), self._present.stack, self._present.bounds
         assert parts is not None  # it was prepared as one
-        rays, stack = rays_of(parts, self.shots), self._present.stack
-        ends = ends_of_touched(Touched(*np.array(self._found, np.int64).reshape(4, 1)), rays.origin_xy, stack)
-        return FirstHits(rays, parts[2], ends, stack)
+        rays, ray = rays_of(parts, self.shots), parts[2]
+        lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
+        found = raycast.hits_and_ends(stack, bounds, lines, ray.hits_most, self.shots.meets, self.shots.exclude)
+        return raycast.walk_of(rays, ray, stack, bounds, found)
 
     @cached_attribute
     def _later(self) -> Told:
         def verdicts() -> Ints:
-            return late.ray_verdicts.verdicts_of([(0, self._first)], self.shots, self._present.bounds)
+            return late.ray_verdicts.verdicts_of([(0, self._walk)], self.shots, self._present.bounds)
 
-        return Told(lambda: self._first.passes, lambda: self._first.stops, verdicts)
+        return Told(lambda: self._walk.passes, lambda: self._walk.stops, verdicts)
 
 
 class ReadyRay(Ready[RayHits]):
-    """Prepared weapon of one thin ray that ends at its first hit.
+    """Prepared weapon of one ray that can be cast.
 
-    Bad input is left to `fire`, and so is a ray that starts inside an item if its weapon does not hit that item.
+    Bad input is left to `fire`, and so are a ray that starts inside an item if its weapon does not hit that item, and
+    projectiles while items move.
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
@@ -80,9 +81,9 @@ class ReadyRay(Ready[RayHits]):
         self._items, self._version, self._arrangement = scene.items, -1, -1
         self._lock = threading.Lock()
         self._stack: Stack
-        self._first: Cast
+        self._follows: Follow
         self._present: Present
-        self._objects: memoryview
+        self._ids: memoryview
 
     def fire(self, at: Any, aim: Any = None, toward: Any = None, shot: Any = None) -> RayHits:
         """Decide what one shot hits; the arguments are those of `fire`."""
@@ -91,37 +92,44 @@ class ReadyRay(Ready[RayHits]):
         place, target = plain_pair(at), None if toward is None else plain_pair(toward)
         numbered = shot is None or (type(shot) is int and 0 <= shot < 2**63)
         step = self._step(place, aim, target) if place and numbered and (target or toward is None) else None
-        if place and step:
-            start = round(SUB * place[0]), round(SUB * place[1])
-            found = entry, x, y, rank = self._first(*start, *step)
-            if entry > 0 or entry == NOTHING or (entry == 0 and self._ray.inside == "hit"):
-                hits: OneRay = OneRay()
-                hits._present, hits._at, hits._told, hits._found = self._present, place, (aim, target, shot), found
-                item = -1 if rank < 0 else self._objects[rank]
-                if item >= 0:
-                    column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
-                    weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
-                    distance2 = column * column + row * row
-                    hits.append(new(HitRow, (0, 0, item, 1, 1, weight, 1, (x, y), distance2)))
-                return hits
-        return Ready.fire(self, at, aim, toward, shot)
+        if place is None or step is None:
+            return Ready.fire(self, at, aim, toward, shot)
+        start = round(SUB * place[0]), round(SUB * place[1])
+        followed = self._follows(*start, *step)
+        if followed is None or (followed[0] == 0 and self._ray.inside != "hit"):
+            return Ready.fire(self, at, aim, toward, shot)
+        hits: OneRay = OneRay()
+        hits._present, hits._at, hits._told = self._present, place, (aim, target, shot)
+        for rank, count, x, y, entry in followed[1]:
+            column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
+            weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
+            told = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
+            hits.append(new(HitRow, told))
+        return hits
 
-    def _unsettled(self, x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
-        """What a ray touches first, by the way chosen now; the next rays go the same way unless it is pending."""
-        chosen = chosen_ray_way("auto", False, self._ray, self.scene, self._stack, self._view, 1, prepared=True)
-        given = self.scene, self._stack, self._view
-        first = cast = PREPARED["cast"](*given)
+    def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """What a ray hits, by the way chosen now; the next rays go the same way unless it is pending."""
+        ray, stack = self._ray, self._stack
+        chosen = chosen_ray_way("auto", False, ray, self.scene, stack, self._view, 1, prepared=True)
+        most = ray.hits_most
+        follow = cast = kernels_of(raycast).follower(stack, self.scene.bounds, self._view, ray.radius_256, most)
         if chosen.way == "march":
-            march = PREPARED["march"](*given)
+            march = marcher(self.scene, stack, self._view)
 
-            def first(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+            def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
                 """March, and cast what the march leaves undecided."""
-                found = march(x, y, dx, dy)
-                return cast(x, y, dx, dy) if found[0] == UNDECIDED else found
+                return march(x, y, dx, dy) or cast(x, y, dx, dy)
+
+        elif chosen.way == "walk" and RAY_WAYS["cast"](ray, self.scene, self._view):
+
+            def follow(*_: int) -> Followed | None:
+                """Leave rays to `fire` that are not cast at the scene as it is."""
+                return None
 
         if not chosen.pending:
-            self._first = first
-        return first(x, y, dx, dy)
+            self._follows = follow
+        found: Followed | None = follow(x, y, dx, dy)
+        return found
 
     def _step(self, place: Pair, aim: Any, target: Pair | None) -> tuple[int, int] | None:
         """Vector from the start of a shot to its end, 1/256 px; None if an argument must be checked by `fire`."""
@@ -139,8 +147,8 @@ class ReadyRay(Ready[RayHits]):
         return over_one(c * self._length), over_one(s * self._length)
 
     def _weight(self, step: tuple[int, int], entry: int) -> int:
-        scale = max(abs(step[0]), 1) * max(abs(step[1]), 1)
-        return int(weights_at(np.array([entry]), np.array([scale]), self._fades)[0])
+        scale = Lines(np.zeros((1, 2), np.int64), np.array([step]), self._ray.radius_256).scale
+        return int(weights_at(np.array([entry]), scale, self._fades)[0])
 
     def _follow(self) -> None:
         """Read the scene as it is now, and choose the kernels."""
@@ -151,8 +159,8 @@ class ReadyRay(Ready[RayHits]):
             stack = self._stack = self._items.stack()
             if stack.forms != self._arrangement:
                 self._arrangement = stack.forms
-                self._objects = np.where(stack.occluder, -1, stack.ids).data
-            self._first = self._unsettled
+                self._ids = stack.ids.data
+            self._follows = self._unsettled
             self._present = self._snapshot(version, stack)
             self._version = version
 

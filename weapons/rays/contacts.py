@@ -32,7 +32,7 @@ from ..fire.plan import Plan
 from ..kinds import placements
 from ..kinds.areas import Rounds, Spread
 from ..kinds.placements import ZEROS, Shots, recoiled
-from ..kinds.rays import Projectile, RayWeapon, Sweep
+from ..kinds.rays import Projectile, RayWeapon, Sweep, is_moving
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,11 +265,6 @@ def stretches(group: Ints, entry: Ints, leave: Ints) -> tuple[Ints, Ints, Ints]:
 def steps_of(ray: RayWeapon) -> int | None:
     """Number of moments of a frame at which a projectile is tested; None for a swept projectile or any other ray."""
     return ray.steps if isinstance(ray, Projectile) else None
-
-
-def is_moving(ray: RayWeapon, items: Items, stack: Stack) -> bool:
-    """Whether any item moves during the ray; only a projectile takes time, one frame."""
-    return isinstance(ray, Projectile) and bool(items.velocity_256[stack.ids].any())
 
 
 def common_scale(ray: RayWeapon, items: Items, stack: Stack) -> int:

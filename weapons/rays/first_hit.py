@@ -1,24 +1,21 @@
-"""Rays that end at their first hit: their ends by cast and by march, and their hits.
+"""Rays that end at their first hit: their ends by march, and their hits.
 
-- The cast tests a thin ray against the boxes and pixels of all items. It leaves to the walk a ray of no length, and one
-  that starts inside an item which its weapon does not hit there.
-- The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item.
-  Both hold what all rays of the call accept. A ray of no length is left over.
+The march by the distance field takes a thin ray to the first pixel that is taken; the label plane names its item. Both
+hold what all rays of the call accept. A ray of no length is left over.
 
 Rows are made at once; passes and stops when they are asked for. A ray walked one cell of the object that ended it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hitplanes.planes.bits import distance_field, raycast
+from hitplanes.planes.bits import distance_field
 from hitplanes.planes.bits.distance_field import NOTHING, PAD, UNDECIDED, Clearance, DistanceField
-from hitplanes.planes.bits.raycast import Cast, Touched, first_at_once
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints, Labels
 from hitplanes.planes.common.limits import HALF, SUB
@@ -28,12 +25,14 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Rows
-from ..fire.prefilter import may_refuse
 from ..kinds.placements import ONES, Shots
 from ..kinds.rays import RayWeapon
-from .contacts import Contacts, Rays, Reason, Terminations, Touches, endless, reasons_at
+from .contacts import NEVER, Contacts, Rays, Reason, Terminations, Touches, endless, reasons_at
 from .ray_hits import Passes, Stops, Summed, Walk, numbered, rows_of_passes, weights_at
 from .ray_walk import Range, lines_of
+
+if TYPE_CHECKING:
+    from .raycast import Follow, Followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,36 +94,18 @@ class FirstHits:
         return Walk(self.rays, lines, hit, ends, self.stack, None, self.ray.fades, traced)
 
 
-def ends_of_touched(found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:
-    """Ends of rays at what they touch first, without `fraction`; `origin_xy` (R, 2) are the pixels of their starts."""
-    return _ended(np.flatnonzero(found.entry >= 0), found, origin_xy, stack)
+def first_at_once(taken: Bools, blocked: Bools, place: Ints) -> Ints:
+    """Of cells (n, k) that each ray enters at the same moment, the column of the one that ends it.
 
+    Cells with an accepted occluder come first, then those of the least (y, x). The front item of the cell ends the ray.
 
-def _ended(met: Ints, found: Touched, origin_xy: Ints, stack: Stack) -> Terminations:
-    """Ends of rays, of which some (n,) touch something: `found` has a row for each of these, or for each ray."""
-    if len(found.entry) > len(met):
-        found = Touched(*(column[met] for column in found))
-    ends, aside = endless(len(origin_xy)), origin_xy.take(met, axis=0)
-    ends.x[met], ends.y[met] = found.x - aside[:, 0], found.y - aside[:, 1]
-    ends.rank[met], ends.time[met] = found.rank, found.entry
-    ends.reason[met] = reasons_at(stack, found.rank)
-    return ends
-
-
-# house: way of rays
-def ends_by_cast(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
-    """Find the ends of rays, without `fraction`, by casting them at the items; and the rays left to the walk."""
-    stack = through.stack
-    whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
-    found = kernels_of(raycast).first_touched(stack, through.bounds, rays.start_256, rays.step_256, *whose)
-    ends = ends_of_touched(found, rays.origin_xy, stack)
-    through.plan.run("cast", "each ray to what it touches first: boxes, filters and occluders, too", ends.nbytes)
-    return ends, np.flatnonzero(_undecided(found.entry, ray))
-
-
-def _undecided(entry: Ints, ray: RayWeapon) -> Bools:
-    """Rays that were not followed, or start inside an item that the weapon does not hit there."""
-    return np.asarray((entry == UNDECIDED) | ((entry == 0) & (ray.inside != "hit")))
+    Parameters
+    ----------
+    taken, blocked : whether an accepted item covers the cell, and whether an accepted occluder does
+    place : numbers of the cells, ordered by (y, x)
+    """
+    later = place.max(initial=0) + 1
+    return np.asarray(np.argmin((~taken * 2 + ~blocked) * later + place, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,12 +164,13 @@ def ends_by_march(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> t
     if len(at):
         starts, width = entry[at] == 0, planes.distances.shape[1]
         cell[at] = planes.first_of(_at_once(cell[at], starts, start_256[at], rays.step_256[at], width))
-    rank, _ = planes.front(cell[met])
-    x, y = planes.place(cell[met])
-    found = Touched(entry[met], x + corner_xy[0], y + corner_xy[1], rank)
-    ends = _ended(met, found, rays.origin_xy, through.stack)
+    ends, aside, (x, y) = endless(len(rays)), corner_xy - rays.origin_xy[met], planes.place(cell[met])
+    ends.rank[met], _ = planes.front(cell[met])
+    ends.time[met], ends.x[met], ends.y[met] = entry[met], x + aside[:, 0], y + aside[:, 1]
+    ends.reason[met] = reasons_at(through.stack, ends.rank[met])
     through.plan.run("march", "each ray to the first cell that is taken", ends.nbytes)
-    return ends, np.flatnonzero(_undecided(entry, ray))
+    starts_inside = (entry == 0) & (ray.inside != "hit")
+    return ends, np.flatnonzero((entry == UNDECIDED) | starts_inside)
 
 
 def _read(through: Range, field: DistanceField) -> tuple[Labels, Clearance]:
@@ -216,37 +198,23 @@ def _at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width:
     return np.asarray(place[:, None] + steps[:, :, 0] + width * steps[:, :, 1])
 
 
-ENGINES: dict[str, Callable[[Rays, RayWeapon, Shots, Range], tuple[Terminations, Ints]]] = {
-    "cast": ends_by_cast,
-    "march": ends_by_march,
-}
-"""Functions that find the ends of rays, by the names of `strategy.RAY_WAYS`."""
-
-
-def caster(scene: Scene, stack: Stack, view: View) -> Cast:
-    """Function that casts one ray at the items that a view accepts."""
-    accepts = view.accepts(stack)
-    cast: Cast = kernels_of(raycast).caster(stack, scene.bounds, None if accepts.all() else accepts)
-    return cast
-
-
-def marcher(scene: Scene, stack: Stack, view: View) -> Cast:
-    """Like `caster`, by march; a ray that comes to several cells at once is UNDECIDED."""
+def marcher(scene: Scene, stack: Stack, view: View) -> Follow:
+    """Like `raycast.follower`, by march; None of a ray that comes to several cells at once."""
     field = scene.derived.distance_field(view)
     assert field is not None
     plane = field.labels.read(scene.items)
     distances, (left, top) = field.read(scene.items, plane), field.corner_xy.tolist()
     flat, shape, labels, width = distances.reshape(-1).data, distances.shape, plane.reshape(-1).data, plane.shape[1]
-    ranks = stack.rank_by_code.data
+    ranks, occluder = stack.rank_by_code.data, stack.occluder.data
 
-    def march(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+    def march(x: int, y: int, dx: int, dy: int) -> Followed | None:
         entry, cell, several = distance_field.one_taken(flat, shape, (x - SUB * left, y - SUB * top), (dx, dy))
+        if entry == NOTHING:
+            return NEVER, []
         if entry < 0 or several:
-            return NOTHING if entry == NOTHING else UNDECIDED, 0, 0, -1
+            return None
         row, column = divmod(cell, shape[1])
-        return entry, column + left, row + top, ranks[labels[(row - PAD) * width + column - PAD] >> 1]
+        rank = ranks[labels[(row - PAD) * width + column - PAD] >> 1]
+        return entry, [] if occluder[rank] else [[rank, 1, column + left, row + top, entry]]
 
     return march
-
-
-PREPARED = {"cast": caster, "march": marcher}  # makers of functions that follow one prepared ray

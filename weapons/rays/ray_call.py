@@ -1,7 +1,7 @@
 """Fire a ray weapon: the whole flow on one screen.
 
-scene -> stack -> weapon -> rays -> way: walk -> pre-filter -> cells on pixels -> ends -> passes and stops -> rows
-                                         cast at all items, or march to the first pixel that is taken -> ends -> rows
+scene -> stack -> weapon -> rays -> way: cast at the items, or march to the first pixel that is taken -> ends -> rows
+                                         walk: pre-filter -> cells on pixels of items -> ends -> rows
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from .. import late
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse, view_of
-from ..fire.strategy import RAY_WAYS, RAYS_ASKED, RayChoice, chosen_candidates, chosen_ray_way, way_of_rest
+from ..fire.strategy import RAY_WAYS, RayChoice, chosen_candidates, chosen_ray_way
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
 from .contacts import Parts, Rays, Terminations, Touches, rays_of
-from .first_hit import ENGINES, FirstHits
+from .first_hit import FirstHits, ends_by_march
 from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes, walked_of
-from .ray_walk import Range, expected_cells, has_track, has_whole_walk, trace, tracked
+from .ray_walk import Range, expected_cells, has_whole_walk, trace
+from .raycast import cast_rays, cast_to_ends
 
 RAYS_AT_ONCE = 2**14
 """Most rays of a chunk; the columns of so many fit the processor's cache."""
@@ -75,7 +76,7 @@ def fired_rays(
             found.append((begin, first))
             plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
         else:
-            followed, row, room = _followed(rays, ray, some, through, room)
+            followed, row, room = _followed(rays, ray, some, through, chosen.way, choose, room)
             rows.append(row)
             found += [(begin, walk) for walk in followed]
         if begin:
@@ -99,12 +100,11 @@ def _planned(
     prefilter, broadphase, strategy = how
     chosen = chosen_ray_way(strategy, how[:2] != ("auto", "auto"), ray, scene, stack, view, count)
     choose = partial(chosen_candidates, prefilter, broadphase, scene, stack)
-    walks, asked = chosen.way == "walk", how[:2] != ("auto", "auto") or RAYS_ASKED.get(strategy, strategy) == "walk"
-    track = not asked and has_track(ray)
-    candidates = choose(count if walks and not track else 0)
+    walks = chosen.way == "walk"
+    candidates = choose(count if walks else 0)
     field = scene.derived.distance_field(view) if view and chosen.way == "march" else None
     plan.run("plan", candidates.why if walks else chosen.why)
-    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field, tracked=track), chosen, choose
+    return Range(scene.items, stack, scene.bounds, candidates, plan, field=field), chosen, choose
 
 
 def first_ends(
@@ -155,7 +155,7 @@ def _unused(
     why_unindexed: str | None, walked: bool, ray: RayWeapon, strategy: str, chosen: RayChoice
 ) -> Iterator[tuple[str, str]]:
     """Stages that rays did not need, and why; `why_unindexed` is None unless some rays went through the pre-filter."""
-    idle = "a part of the walk" if walked else "no ray was left to walk"
+    idle = "a part of the walk" if walked else "no ray walks"
     for name in ("pre-filter", "walk", "stops"):
         yield name, idle
     yield "broad phase", why_unindexed or idle
@@ -169,24 +169,26 @@ def _unused(
 
 
 def _first_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose) -> Terminations:
-    """Ends of rays that end at their first hit; what one way leaves over is found by the next."""
+    """Ends of rays that end at their first hit; those that march leaves over are cast, and the rest walk."""
     if way == "walk":
         return Terminations.joined([walk.ends for walk in _walks(rays, ray, shots, through)])
-    ends, left = ENGINES[way](rays, ray, shots, through)
+    ends, left = (cast_to_ends if way == "cast" else ends_by_march)(rays, ray, shots, through)
     if len(left):
-        rest = way_of_rest(way, through.stack, len(left))
-        through = replace(through, candidates=choose(len(left) if rest == "walk" and not through.tracked else 0))
-        through.plan.run("plan", "")
+        rest = "walk" if way == "cast" else "cast"
+        through = _walking(through, choose, len(left)) if rest == "walk" else through
         ends.put(left, _first_ends(rays.take(left), ray, shots, through, rest, choose))
     return ends
 
 
+def _walking(through: Range, choose: Choose, rays: int) -> Range:
+    """The items as so many rays are tested against them that were left over by another way."""
+    through = replace(through, candidates=choose(rays))
+    through.plan.run("plan", "")
+    return through
+
+
 def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator[Walk]:
-    """Follow rays to their ends, in chunks that are expected to touch at most CHUNK_CELLS cells."""
-    walk = tracked(rays, ray, shots, through)
-    if walk is not None:
-        yield walk
-        return
+    """Follow rays cell by cell to their ends, in chunks that are expected to touch at most CHUNK_CELLS cells."""
     begin = cells = 0
     most = WALKED_AT_ONCE
     if through.candidates.prefilter.name == "none":
@@ -208,12 +210,13 @@ def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator
 
 
 def _followed(
-    rays: Rays, ray: RayWeapon, shots: Shots, through: Range, room: int
+    rays: Rays, ray: RayWeapon, shots: Shots, through: Range, way: str, choose: Choose, room: int
 ) -> tuple[list[Walk | Made], Rows, int]:
-    """Follow rays to their ends.
+    """Follow rays that go on to their ends.
 
     Parameters
     ----------
+    way, choose : the chosen way, and the function that chooses the pre-filter of those that walk
     room : number of cells that may be kept until passes are read
 
     Returns
@@ -222,7 +225,10 @@ def _followed(
     """
     walks: list[Walk | Made] = []
     summed, pixels, plan = [], [], through.plan
-    for walk in _walks(rays, ray, shots, through):
+    cast = cast_rays(rays, ray, shots, through) if way == "cast" else None
+    if cast is None and way == "cast":
+        through = _walking(through, choose, len(rays))
+    for walk in [cast] if cast else _walks(rays, ray, shots, through):
         summed.append(walk.summed)
         parts = walk.parts()
         for part in parts:

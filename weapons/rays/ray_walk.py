@@ -1,4 +1,4 @@
-"""Ray walk, the reference for all rays: the contacts of each ray with items, and its end.
+"""Ray walk, the reference for all rays: the contacts of each ray with items, cell by cell, and its end.
 
 Only cells inside the boxes of items are tested. A ray that may end early is followed in stretches, each longer than the
 one before, until its end is known, so that in a crowd it is tested against few items.
@@ -13,7 +13,6 @@ import numpy as np
 
 from hitplanes.planes import late
 from hitplanes.planes.bits.distance_field import DistanceField
-from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.rasterize import Lines
@@ -23,24 +22,20 @@ from hitplanes.planes.scene.items import Items, Stack
 from ..fire.plan import Plan
 from ..fire.prefilter import Candidates, may_refuse, refused
 from ..kinds.placements import Shots
-from ..kinds.rays import Projectile, RayWeapon
-from . import tracks
+from ..kinds.rays import Projectile, RayWeapon, is_moving
 from .contacts import (
     Contacts,
     Rays,
     Terminations,
-    Touches,
     at_steps,
     common_scale,
     find_contacts,
     in_frame,
-    is_moving,
     relative_lines,
     steps_of,
     stretches,
     terminations_of,
 )
-from .ray_hits import Walk
 
 STRETCH_PAIRS, STRETCH_GROWTH = 150, 2
 """Pairs of rays and boxes expected in the first stretch of a walk, at least one a ray, which cost as much as a stretch;
@@ -63,8 +58,7 @@ class Range:
     """The items that rays are tested against, and the records of the work.
 
     `field` is that of a scene within bounds, for rays that march; it holds what all of them accept. `looked` is set
-    only for a report; `whole` follows rays in one stretch, beyond their ends. With `tracked`, rays need not walk cell
-    by cell, and all boxes are compared.
+    only for a report; `whole` follows rays in one stretch, beyond their ends.
     """
 
     items: Items
@@ -75,7 +69,6 @@ class Range:
     looked: Looked | None = None
     whole: bool = False
     field: DistanceField | None = None
-    tracked: bool = False
 
 
 # house: way of rays
@@ -116,38 +109,9 @@ def trace(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Con
     return met, ends, timed, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
 
 
-def has_track(ray: RayWeapon) -> bool:
-    """Whether the rows of a weapon's rays need only the first cells of items, and the numbers of their cells."""
-    return ray.inside == "hit" and ray.budget_256 is None and steps_of(ray) is None
-
-
 def has_whole_walk(ray: RayWeapon, items: Items, stack: Stack) -> bool:
     """Whether a weapon's rays hit what they meet in all cells before their ends, at times of their own."""
     return ray.inside != "ignore_until_exit" and steps_of(ray) is None and not is_moving(ray, items, stack)
-
-
-# house: way of rays
-def tracked(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
-    """Follow rays to their ends by the accelerated form of `trace`; None if it does not serve."""
-    stack, plan = through.stack, through.plan
-    if not through.tracked or is_moving(ray, through.items, stack):
-        return None
-    lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
-    if isinstance(ray, Projectile) and not lines.length2.all():
-        return None
-    whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
-    found = kernels_of(tracks).tracks(stack, through.bounds, lines, ray.hits_most, *whose)
-    if found is None:
-        return None
-    hit, ends = found
-    lines = lines_of(rays, ray)
-    plan.run("walk", "each ray to its end: boxes, filters and occluders, too", hit.nbytes + ends.nbytes)
-    fraction = np.ones(len(rays))
-    at_items = np.flatnonzero(ends[0])
-    fraction[at_items] = ends[1, at_items] / lines.scale[at_items]
-    reason, time, y, x, rank, alone = ends
-    stops = Terminations(reason, time, y, x, rank, alone != 0, fraction)
-    return Walk(rays, lines, Touches(*hit), stops, stack, through.bounds, ray.fades)
 
 
 def touching(rays: Rays, ray: RayWeapon, through: Range) -> tuple[Contacts, Lines]:

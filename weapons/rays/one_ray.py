@@ -1,47 +1,35 @@
-"""Ray casts: the first item that a thin ray touches, found by the masks of all items, without a plane.
+"""A thin ray up to its first hit, in whole numbers of Python: for one ray a call this is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
 box is left that it enters before the first cell that it found. Times are those of `grid.rasterize`: whole numbers over
 max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on rounding.
-
-Of cells that are entered at once, one with an occluder comes first, then the least (y, x); within a cell the front item
-counts. `jit.rays` has the compiled kernel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..common.checks import Bools, Ints
-from ..common.limits import HALF, SUB
-from ..grid.spans import Box, meets
-from ..scene.items import Stack, clipped
-from .distance_field import LONGEST, NOTHING, UNDECIDED
+from hitplanes.planes.bits.distance_field import LONGEST
+from hitplanes.planes.common.checks import Bools, Ints
+from hitplanes.planes.common.limits import HALF, SUB
+from hitplanes.planes.grid.spans import Box, meets
+from hitplanes.planes.scene.derived import View
+from hitplanes.planes.scene.items import Stack, clipped
+
+from .contacts import NEVER
+from .first_hit import first_at_once
+
+if TYPE_CHECKING:
+    from .raycast import Follow, Followed
 
 ROWS_MOST = 400
-"""Most rows of masks that one ray looks at in numpy; with more, the walk is faster."""
+"""Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
 
 Pair = tuple[int, int]
 Spell = tuple[int, int]
 """Times at which a ray enters and leaves a box or a cell."""
-
-
-class Touched(NamedTuple):
-    """The first cell and item that rays (R,) touch, as columns.
-
-    Parameters
-    ----------
-    entry : time at which a ray enters the cell; NOTHING; or UNDECIDED if it was not followed
-    x, y, rank : the cell, and the item
-    """
-
-    entry: Ints
-    x: Ints
-    y: Ints
-    rank: Ints
 
 
 class Near(NamedTuple):
@@ -60,67 +48,20 @@ class Near(NamedTuple):
     box_xyxy: Ints
 
 
-Cast = Callable[[int, int, int, int], tuple[int, ...]]
-"""Function that casts one ray from (x, y) to (x + dx, y + dy), 1/256 px; it returns a row of `Touched`."""
+def follower(stack: Stack, bounds: Box | None, view: View) -> Follow:
+    """Function that follows one thin ray to what it touches first; None if that takes many rows, or ray is too long."""
+    accepted = view.accepts(stack)
+    accepts = None if accepted.all() else accepted
 
-
-def first_touched(
-    stack: Stack,
-    bounds: Box | None,
-    start_256: Ints,
-    step_256: Ints,
-    meets: Ints | None = None,
-    exclude: Ints | None = None,
-) -> Touched:
-    """Find the first item that each ray touches.
-
-    Parameters
-    ----------
-    bounds : box beyond which nothing is touched, or None
-    start_256, step_256 : (R, 2) rays, up to 2**48
-    meets, exclude : (R,) filter of items that a ray meets, and (R, K) owners whose items are skipped; or None, both
-
-    Returns
-    -------
-    the first cells; a ray without length, or longer than LONGEST, is UNDECIDED, and so is one in numpy that looks at
-    more than ROWS_MOST rows
-    """
-    found = []
-    for ray, ((x, y), (dx, dy)) in enumerate(zip(start_256.tolist(), step_256.tolist(), strict=True)):
-        accepts = None
-        if meets is not None and exclude is not None:
-            accepts = (stack.categories & meets[ray]) != 0
-            accepts &= ~(stack.owner[:, None] == exclude[ray]).any(axis=1)
-        found.append(caster(stack, bounds, accepts)(x, y, dx, dy))
-    return Touched(*np.array(found, np.int64).reshape(-1, 4).T)
-
-
-def caster(stack: Stack, bounds: Box | None, accepts: Bools | None) -> Cast:
-    """Function that casts one ray at the accepted items of a mask (M,), or at all."""
-
-    def cast(x: int, y: int, dx: int, dy: int) -> tuple[int, ...]:
+    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
         if not (dx or dy) or max(abs(dx), abs(dy)) > LONGEST:
-            return UNDECIDED, 0, 0, -1
+            return None
         origin = (x + HALF) // SUB, (y + HALF) // SUB
         ray = Ray((x - SUB * origin[0], y - SUB * origin[1]), (dx, dy))
         return _first(ray, origin, _near(ray, origin, stack, bounds, accepts), stack)
 
-    return cast
-
-
-# house: hit rule of rays
-def first_at_once(taken: Bools, blocked: Bools, place: Ints) -> Ints:
-    """Of cells (n, k) that each ray enters at the same moment, the column of the one that ends it.
-
-    Cells with an accepted occluder come first, then those of the least (y, x). The front item of the cell ends the ray.
-
-    Parameters
-    ----------
-    taken, blocked : whether an accepted item covers the cell, and whether an accepted occluder does
-    place : numbers of the cells, ordered by (y, x)
-    """
-    later = place.max(initial=0) + 1
-    return np.asarray(np.argmin((~taken * 2 + ~blocked) * later + place, axis=1))
+    return follow
 
 
 class Ray:
@@ -198,8 +139,9 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
     return Near(rank[rows], entry[rows], leave[rows], box[rows])
 
 
-def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, int, int]:
-    """Time, cell and rank of the first item that a ray touches."""
+# house: hit rule of rays
+def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> Followed | None:
+    """What a ray touches first; None if it looks at too many rows."""
     best: tuple[int, int, int] | None = None
     left = ROWS_MOST
     for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
@@ -209,12 +151,12 @@ def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, 
         rows = ray.rows(box, (entry, leave))
         left -= len(rows) + 1
         if left < 0:
-            return UNDECIDED, 0, 0, -1
+            return None
         found = _in(ray, origin, box, rows, stack, int(near.rank[k]))
         if found is not None and (best is None or found[0] < best[0]):
             best = found
     if best is None:
-        return NOTHING, 0, 0, -1
+        return NEVER, []
     cells = []
     for x, y in ((best[1] + k % 3 - 1, best[2] + k // 3 - 1) for k in range(9)):
         first, last = ray.spell(x, y)
@@ -227,7 +169,8 @@ def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> tuple[int, int, 
         blocked = np.array([[stack.occluder[ranks].any() for _, _, ranks in cells]])
         at = int(first_at_once(np.ones_like(blocked), blocked, np.arange(len(cells))[None])[0])
     x, y, ranks = cells[at]
-    return best[0], x, y, int(ranks.min())
+    rank = int(ranks.min())
+    return best[0], [] if stack.occluder[rank] else [[rank, 1, x, y, best[0]]]
 
 
 def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:

@@ -1,8 +1,8 @@
-"""Tracks of rays that go on: what each ray hits, how many cells of it, and where the ray ends, without all its cells.
+"""Raycast: what each ray hits, how many cells of it, and where the ray ends, without all its cells.
 
 The rows of an answer need no more. Cells, with the times at which a ray enters and leaves them, are found again when
-passes are read. `jit.tracks` has the compiled kernel; `ray_walk.trace` is the reference, and serves budgets, items that
-move during a ray, and weapons that do not hit what their rays start in.
+passes are read. `jit.raycast` has the compiled kernel; `ray_walk.trace` is the reference, and serves budgets, items
+that move during a ray, and most weapons that do not hit what their rays start in.
 
 1. Items whose boxes a ray enters, in the order of entry.
 2. The first cell of each item, and the number of its cells. Rays that may end early look at few items at a time.
@@ -11,23 +11,31 @@ move during a ray, and weapons that do not hit what their rays start in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from hitplanes.planes.bits.cells import BRUTE_PAIRS, is_sparse, met_boxes
+from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 
+from ..fire.prefilter import may_refuse
+from ..kinds.placements import Shots
+from ..kinds.rays import RayWeapon
 from .contacts import (
     NEVER,
     Contacts,
+    Rays,
     Terminations,
+    Touches,
     cells_most,
     end_at_hits,
     end_at_occluders,
@@ -35,6 +43,8 @@ from .contacts import (
     find_contacts,
     first_of_each,
 )
+from .ray_hits import Walk
+from .ray_walk import Range, lines_of
 
 RAYS_AT_ONCE = 1024
 """Most rays that are followed at a time; the columns of their pairs fit the processor's cache."""
@@ -82,15 +92,54 @@ class Firsts(Columns):
     most: Ints
 
 
+Followed = tuple[int, list[list[int]]]
+"""When a ray ends, and what it hits, in order: rank, number of cells, first cell (x, y) in the world, and its time."""
+
+Follow = Callable[[int, int, int, int], Followed | None]
+"""Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
+
+
+# house: way of rays
+def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
+    """Follow rays to their ends; None if they are too long or too wide for the kernel."""
+    stack, plan = through.stack, through.plan
+    lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
+    whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
+    this = sys.modules[__name__]
+    found = kernels_of(this).hits_and_ends(stack, through.bounds, lines, ray.hits_most, *whose)
+    if found is None:
+        return None
+    plan.run("cast", "each ray to its end: boxes, filters and occluders, too", sum(part.nbytes for part in found))
+    return walk_of(rays, ray, stack, through.bounds, found)
+
+
+def walk_of(rays: Rays, ray: RayWeapon, stack: Stack, bounds: Box | None, found: tuple[Ints, Ints]) -> Walk:
+    """Rays that were followed to their ends; `found` is what they hit and their ends, as `hits_and_ends` returns it."""
+    lines, (reason, time, y, x, rank, alone) = lines_of(rays, ray), found[1]
+    fraction, at_items = np.ones(len(rays)), np.flatnonzero(reason)
+    fraction[at_items] = time[at_items] / lines.scale[at_items]
+    ends = Terminations(reason, time, y, x, rank, alone != 0, fraction)
+    return Walk(rays, lines, Touches(*found[0]), ends, stack, bounds, ray.fades)
+
+
+def cast_to_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
+    """Ends of rays that end at their first hit; and the rays left to the walk."""
+    walk = cast_rays(rays, ray, shots, through)
+    if walk is None:
+        return endless(len(rays)), np.arange(len(rays))
+    starts_inside = (walk.ends.time == 0) & (ray.inside != "hit")
+    return walk.ends, np.flatnonzero(starts_inside)
+
+
 # house: hit rule of rays
-def tracks(
+def hits_and_ends(
     stack: Stack,
     bounds: Box | None,
     lines: Lines,
     most: int | None,
     meets: Ints | None = None,
     exclude: Ints | None = None,
-) -> tuple[Ints, Ints] | None:
+) -> tuple[Ints, Ints]:
     """Follow rays to their ends, as `trace` does, and count the cells of what they hit.
 
     Parameters
@@ -110,7 +159,7 @@ def tracks(
     for begin in range(0, max(len(lines), 1), step):
         some = slice(begin, begin + step)
         whose = (meets[some], exclude[some]) if meets is not None and exclude is not None else None
-        found.append(_tracks(stack, bounds, lines.take(some), most, whose))
+        found.append(_hits_and_ends(stack, bounds, lines.take(some), most, whose))
         found[-1][0][0] += begin
     if len(found) == 1:
         return found[0]
@@ -118,10 +167,10 @@ def tracks(
     return hit, ends
 
 
-def _tracks(
+def _hits_and_ends(
     stack: Stack, bounds: Box | None, lines: Lines, most: int | None, whose: tuple[Ints, Ints] | None
 ) -> tuple[Ints, Ints]:
-    """Tracks of some rays."""
+    """`hits_and_ends` of some rays."""
     origin = pixel(lines.start)
     own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
     near = near_items(stack, bounds, lines, own, origin, whose)
@@ -141,6 +190,27 @@ def _tracks(
         hit.count[last] = cells.only(ends.walked(cells)).count
     columns = ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone.astype(np.int64)
     return np.stack([hit.ray, hit.rank, hit.count, hit.x, hit.y, hit.entry]), np.stack(columns)
+
+
+def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
+    """Function that follows one ray of half a width, in 1/256 px, among the items that a view accepts.
+
+    `most` is the number of objects that a ray may hit, or None.
+    """
+    if not radius and most == 1:
+        from . import one_ray
+
+        return one_ray.follower(stack, bounds, view)
+    meets, exclude = np.array([view.meets]), np.array([view.exclude], np.int64)
+
+    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
+        lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
+        hit, ends = hits_and_ends(stack, bounds, lines, most, meets, exclude)
+        hit[3:5] += pixel(lines.start).T
+        return int(ends[1, 0]), hit[1:].T.tolist()
+
+    return follow
 
 
 def near_items(

@@ -1,4 +1,4 @@
-"""Tracks of rays that go on, in numpy and compiled: the rows, passes and stops of the walk, which oracles judge."""
+"""Rays that go on and are cast, in numpy and compiled: the rows, passes and stops of the walk, which oracles judge."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from hitplanes import ALL, Hits, Laser, Pistol, Projectile, Rifle, Scene, Spread, Sweep, Weapon, fire
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.rasterize import DIAGONAL, FAR, Lines
-from hitplanes.weapons.rays import tracks
+from hitplanes.weapons.rays import raycast
 
 Pixel = tuple[int, int]
 
@@ -61,7 +61,7 @@ def as_walked(scene: Scene, weapon: Weapon, **how: Any) -> Hits:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_tracks_are_those_of_the_walk(jit: bool, seed: int) -> None:
+def test_rays_that_are_cast_are_those_that_walk(jit: bool, seed: int) -> None:
     """In crowds, where a ray looks at its items in several rounds; filtered, with owners left out, and in bounds."""
     rng = np.random.default_rng(seed)
     side, found = int(rng.integers(12, 60)), 0
@@ -116,18 +116,18 @@ def test_many_rays_in_a_wide_world(jit: bool, monkeypatch: pytest.MonkeyPatch) -
     at, aim = rng.uniform(-300, 2300, (300, 2)), rng.uniform(0, 360, 300)
     for weapon in (Laser(90), Laser(90, width=7), Rifle(120, max_hits=2), Projectile(100, 3)):
         for pairs in (1, 2**30):
-            for module in ("planes.bits.cells", "weapons.rays.tracks", *(["planes.jit.tracks"] if jit else [])):
+            for module in ("planes.bits.cells", "weapons.rays.raycast", *(["planes.jit.raycast"] if jit else [])):
                 monkeypatch.setattr(f"hitplanes.{module}.BRUTE_PAIRS", pairs)
             assert len(as_walked(scene, weapon, at=at, aim=aim)) > 20
 
 
 def test_the_limits_of_the_kernel() -> None:
     """It serves rays up to them, and no others."""
-    jit, stack = pytest.importorskip("hitplanes.planes.jit.tracks"), Scene().items.stack()
+    jit, stack = pytest.importorskip("hitplanes.planes.jit.raycast"), Scene().items.stack()
 
     def serves(length: int, radius: int) -> bool:
         lines = Lines(np.zeros((1, 2), np.int64), np.array([[length, 0]]), radius)
-        return jit.tracks(stack, None, lines, None) is not None
+        return jit.hits_and_ends(stack, None, lines, None) is not None
 
     assert serves(jit.FARTHEST, 0) and not serves(jit.FARTHEST + 1, 0)
     assert serves(2**24, DIAGONAL - 1) and not serves(2**25, DIAGONAL - 1) and serves(2**25, DIAGONAL)
@@ -137,12 +137,12 @@ def test_the_limits_of_the_kernel() -> None:
 
 
 def test_no_rays_and_no_items(jit: bool) -> None:
-    kernels, none = kernels_of(tracks), np.zeros((0, 2), np.int64)
+    kernels, none = kernels_of(raycast), np.zeros((0, 2), np.int64)
     for stack in (Scene().items.stack(), crowd(np.random.default_rng(1), 9, 9).items.stack()):
         for radius in (0, 300):
-            hit, ends = kernels.tracks(stack, None, Lines(none, none, radius), None)
+            hit, ends = kernels.hits_and_ends(stack, None, Lines(none, none, radius), None)
             assert hit.shape == (6, 0) and ends.shape == (6, 0)
-    hit, ends = kernels.tracks(Scene().items.stack(), None, Lines(none[:0].repeat(1, 0), none, 0), 3)
+    hit, ends = kernels.hits_and_ends(Scene().items.stack(), None, Lines(none[:0].repeat(1, 0), none, 0), 3)
     assert hit.shape == (6, 0)
 
 
@@ -171,7 +171,7 @@ def test_passes_are_read_after_items_have_moved_and_gained_speed(jit: bool) -> N
 
 def test_roots_and_shares_of_the_kernel_are_exact() -> None:
     """Also where products of 64 bits wrap around."""
-    jit, rng = pytest.importorskip("hitplanes.planes.jit.tracks"), random.Random(4)
+    jit, rng = pytest.importorskip("hitplanes.planes.jit.raycast"), random.Random(4)
     for bits in (3, 20, 30, 40, 56):
         for _ in range(300):
             length2, radius = rng.randint(1, 2**bits), rng.randint(1, 2 ** min(17, (89 - bits) // 2 + 1))

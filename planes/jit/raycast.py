@@ -1,6 +1,9 @@
-"""Compiled kernel of rays that go on: what each hits, how many pixels of it, and where the ray ends."""
+"""Compiled raycast: what each ray hits, how many pixels of it, and where the ray ends. See `weapons.rays.raycast`."""
 
 from __future__ import annotations
+
+from math import isqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit, types
@@ -10,23 +13,93 @@ from ..common.checks import Ints
 from ..common.limits import HALF, SUB
 from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
+from ..scene.derived import View
 from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
 from .cache import compiled
-from .rays import BOUNDS, LATE, PAIRS, near_of, part_of, run_of, times_in
+from .march import over
 from .scene import root_of
+
+if TYPE_CHECKING:
+    from hitplanes.weapons.rays.raycast import Follow, Followed
 
 RANK, COUNT, ENTRY, Y, X, ENTER, LAST, FOUND = range(8)
 """Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels."""
+
+LATE = 2**62
+"""A time after all others."""
+
+BOUNDS = types.UniTuple(types.int64, 4)
+PAIRS = types.Array(types.int64, 2, "A", readonly=True)
 
 NO_STOP = LATE, 0, 0, True, True
 
 FARTHEST, LONG = 2**29, 2**50
 """Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `_share` do."""
 
-TRACK_PAIRS, TRACK_RAY = 135_000, 2000
-"""Like PART_PAIRS and RAY_PAIRS, for rays that go on."""
+NOWHERE = (0, 0, 0, 0, 0), NONE, NONE
+"""Cells that list no items: all boxes are compared."""
+
+SORTED = 32
+"""Boxes of a ray that are picked one by one, the earliest first; more are sorted."""
+
+PART_PAIRS, RAY_PAIRS = 135_000, 2000
+"""Least number of pairs of a ray and an item that is worth a thread; each ray counts as so many more."""
+
+
+@njit(inline="always")
+def _spell(low, high, sign, across, entry, leave):
+    """Part of the time from `entry` to `leave` in which a ray is between two sides, given relative to its start."""
+    if sign == 0:
+        return (entry, leave) if low <= 0 <= high else (LATE, np.int64(0))
+    near, far = (low, high) if sign > 0 else (-high, -low)
+    return max(entry, near * across), min(leave, far * across)
+
+
+@njit
+def _times_in(left, top, right, low, ray):
+    """Times at which a ray enters and leaves a box of pixels; leave < entry if it does not touch the box."""
+    x, y, dx, dy, across_x, across_y = ray
+    entry, leave = _spell(SUB * left - HALF - x, SUB * right + HALF - x, dx, across_x, np.int64(0), across_x * across_y)
+    return _spell(SUB * top - HALF - y, SUB * low + HALF - y, dy, across_y, entry, leave)
+
+
+@njit
+def _part_of(box, at, origin_x, origin_y, bounds):
+    """The part of an item's box within the bounds, relative to a pixel."""
+    left, top = max(box[at, 0], bounds[0]) - origin_x, max(box[at, 1], bounds[1]) - origin_y
+    return left, top, min(box[at, 2], bounds[2]) - origin_x, min(box[at, 3], bounds[3]) - origin_y
+
+
+@njit
+def _near_of(box, origin_x, origin_y, ray, bounds, near, reach):
+    """Write the items with pixels whose centres may lie within `reach` of a ray to `near`; return how many."""
+    x, y, dx, dy, around = ray[0] + reach, ray[1] + reach, ray[2], ray[3], 2 * reach - SUB + 1
+    left, right = ((min(x, x + dx) - around) >> 8) + origin_x, (max(x, x + dx) >> 8) + origin_x
+    top, low = ((min(y, y + dy) - around) >> 8) + origin_y, (max(y, y + dy) >> 8) + origin_y
+    left, top, right, low = max(left, bounds[0]), max(top, bounds[1]), min(right, bounds[2]), min(low, bounds[3])
+    count = 0
+    for at in range(len(box)):
+        across = (box[at, 0] <= right) & (box[at, 2] >= left)
+        near[count] = at
+        count += across & (box[at, 1] <= low) & (box[at, 3] >= top)
+    return count
+
+
+@njit
+def _run_of(row, begin, step, u, along):
+    """First and last cell of a row that a ray touches, along its longer axis; (1, 0) if it touches none."""
+    first = max(min(begin, begin + step), SUB * row - HALF) - begin
+    last = min(max(begin, begin + step), SUB * row + HALF) - begin
+    if first > last:
+        return np.int64(1), np.int64(0)
+    if step == 0:
+        low, high, per = min(u, u + along), max(u, u + along), np.int64(1)
+    else:
+        per, slope = abs(step), along if step > 0 else -along
+        low, high = u * per + min(first * slope, last * slope), u * per + max(first * slope, last * slope)
+    return -over(HALF * per - low, SUB * per), over(high + HALF * per, SUB * per)
 
 
 @njit
@@ -60,7 +133,7 @@ def _entry_of(at_x, at_y, u, v, ray, wide):
     radius, side, _, length2 = wide
     best, within = np.int64(LATE), (np.int64(0), np.int64(-1))
     if radius < DIAGONAL:
-        within = times_in(at_x, at_y, at_x, at_y, ray)
+        within = _times_in(at_x, at_y, at_x, at_y, ray)
         if radius == 0:
             return within[0] if within[0] <= within[1] else best
     if abs(v) <= side and (length2 > 0 or (SUB * at_x - x) ** 2 + (SUB * at_y - y) ** 2 <= radius * radius):
@@ -115,13 +188,14 @@ def _rows(least, most, u, along, v, step, wide):
 
 
 @njit
-def _touches(part, mask, ray, wide, stop):
+def _touches(part, mask, ray, wide, stop, first_alone):
     """Number of pixels of an item that a ray enters before a stop, and time and cell of the first of them.
 
     Parameters
     ----------
     wide : radius of the ray; its `sides` and `wide_sides`, see `grid.rasterize.Lines`; and its squared length
     stop : time and cell of the stop, whether the cell is the only one at that time, and whether the item is hit in it
+    first_alone : whether the number does not matter, so that a thin ray is followed to its first pixel and no further
     """
     x, y, dx, dy, across_x, across_y = ray
     masks, begin, width, first_x, first_y = mask
@@ -133,8 +207,10 @@ def _touches(part, mask, ray, wide, stop):
     top, low = _rows(u_least, u_most, u, along, v, step, wide)
     per = 1 / step if step != 0 else 0.0
     first_of = np.int64(0), np.int64(LATE), np.int64(0), np.int64(0)
-    for row in range(max(top, v_least), min(low, v_most) + 1):
-        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
+    top, low = max(top, v_least), min(low, v_most)
+    for k in range(low - top + 1):
+        row = top + k if step >= 0 else low - k
+        first, last = _run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
         first, last = max(first, u_least), min(last, u_most)
         if first > last:
             continue
@@ -142,9 +218,11 @@ def _touches(part, mask, ray, wide, stop):
         pixel = begin + (upper - first_y) * width + left - first_x
         ahead = (SUB * row - v) * (1 if step > 0 else -1)
         if wide[0] == 0 and step != 0 and (ahead - HALF) * across > first_of[1] and (ahead + HALF) * across < stop[0]:
+            if first_alone:
+                break
             count = first_of[0]
-            for k in range(last - first + 1):
-                count += masks[pixel + k * stride]
+            for i in range(last - first + 1):
+                count += masks[pixel + i * stride]
             first_of = count, first_of[1], first_of[2], first_of[3]
         else:
             first_of = _in_run(left, upper, last - first + 1, masks, pixel, stride, steep, ray, wide, stop, first_of)
@@ -180,7 +258,7 @@ def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, fir
 def _bounds(left, top, right, low, ray, wide):
     """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
     if wide[0] == 0:
-        return times_in(left, top, right, low, ray)
+        return _times_in(left, top, right, low, ray)
     x, y, dx, dy, _, _ = ray
     reach, length2 = wide[2], wide[3]
     left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
@@ -226,13 +304,13 @@ def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, ne
     if len(listed) > 0:
         some = _listed(grid, begin, listed, ray, origin, reach, near)
     else:
-        some = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
+        some = _near_of(box, origin[0], origin[1], ray, bounds, near, reach)
     count = 0
     for i in range(some):
         at = near[i]
         if len(meets) and refuses(at, categories, owner, meets, exclude, who):
             continue
-        left, top, right, low = part_of(box, at, origin[0], origin[1], bounds)
+        left, top, right, low = _part_of(box, at, origin[0], origin[1], bounds)
         if left > right or top > low:
             continue
         found[RANK, count] = at
@@ -242,26 +320,41 @@ def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, ne
 
 
 @njit
-def _of_item(items, at, origin, ray, wide, bounds, stop):
+def _of_item(items, at, origin, ray, wide, bounds, stop, first_alone):
     """`_touches` of an item within the bounds."""
     box, offset, masks, _, _, _ = items
     mask = masks, offset[at], box[at, 2] - box[at, 0] + 1, box[at, 0] - origin[0], box[at, 1] - origin[1]
-    return _touches(part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop)
+    return _touches(_part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop, first_alone)
+
+
+@njit
+def _earliest_first(found, k, count):
+    """Swap the item of the earliest time of entry, of those from place k on, to that place."""
+    least = k
+    for i in range(k + 1, count):
+        least = i if found[ENTER, i] < found[ENTER, least] else least
+    for column in (RANK, ENTER, LAST):
+        found[column, k], found[column, least] = found[column, least], found[column, k]
 
 
 @njit
 def _meet(items, origin, ray, wide, bounds, most, found, count):
     """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
     occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[FOUND]
-    ranks, enters, lasts = found[RANK, :count].copy(), found[ENTER, :count].copy(), found[LAST, :count].copy()
-    for i in np.argsort(enters):
-        if enters[i] > limit:
+    if count > SORTED:
+        order = np.argsort(found[ENTER, :count])
+        for column in (RANK, ENTER, LAST):
+            found[column, :count] = found[column, :count][order]
+    for k in range(count):
+        if count <= SORTED:
+            _earliest_first(found, k, count)
+        if found[ENTER, k] > limit:
             break
-        at = ranks[i]
-        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, NO_STOP)
+        at = found[RANK, k]
+        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, NO_STOP, most == 1)
         if pixels == 0:
             continue
-        found[RANK, met], found[COUNT, met], found[LAST, met] = at, pixels, lasts[i]
+        found[RANK, met], found[COUNT, met], found[LAST, met] = at, pixels, found[LAST, k]
         found[ENTRY, met], found[Y, met], found[X, met] = entry, y, x
         met += 1
         if occluder[at]:
@@ -326,7 +419,7 @@ def _sort(found, order, count):
         order[place] = i
 
 
-TRACKS = types.Tuple((types.int64, types.int64, types.int64))(
+RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
     types.int64, types.int64, types.int64, ROWS_OUT, PAIRS, PAIRS, types.int64, PAIRS, types.int64,
     types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
     types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
@@ -335,43 +428,51 @@ TRACKS = types.Tuple((types.int64, types.int64, types.int64))(
 
 # house: hit rule of rays
 @njit
-def _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends):
+def _follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
     """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
+    origin = (x + HALF) >> 8, (y + HALF) >> 8
+    ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
     count = _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found)
     count = _meet(items, origin, ray, wide, bounds, most, found, count)
-    count, rank, time, y, x = _blocked(items, origin, bounds, found, count)
+    count, rank, time, last_y, last_x = _blocked(items, origin, bounds, found, count)
     _sort(found, near, count)
     reason, alone = np.int64(rank >= 0), rank >= 0
     if 0 < most <= count:
         at, count = near[most - 1], most
         alone = alone and found[ENTRY, at] == time
-        reason, rank, time, y, x = np.int64(2), found[RANK, at], found[ENTRY, at], found[Y, at], found[X, at]
-    ends[0, who], ends[1, who], ends[2, who], ends[3, who], ends[4, who], ends[5, who] = reason, time, y, x, rank, alone
+        reason, rank, time = np.int64(2), found[RANK, at], found[ENTRY, at]
+        last_y, last_x = found[Y, at], found[X, at]
+    ends[0, who], ends[1, who], ends[2, who], ends[3, who], ends[4, who], ends[5, who] = (
+        reason,
+        time,
+        last_y,
+        last_x,
+        rank,
+        alone,
+    )
     for i in range(count):
         at = near[i]
-        if found[ENTRY, at] == time and found[Y, at] == y and found[X, at] == x:
+        if found[ENTRY, at] == time and found[Y, at] == last_y and found[X, at] == last_x:
             found[COUNT, at] = 1  # all other pixels of the item come after the first
         elif found[LAST, at] >= time:
-            stop = time, x, y, alone, found[RANK, at] <= rank
-            found[COUNT, at] = _of_item(items, found[RANK, at], origin, ray, wide, bounds, stop)[0]
+            stop = time, last_x, last_y, alone, found[RANK, at] <= rank
+            found[COUNT, at] = _of_item(items, found[RANK, at], origin, ray, wide, bounds, stop, False)[0]
     return count
 
 
-@compiled(TRACKS)
-def _tracks(begin, end, row, out, start, step, radius, sides, most, items, cells, meets, exclude, bounds, ends):
+@compiled(RAYCAST)
+def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, meets, exclude, bounds, ends):
     """Write what rays hit, in order, to columns (ray, rank, count, x, y, entry), and their ends.
 
     Returns
     -------
     the ray that there is no room for, or `end`; the number of rows; and 0
     """
-    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((8, len(items[0]) + 1), np.int64)
+    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((FOUND + 1, len(items[0]) + 1), np.int64)
     for who in range(begin, end):
         x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
-        origin = (x + HALF) >> 8, (y + HALF) >> 8
-        ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
         wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
-        count = _follow(who, ray, wide, origin, items, cells, bounds, most, meets, exclude, near, found, ends)
+        count = _follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends)
         if row + count > out.shape[1]:
             return who, row, 0
         for i in range(count):
@@ -382,16 +483,45 @@ def _tracks(begin, end, row, out, start, step, radius, sides, most, items, cells
     return end, row, 0
 
 
+@compiled(
+    types.UniTuple(types.int64, 2)(
+        *[types.int64] * 8, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)), INTS, BOUNDS, ROWS_OUT
+    ),
+    nogil=False,
+)
+def _one(x, y, dx, dy, radius, side, wide_side, most, items, rank, bounds, out):
+    """Write what a ray hits to columns (rank, count, x, y, entry); return how many, and the time at which it ends."""
+    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((FOUND + 1, len(items[0]) + 1), np.int64)
+    wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
+    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
+    count = _follow(0, x, y, dx, dy, wide, items, NOWHERE, bounds, most, NONE, NOBODY, near, found, ends)
+    for i in range(count):
+        at = near[i]
+        out[0, i], out[1, i], out[2, i] = rank[found[RANK, at]], found[COUNT, at], found[X, at] + origin_x
+        out[3, i], out[4, i] = found[Y, at] + origin_y, found[ENTRY, at]
+    return count, ends[1, 0]
+
+
+ONE = _one.overloads[_one.signatures[0]].entry_point
+"""Its entry point, without the dispatch on argument types, which takes longer than the call."""
+
+
 def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
     """The items listed by cells of the corners of the rays' boxes, if that spares most comparisons; else nothing."""
     size = (np.abs(lines.step).max(axis=0, initial=0) + 2 * max(lines.radius, HALF)) // SUB + 2
     if len(lines) * len(stack) <= BRUTE_PAIRS or not is_sparse(stack.sizes, size):
-        return (0, 0, 0, 0, 0), NONE, NONE
+        return NOWHERE
     listed = cells_of(stack.box_xyxy, np.concatenate([[0, 0], size]), int(size.max()).bit_length())
     return tuple(listed[:5]), listed.begin, listed.listed
 
 
-def tracks(
+def _fits(longest: int, radius: int) -> bool:
+    """Whether sums of products of rays of so many 1/256 px along x or y fit int64."""
+    far = 2 * longest * longest
+    return longest + radius <= FARTHEST and radius * radius * far < FAR and not (0 < radius < DIAGONAL and far >= LONG)
+
+
+def hits_and_ends(
     stack: Stack,
     bounds: Box | None,
     lines: Lines,
@@ -399,29 +529,43 @@ def tracks(
     meets: Ints | None = None,
     exclude: Ints | None = None,
 ) -> tuple[Ints, Ints] | None:
-    """Follow rays to their ends, as `trace` does, and count the pixels of what they hit.
-
-    Parameters
-    ----------
-    lines : (R,) the rays, from where they begin in the world
-    most : number of objects that a ray may hit, or None
-    meets, exclude : see `bits.raycast.first_touched`
-
-    Returns
-    -------
-    what rays hit and their ends, see `weapons.rays.tracks`; None if they are so long or so wide that int64 overflows
-    """
-    longest, radius = int(np.abs(lines.step).max(initial=0)), lines.radius
-    far = 2 * longest * longest
-    if longest + radius > FARTHEST or radius * radius * far >= FAR or (0 < radius < DIAGONAL and far >= LONG):
+    """See `weapons.rays.raycast.hits_and_ends`; None if rays are so long or so wide that int64 overflows."""
+    radius = lines.radius
+    if not _fits(int(np.abs(lines.step).max(initial=0)), radius):
         return None
     sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
     ends = np.zeros((6, len(lines)), np.int64)
     items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
     whose = (NONE, NOBODY) if meets is None or exclude is None else (meets, exclude)
     found = rows_by(
-        _tracks, 6, len(lines), TRACK_PAIRS / (TRACK_RAY + len(stack)), lines.start, lines.step, radius, sides,
+        _each, 6, len(lines), PART_PAIRS / (RAY_PAIRS + len(stack)), lines.start, lines.step, radius, sides,
         most or 0, items, _cells(stack, lines), *whose, EVERYWHERE if bounds is None else bounds, ends,
     )  # fmt: skip
     assert found is not None
     return found, ends
+
+
+def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
+    """See `weapons.rays.raycast.follower`."""
+    rank = np.flatnonzero(view.accepts(stack))
+    some = slice(None) if len(rank) == len(stack) else rank
+    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some]
+    items = *map(np.ascontiguousarray, columns), NONE, NONE
+    within = EVERYWHERE if bounds is None else bounds
+    room, limit = len(rank) if most is None else min(most, len(rank)), most or 0
+
+    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
+        if not _fits(max(abs(dx), abs(dy)), radius):
+            return None
+        side = wide_side = 0
+        if radius:
+            length2 = dx * dx + dy * dy
+            side = wide_side = isqrt(radius * radius * length2)
+            if radius < DIAGONAL:
+                wide_side = isqrt(DIAGONAL * DIAGONAL * length2)
+        hit = np.empty((5, room), np.int64)
+        count, time = ONE(x, y, dx, dy, radius, side, wide_side, limit, items, rank, within, hit)
+        return time, hit[:, :count].T.tolist()
+
+    return follow

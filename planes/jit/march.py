@@ -1,0 +1,195 @@
+"""Compiled kernels of the march by the distance field."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
+from ..common.checks import Bools, Ints
+from ..common.limits import HALF, SUB
+from .cache import compiled
+
+BLOCK = 128
+"""Rays that march together, so that reads overlap; their columns fit the fastest cache."""
+
+ROUNDS = 4
+"""Jumps of each ray of a block before finished rays are replaced."""
+
+N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
+"""Columns of a block: N, the crossings before a ray's next look, and those of `bits.distance_field._ways`."""
+
+
+@compiled()
+def distances_of(taken: Bools) -> Clearance:
+    """See `bits.distance_field.distances_of`."""
+    h, w = taken.shape
+    distance = np.full((h + 2 * PAD, w + 2 * PAD), FAR, np.uint8)
+    for y in range(PAD, h + PAD):
+        for x in range(w):
+            if taken[y - PAD, x]:
+                distance[y, x + PAD] = 0
+    height, width = distance.shape
+    for y in range(1, height):
+        for x in range(width):
+            distance[y, x] = min(distance[y, x], distance[y - 1, x] + 1)
+        _spread_along(distance[y])
+    for y in range(height - 2, -1, -1):
+        for x in range(width):
+            distance[y, x] = min(distance[y, x], distance[y + 1, x] + 1)
+        _spread_along(distance[y])
+    return distance
+
+
+@compiled()
+def _spread_along(row: Clearance) -> None:
+    """Limit each cell of a row to 1 more than the cells beside it."""
+    for x in range(1, len(row)):
+        row[x] = min(row[x], row[x - 1] + 1)
+    for x in range(len(row) - 2, -1, -1):
+        row[x] = min(row[x], row[x + 1] + 1)
+
+
+@compiled(error_model="numpy")
+def first_taken(distances: Clearance, start_256: Ints, step_256: Ints) -> tuple[Ints, Ints, Bools]:
+    """See `bits.distance_field.first_taken`."""
+    count, flat = len(start_256), distances.reshape(-1)
+    height, width = distances.shape
+    entry, cell, several = np.full(count, NOTHING), np.zeros(count, np.int64), np.zeros(count, np.bool_)
+    block, look, jump = np.zeros((COLUMNS, BLOCK)), np.empty(BLOCK, np.int32), np.zeros(BLOCK, np.uint8)
+    free = np.arange(BLOCK)
+    left = holes = BLOCK
+    ray = 0
+    while left:
+        while holes and ray < count:
+            x, y, one = start_256[ray, 0], start_256[ray, 1], free[holes - 1]
+            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, one)
+            if why < 0:
+                entry[ray] = why
+            elif block[N, one] == 0 and _between(flat, block, one, x, y):
+                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, one]), True
+            else:
+                block[RAY, one] = ray
+                holes -= 1
+            ray += 1
+        left = _closed(block, left, free, holes)
+        for _ in range(ROUNDS):
+            _look(block, left, look)
+            _jump(flat, block, left, look, jump)
+        holes = _done(block, left, jump, free)
+        for hole in range(holes):
+            one = free[hole]
+            if block[N, one] < block[STOP, one]:
+                done, place = np.int64(block[RAY, one]), np.int64(look[one])
+                several[done] = place < 0
+                cell[done] = place = max(place, ~place)
+                entry[done] = _entry(place, width, start_256[done], step_256[done])
+    return entry, cell, several
+
+
+@compiled()
+def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
+    """Move the last rays of a block to the free places; return the number of rays."""
+    for hole in range(holes - 1, -1, -1):
+        left -= 1
+        for column in range(COLUMNS):
+            block[column, free[hole]] = block[column, left]
+    return left
+
+
+@compiled()
+def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
+    """Write the places of rays that hit or ended to `free`; return how many."""
+    holes = 0
+    for one in range(left):
+        free[holes] = one
+        holes += (jump[one] == 0) | (block[N, one] >= block[STOP, one])
+    return holes
+
+
+@compiled(error_model="numpy")
+def _look(block, count, look):  # type: ignore[no-untyped-def]
+    """Write the place of the cell that each ray looks at; at a corner it is ~place, a negative number."""
+    for one in range(count):
+        n = block[N, one]
+        quotient = (block[A, one] * n + block[C, one]) / block[B, one]
+        i = np.floor(quotient)
+        place = np.int32(block[BASE, one] + i * block[ALONG, one] + n * block[ACROSS, one])
+        look[one] = ~place if i == quotient else place
+
+
+@compiled()
+def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
+    """Move rays by the distance at their cells, up to their ends."""
+    for one in range(count):
+        place = look[one]
+        far = flat[np.int64(max(place, ~place))]
+        if place < 0:
+            far = min(far, flat[~place - np.int32(block[ASIDE, one])])
+        jump[one] = far
+        block[N, one] = min(block[N, one] + far, block[STOP, one])
+
+
+@compiled()
+def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
+    """Time at which a ray enters a cell."""
+    ahead_x, ahead_y = SUB * (place % width) - start_256[0], SUB * (place // width) - start_256[1]
+    dx, dy = step_256[0], step_256[1]
+    ahead_x, ahead_y = ahead_x if dx >= 0 else -ahead_x, ahead_y if dy >= 0 else -ahead_y
+    return max((ahead_x - HALF) * max(abs(dy), 1), (ahead_y - HALF) * max(abs(dx), 1), 0)
+
+
+@compiled()
+def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
+    """Whether a ray starts on a border and touches a taken cell there, other than the one that it enters."""
+    on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
+    if not (on_x or on_y):
+        return False
+    across, base = np.int64(block[ACROSS, one]), np.int64(block[BASE, one])
+    step = np.int64(block[ALONG, one]) + across
+    if on_x and flat[base - step] == 0:
+        return True
+    return on_y and (flat[base - across] == 0 or (on_x and flat[base - step - across] == 0))
+
+
+@compiled(error_model="numpy")
+def over(numerator, denominator):  # type: ignore[no-untyped-def]
+    """Quotient of whole numbers, rounded down, by floats where that is exact."""
+    if abs(numerator) < EXACT:
+        return np.int64(np.floor(float(numerator) / float(denominator)))
+    return numerator // denominator
+
+
+@compiled(error_model="numpy")
+def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: ignore[no-untyped-def]
+    """Write the columns of a ray to its block; return 0, or NOTHING or UNDECIDED."""
+    back_x, back_y = step_x < 0, step_y < 0
+    dx, dy = abs(step_x), abs(step_y)
+    x, y = (x_256 + HALF - back_x) >> 8, (y_256 + HALF - back_y) >> 8
+    ax, ay = (x_256 - (x << 8)) * (1 - 2 * back_x), (y_256 - (y << 8)) * (1 - 2 * back_y)
+    if dx + dy == 0 or dx > LONGEST or dy > LONGEST:
+        return UNDECIDED
+    last_x, last_y = (dx + ax + HALF) >> 8, (dy + ay + HALF) >> 8
+    behind_x, behind_y = back_x * (width - 1 - 2 * x) + x, back_y * (height - 1 - 2 * y) + y
+    room_x, room_y = width - 2 - behind_x, height - 2 - behind_y
+    if room_x < 0 or room_y < 0 or 1 - behind_x > last_x or 1 - behind_y > last_y:
+        return NOTHING
+    a, b, c = SUB * dx, SUB * (dx + dy), dx * (HALF - ay) + dy * (HALF + ax)
+    across = width * (1 - 2 * back_y)
+    aside = along = 1 - 2 * back_x - across
+    if dx == 0 and ax == -HALF:
+        aside = 1
+    if dy == 0 and ay == -HALF:
+        aside, c = width, 0
+    first, stop = 0, last_x + last_y + 1
+    off_x, off_y = -over(c - b * (room_x + 1), max(a, 1)), over(c + b * room_y, max(SUB * dy, 1)) + 1
+    stop = min(stop, off_x if last_x > room_x else stop, off_y if last_y > room_y else stop)
+    if behind_x < 1:
+        first = max(first, -over(c - b * (1 - behind_x), a))
+    if behind_y < 1:
+        first = max(first, over(c - b * behind_y, SUB * dy) + 1)
+    if float(a) * stop + c >= EXACT:
+        return UNDECIDED
+    block[A, one], block[B, one], block[C, one] = a, b, c
+    block[ALONG, one], block[ACROSS, one], block[ASIDE, one] = along, across, aside
+    block[BASE, one], block[N, one], block[STOP, one] = y * width + x, first, stop
+    return 0 if first < stop else NOTHING
