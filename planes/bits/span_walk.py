@@ -6,6 +6,7 @@ item is its place in the stack, 0 in front.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import pairwise
@@ -128,15 +129,11 @@ def walk(
     ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
     keep = np.where(ends, ~LIVE & 31, 31).astype(np.uint8)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
-    depth = np.arange(len(pairs.placement)) - np.searchsorted(pairs.placement, pairs.placement)
-    order = np.argsort(depth[pair], kind="stable")
-    steps = np.flatnonzero(np.diff(depth[pair][order], prepend=-1, append=-1))
     box, item = stack.box_xyxy, pairs.rank[pair]
     sample = start[run] - runs.x_first[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
     emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64), kind[:0])]
-    for begin, end in pairwise(steps):
-        now = order[begin:end]
+    for now in _steps(pairs, pair):
         piece, x = each_pixel(x_first[now], x_last[now])
         meeting = now[piece]
         index = sample[meeting] + x
@@ -153,7 +150,15 @@ def walk(
     meeting, x, does = (np.concatenate(column) for column in zip(*emitted, strict=True))
     first, last = _stretches(meeting, x, does)
     met = meeting[first]
-    return Events(does[first], pairs.rank[pair[met]], run[met], x[first], x[last]), state
+    return Events(does[first], item[met], run[met], x[first], x[last]), state
+
+
+def _steps(pairs: Pairs, pair: Ints) -> Iterator[Ints]:
+    """Numbers of the meetings (n,) of pairs with the first item of each placement, with the second, and so on."""
+    depth = np.arange(len(pairs.placement)) - np.searchsorted(pairs.placement, pairs.placement)
+    order = np.argsort(depth[pair], kind="stable")
+    steps = np.flatnonzero(np.diff(depth[pair][order], prepend=-1, append=-1))
+    return (order[begin:end] for begin, end in pairwise(steps))
 
 
 def _meetings(runs: Runs, pairs: Pairs, stack: Stack) -> tuple[Ints, Ints, Ints, Ints]:

@@ -259,17 +259,22 @@ def chosen_ray_way(
         return RayChoice("walk", f"{why}every ray walks")
     if not_cast := _not_cast(ray, scene):
         return RayChoice("walk", f"{why}{not_cast}")
-    now, pairs = costs(), rays * len(stack)
+    return _cast_or_march(ray, scene, view, rays, prepared, why)
+
+
+def _cast_or_march(
+    ray: RayWeapon, scene: Scene, view: View | None, rays: int, prepared: bool, why: str
+) -> RayChoice:  # fmt: skip
+    """Of rays that can be cast, whether they march; `why` tells what was passed over."""
+    now, pairs = costs(), rays * len(scene.items.stack())
     cast = now.cast_call + rays * now.cast_ray + pairs * now.cast_pair
     march = now.march_call + rays * now.march_ray
     if prepared:
         cast, march = now.prepared_cast + pairs * now.prepared_cast_item, now.prepared_march
     why += f"about {cast / 1e3:.0f} us cast at items"
-    if _not_marched(ray, scene, view):
+    field = scene.derived.distance_field(view) if is_thin_first(ray) and view is not None else None
+    if field is None:
         return RayChoice("cast", why)
-    assert view is not None  # else it is not marched
-    field = scene.derived.distance_field(view)
-    assert field is not None  # so here
     other = RayChoice("cast", f"{why}, {march / 1e3:.0f} us by march")
     return other if cast <= march else _rented_or_bought(other, field, scene, cast - march)
 
