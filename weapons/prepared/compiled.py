@@ -3,8 +3,7 @@
 A shot walks the stack from front to back at first. When the shots have spent as much time on that as the visible set
 costs, it is made, and its tiles are listed by cells of shot positions.
 
-Arrays are handed over by address, because unpacking them would take ten times as long as a shot. The kernel does not
-release the interpreter's lock, because that would take as long as a shot; so all calls can share one scratch memory.
+Kernels are given structs of arrays, because unpacking an array for each column would take as long as the shot.
 """
 
 from __future__ import annotations
@@ -14,9 +13,8 @@ import threading
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import carray, njit, types
-from numba.extending import intrinsic
+from numba import types
+from numba.experimental import structref
 
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.cells import Cells
@@ -25,9 +23,8 @@ from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.jit import bit_rows
 from hitplanes.planes.jit.areas import KEY, NOBODY, RANK, SAMPLES, X, Y, match
-from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, cell_at
+from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
@@ -48,126 +45,105 @@ MAKE_VISIBLE = -1
 UNKNOWN = -2
 """Returned by `_shot` instead of a number of rows: the shot is left to `fire`."""
 
-PIERCE, SPENT, WORTH, IS_VISIBLE, LEFT, TOP, RIGHT, LOW, CELLS = *range(8), slice(8, 13)
-TILES, OCCLUDERS, LISTED, BEGIN, ITEM, RANK_OF, BOX, WORD_OF, WORDS, BLOCKS, NEAR, OUT = range(13, 25)
-"""Fields of a scene for shots:
-
-- whether shots pierce; time spent on walking; cost of the visible set; whether that is in use; the bounds
-- CELLS: the grid of cells; TILES, OCCLUDERS: number of tiles, and of flags of occluders, which may be 0
-- LISTED, BEGIN: addresses of the lists of tiles by cell
-- ITEM to BLOCKS: addresses of the columns of the tiles; NEAR, OUT: addresses of scratch memory and of rows
-"""
-
-SHAPE, FIRST, STEP, LENGTH, PIXELS = slice(0, 4), 4, 5, 6, 7
-"""Fields of a round: its box relative to its pixel; place of its first word; words a column; all words; the words."""
-
-SCENE, ROUND, FOUND = range(3)
-"""Fields of a buffer: addresses of the scene and the round; first of the rows. Scratch memory follows the rows."""
-
 ROW = 5
 """Numbers of a row: item, samples, squared distance, x, y."""
 
-FOUND_AT, ROW_BYTES = 8 * FOUND, 8 * ROW
+ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
 read = struct.Struct("5q").unpack_from
 NO_SUMS, NO_STRIPS, ZERO = np.zeros(0, np.uint32), np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 
-
-@intrinsic
-def pointer(_: Any, address: Any) -> Any:
-    """An address as a pointer."""
-
-    def made(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
-
-    return types.voidptr(types.int64), made
+NUMBERS, GRID = types.Array(types.int64, 1, "C", readonly=True), types.UniTuple(types.int64, 5)
+BOUNDS = types.UniTuple(types.int64, 4)
 
 
-@njit(inline="always")
-def ints_at(address):
-    """Array of int64 from an address on."""
-    return carray(pointer(address), (2**40,), np.int64)
+@structref.register
+class PlaceType(types.StructRef):
+    """Type of `Place` in kernels."""
 
 
-@njit(inline="always")
-def words_at(address):
-    """Array of uint64 from an address on."""
-    return carray(pointer(address), (2**40,), np.uint64)
+class Place(structref.StructRefProxy):
+    """What shots at a scene look up, in kernels.
+
+    Parameters
+    ----------
+    item : ids by rank
+    rank, box, begin, words, occluder : columns of `OrderedTiles`
+    grid, cell_begin, listed : columns of `Cells`; no cells if shots walk all tiles
+    pierce, bounds : as in `Limits`
+    worth, spent : ns that the visible set takes, and that shots have walked for want of it; 0 if it is there
+    """
 
 
-@njit(inline="always")
-def flags_at(address):
-    """Array of booleans from an address on."""
-    return carray(pointer(address), (2**40,), np.bool_)
+OF_PLACE = [
+    ("item", NUMBERS), ("rank", NUMBERS), ("box", BOXES), ("begin", NUMBERS), ("words", WORDS), ("occluder", FLAGS),
+    ("grid", GRID), ("cell_begin", NUMBERS), ("listed", NUMBERS), ("pierce", types.boolean), ("bounds", BOUNDS),
+    ("worth", types.int64), ("spent", types.int64),
+]  # fmt: skip
 
 
-def address(array: Any) -> int:
-    """Address of an array's first value."""
-    assert array.flags.c_contiguous
-    return int(array.__array_interface__["data"][0])
+@structref.register
+class ShapeType(types.StructRef):
+    """Type of `Shape` in kernels."""
 
 
-NUMBERS = types.Array(types.int64, 1, "C", readonly=True)
+class Shape(structref.StructRefProxy):
+    """A round in kernels: columns `box`, `first`, `rows` and `words` of `PatternBits`, of one pattern."""
 
 
-@compiled(types.void(types.int64[::1], *[NUMBERS] * 4, BOXES, NUMBERS, bit_rows.WORDS, FLAGS, NUMBERS, BOXES))
-def _put_addresses(here, listed, begin, item, rank, box, word_of, words, blocks, near, out):
-    """Write the addresses of the columns of the tiles to the fields of a scene, from LISTED on."""
-    addresses = (
-        listed.ctypes.data, begin.ctypes.data, item.ctypes.data, rank.ctypes.data, box.ctypes.data,
-        word_of.ctypes.data, words.ctypes.data, blocks.ctypes.data, near.ctypes.data, out.ctypes.data,
-    )  # fmt: skip
-    for k in range(len(addresses)):
-        here[LISTED + k] = addresses[k]
+OF_SHAPE = [("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1])]
+
+for proxy, of, fields in ((Place, PlaceType, OF_PLACE), (Shape, ShapeType, OF_SHAPE)):
+    structref.define_constructor(proxy, of, [name for name, _ in fields])
+    structref.define_boxing(of, proxy)
+PLACE, SHAPE = PlaceType(OF_PLACE), ShapeType(OF_SHAPE)
+
+
+@compiled(PLACE(*[of for _, of in OF_PLACE[:-1]]))
+def _place(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth):
+    return Place(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth, 0)
+
+
+@compiled(SHAPE(*[of for _, of in OF_SHAPE]))
+def _shape(box, first, rows, words):
+    return Shape(box, first, rows, words)
 
 
 # house: way of areas
-@compiled(types.int64(types.float64, types.float64, types.int64), nogil=False)
-def _shot(at_x, at_y, buffer_at):
-    """Number of rows of a round at a position, which are written to the buffer."""
+@compiled(types.int64(types.float64, types.float64, PLACE, SHAPE, types.int64[:, ::1]), nogil=False)
+def _shot(at_x, at_y, place, shape, found):
+    """Number of rows of a round at a position, which are written to `found`, (FEW_ROWS, ROW)."""
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
-    buffer = ints_at(buffer_at)
-    scene, shape = ints_at(buffer[SCENE]), ints_at(buffer[ROUND])
-    count = scene[TILES]
-    pixel_x, pixel_y = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
-    cells, begin, zero = scene[CELLS], ints_at(scene[BEGIN]), NO_NUMBERS
-    if scene[IS_VISIBLE]:
-        cell = cell_at(pixel_x, pixel_y, cells[0], cells[1], cells[2], cells[3], cells[4])
+    column, row = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
+    (left, top, bits, wide, high), begin, count = place.grid, place.cell_begin, len(place.rank)
+    if wide:
+        cell = cell_at(column, row, left, top, bits, wide, high)
         if cell < 0 or begin[cell] == begin[cell + 1]:
             return 0
-    else:
-        scene[SPENT] += EACH_TILE * count + EACH_SHOT
-        if scene[SPENT] > scene[WORTH]:
+    elif place.worth:
+        place.spent += EACH_TILE * count + EACH_SHOT
+        if place.spent > place.worth:
             return MAKE_VISIBLE
-    x, y = buffer[FOUND : FOUND + 1], buffer[FOUND + 1 : FOUND + 2]  # until rows are written there
-    x[0], y[0] = pixel_x, pixel_y
-    out = carray(pointer(scene[OUT]), (Y + 1, FEW_ROWS), np.int64)
-    rest = words_at(buffer_at + 8 * (FOUND + ROW * FEW_ROWS))
+    scratch, rest, none = np.empty(OUT + 2 + count, np.int64), np.empty_like(shape.words), NO_NUMBERS
+    out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 : OUT + 2]
+    x[0], y[0], near = column, row, scratch[OUT + 2 :]
     turn, rows, _ = match(
         0, 1, 0, out, ZERO, x, y, x, y,
-        carray(pointer(buffer[ROUND]), (1, 4), np.int64), shape[FIRST : FIRST + 1], shape[STEP : STEP + 1],
-        words_at(buffer[ROUND] + 8 * PIXELS), NO_STRIPS, NO_SUMS, ZERO,
-        ints_at(scene[RANK_OF])[:count], carray(pointer(scene[BOX]), (count, 4), np.int64), ints_at(scene[WORD_OF]),
-        words_at(scene[WORDS]), flags_at(scene[BLOCKS])[: scene[OCCLUDERS]], zero, zero,
-        cells[0], cells[1], cells[2], cells[3], cells[4], begin, ints_at(scene[LISTED]),
-        scene[PIERCE] > 0, (scene[LEFT], scene[TOP], scene[RIGHT], scene[LOW]), zero, NOBODY, 1,
-        ints_at(scene[NEAR]), rest, out[0], out[0], out[0], rest,
+        shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, NO_SUMS, ZERO,
+        place.rank, place.box, place.begin, place.words, place.occluder, none, none,
+        left, top, bits, wide, high, begin, place.listed,
+        place.pierce, place.bounds, none, NOBODY, 1, near, rest, near, near, near, rest,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
-    found, item = carray(pointer(buffer_at + FOUND_AT), (FEW_ROWS, ROW), np.int64), ints_at(scene[ITEM])
     for row in range(rows):
-        found[row, 0], found[row, 1], found[row, 2] = item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
+        found[row, 0], found[row, 1], found[row, 2] = place.item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
         found[row, 3], found[row, 4] = out[X, row], out[Y, row]
     return rows
 
 
 shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
-
-
-Buffer = tuple[int, memoryview, Ints]
-"""Memory to which a kernel writes rows: its address, bytes, and the array that owns them."""
 
 
 class PositionCache:
@@ -181,9 +157,8 @@ class PositionCache:
         self._forms = -1
         self._there: Ints
         self._tiles: OrderedTiles
-        self._out = np.empty((Y + 1, FEW_ROWS), np.int64)
-        self._here = np.zeros(OUT + 1, np.int64)  # changed in place, because buffers have its address
-        self._kept: tuple[Any, ...] = ()
+        self._place: Any  # a Place
+        self._is_visible = False
         self._lock = threading.Lock()
 
     def follow(self, stack: Stack) -> None:
@@ -204,35 +179,36 @@ class PositionCache:
             if len(self._there) < len(boxes_xyxy):
                 boxes_xyxy = boxes_xyxy.take(self._there, axis=0)
             ordered = self._tiles._replace(box_xyxy=boxes_xyxy)
-            worth = int(COMPILED.visible_made + COMPILED.visible_item * len(stack))
+            worth = max(int(COMPILED.visible_made + COMPILED.visible_item * len(stack)), 1)
             bounds = self._scene.bounds or EVERYWHERE
             cells = Cells(0, 0, 0, 0, 0, NO_NUMBERS, NO_NUMBERS)
-            self._place(ordered, cells, stack, (self._view.pierce, 0, worth, False, *bounds))
+            self._use(ordered, cells, stack, self._view.pierce, bounds, worth)
 
     def _use_visible(self, visible_set: VisibleSet, stack: Stack) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
-        self._place(visible_set.seen, visible_set.cells(self._reach), stack, (True, 0, 0, True, *EVERYWHERE))
+        self._use(visible_set.seen, visible_set.cells(self._reach), stack, True, EVERYWHERE, 0)
 
-    def _place(self, tiles: OrderedTiles, cells: Cells, stack: Stack, told: tuple[int, ...]) -> None:
-        """Write the addresses of the tiles to the fields of the scene."""
-        columns = tuple(map(np.ascontiguousarray, (cells.listed, cells.begin, stack.ids, *tiles[:5])))
-        near = np.empty(len(tiles.rank), np.int64)
-        self._here[:LISTED] = *told, *cells[:5], len(tiles.rank), len(tiles.occluder)
-        _put_addresses(self._here, *columns, near, self._out)
-        self._kept = columns, near  # last, because another thread may still read the old columns
+    def _use(
+        self, tiles: OrderedTiles, cells: Cells, stack: Stack, pierce: bool, bounds: tuple[int, ...], worth: int
+    ) -> None:
+        """Let shots look up tiles; `worth` is the time to make the visible set, ns, or 0."""
+        columns = map(np.ascontiguousarray, (stack.ids, *tiles[:5]))
+        lists = tuple(cells[:5]), np.ascontiguousarray(cells.begin), np.ascontiguousarray(cells.listed)
+        self._place, self._is_visible = _place(*columns, *lists, pierce, tuple(bounds), worth), not worth
 
     def look(self, one: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
-        numbers, number, tell = _numbers(one), one.number, self._tell
-        buffers: list[Buffer] = []
+        shape, number, tell = _shape_of(one), one.number, self._tell
+        buffers: list[tuple[Any, memoryview]] = []
 
         def look(x: float, y: float, hits: Answer) -> None:
             """Call the kernel and read its rows from a buffer."""
             try:
                 buffer = buffers.pop()  # each thread takes its own
             except IndexError:
-                buffer = self._buffer(numbers)
-            count = shot(x, y, buffer[0])
+                found = np.empty((FEW_ROWS, ROW), np.int64)
+                buffer = found, memoryview(found).cast("B")
+            count = shot(x, y, self._place, shape, buffer[0])
             if count:
                 if count < 0:
                     buffers.append(buffer)
@@ -240,30 +216,25 @@ class PositionCache:
                         raise KeyError
                     self._make_visible()
                     return look(x, y, hits)
-                view, at, end = buffer[1], FOUND_AT, FOUND_AT + ROW_BYTES * count
+                view, at, end = buffer[1], 0, ROW_BYTES * count
                 while at < end:  # faster than a range
                     item, n, distance2, column, row = read(view, at)
                     tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (column, row), distance2)))
                     at += ROW_BYTES
             buffers.append(buffer)
 
-        return look, PIECE_BYTES + numbers.nbytes
+        return look, PIECE_BYTES + one.pattern.words.nbytes
 
     def _make_visible(self) -> None:
         with self._lock:
-            if not self._here[IS_VISIBLE]:
+            if not self._is_visible:
                 scene = self._scene
                 visible_set = scene.derived.visible(self._view).read(scene.items)
                 self._use_visible(visible_set, scene.items.stack())
 
-    def _buffer(self, pixels: Ints) -> Buffer:
-        numbers = np.zeros(FOUND + ROW * FEW_ROWS + len(pixels), np.int64)
-        numbers[:FOUND] = address(self._here), address(pixels)
-        return address(numbers), memoryview(numbers).cast("B"), numbers
 
-
-def _numbers(one: Round) -> Ints:
-    """Fields of a round, as `_shot` reads them."""
+def _shape_of(one: Round) -> Any:
+    """The Shape of a round."""
     words = one.pattern.words
-    head = *one.pattern.box_xyxy[0].tolist(), WORD, words.shape[1], words.size
-    return np.concatenate([np.array(head, np.int64), np.zeros(WORD, np.int64), words.reshape(-1).view(np.int64)])
+    flat = np.concatenate([np.zeros(WORD, np.uint64), words.reshape(-1)])
+    return _shape(one.pattern.box_xyxy[:1], np.array([WORD]), np.array([words.shape[1]]), flat)
