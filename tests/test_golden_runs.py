@@ -349,6 +349,7 @@ def test_goldens_that_no_test_uses(game: pytest.Pytester, case: str) -> None:
 # Workers
 
 
+@pytest.mark.long
 def test_workers_leave_the_same_page_and_the_same_lists(untouched: pytest.Pytester) -> None:
     pytest.importorskip("xdist")
     written = untouched.runpytest_subprocess("--hits-update", "-n", "2")

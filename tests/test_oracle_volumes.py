@@ -11,6 +11,7 @@ import numpy as np
 import oracle_volumes as exact
 import pytest
 from oracle_volumes import KINDS, PAIRS, contains_point, cross3, dot, fractions, meets, minus, times
+from some_of import some_of
 
 Shape = tuple[Any, ...]
 SPACE_PAIRS = [("circle", "circle"), ("circle", "aabb"), ("aabb", "aabb")]
@@ -20,8 +21,8 @@ EXTREME = ("subnormal", "huge", "greatest", "mixed")
 ORDINARY = tuple(name for name in adversarial.FAMILIES if name not in EXTREME)
 COUNT = 72  # of each pair, in each law: six of each family
 
-every_pair = pytest.mark.parametrize(("kind_a", "kind_b", "dim"), ALL_PAIRS + SMALL_PAIRS)
-planar_pair = pytest.mark.parametrize(("kind_a", "kind_b"), [*PAIRS, *(pair[:2] for pair in SMALL_PAIRS)])
+every_pair = pytest.mark.parametrize(("kind_a", "kind_b", "dim"), some_of(ALL_PAIRS + SMALL_PAIRS, 2))
+planar_pair = pytest.mark.parametrize(("kind_a", "kind_b"), some_of([*PAIRS, *(pair[:2] for pair in SMALL_PAIRS)], 2))
 
 
 def up(value: float, ulps: int = 1) -> float:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from ray_battles import some_battle
+from some_of import some_of
 from test_march import single
 from test_ready import changed, crowd, same
 
@@ -90,10 +91,11 @@ GO_ON: list[Weapon] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "weapon", [Pistol(150), Pistol(90, falloff="smooth"), Rifle(120, max_hits=1), *GO_ON], ids=repr
-)
-@pytest.mark.parametrize("exclude", [None, pytest.param(3, marks=pytest.mark.long), [1, 4]])
+WHILE_IT_CHANGES = Pistol(150), *GO_ON, Rifle(120, max_hits=1), Pistol(90, falloff="smooth")
+
+
+@pytest.mark.parametrize("weapon", some_of(WHILE_IT_CHANGES, 2), ids=repr)
+@pytest.mark.parametrize("exclude", some_of([None, 3, [1, 4]]))
 @pytest.mark.parametrize("bounded", [True, False])
 def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: bool) -> None:
     """Many shots at a scene that stands still: in numpy they come to jump, if no object is refused."""

@@ -101,7 +101,7 @@ def fire_some(scene: Scene) -> None:
     fire(scene, RAY, (0, 9), aim=0)
 
 
-@pytest.mark.parametrize("every", [0, 4])
+@pytest.mark.parametrize("every", [0, pytest.param(4, marks=pytest.mark.long)])
 @pytest.mark.parametrize("at_once", [1, 25])
 @pytest.mark.usefixtures("lean")
 def test_of_an_object_that_was_removed_little_is_kept(every: int, at_once: int) -> None:
