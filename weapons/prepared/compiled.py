@@ -108,7 +108,6 @@ def _shape(box, first, rows, words):
     return Shape(box, first, rows, words)
 
 
-# house: way of areas
 @compiled(types.int64(types.float64, types.float64, PLACE, SHAPE, types.int64[:, ::1]), nogil=False)
 def _shot(at_x, at_y, place, shape, found):
     """Number of rows of a round at a position, which are written to `found`, (FEW_ROWS, ROW)."""
