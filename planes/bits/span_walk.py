@@ -123,14 +123,11 @@ def walk(
     -------
     events, and the state of each sample, in the order of the runs
     """
-    start = np.cumsum(runs.lengths) - runs.lengths
     state = np.full(int(runs.lengths.sum()), LIVE, np.uint8)
-    kind = pairs.kind
-    ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
-    keep = np.where(ends, ~LIVE & 31, 31).astype(np.uint8)
+    kind, keep = pairs.kind, _kept(pairs.kind, pierce)
     pair, run, x_first, x_last = _meetings(runs, pairs, stack)
     box, item = stack.box_xyxy, pairs.rank[pair]
-    sample = start[run] - runs.x_first[run]
+    sample = (np.cumsum(runs.lengths) - runs.lengths - runs.x_first)[run]
     texel = stack.offset[item] + (runs.y[run] - box[item, 1]) * stack.width[item] - box[item, 0]
     emitted = [(np.zeros(0, np.int64), np.zeros(0, np.int64), kind[:0])]
     for now in _steps(pairs, pair):
@@ -147,10 +144,21 @@ def walk(
         emitted.append((meeting[wanted], x[wanted], does[wanted]))
     if shelter is not None:
         state[shelter.items > 0] |= SHELTERED
+    return _events_of(emitted, item, run), state
+
+
+def _kept(kind: Kinds, pierce: bool) -> Kinds:
+    """Bits of a sample's state that each pair leaves: an accepted item ends the walk, an object unless shots pierce."""
+    ends = (kind == BLOCK) | ((kind == HIT) & (not pierce))
+    return np.where(ends, ~LIVE & 31, 31).astype(np.uint8)
+
+
+def _events_of(emitted: list[tuple[Ints, Ints, Kinds]], item: Ints, run: Ints) -> Events:
+    """Events of meetings, each with the column and what the item did there; `item` and `run` are those of meetings."""
     meeting, x, does = (np.concatenate(column) for column in zip(*emitted, strict=True))
     first, last = _stretches(meeting, x, does)
     met = meeting[first]
-    return Events(does[first], item[met], run[met], x[first], x[last]), state
+    return Events(does[first], item[met], run[met], x[first], x[last])
 
 
 def _steps(pairs: Pairs, pair: Ints) -> Iterator[Ints]:

@@ -49,8 +49,9 @@ from .ray_walk import Range, lines_of
 RAYS_AT_ONCE = 1024
 """Most rays that are followed at a time; the columns of their pairs fit the processor's cache."""
 
-FEW, GROWTH = 4, 2
-"""Boxes of each ray in the first round, and the ratio of the numbers of two rounds in a row."""
+FEW, GROWTH, ROUND_PAIRS = 4, 2, 128
+"""Boxes of each ray in the first round, the ratio of the numbers of two rounds in a row, and as many pairs of a ray and
+a box as take the time of a round."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +277,7 @@ def _rounds(near: Near, rays: int, most: int | None, stack: Stack) -> Iterator[I
 
     Of rays that go through all objects, or meet few boxes, all objects are next.
     """
-    early = len(near) > FEW * rays
+    early = len(near) > FEW * rays + ROUND_PAIRS
     object_ = np.arange(len(near))
     if early and stack.has_occluders:
         blocks = stack.occluder[near.rank]
