@@ -32,7 +32,7 @@ def changed_boxes(scene: Scene, version: int) -> Any:
 
 
 BOX = (-9, 4, 40, 33)
-NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.scene"]
+NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.planes"]
 
 
 def front_to_back(scene: Scene) -> list[int]:

@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-import importlib
 import itertools
 import math
 import os
@@ -22,7 +21,7 @@ import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from hitplanes.planes.common.backend import LruCache
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import VARIANT_BYTES
 from hitplanes.planes.grid import rasterize
@@ -116,37 +115,70 @@ def test_placed_mask_is_the_reference(
     assert placed(sprite_of(mask, pivot), position, flip=flip, scale=scale, angle=angle) == expected
 
 
-@pytest.mark.parametrize("name", ["hitplanes.planes.scene.variants", "hitplanes.planes.jit.scene"])
+def mapping(rng: random.Random, frames: list[np.ndarray], grids: int) -> tuple[np.ndarray, variants.Grids]:
+    """Grids of one size and scale, a frame for each, with steps of a few parts, so that many places are on borders."""
+    which, unit = np.array([rng.randrange(len(frames)) for _ in range(grids)]), (rng.randint(1, 6), rng.randint(1, 6))
+    step = np.array([[[rng.randint(-9, 9) for _ in range(2)] for _ in range(2)] for _ in which])
+    first = np.array([
+        [rng.randint(-9, u * side + 9) for u, side in zip(unit, frames[k].shape[::-1], strict=True)] for k in which
+    ])  # fmt: skip
+    size = np.array([[rng.randint(1, 12), rng.randint(1, 12)]] * grids)
+    return which, variants.Grids(np.zeros_like(size), size, first, step, np.array([unit] * grids))
+
+
+def squares_at(place: np.ndarray, unit: np.ndarray, shape: tuple[int, ...]) -> set[tuple[int, int]]:
+    """Squares (row, column) of a frame that hold a place: two of them on a border, four at a corner."""
+    x, y = ({int(p // u), int(-(-p // u) - 1)} for p, u in zip(place, unit, strict=True))
+    return {(row, column) for row in y & set(range(shape[0])) for column in x & set(range(shape[1]))}
+
+
 @LAWS
 @given(masks(), masks(), st.integers(0, 2**32))
 def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(
-    name: str, mask: np.ndarray, other: np.ndarray, seed: int
+    mask: np.ndarray, other: np.ndarray, seed: int
 ) -> None:
-    """Steps of a few parts, so that many places are on borders; both kernels choose the same of several squares."""
-    if name.endswith("jit.scene"):
-        pytest.importorskip("numba")
-    rng = random.Random(seed)
-    frames, which = [mask, other], np.array([0, 1, 1])
+    frames = [mask, other]
+    which, grids = mapping(random.Random(seed), frames, 3)
     h, w = (max(frame.shape[axis] for frame in frames) for axis in (0, 1))
     planes = np.zeros((2, h + 2, w + 2), np.bool_)
     for plane, frame in zip(planes, frames, strict=True):
         plane[1 : frame.shape[0] + 1, 1 : frame.shape[1] + 1] = frame
-    unit, (width, height) = (rng.randint(1, 6), rng.randint(1, 6)), (rng.randint(1, 12), rng.randint(1, 12))
-    step = np.array([[[rng.randint(-9, 9) for _ in range(2)] for _ in range(2)] for _ in which])
-    first = np.array([[rng.randint(-9, u * side + 9) for u, side in zip(unit, (w, h), strict=True)] for _ in which])
-    given = planes, which, first, step, unit, (width, height)
-    found = importlib.import_module(name).resample(*given)
-    in_frame = np.zeros(planes.shape, np.bool_)
-    in_frame[:, 1:-1, 1:-1] = True
-    both = [np.where(in_frame.reshape(-1)[places], places, -1) for places in (found, variants.resample(*given))]
-    assert np.array_equal(*both)
+    width, height = grids.size_wh.max(axis=0).tolist()
+    found = variants.resample(planes, which, grids.first, grids.step, tuple(grids.unit[0].tolist()), (width, height))
     for n, j, i in itertools.product(range(3), range(height), range(width)):
-        place = first[n] + i * step[n, :, 0] + j * step[n, :, 1]
-        x, y = ({int(p // u), int(-(-p // u) - 1)} for p, u in zip(place, unit, strict=True))
-        inside = {(int(which[n]), row, column) for row in y & set(range(h)) for column in x & set(range(w))}
+        place = grids.first[n] + i * grids.step[n, :, 0] + j * grids.step[n, :, 1]
+        inside = squares_at(place, grids.unit[n], (h, w))
         k, row, column = (int(v) for v in np.unravel_index(found[n, j, i], planes.shape))
-        assert planes[k, row, column] == any(planes[k, row + 1, column + 1] for k, row, column in inside)
-        assert (k, row - 1, column - 1) in inside if inside else not planes[k, row, column]
+        assert k == which[n]
+        assert planes[k, row, column] == any(planes[k, row + 1, column + 1] for row, column in inside)
+        assert (row - 1, column - 1) in inside if inside else not planes[k, row, column]
+
+
+@AGAINST
+@given(masks(), masks(), st.integers(0, 2**32))
+def test_a_pixel_is_set_if_a_set_square_holds_its_centre(
+    jit: bool, mask: np.ndarray, other: np.ndarray, seed: int
+) -> None:
+    """Before it is cropped and turned by quarter turns, pixel by pixel."""
+    frames, rng = [mask, other], random.Random(seed)
+    which, grids = mapping(rng, frames, 5)
+    quarters = np.array([rng.randrange(4) for _ in which])
+    turned = kernels_of(variants).turned_masks(frames, which, grids, quarters)
+    for n, (found, corner, area) in enumerate(zip(*turned, strict=True)):
+        (width, height), frame = grids.size_wh[n].tolist(), frames[which[n]]
+        places = {
+            (j, i): grids.first[n] + i * grids.step[n, :, 0] + j * grids.step[n, :, 1]
+            for j, i in itertools.product(range(height), range(width))
+        }
+        held = {at for at, p in places.items() if any(frame[s] for s in squares_at(p, grids.unit[n], frame.shape))}
+        assert area == len(held)
+        if held:
+            top, left = (min(at[axis] for at in held) for axis in (0, 1))
+            whole = np.zeros([max(at[axis] for at in held) + 1 for axis in (0, 1)], np.bool_)
+            whole[tuple(np.array(sorted(held)).T)] = True
+            assert corner == [left, top] and np.array_equal(found, np.rot90(whole[top:, left:], -quarters[n]))
+        else:
+            assert found.size == 0
 
 
 @AGAINST
@@ -157,7 +189,7 @@ def test_masks_that_are_made_together_are_those_made_alone(jit: bool, poses: lis
     forms = [posed(sprite, *pose) for sprite, (_, _, *pose) in zip(sprites, poses, strict=True)]
     alone = [[variant_of(Sprite(sprite.frames, sprite.pivot_256), form) for form in forms] for sprite in sprites]
     pairs = list(itertools.product(sprites, forms))
-    with mock.patch.object(variants, "MAPPED_PIXELS", 60):
+    with mock.patch.object(kernels_of(variants), "MAPPED_PIXELS", 60):
         together = variants_of(*zip(*pairs, strict=True))
         again = variants_of(*zip(*pairs, strict=True))
     assert all(one is other for one, other in zip(together, again, strict=True))

@@ -18,7 +18,7 @@ from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
 from .cache import compiled
-from .march import over
+from .planes import over
 from .scene import root_of
 
 if TYPE_CHECKING:

@@ -1,20 +1,22 @@
-"""Compiled kernels of fixed point, shapes, turned masks and label planes, and of the draws of pellets."""
+"""Compiled kernels of fixed point, shapes and turned masks, and of the draws of pellets."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 from numba import njit, types
 
-from ..bits.label_plane import CELL_BITS, Front
-from ..common.checks import Bools, Floats, Ints, Labels
-from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
+from ..common.checks import Bools, Floats, Ints
+from ..common.limits import GOLDEN, HALF, MAPPED_PIXELS, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import DOUBT, UNIT
 from ..grid.rasterize import DIAGONAL, WIDEST, RowRuns, sides_of
-from ..grid.spans import Box
-from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
+from ..grid.spans import pieces
+from ..scene.variants import Grids
+from .bit_rows import INTS, OUT
 from .cache import compiled
 
 TERMS = 8  # terms of each series; up to 45 degrees the rest is below 2**-53
@@ -92,56 +94,124 @@ def pixels(at_256: Ints) -> Ints:
 
 
 PELLETS = types.Array(types.int64, 2, "A", readonly=True)
-PLANES = types.Array(types.boolean, 3, "A", readonly=True)
 STEPS = types.Array(types.int64, 3, "A", readonly=True)
 WHOLE = types.int64
 
 
-@compiled(WHOLE(PLANES, *[WHOLE] * 3, types.boolean, types.boolean, WHOLE))
-def _on_border(planes, k, row, column, up, left, at):
-    """Place among the squares that meet at a border: the first that is set, else the last in the frame, else `at`."""
-    _, rows, columns = planes.shape
+MASKS = types.Array(types.boolean, 1, "C", readonly=True)
+
+
+@njit
+def _is_beside(flat, begin, wide, high, column, row, left, up):
+    """Whether any of the squares of a frame that meet at a border is set."""
     for j in (row, row - 1) if up else (row, row):
         for i in (column, column - 1) if left else (column, column):
-            if 0 < j < rows - 1 and 0 < i < columns - 1:
-                at = (k * rows + j) * columns + i
-                if planes[k, j, i]:
-                    return at
-    return at
+            if 0 <= j < high and 0 <= i < wide and flat[begin + j * wide + i]:
+                return True
+    return False
 
 
-@compiled(types.void(PLANES, INTS, PELLETS, STEPS, WHOLE, WHOLE, types.int64[:, :, ::1]))
-def _resample(planes, which, first, step, unit_x, unit_y, source):
-    count, height, width = source.shape
-    rows, columns = np.uint64(planes.shape[1]), np.uint64(planes.shape[2])
-    for n in range(count):
-        k, (across_x, down_x), (across_y, down_y) = which[n], step[n, 0], step[n, 1]
-        along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
-        outside = np.int64(k * planes.shape[1] * planes.shape[2])
-        for y in range(height):
-            begin_x, begin_y = first[n, 0] + unit_x + y * down_x, first[n, 1] + unit_y + y * down_y
-            column, x_rest, row, y_rest = begin_x // unit_x, begin_x % unit_x, begin_y // unit_y, begin_y % unit_y
-            for x in range(width):
-                j, i = np.uint64(row), np.uint64(column)  # negative numbers become very large
-                at = outside + np.int64(j * columns + i) if j < rows and i < columns else outside
-                if x_rest == 0 or y_rest == 0:
-                    at = _on_border(planes, k, row, column, y_rest == 0, x_rest == 0, outside)
-                source[n, y, x] = at
-                column, x_rest = column + along_x, x_rest + over_x
-                if x_rest >= unit_x:
-                    column, x_rest = column + 1, x_rest - unit_x
-                row, y_rest = row + along_y, y_rest + over_y
-                if y_rest >= unit_y:
-                    row, y_rest = row + 1, y_rest - unit_y
+@njit
+def _within(value, step, most, near, far):
+    """The part of near .. far - 1 in which 0 <= value + k * step <= most."""
+    if step == 0:
+        return (near, far) if 0 <= value <= most else (near, near)
+    first, last = -(value // step), (most - value) // step
+    if step < 0:
+        first, last = -((value - most) // step), -value // step
+    near = max(near, first)
+    return near, max(min(far, last + 1), near)
 
 
-def resample(
-    planes: Bools, which: Ints, first: Ints, step: Ints, unit: tuple[int, int], size_wh: tuple[int, int]
-) -> Ints:
-    """See `scene.variants.resample`; it divides once a row, not once a pixel."""
-    source = np.empty((len(which), *size_wh[::-1]), np.int64)
-    _resample(planes, which, first, step, *unit, source)
-    return source
+@njit
+def _map(flat, frame, first, step, unit, size_wh, held):
+    """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels."""
+    (begin, wide, high), (unit_x, unit_y), width = frame, unit, size_wh[0]
+    (across_x, down_x), (across_y, down_y) = step[0], step[1]
+    along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
+    columns, rows, first_place, at = np.uint64(wide), np.uint64(high), np.uint64(begin), 0
+    left, top, right, low, area = width, size_wh[1], 0, 0, 0
+    for y in range(size_wh[1]):
+        begin_x, begin_y = first[0] + y * down_x, first[1] + y * down_y
+        near, far = _within(begin_x, across_x, wide * unit_x, 0, width)
+        near, far = _within(begin_y, across_y, high * unit_y, near, far)
+        held[at : at + width] = False
+        place_x, place_y = begin_x + near * across_x, begin_y + near * across_y
+        column, x_rest, row, y_rest = place_x // unit_x, place_x % unit_x, place_y // unit_y, place_y % unit_y
+        count = 0
+        for x in range(at + near, at + far):
+            j, i = np.uint64(row), np.uint64(column)
+            on = j < rows and i < columns and flat[first_place + j * columns + i]
+            if x_rest == 0 or y_rest == 0:
+                on = on or _is_beside(flat, begin, wide, high, column, row, x_rest == 0, y_rest == 0)
+            held[np.uint64(x)] = on
+            count += on
+            x_rest, y_rest = x_rest + over_x, y_rest + over_y
+            carried_x, carried_y = x_rest >= unit_x, y_rest >= unit_y  # without a branch
+            column, row = column + along_x + carried_x, row + along_y + carried_y
+            x_rest, y_rest = x_rest - (unit_x if carried_x else 0), y_rest - (unit_y if carried_y else 0)
+        if count:
+            area, top, low = area + count, min(top, y), y + 1
+            first_x, last_x = near, far - 1
+            while first_x < left and not held[at + first_x]:
+                first_x += 1
+            while last_x >= right and not held[at + last_x]:
+                last_x -= 1
+            left, right = min(left, first_x), max(right, last_x + 1)
+        at += width
+    return left, top, right, low, area
+
+
+@njit
+def _crop(held, width, left, top, wide, high, quarter, out):
+    """Write a part of a grid to `out`, turned by quarter turns."""
+    begin, down, right = 0, wide, 1
+    if quarter == 1:
+        begin, down, right = high - 1, -1, high
+    elif quarter == 2:
+        begin, down, right = high * wide - 1, -wide, -1
+    elif quarter == 3:
+        begin, down, right = (wide - 1) * high, 1, -high
+    for y in range(high):
+        source, place = (top + y) * width + left, begin + y * down
+        for x in range(wide):
+            out[place + x * right] = held[source + x]
+
+
+@compiled(types.Tuple((types.int64[:, ::1], types.boolean[::1]))(
+    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS, INTS
+))  # fmt: skip
+def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
+    boxes, room, most, used = np.empty((len(which), 6), np.int64), 0, 0, 0
+    for n in range(len(which)):
+        room, most = room + size_wh[n, 0] * size_wh[n, 1], max(most, size_wh[n, 0] * size_wh[n, 1])
+    out, held = np.empty(room, np.bool_), np.empty(most, np.bool_)
+    for n in range(len(which)):
+        left, top, right, low, area = _map(flat, frames[which[n]], first[n], step[n], unit[n], size_wh[n], held)
+        wide, high = max(right - left, 0), max(low - top, 0)
+        _crop(held, size_wh[n, 0], left, top, wide, high, quarter[n], out[used:])
+        boxes[n, 0], boxes[n, 1], boxes[n, 4], boxes[n, 5] = left, top, area, used
+        boxes[n, 2], boxes[n, 3] = (high, wide) if quarter[n] & 1 else (wide, high)
+        used += wide * high
+    return boxes, out
+
+
+def turned_masks(
+    masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints
+) -> tuple[list[Bools], list[list[int]], list[int]]:
+    """See `scene.variants.turned_masks`; it divides once a row, not once a pixel."""
+    sizes = [mask.size for mask in masks]
+    shapes = [(begin, *mask.shape[::-1]) for begin, mask in zip(accumulate(sizes, initial=0), masks, strict=False)]
+    flat = np.concatenate([mask.reshape(-1) for mask in masks])
+    frames, made, corners, areas = np.array(shapes), [], [], []
+    for part in pieces(grids.size_wh.prod(axis=1), MAPPED_PIXELS):
+        _, size_wh, *places = (column[part] for column in grids)
+        boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh, quarters[part])
+        for left, top, wide, high, area, begin in boxes.tolist():
+            made.append(out[begin : begin + wide * high].reshape(high, wide))
+            corners.append([left, top])
+            areas.append(area)
+    return made, corners, areas
 
 
 @njit
@@ -459,78 +529,6 @@ def place(
                 after[i, side] = (now + edge[item, side]) >> 8
                 box[item, side] = after[i, side]
     return True
-
-
-@compiled()
-def paint(labels: Labels, x: int, y: int, dirty: Ints, places: Ints, masks: Bools) -> None:
-    """Redraw boxes of a label plane, back to front; see `bits.label_plane.paint`."""
-    for d in range(len(dirty)):
-        left, top, right, low = dirty[d, 0], dirty[d, 1], dirty[d, 2], dirty[d, 3]
-        labels[top - y : low - y + 1, left - x : right - x + 1] = 0
-        for rank in range(len(places) - 1, -1, -1):
-            place = places[rank]
-            if place[0] <= right and place[2] >= left and place[1] <= low and place[3] >= top:
-                paint_item(labels, x, y, left, top, right, low, place, masks)
-
-
-@compiled()
-def paint_item(
-    labels: Labels, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
-) -> None:
-    """Draw the part of an item that lies in a box over what is drawn there."""
-    zero, one = labels.dtype.type(0), labels.dtype.type(1)
-    code = labels.dtype.type(place[5])
-    width = place[2] - place[0] + 1
-    x0, x1, y0, y1 = max(left, place[0]), min(right, place[2]), max(top, place[1]), min(low, place[3])
-    begin = place[4] + (y0 - place[1]) * width + x0 - place[0]
-    n = x1 - x0 + 1
-    for row in range(y0 - y, y1 - y + 1):
-        part, mask = labels[row, x0 - x : x1 - x + 1], masks[begin : begin + n]
-        for i in range(n):
-            old = part[i]
-            new = code + one if old != zero else code
-            part[i] = new if mask[i] else old
-        begin += width
-
-
-CELLS = types.Array(types.boolean, 2, "C", readonly=True)
-BITS = np.uint64(CELL_BITS)
-
-
-# house: hit rule of areas
-@compiled(
-    *(
-        types.int64(
-            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
-        )
-        for kind in (types.uint16, types.uint32)
-    )
-)  # fmt: skip
-def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
-    count = 0
-    high, wide, coarse = np.uint64(labels.shape[0]), np.uint64(labels.shape[1]), cells.size > 0
-    for i in range(len(at_256)):
-        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
-        column, row = np.uint64(x - left), np.uint64(y - top)  # negative numbers become very large
-        if (column >= wide) | (row >= high):
-            continue
-        if coarse and not cells[row >> BITS, column >> BITS]:
-            continue
-        front = np.int64(labels[row, column] >> 1)  # always written; the next one overwrites it if it is no hit
-        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
-        count += objects[front]
-    return count
-
-
-NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
-
-
-def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
-    """See `bits.label_plane.front_at`."""
-    place, item = np.empty((2, len(at_256)), np.int64)
-    xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
-    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
-    return Front(place[:count], item[:count], xy[:count])
 
 
 ANY_INTS = types.Array(types.int64, 1, "A", readonly=True)

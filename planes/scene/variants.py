@@ -223,7 +223,8 @@ def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant
             shapes[row] = next(iter(sprite.source or {}), "sprite"), sprite.outline, form
         elif form.plain:
             mask, pivot = _flipped_frame(sprite, form)
-            made[row] = _cropped(mask[None], [pivot], [form])[0]
+            mask, x, y = _quarter_turned(mask, *pivot, form.quarter)
+            made[row] = cropped(form, mask, (x, y))
         else:
             mapped[row] = sprite, form
     if mapped:
@@ -275,30 +276,62 @@ def cropped(form: Transform, mask: Bools, pivot_256: tuple[int, int]) -> Variant
 
 
 def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
-    """Variants of frames that are mapped inversely, in batches of nearly one size."""
+    """Variants of frames that are mapped inversely."""
     keys = [(sprite.uid, form.frame, form.flip) for sprite, form in zip(sprites, forms, strict=True)]
     firsts = dict(zip(reversed(keys), range(len(keys) - 1, -1, -1), strict=True))
     frames = {key: _flipped_frame(sprites[row], forms[row]) for key, row in firsts.items()}
     masks, pivots = zip(*(frames[key] for key in keys), strict=True)
     grids = _grids_of(masks, pivots, forms)
-    made: dict[int, Variant] = {}
-    for batch in _batches(grids, forms):
-        used = {key: number for number, key in enumerate(dict.fromkeys(keys[row] for row in batch))}
-        which = np.array([used[keys[row]] for row in batch])
-        planes = [frames[key][0] for key in used]
-        part = Grids(*(column[batch] for column in grids))
-        held = _mapped(part, planes, which, planes)
-        made |= zip(batch, _cropped(held, part.pivot_256.tolist(), [forms[row] for row in batch]), strict=True)
-    return [made[row] for row in range(len(forms))]
+    numbers = {key: number for number, key in enumerate(frames)}
+    planes, which = [mask for mask, _ in frames.values()], np.array([numbers[key] for key in keys])
+    quarters = np.array([form.quarter for form in forms])
+    found = kernels_of(sys.modules[__name__]).turned_masks(planes, which, grids, quarters)
+    made = []
+    for form, pivot, mask, corner, area in zip(forms, grids.pivot_256.tolist(), *found, strict=True):
+        height, width = mask.shape[:: -1 if form.quarter & 1 else 1]
+        x, y = _turned_pivot(pivot[0] - SUB * corner[0], pivot[1] - SUB * corner[1], (width, height), form.quarter)
+        made.append(Variant(form, frozen(mask), x, y, area) if area else Variant(form, frozen(mask), 0, 0, 0))
+    return made
 
 
-def _batches(grids: Grids, forms: Sequence[Transform]) -> Iterator[list[int]]:
+def turned_masks(
+    masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints
+) -> tuple[list[Bools], list[list[int]], list[int]]:
+    """Masks of frames at the centres of grids, cropped to their pixels and turned by quarter turns.
+
+    Parameters
+    ----------
+    which, quarters : (n,) number of each grid's frame, and of its quarter turns
+
+    Returns
+    -------
+    the masks (n); the corners (n) of their boxes on the grids, before the quarter turns; and their pixels (n)
+    """
+    made: dict[int, tuple[Bools, list[int], int]] = {}
+    for batch in _batches(grids):
+        used = {number: place for place, number in enumerate(dict.fromkeys(which[batch].tolist()))}
+        planes = [masks[number] for number in used]
+        own = np.array([used[number] for number in which[batch].tolist()])
+        held = _mapped(Grids(*(column[batch] for column in grids)), planes, own, planes)
+        rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
+        sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
+        areas, (height, width) = np.count_nonzero(held, axis=(1, 2)).tolist(), held.shape[1:]
+        turns = quarters[batch].tolist()
+        for row, mask, side, quarter, area in zip(batch, held, sides.tolist(), turns, areas, strict=True):
+            left, top, right, low = side if area else (0, 0, width, height)
+            part, _, _ = _quarter_turned(mask[top : height - low, left : width - right], 0, 0, quarter)
+            made[row] = part, [left, top], area
+    every = (made[row] for row in range(len(which)))
+    found, corners, counts = zip(*every, strict=True)
+    return list(found), list(corners), list(counts)
+
+
+def _batches(grids: Grids) -> Iterator[list[int]]:
     """Rows of one scale and of nearly one size, as many as are mapped at a time."""
-    sizes = grids.size_wh.tolist()
-    scales = [(form.scale_x, form.scale_y) for form in forms]
+    sizes, scales = grids.size_wh.tolist(), grids.unit.tolist()
     batch: list[int] = []
     wide = high = 0
-    for row in sorted(range(len(forms)), key=lambda row: (scales[row], sizes[row][0] * sizes[row][1])):
+    for row in sorted(range(len(sizes)), key=lambda row: (scales[row], sizes[row][0] * sizes[row][1])):
         width, height = sizes[row]
         if batch:
             wide, high = max(wide, width), max(high, height)
@@ -363,10 +396,10 @@ def _mapped(grids: Grids, masks: Sequence[Bools], which: Ints, values: Sequence[
     cells = picked.reshape(-1, *picked.shape[3:])
     width, height = grids.size_wh.max(axis=0).tolist()
     unit_x, unit_y = grids.unit[0].tolist()
-    rows, kernel, strips = max(1, MAPPED_PIXELS // (len(which) * width)), kernels_of(sys.modules[__name__]).resample, []
+    rows, strips = max(1, MAPPED_PIXELS // (len(which) * width)), []
     for y in range(0, height, rows):
         first = grids.first + y * grids.step[:, :, 1]
-        source = kernel(planes, which, first, grids.step, (unit_x, unit_y), (width, min(rows, height - y)))
+        source = resample(planes, which, first, grids.step, (unit_x, unit_y), (width, min(rows, height - y)))
         strips.append(cells.take(source, axis=0))
     return np.concatenate(strips, axis=1)
 
@@ -420,24 +453,6 @@ def _at_borders(planes: Bools, which: Ints, column: Ints, row: Ints, unit: tuple
         found[inside] = cell
         held[inside] = planes.reshape(-1).take(cell)
     return np.asarray(found)
-
-
-def _cropped(held: Bools, pivots_256: Sequence[Sequence[int]], forms: Sequence[Transform]) -> list[Variant]:
-    """Variants of mapped masks (n, height, width), cropped and turned by their quarter turns."""
-    rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
-    sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
-    areas = np.count_nonzero(held, axis=(1, 2)).tolist()
-    height, width = held.shape[1:]
-    made = []
-    for mask, side, pivot, form, area in zip(held, sides.tolist(), pivots_256, forms, areas, strict=True):
-        left, top, right, bottom = side
-        if not area:
-            made.append(Variant(form, frozen(np.zeros((0, 0), np.bool_)), 0, 0, 0))
-            continue
-        part = mask[top : height - bottom, left : width - right]
-        part, x, y = _quarter_turned(part, pivot[0] - SUB * left, pivot[1] - SUB * top, form.quarter)
-        made.append(Variant(form, frozen(part), x, y, area))
-    return made
 
 
 def turned_runs(mask: Bools, pivot_256: tuple[int, int], direction: Ints) -> RowRuns:
@@ -501,10 +516,19 @@ def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
     return RowRuns(shape[begin][own], row, parts)
 
 
+def _turned_pivot(x: int, y: int, size_wh: tuple[int, int], turns: int) -> tuple[int, int]:
+    """Pivot (x, y) of a grid, turned by quarter turns; its size is that before them."""
+    width, height = size_wh
+    for _ in range(turns):
+        x, y, width, height = SUB * (height - 1) - y, x, height, width
+    return x, y
+
+
 def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:
     """An array (h, w, ...) and its pivot (x, y), turned by quarter turns."""
+    x, y = _turned_pivot(x, y, (array.shape[1], array.shape[0]), turns)
     for _ in range(turns):
-        array, x, y = array.swapaxes(0, 1)[:, ::-1], SUB * (array.shape[0] - 1) - y, x
+        array = array.swapaxes(0, 1)[:, ::-1]
     return array, x, y
 
 
