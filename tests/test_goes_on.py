@@ -176,7 +176,7 @@ def test_roots_and_shares_of_the_kernel_are_exact() -> None:
         for _ in range(300):
             length2, radius = rng.randint(1, 2**bits), rng.randint(1, 2 ** min(17, (89 - bits) // 2 + 1))
             v = rng.choice([0, 1, rng.randint(0, math.isqrt(radius**2 * length2)), math.isqrt(radius**2 * length2)])
-            assert jit._half_chord(radius, v, length2) == math.isqrt(radius**2 * length2 - v * v)
+            assert jit.half_chord(radius, v, length2) == math.isqrt(radius**2 * length2 - v * v)
     for _ in range(1000):
         length2 = rng.randint(1, 2 ** rng.randint(1, 50))
         scale = rng.randint(1, max(length2 // 2, 1))
@@ -185,4 +185,4 @@ def test_roots_and_shares_of_the_kernel_are_exact() -> None:
         whole = rng.randint(0, parts), parts * share, parts * rng.randint(share, 2**43)  # quotients are whole numbers
         for time_, scale_, length2_ in ((time, scale, length2), (whole[0] * share, whole[1], whole[2])):
             for sign in (1, -1):
-                assert jit._share(sign * time_, length2_, scale_) == sign * time_ * length2_ // scale_
+                assert jit.share(sign * time_, length2_, scale_) == sign * time_ * length2_ // scale_

@@ -186,6 +186,7 @@ def test_verdicts_of_battles_are_those_of_the_cells(part: int, monkeypatch: pyte
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", range(3))
+@pytest.mark.usefixtures("jit")
 def test_verdicts_of_many_battles_are_those_of_the_cells(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(1000 + 100 * part, 1100 + 100 * part):
         scene, weapon, how = battle(seed)

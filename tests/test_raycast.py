@@ -78,7 +78,7 @@ def first_touched(
             view = View(False, meets[k], tuple(sorted({*exclude[k]} - {-1})))
         elif stack.has_unmet:
             continue
-        followed = kernels.follower(stack, bounds, view, 0, 1)(*at, *by)
+        followed = kernels_of(one_ray).follower(stack, bounds, view, 0, 1)(*at, *by)
         if followed is None:  # too long for it
             assert by == (0, 0) or kernels is raycast
             continue
@@ -260,7 +260,7 @@ def test_many_boxes_that_are_entered_and_not_touched(kernels: ModuleType, aim: f
     assert prepare(hollow, Pistol(2000)).fire((-5, 10)) == hits
     if kernels is raycast:
         stack, view = hollow.items.stack(), View(False, EVERYTHING, ())
-        assert one_ray.follower(stack, None, view)(256 * -5, 256 * 10, 256 * 2000, 0) is None
+        assert one_ray.follower(stack, None, view, 0, 1)(256 * -5, 256 * 10, 256 * 2000, 0) is None
     sooner = hollow.add(np.ones((99, 3), np.bool_), (50, 10))  # some twenty boxes are entered before
     assert fire(hollow, Pistol(2000), (-5, 10), strategy="cast").object.tolist() == [sooner]
 

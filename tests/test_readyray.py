@@ -36,7 +36,7 @@ from hitplanes import (
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
-from hitplanes.weapons.rays import raycast
+from hitplanes.weapons.rays import one_ray, raycast
 
 worlds = st.randoms(use_true_random=False)
 AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
@@ -117,18 +117,18 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
 @pytest.fixture
 def casts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Numbers of casts in numpy: the last counts on, and whoever begins to count appends a 0."""
-    counts, inner = [0], raycast.follower
+    counts, inner = [0], one_ray.follower
 
     def counted(*of: Any) -> Any:
         cast = inner(*of)
 
-        def one(*ray: int) -> raycast.Followed | None:
+        def one(*ray: int) -> one_ray.Followed | None:
             counts[-1] += 1
             return cast(*ray)
 
         return one
 
-    monkeypatch.setattr(raycast, "follower", counted)
+    monkeypatch.setattr(one_ray, "follower", counted)
     return counts
 
 

@@ -60,6 +60,8 @@ COMPILED = {
     "hitplanes.planes.bits.front_to_back": "hitplanes.planes.jit.areas",
     "hitplanes.planes.bits.distance_field": "hitplanes.planes.jit.planes",
     "hitplanes.weapons.rays.raycast": "hitplanes.planes.jit.raycast",
+    "hitplanes.weapons.explain.ray_verdicts": "hitplanes.planes.jit.raycast",
+    "hitplanes.weapons.rays.one_ray": "hitplanes.weapons.prepared.compiled",
     "hitplanes.weapons.prepared.position_cache": "hitplanes.weapons.prepared.compiled",
 }
 """Each module with numpy kernels, and the module that has the same functions compiled."""

@@ -1,11 +1,11 @@
-"""Compiled kernels of the label plane, of the distance field, and of the march by it."""
+"""Compiled kernels of the label plane, of the distance field and the march by it, and of rays at pixels."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numba import types
+from numba import njit, types
 
 from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 from ..bits.label_plane import CELL_BITS, Front
@@ -14,6 +14,7 @@ from ..common.limits import HALF, SUB
 from ..grid.spans import Box
 from .bit_rows import BOXES, FLAGS, OUT, ROWS_OUT
 from .cache import compiled
+from .scene import root_of
 
 BLOCK = 128
 """Rays that march together, so that reads overlap; their columns fit the fastest cache."""
@@ -271,3 +272,80 @@ def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: igno
     block[ALONG, one], block[ACROSS, one], block[ASIDE, one] = along, across, aside
     block[BASE, one], block[N, one], block[STOP, one] = y * width + x, first, stop
     return 0 if first < stop else NOTHING
+
+
+LATE = 2**62
+"""A time after all others."""
+
+
+@njit(inline="always")
+def _spell(low, high, sign, across, entry, leave):
+    """Part of the time from `entry` to `leave` in which a ray is between two sides, given relative to its start."""
+    if sign == 0:
+        return (entry, leave) if low <= 0 <= high else (LATE, np.int64(0))
+    near, far = (low, high) if sign > 0 else (-high, -low)
+    return max(entry, near * across), min(leave, far * across)
+
+
+@njit
+def times_in(left, top, right, low, ray):
+    """Times at which a ray enters and leaves a box of pixels; leave < entry if it does not touch the box."""
+    x, y, dx, dy, across_x, across_y = ray
+    entry, leave = _spell(SUB * left - HALF - x, SUB * right + HALF - x, dx, across_x, np.int64(0), across_x * across_y)
+    return _spell(SUB * top - HALF - y, SUB * low + HALF - y, dy, across_y, entry, leave)
+
+
+@njit
+def run_of(row, begin, step, u, along):
+    """First and last cell of a row that a ray touches, along its longer axis; (1, 0) if it touches none."""
+    first = max(min(begin, begin + step), SUB * row - HALF) - begin
+    last = min(max(begin, begin + step), SUB * row + HALF) - begin
+    if first > last:
+        return np.int64(1), np.int64(0)
+    if step == 0:
+        low, high, per = min(u, u + along), max(u, u + along), np.int64(1)
+    else:
+        per, slope = abs(step), along if step > 0 else -along
+        low, high = u * per + min(first * slope, last * slope), u * per + max(first * slope, last * slope)
+    return -over(HALF * per - low, SUB * per), over(high + HALF * per, SUB * per)
+
+
+@njit
+def near_of(box, origin_x, origin_y, ray, bounds, near, reach):
+    """Write the items with pixels whose centres may lie within `reach` of a ray to `near`; return how many."""
+    x, y, dx, dy, around = ray[0] + reach, ray[1] + reach, ray[2], ray[3], 2 * reach - SUB + 1
+    left, right = ((min(x, x + dx) - around) >> 8) + origin_x, (max(x, x + dx) >> 8) + origin_x
+    top, low = ((min(y, y + dy) - around) >> 8) + origin_y, (max(y, y + dy) >> 8) + origin_y
+    left, top, right, low = max(left, bounds[0]), max(top, bounds[1]), min(right, bounds[2]), min(low, bounds[3])
+    count = 0
+    for at in range(len(box)):
+        across = (box[at, 0] <= right) & (box[at, 2] >= left)
+        near[count] = at
+        count += across & (box[at, 1] <= low) & (box[at, 3] >= top)
+    return count
+
+
+@njit
+def part_of(box, at, origin_x, origin_y, bounds):
+    """The part of an item's box within the bounds, relative to a pixel."""
+    left, top = max(box[at, 0], bounds[0]) - origin_x, max(box[at, 1], bounds[1]) - origin_y
+    return left, top, min(box[at, 2], bounds[2]) - origin_x, min(box[at, 3], bounds[3]) - origin_y
+
+
+@njit
+def share(time, length2, scale):
+    """The part time / scale of a squared length below 2**50, rounded down; products wrap, their difference fits."""
+    whole = np.int64(np.floor(float(time) / float(scale) * float(length2)))
+    return whole + (time * length2 - whole * scale) // scale
+
+
+@njit
+def half_chord(radius, v, length2):
+    """Root of radius^2 length^2 - v^2, rounded down; see `grid.fixed_point.far_roots`."""
+    side = radius * np.sqrt(float(length2))
+    root = np.int64(np.rint(np.sqrt(max((side - v) * (side + v), 0.0))))
+    left = radius * radius * length2 - v * v - root * root
+    if root < 2**31:
+        return root_of(root * root + left)
+    step = left // (2 * root)
+    return root + step - (left - 2 * root * step - step * step < 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,30 +12,28 @@ from ..common.checks import Ints
 from ..common.limits import HALF, SUB
 from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
-from ..scene.derived import View
 from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
 from .cache import compiled
-from .planes import over
-from .scene import root_of
+from .planes import LATE, half_chord, near_of, part_of, run_of, share, times_in
 
 if TYPE_CHECKING:
-    from hitplanes.weapons.rays.raycast import Follow, Followed
+    from hitplanes.weapons.rays.ray_hits import Walk
 
 RANK, COUNT, ENTRY, Y, X, ENTER, LAST, FOUND = range(8)
 """Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels."""
-
-LATE = 2**62
-"""A time after all others."""
 
 BOUNDS = types.UniTuple(types.int64, 4)
 PAIRS = types.Array(types.int64, 2, "A", readonly=True)
 
 NO_STOP = LATE, 0, 0, True, True
 
+LISTED = 4096 * SUB
+"""Longest ray of which all cells are looked at for their verdicts."""
+
 FARTHEST, LONG = 2**29, 2**50
-"""Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `_share` do."""
+"""Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `share` do."""
 
 NOWHERE = (0, 0, 0, 0, 0), NONE, NONE
 """Cells that list no items: all boxes are compared."""
@@ -46,79 +43,6 @@ SORTED = 32
 
 PART_PAIRS, RAY_PAIRS = 135_000, 2000
 """Least number of pairs of a ray and an item that is worth a thread; each ray counts as so many more."""
-
-
-@njit(inline="always")
-def _spell(low, high, sign, across, entry, leave):
-    """Part of the time from `entry` to `leave` in which a ray is between two sides, given relative to its start."""
-    if sign == 0:
-        return (entry, leave) if low <= 0 <= high else (LATE, np.int64(0))
-    near, far = (low, high) if sign > 0 else (-high, -low)
-    return max(entry, near * across), min(leave, far * across)
-
-
-@njit
-def _times_in(left, top, right, low, ray):
-    """Times at which a ray enters and leaves a box of pixels; leave < entry if it does not touch the box."""
-    x, y, dx, dy, across_x, across_y = ray
-    entry, leave = _spell(SUB * left - HALF - x, SUB * right + HALF - x, dx, across_x, np.int64(0), across_x * across_y)
-    return _spell(SUB * top - HALF - y, SUB * low + HALF - y, dy, across_y, entry, leave)
-
-
-@njit
-def _part_of(box, at, origin_x, origin_y, bounds):
-    """The part of an item's box within the bounds, relative to a pixel."""
-    left, top = max(box[at, 0], bounds[0]) - origin_x, max(box[at, 1], bounds[1]) - origin_y
-    return left, top, min(box[at, 2], bounds[2]) - origin_x, min(box[at, 3], bounds[3]) - origin_y
-
-
-@njit
-def _near_of(box, origin_x, origin_y, ray, bounds, near, reach):
-    """Write the items with pixels whose centres may lie within `reach` of a ray to `near`; return how many."""
-    x, y, dx, dy, around = ray[0] + reach, ray[1] + reach, ray[2], ray[3], 2 * reach - SUB + 1
-    left, right = ((min(x, x + dx) - around) >> 8) + origin_x, (max(x, x + dx) >> 8) + origin_x
-    top, low = ((min(y, y + dy) - around) >> 8) + origin_y, (max(y, y + dy) >> 8) + origin_y
-    left, top, right, low = max(left, bounds[0]), max(top, bounds[1]), min(right, bounds[2]), min(low, bounds[3])
-    count = 0
-    for at in range(len(box)):
-        across = (box[at, 0] <= right) & (box[at, 2] >= left)
-        near[count] = at
-        count += across & (box[at, 1] <= low) & (box[at, 3] >= top)
-    return count
-
-
-@njit
-def _run_of(row, begin, step, u, along):
-    """First and last cell of a row that a ray touches, along its longer axis; (1, 0) if it touches none."""
-    first = max(min(begin, begin + step), SUB * row - HALF) - begin
-    last = min(max(begin, begin + step), SUB * row + HALF) - begin
-    if first > last:
-        return np.int64(1), np.int64(0)
-    if step == 0:
-        low, high, per = min(u, u + along), max(u, u + along), np.int64(1)
-    else:
-        per, slope = abs(step), along if step > 0 else -along
-        low, high = u * per + min(first * slope, last * slope), u * per + max(first * slope, last * slope)
-    return -over(HALF * per - low, SUB * per), over(high + HALF * per, SUB * per)
-
-
-@njit
-def _share(time, length2, scale):
-    """The part time / scale of a squared length below 2**50, rounded down; products wrap, their difference fits."""
-    whole = np.int64(np.floor(float(time) / float(scale) * float(length2)))
-    return whole + (time * length2 - whole * scale) // scale
-
-
-@njit
-def _half_chord(radius, v, length2):
-    """Root of radius^2 length^2 - v^2, rounded down; see `grid.fixed_point.far_roots`."""
-    side = radius * np.sqrt(float(length2))
-    root = np.int64(np.rint(np.sqrt(max((side - v) * (side + v), 0.0))))
-    left = radius * radius * length2 - v * v - root * root
-    if root < 2**31:
-        return root_of(root * root + left)
-    step = left // (2 * root)
-    return root + step - (left - 2 * root * step - step * step < 0)
 
 
 @njit
@@ -133,16 +57,16 @@ def _entry_of(at_x, at_y, u, v, ray, wide):
     radius, side, _, length2 = wide
     best, within = np.int64(LATE), (np.int64(0), np.int64(-1))
     if radius < DIAGONAL:
-        within = _times_in(at_x, at_y, at_x, at_y, ray)
+        within = times_in(at_x, at_y, at_x, at_y, ray)
         if radius == 0:
             return within[0] if within[0] <= within[1] else best
     if abs(v) <= side and (length2 > 0 or (SUB * at_x - x) ** 2 + (SUB * at_y - y) ** 2 <= radius * radius):
-        root = _half_chord(radius, v, length2)
+        root = half_chord(radius, v, length2)
         if max(u - root, 0) <= min(u + root, length2):
             best = max(u - root, 0)
     if within[0] <= within[1]:
-        entry = -_share(-within[0], length2, across_x * across_y)
-        if entry <= _share(within[1], length2, across_x * across_y):
+        entry = -share(-within[0], length2, across_x * across_y)
+        if entry <= share(within[1], length2, across_x * across_y):
             best = min(best, entry)
     return best
 
@@ -210,7 +134,7 @@ def _touches(part, mask, ray, wide, stop, first_alone):
     top, low = max(top, v_least), min(low, v_most)
     for k in range(low - top + 1):
         row = top + k if step >= 0 else low - k
-        first, last = _run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
+        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
         first, last = max(first, u_least), min(last, u_most)
         if first > last:
             continue
@@ -258,7 +182,7 @@ def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, fir
 def _bounds(left, top, right, low, ray, wide):
     """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
     if wide[0] == 0:
-        return _times_in(left, top, right, low, ray)
+        return times_in(left, top, right, low, ray)
     x, y, dx, dy, _, _ = ray
     reach, length2 = wide[2], wide[3]
     left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
@@ -304,13 +228,13 @@ def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, ne
     if len(listed) > 0:
         some = _listed(grid, begin, listed, ray, origin, reach, near)
     else:
-        some = _near_of(box, origin[0], origin[1], ray, bounds, near, reach)
+        some = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
     count = 0
     for i in range(some):
         at = near[i]
         if len(meets) and refuses(at, categories, owner, meets, exclude, who):
             continue
-        left, top, right, low = _part_of(box, at, origin[0], origin[1], bounds)
+        left, top, right, low = part_of(box, at, origin[0], origin[1], bounds)
         if left > right or top > low:
             continue
         found[RANK, count] = at
@@ -324,7 +248,7 @@ def _of_item(items, at, origin, ray, wide, bounds, stop, first_alone):
     """`_touches` of an item within the bounds."""
     box, offset, masks, _, _, _ = items
     mask = masks, offset[at], box[at, 2] - box[at, 0] + 1, box[at, 0] - origin[0], box[at, 1] - origin[1]
-    return _touches(_part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop, first_alone)
+    return _touches(part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop, first_alone)
 
 
 @njit
@@ -428,7 +352,7 @@ RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
 
 # house: hit rule of rays
 @njit
-def _follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
+def follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
     """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
     origin = (x + HALF) >> 8, (y + HALF) >> 8
     ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
@@ -472,7 +396,7 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     for who in range(begin, end):
         x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
         wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
-        count = _follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends)
+        count = follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends)
         if row + count > out.shape[1]:
             return who, row, 0
         for i in range(count):
@@ -483,27 +407,118 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     return end, row, 0
 
 
-@compiled(
-    types.UniTuple(types.int64, 2)(
-        *[types.int64] * 8, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)), INTS, BOUNDS, ROWS_OUT
-    ),
-    nogil=False,
-)
-def _one(x, y, dx, dy, radius, side, wide_side, most, items, rank, bounds, out):
-    """Write what a ray hits to columns (rank, count, x, y, entry); return how many, and the time at which it ends."""
-    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((FOUND + 1, len(items[0]) + 1), np.int64)
-    wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
-    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
-    count = _follow(0, x, y, dx, dy, wide, items, NOWHERE, bounds, most, NONE, NOBODY, near, found, ends)
-    for i in range(count):
-        at = near[i]
-        out[0, i], out[1, i], out[2, i] = rank[found[RANK, at]], found[COUNT, at], found[X, at] + origin_x
-        out[3, i], out[4, i] = found[Y, at] + origin_y, found[ENTRY, at]
-    return count, ends[1, 0]
+OUTSIDE, BEYOND, EMPTY, FILTERED, OCCLUDED, HIT = range(1, 7)
+"""What is known of a cell of a ray, each more than the one before; 0 of one that the ray does not touch."""
+
+VERDICTS = 0, 4, 5, 0, 3, 2, 1
+"""The same as `bits.span_walk.Verdict`."""
 
 
-ONE = _one.overloads[_one.signatures[0]].entry_point
-"""Its entry point, without the dispatch on argument types, which takes longer than the call."""
+@njit
+def _cell_runs(ray, wide):
+    """Top row of a ray; the first cell of each row; and where each row begins in a list of cells, with the end."""
+    x, y, dx, dy, _, _ = ray
+    u, along, v, step = (y, dy, x, dx) if abs(dy) > abs(dx) else (x, dx, y, dy)
+    top, low = _rows(-(2**40), 2**40, u, along, v, step, wide)
+    first, begin = np.empty(low - top + 1, np.int64), np.zeros(low - top + 2, np.int64)
+    per = 1 / step if step != 0 else 0.0
+    for k in range(low - top + 1):
+        row = top + k
+        near, far = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
+        first[k], begin[k + 1] = near, begin[k] + max(far - near + 1, 0)
+    return top, first, begin
+
+
+@njit
+def _reached(at_x, at_y, u, v, ray, wide, bounds, stop):
+    """What a ray makes of a cell without items: OUTSIDE, BEYOND, EMPTY, or 0 if it does not touch it."""
+    radius, side, _, length2 = wide
+    inside = bounds[0] <= at_x <= bounds[2] and bounds[1] <= at_y <= bounds[3]
+    if radius > 0 and length2 > 0 and abs(v) <= side and -1 < u < length2:  # it is touched for sure
+        if not inside:
+            return OUTSIDE
+        if u < stop[0]:
+            return EMPTY
+    elif radius > 0 and _entry_of(at_x, at_y, u, v, ray, wide) == LATE:
+        return 0
+    if not inside:
+        return OUTSIDE
+    return EMPTY if stop[0] == LATE or _walked(at_x, at_y, u, v, ray, wide, stop)[0] else BEYOND
+
+
+@njit
+def _lay_row(row, first, cells, ray, wide, bounds, stop):
+    """Write what a ray makes of the cells of a row without items, from cell `first` on."""
+    x, y, dx, dy, across_x, across_y = ray
+    steep, time, last = abs(dy) > abs(dx), stop[0], first + len(cells) - 1
+    v, step, across = (x, dx, across_x) if steep else (y, dy, across_y)
+    near, far, low, high = bounds[1], bounds[3], bounds[0], bounds[2]
+    if not steep:
+        near, far, low, high = bounds[0], bounds[2], bounds[1], bounds[3]
+    inside, ahead = low <= row <= high and near <= first and last <= far, (SUB * row - v) * (1 if step > 0 else -1)
+    if wide[0] == 0 and step != 0 and inside and not (ahead - HALF) * across <= time <= (ahead + HALF) * across:
+        cells[:] = EMPTY if (ahead + HALF) * across < time else BEYOND
+        return
+    at_x, at_y = (row, first) if steep else (first, row)
+    px, py = SUB * at_x - x, SUB * at_y - y
+    u, v = px * dx + py * dy, px * dy - py * dx
+    along, aside = (SUB * dy, -SUB * dx) if steep else (SUB * dx, SUB * dy)
+    sure = inside and wide[0] > 0 and wide[3] > 0
+    for place in range(len(cells)):
+        if sure and abs(v) <= wide[1] and -1 < u < min(time, wide[3]):
+            cells[place] = EMPTY
+        else:
+            cells[place] = _reached(at_x, at_y, u, v, ray, wide, bounds, stop)
+        at_x, at_y, u, v = at_x + (not steep), at_y + steep, u + along, v + aside
+
+
+@njit
+def _mark(items, at, origin, steep, stop, what, last_rank, rows, cells):
+    """Mark the cells of an item that a ray reaches; of the last cell only if the item is not behind `last_rank`."""
+    (box, offset, masks, _, _, _), (top, first, begin) = items, rows
+    left, upper, width = box[at, 0] - origin[0], box[at, 1] - origin[1], box[at, 2] - box[at, 0] + 1
+    right, lower = box[at, 2] - origin[0], box[at, 3] - origin[1]
+    u_least, u_most, v_least, v_most = (upper, lower, left, right) if steep else (left, right, upper, lower)
+    for row in range(max(v_least, top), min(v_most, top + len(first) - 1) + 1):
+        near, place = first[row - top], begin[row - top]
+        for cell in range(max(near, u_least), min(near + begin[row - top + 1] - place - 1, u_most) + 1):
+            at_x, at_y = (row, cell) if steep else (cell, row)
+            if cells[place + cell - near] < EMPTY or not masks[offset[at] + (at_y - upper) * width + at_x - left]:
+                continue
+            if at <= last_rank or at_x != stop[1] or at_y != stop[2]:
+                cells[place + cell - near] = max(cells[place + cell - near], what)
+
+
+@compiled(types.void(
+    PAIRS, PAIRS, PAIRS, types.int64, PAIRS, PAIRS, INTS, INTS, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
+    INTS, OWNERS, BOUNDS, ROWS_OUT,
+))  # fmt: skip
+def _verdicts(start, step, origins, radius, sides, ends, hit_begin, hit_rank, items, meets, exclude, bounds, counts):
+    near = np.empty(len(items[0]) + 1, np.int64)
+    for who in range(len(start)):
+        x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
+        ray = x, y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
+        wide, steep = (radius, sides[0, who], sides[1, who], dx * dx + dy * dy), abs(dy) > abs(dx)
+        origin, reason = (origins[who, 0], origins[who, 1]), ends[0, who]
+        within = bounds[0] - origin[0], bounds[1] - origin[1], bounds[2] - origin[0], bounds[3] - origin[1]
+        stop = ends[1, who], ends[3, who], ends[2, who], ends[5, who] != 0, reason < 3  # used up budgets reach no cell
+        top, first, begin = rows = _cell_runs(ray, wide)
+        cells = np.empty(begin[-1], np.uint8)
+        for row in range(len(first)):
+            _lay_row(top + row, first[row], cells[begin[row] : begin[row + 1]], ray, wide, within, stop)
+        if len(meets):
+            for i in range(near_of(items[0], origin[0], origin[1], ray, bounds, near, max(radius, HALF))):
+                if refuses(near[i], items[4], items[5], meets, exclude, who):
+                    _mark(items, near[i], origin, steep, stop, FILTERED, LATE, rows, cells)
+        if reason == 1:
+            row, cell = (stop[1], stop[2]) if steep else (stop[2], stop[1])
+            cells[begin[row - top] + cell - first[row - top]] = OCCLUDED
+        last_rank = ends[4, who] if reason in (1, 2) else LATE
+        for i in range(hit_begin[who], hit_begin[who + 1]):
+            _mark(items, hit_rank[i], origin, steep, stop, HIT, last_rank, rows, cells)
+        for known in cells:
+            if known:
+                counts[who, VERDICTS[known]] += 1
 
 
 def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
@@ -515,7 +530,7 @@ def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
     return tuple(listed[:5]), listed.begin, listed.listed
 
 
-def _fits(longest: int, radius: int) -> bool:
+def fits(longest: int, radius: int) -> bool:
     """Whether sums of products of rays of so many 1/256 px along x or y fit int64."""
     far = 2 * longest * longest
     return longest + radius <= FARTHEST and radius * radius * far < FAR and not (0 < radius < DIAGONAL and far >= LONG)
@@ -531,7 +546,7 @@ def hits_and_ends(
 ) -> tuple[Ints, Ints] | None:
     """See `weapons.rays.raycast.hits_and_ends`; None if rays are so long or so wide that int64 overflows."""
     radius = lines.radius
-    if not _fits(int(np.abs(lines.step).max(initial=0)), radius):
+    if not fits(int(np.abs(lines.step).max(initial=0)), radius):
         return None
     sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
     ends = np.zeros((6, len(lines)), np.int64)
@@ -545,27 +560,19 @@ def hits_and_ends(
     return found, ends
 
 
-def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
-    """See `weapons.rays.raycast.follower`."""
-    rank = np.flatnonzero(view.accepts(stack))
-    some = slice(None) if len(rank) == len(stack) else rank
-    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some]
-    items = *map(np.ascontiguousarray, columns), NONE, NONE
-    within = EVERYWHERE if bounds is None else bounds
-    room, limit = len(rank) if most is None else min(most, len(rank)), most or 0
-
-    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one ray."""
-        if not _fits(max(abs(dx), abs(dy)), radius):
-            return None
-        side = wide_side = 0
-        if radius:
-            length2 = dx * dx + dy * dy
-            side = wide_side = isqrt(radius * radius * length2)
-            if radius < DIAGONAL:
-                wide_side = isqrt(DIAGONAL * DIAGONAL * length2)
-        hit = np.empty((5, room), np.int64)
-        count, time = ONE(x, y, dx, dy, radius, side, wide_side, limit, items, rank, within, hit)
-        return time, hit[:, :count].T.tolist()
-
-    return follow
+def verdicts_of_rays(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints | None:
+    """See `weapons.explain.ray_verdicts.verdicts_of_rays`; None if rays are so long or so wide that it is faster."""
+    lines, ends, stack = walk.lines, walk.ends, walk.stack
+    longest, radius = int(np.abs(lines.step).max(initial=0)), lines.radius
+    if longest + radius > LISTED or not fits(longest, radius):
+        return None
+    sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
+    stops = np.stack([ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone])
+    hits = np.searchsorted(walk.hit.ray, np.arange(len(lines) + 1)), walk.hit.rank
+    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
+    counts = np.zeros((len(lines), 6), np.int64)
+    _verdicts(
+        lines.start, lines.step, walk.rays.origin_xy, radius, sides, stops, *hits, items,
+        *(whose or (NONE, NOBODY)), EVERYWHERE if bounds is None else bounds, counts,
+    )  # fmt: skip
+    return counts

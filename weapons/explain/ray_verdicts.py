@@ -10,6 +10,7 @@ walk -> all cells, those in bounds, those before the end -> of these: hit, occlu
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from hitplanes.planes.bits.cells import met_boxes
 from hitplanes.planes.bits.span_walk import Verdict
+from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
@@ -46,7 +48,13 @@ def verdicts_of(walks: Iterable[tuple[int, Walk | FirstHits]], shots: Shots, bou
     found = np.zeros(len(shots) * n, np.int64)
     for first, part in walks:
         walk = part if isinstance(part, Walk) else _walk_of(part, shots, first)
-        of_rays = _verdicts_of_rays(walk, shots, first, bounds)
+        whose = None
+        if may_refuse(walk.stack, shots):
+            row = walk.rays.shot + first
+            whose = shots.meets[row], shots.exclude[row]
+        of_rays = kernels_of(sys.modules[__name__]).verdicts_of_rays(walk, whose, bounds)
+        if of_rays is None:
+            of_rays = verdicts_of_rays(walk, whose, bounds)
         place = (walk.rays.shot + first)[:, None] * n + np.arange(n)
         found += np.bincount(place.ravel(), of_rays.ravel(), len(found)).astype(np.int64)
     return found.reshape(-1, n)
@@ -66,8 +74,11 @@ def _walk_of(rays: FirstHits, shots: Shots, first_shot: int) -> Walk:
     return replace(walk, ends=replace(ends, alone=alone))
 
 
-def _verdicts_of_rays(walk: Walk, shots: Shots, first_shot: int, bounds: Box | None) -> Ints:
-    """Number of cells (R, 6) of rays by verdict."""
+def verdicts_of_rays(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
+    """Number of cells (R, 6) of rays by verdict; the compiled kernel returns None for rays that are too long for it.
+
+    `whose` is the filter of items that each ray meets (R,), and the owners (R, K) whose items it skips, or None.
+    """
     lines, ends, origin = walk.lines, walk.ends, walk.rays.origin_xy
     counts = np.zeros((len(lines), len(Verdict)), np.int64)
     box = lines.box_xyxy
@@ -80,7 +91,7 @@ def _verdicts_of_rays(walk: Walk, shots: Shots, first_shot: int, bounds: Box | N
         inside[leaving] = cells_in(lines.take(leaving), box[leaving])
     reached, ended = inside.copy(), np.flatnonzero(ends.reason != Reason.RANGE)
     reached[ended] = cells_in(lines.take(ended), box[ended], ends.take(ended))
-    met = _met(walk, shots, first_shot, bounds)
+    met = _met(walk, whose, bounds)
     counts[:, Verdict.HIT : Verdict.OUTSIDE] = met
     counts[:, Verdict.EMPTY] = reached - met.sum(axis=1)
     counts[:, Verdict.OUTSIDE], counts[:, Verdict.BEYOND] = total - inside, inside - reached
@@ -256,12 +267,12 @@ def _in_rows(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
     return found
 
 
-def _met(walk: Walk, shots: Shots, first_shot: int, bounds: Box | None) -> Ints:
+def _met(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
     """Number of cells (R, 3) of rays that are hit, occluded, and filtered."""
     n, ends = len(walk.rays), walk.ends
     stopped = ends.reason == Reason.OCCLUDER
     counts = np.stack([np.bincount(walk.hit.ray, walk.hit.count, n).astype(np.int64), stopped, np.zeros(n, np.int64)])
-    skipped = _skipped(walk, shots, first_shot, bounds)
+    skipped = _skipped(walk, whose, bounds)
     listed = _several_in_cells(walk)
     listed[skipped >> 2 * REACH_BITS] = True
     rays = np.flatnonzero(listed)
@@ -299,17 +310,20 @@ def _several_in_cells(walk: Walk) -> Bools:
     return several
 
 
-def _skipped(walk: Walk, shots: Shots, first_shot: int, bounds: Box | None) -> Ints:
+def _skipped(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
     """Keys of the cells of items that the filter refuses, before the ends of rays."""
     keys = [np.zeros(0, np.int64)]
-    if not may_refuse(walk.stack, shots):
+    if whose is None:
         return keys[0]
+    stack, (meets, exclude) = walk.stack, whose
     for begin in range(0, len(walk.rays), RAYS_AT_ONCE):
         some = slice(begin, begin + RAYS_AT_ONCE)
         rays, own, ends = walk.rays.take(some), walk.lines.take(some), walk.ends.take(some)
         lines = replace(own, start=rays.start_256)
         near = near_items(walk.stack, bounds, lines, own, rays.origin_xy, None)
-        near = near.take(refused(walk.stack, near.rank, shots, rays.shot[near.ray] + first_shot))
+        row, rank = near.ray + begin, near.rank
+        unmet = (stack.categories[rank] & meets[row]) == 0
+        near = near.take(unmet | (stack.owner[rank][:, None] == exclude[row]).any(axis=1))
         met = find_contacts(own.take(near.ray), near.ray, near.rank, walk.stack, bounds, rays.origin_xy[near.ray])
         ray = met.ray[met.pair]
         before = ends.reaches(ray, met.entry, met.y, met.x)

@@ -1,6 +1,6 @@
-"""Compiled form of the position cache: one call of the kernel of areas answers a shot.
+"""Compiled forms of prepared shots: one call of the kernel of areas, or of rays, answers a shot.
 
-A shot walks the stack from front to back at first. When the shots have spent as much time on that as the visible set
+A pattern walks the stack from front to back at first. When shots have spent as much time on that as the visible set
 costs, it is made, and its tiles are listed by cells of shot positions.
 
 Kernels are given structs of arrays, because unpacking an array for each column would take as long as the shot.
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 import threading
+from math import isqrt
 from typing import Any
 
 import numpy as np
@@ -22,15 +23,21 @@ from hitplanes.planes.bits.front_to_back import NO_NUMBERS, OrderedTiles
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
-from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.jit.areas import KEY, NOBODY, RANK, SAMPLES, X, Y, match
-from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, WORDS, cell_at
+from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
+from hitplanes.planes.grid.rasterize import DIAGONAL
+from hitplanes.planes.grid.spans import Box
+from hitplanes.planes.jit import raycast as cast
+from hitplanes.planes.jit.areas import KEY, NOBODY, NONE, RANK, SAMPLES, X, Y, match
+from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
+from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
+from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import NO_BOXES, Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
 from ..kinds.weapon import Weapon
+from ..rays.one_ray import Follow, Followed
 from .one_shot import Answer, Filter, Round, answer_of
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 
@@ -237,3 +244,52 @@ def _shape_of(one: Round) -> Any:
     words = one.pattern.words
     flat = np.concatenate([np.zeros(WORD, np.uint64), words.reshape(-1)])
     return _shape(one.pattern.box_xyxy[:1], np.array([WORD]), np.array([words.shape[1]]), flat)
+
+
+@compiled(
+    types.UniTuple(types.int64, 2)(
+        *[types.int64] * 8, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)), INTS, BOUNDS, ROWS_OUT
+    ),
+    nogil=False,
+)
+def _one_ray(x, y, dx, dy, radius, side, wide_side, most, items, rank, bounds, out):
+    """Write what a ray hits to columns (rank, count, x, y, entry); return how many, and the time at which it ends."""
+    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((cast.FOUND + 1, len(items[0]) + 1), np.int64)
+    wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
+    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
+    count = follow(0, x, y, dx, dy, wide, items, NOWHERE, bounds, most, NONE, NOBODY, near, found, ends)
+    for i in range(count):
+        at = near[i]
+        out[0, i], out[1, i], out[4, i] = rank[found[cast.RANK, at]], found[cast.COUNT, at], found[cast.ENTRY, at]
+        out[2, i], out[3, i] = found[cast.X, at] + origin_x, found[cast.Y, at] + origin_y
+    return count, ends[1, 0]
+
+
+one_ray = _one_ray.overloads[_one_ray.signatures[0]].entry_point
+"""Its entry point, without the dispatch on argument types, which takes longer than the call."""
+
+
+def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
+    """See `rays.one_ray.follower`."""
+    rank = np.flatnonzero(view.accepts(stack))
+    some = slice(None) if len(rank) == len(stack) else rank
+    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some]
+    items = *map(np.ascontiguousarray, columns), NONE, NONE
+    within = EVERYWHERE if bounds is None else bounds
+    room, limit = len(rank) if most is None else min(most, len(rank)), most or 0
+
+    def followed(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
+        if not fits(max(abs(dx), abs(dy)), radius):
+            return None
+        side = wide_side = 0
+        if radius:
+            length2 = dx * dx + dy * dy
+            side = wide_side = isqrt(radius * radius * length2)
+            if radius < DIAGONAL:
+                wide_side = isqrt(DIAGONAL * DIAGONAL * length2)
+        hit = np.empty((5, room), np.int64)
+        count, time = one_ray(x, y, dx, dy, radius, side, wide_side, limit, items, rank, within, hit)
+        return time, hit[:, :count].T.tolist()
+
+    return followed

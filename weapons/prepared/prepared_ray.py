@@ -28,11 +28,11 @@ from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
-from ..rays import raycast
+from ..rays import one_ray, raycast
 from ..rays.contacts import rays_of
 from ..rays.first_hit import marcher
+from ..rays.one_ray import Follow, Followed
 from ..rays.ray_hits import RayHits, Told, Walk, weights_at
-from ..rays.raycast import Follow, Followed
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
@@ -112,7 +112,7 @@ class ReadyRay(Ready[RayHits]):
         ray, stack = self._ray, self._stack
         chosen = chosen_ray_way("auto", False, ray, self.scene, stack, self._view, 1, prepared=True)
         most = ray.hits_most
-        follow = cast = kernels_of(raycast).follower(stack, self.scene.bounds, self._view, ray.radius_256, most)
+        follow = cast = kernels_of(one_ray).follower(stack, self.scene.bounds, self._view, ray.radius_256, most)
         if chosen.way == "march":
             march = marcher(self.scene, stack, self._view)
 

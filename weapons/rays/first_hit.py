@@ -32,7 +32,7 @@ from .ray_hits import Passes, Stops, Summed, Walk, numbered, rows_of_passes, wei
 from .ray_walk import Range, lines_of
 
 if TYPE_CHECKING:
-    from .raycast import Follow, Followed
+    from .one_ray import Follow, Followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +94,7 @@ class FirstHits:
         return Walk(self.rays, lines, hit, ends, self.stack, None, self.ray.fades, traced)
 
 
+# house: hit rule of rays
 def first_at_once(taken: Bools, blocked: Bools, place: Ints) -> Ints:
     """Of cells (n, k) that each ray enters at the same moment, the column of the one that ends it.
 
@@ -199,7 +200,7 @@ def _at_once(place: Ints, starts: Bools, start_256: Ints, step_256: Ints, width:
 
 
 def marcher(scene: Scene, stack: Stack, view: View) -> Follow:
-    """Like `raycast.follower`, by march; None of a ray that comes to several cells at once."""
+    """Like `one_ray.follower`, by march; None of a ray that comes to several cells at once."""
     field = scene.derived.distance_field(view)
     assert field is not None
     plane = field.labels.read(scene.items)

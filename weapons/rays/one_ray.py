@@ -1,4 +1,4 @@
-"""A thin ray up to its first hit, in whole numbers of Python: for one ray a call this is faster than numpy.
+"""One ray a call. A thin ray up to its first hit is followed in whole numbers of Python, which is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
 box is left that it enters before the first cell that it found. Times are those of `grid.rasterize`: whole numbers over
@@ -7,22 +7,23 @@ max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on round
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from hitplanes.planes.bits.distance_field import LONGEST
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import HALF, SUB
+from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import Box, meets
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 
 from .contacts import NEVER
 from .first_hit import first_at_once
-
-if TYPE_CHECKING:
-    from .raycast import Follow, Followed
+from .raycast import hits_and_ends
 
 ROWS_MOST = 400
 """Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
@@ -48,8 +49,34 @@ class Near(NamedTuple):
     box_xyxy: Ints
 
 
-def follower(stack: Stack, bounds: Box | None, view: View) -> Follow:
-    """Function that follows one thin ray to what it touches first; None if that takes many rows, or ray is too long."""
+Followed = tuple[int, list[list[int]]]
+"""When a ray ends, and what it hits, in order: rank, number of cells, first cell (x, y) in the world, and its time."""
+
+Follow = Callable[[int, int, int, int], Followed | None]
+"""Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
+
+
+def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
+    """Function that follows one ray of half a width, in 1/256 px, among the items that a view accepts.
+
+    `most` is the number of objects that a ray may hit, or None.
+    """
+    if not radius and most == 1:
+        return _first_follower(stack, bounds, view)
+    meets, exclude = np.array([view.meets]), np.array([view.exclude], np.int64)
+
+    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
+        lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
+        hit, ends = hits_and_ends(stack, bounds, lines, most, meets, exclude)
+        hit[3:5] += pixel(lines.start).T
+        return int(ends[1, 0]), hit[1:].T.tolist()
+
+    return follow
+
+
+def _first_follower(stack: Stack, bounds: Box | None, view: View) -> Follow:
+    """Function that follows one thin ray to what it touches first; None if that takes many rows, or it is too long."""
     accepted = view.accepts(stack)
     accepts = None if accepted.all() else accepted
 
@@ -139,7 +166,6 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
     return Near(rank[rows], entry[rows], leave[rows], box[rows])
 
 
-# house: hit rule of rays
 def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> Followed | None:
     """What a ray touches first; None if it looks at too many rows."""
     best: tuple[int, int, int] | None = None

@@ -12,7 +12,7 @@ that move during a ray, and most weapons that do not hit what their rays start i
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,6 @@ from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
-from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 
 from ..fire.prefilter import may_refuse
@@ -91,13 +90,6 @@ class Firsts(Columns):
     y: Ints
     entry: Ints
     most: Ints
-
-
-Followed = tuple[int, list[list[int]]]
-"""When a ray ends, and what it hits, in order: rank, number of cells, first cell (x, y) in the world, and its time."""
-
-Follow = Callable[[int, int, int, int], Followed | None]
-"""Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
 
 
 # house: way of rays
@@ -191,27 +183,6 @@ def _hits_and_ends(
         hit.count[last] = cells.only(ends.walked(cells)).count
     columns = ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone.astype(np.int64)
     return np.stack([hit.ray, hit.rank, hit.count, hit.x, hit.y, hit.entry]), np.stack(columns)
-
-
-def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
-    """Function that follows one ray of half a width, in 1/256 px, among the items that a view accepts.
-
-    `most` is the number of objects that a ray may hit, or None.
-    """
-    if not radius and most == 1:
-        from . import one_ray
-
-        return one_ray.follower(stack, bounds, view)
-    meets, exclude = np.array([view.meets]), np.array([view.exclude], np.int64)
-
-    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one ray."""
-        lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
-        hit, ends = hits_and_ends(stack, bounds, lines, most, meets, exclude)
-        hit[3:5] += pixel(lines.start).T
-        return int(ends[1, 0]), hit[1:].T.tolist()
-
-    return follow
 
 
 def near_items(
