@@ -294,6 +294,15 @@ def test_scale_is_one_number_one_for_each_or_pairs(scale: Any, sizes: list[tuple
     assert [scene.mask(i)[0].shape[::-1] for i in range(2)] == sizes
 
 
+def test_one_object_may_be_given_one_pair() -> None:
+    scene = Scene()
+    scene.add(np.ones((2, 2), np.bool_))
+    for ids in (0, [0]):
+        scene.set(ids, scale=(1, 3))
+        assert scene.mask(0)[0].shape == (6, 2)
+        scene.set(ids, scale=1)
+
+
 def test_a_change_of_one_thing_keeps_the_others() -> None:
     """A pose set step by step is the pose given at once."""
     pose: dict[str, Any] = {"angle": 33.25, "scale": (1.5, 0.7), "flip": "y", "frame": 1, "layer": 2}
@@ -329,7 +338,8 @@ def test_a_change_of_one_thing_keeps_the_others() -> None:
         ({"ids": [0, 1], "angle": "up"}, "angle: expected numbers"),
         ({"ids": [0, 1], "scale": [1, 257]}, r"row 1: scale\[0\]: expected a number"),
         ({"ids": [0, 1], "scale": [[1, 1], [1, 0]]}, r"row 1: scale\[1\]: expected a number"),
-        ({"ids": [0, 1], "scale": [1, 2, 3]}, r"scale: expected shape"),
+        ({"ids": [0, 1], "scale": [1, 2, 3]}, r"scale: expected shape \(2,\), got \(3,\)"),
+        ({"ids": 1, "scale": [1, 2, 3]}, r"scale: expected shape \(1,\), got \(3,\)"),
         ({"ids": [0, 1], "scale": [1, [2, 3]]}, r"scale: expected"),
         ({"ids": [0, 1], "flip": ["x", "z"]}, "row 1: flip: expected one of 'none', 'x', 'y', 'xy', got 'z'"),
         ({"ids": [0, 1], "flip": 5}, "row 0: flip: expected one of"),

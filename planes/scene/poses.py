@@ -121,10 +121,12 @@ def _flip_rows(flip: object, n: int) -> list[str]:
 
 
 def _scale_rows(scale: object, n: int) -> tuple[list[int], list[int]]:
-    """Scales in x and y, in 1/65536; given are one number for all, (n,), or pairs (n, 2) or (1, 2)."""
+    """Scales in x and y, in 1/65536; given are one number, (n,), pairs (n, 2) or (1, 2), or (2,) of one object."""
     values = array_of("scale", scale)
-    if values.ndim < 2:
-        values = each("scale", values, n)[:, None]
+    if values.shape == (2,) and n == 1:
+        values = values[None]
+    elif values.ndim < 2:
+        values = reals("scale", each("scale", values, n), (n,))[:, None]
     fits = values.ndim == 2 and values.shape[0] in (1, n) and values.shape[1] in (1, 2)
     pairs = reals("scale", np.broadcast_to(values, (n, 2)) if fits else values, (n, 2))
     whole = []

@@ -205,8 +205,8 @@ class Scene:
     ) -> None:  # fmt: skip
         """Change objects, all or none; each value is one for all objects, or one per object.
 
-        `ids` is one id or several (n,). `scale` is a number, one per object (n,), or pairs (n, 2) or (1, 2); `sprite`
-        is one for all, or a list (n,). The other parameters are those of `add`.
+        `ids` is one id or several (n,). `scale` is a number, one per object (n,), pairs (n, 2) or (1, 2), or (sx, sy)
+        of one object; `sprite` is one for all, or a list (n,). The other parameters are those of `add`.
         """
         rows = self._existing(ids)
         n = len(rows)
