@@ -542,3 +542,15 @@ def test_rows_of_spans_begin_at_a_corner() -> None:
     spans = Spans.from_mask(MASK, (5, 7))
     assert pixels_of(rows_of_spans(spans, (3, 4), 10), 10).tolist() == [[2, 3], [4, 3], [3, 4]]
     assert rows_of_spans(Spans.empty(), (0, 0), 10) == 0
+
+
+@pytest.mark.usefixtures("jit")
+def test_rows_of_a_spread_are_those_of_then_also_once_objects_have_moved() -> None:
+    """They are made when they are read."""
+    scene = Scene((60, 60))
+    duck = scene.add(np.ones((20, 20), np.bool_), (30, 30))
+    ready = prepare(scene, Spread(Disc(3), 6, 5))
+    now, later = ready.fire((30, 30)), ready.fire((30, 30))
+    told = list(now)
+    scene.move(duck, (50, 50))
+    assert told and list(later) == told and len(later) == len(told)

@@ -18,6 +18,7 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Role, Stack
 from hitplanes.planes.scene.scene import Scene
 
+from ..fire.call import AUTO, fired
 from ..fire.hits import HitRow, Hits, Rows, rows_of_span_hits
 from ..fire.plan import Plan, absent, unaimed, undrawn
 from ..fire.prefilter import Candidates, may_refuse
@@ -207,7 +208,8 @@ class OneShot(Answer, list[HitRow]):
 class ManyPellets(Answer):
     """Answer of a weapon with several pellets.
 
-    The look-up only counts its rows; they are made by a walk when they are read.
+    The look-up only counts its rows. They are made when they are read: as `fire` makes those of a batch, or, once the
+    scene has changed, by a walk of the snapshot.
     """
 
     _count = 0
@@ -227,8 +229,11 @@ class ManyPellets(Answer):
     def _columns(self) -> Rows:
         if not self._count:
             return Rows.none()
+        present = self._present
+        if present.scene.version == present.version:
+            return fired(present.scene, present.weapon, self.shots, *AUTO)._rows
         placements, met = self._met
-        return rows_of_span_hits(met, placements, self._present.stack.ids, 0)
+        return rows_of_span_hits(met, placements, present.stack.ids, 0)
 
 
 def answer_of(weapon: Weapon) -> tuple[Callable[[], Answer], Callable[[Any, HitRow], None]]:
