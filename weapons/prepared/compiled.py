@@ -28,7 +28,7 @@ from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
 from hitplanes.planes.jit.areas import KEY, NOBODY, NONE, RANK, SAMPLES, X, Y, match
-from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
+from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
 from hitplanes.planes.scene.derived import View
@@ -246,23 +246,52 @@ def _shape_of(one: Round) -> Any:
     return _shape(one.pattern.box_xyxy[:1], np.array([WORD]), np.array([words.shape[1]]), flat)
 
 
-@compiled(
-    types.UniTuple(types.int64, 2)(
-        *[types.int64] * 8, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)), INTS, BOUNDS, ROWS_OUT
-    ),
-    nogil=False,
-)
-def _one_ray(x, y, dx, dy, radius, side, wide_side, most, items, rank, bounds, out):
-    """Write what a ray hits to columns (rank, count, x, y, entry); return how many, and the time at which it ends."""
-    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((cast.FOUND + 1, len(items[0]) + 1), np.int64)
+@structref.register
+class TargetsType(types.StructRef):
+    """Type of `Targets` in kernels."""
+
+
+class Targets(structref.StructRefProxy):
+    """What single rays are cast at, in kernels: columns of the accepted items, their ranks, and the bounds."""
+
+
+OF_TARGETS = [
+    ("box", BOXES), ("offset", NUMBERS), ("masks", FLAGS), ("occluder", FLAGS), ("rank", NUMBERS), ("bounds", BOUNDS)
+]  # fmt: skip
+structref.define_constructor(Targets, TargetsType, [name for name, _ in OF_TARGETS])
+structref.define_boxing(TargetsType, Targets)
+TARGETS = TargetsType(OF_TARGETS)
+
+
+@compiled(TARGETS(*[of for _, of in OF_TARGETS]))
+def _targets(box, offset, masks, occluder, rank, bounds):
+    return Targets(box, offset, masks, occluder, rank, bounds)
+
+
+@compiled(types.UniTuple(types.int64, 7)(*[types.int64] * 8, TARGETS, ROWS_OUT), nogil=False)
+def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
+    """Number of objects that a ray hits, time at which it ends, and of the first: rank, count, x, y, and entry.
+
+    The other objects that it hits are written to columns with the same five numbers.
+    """
+    items = targets.box, targets.offset, targets.masks, targets.occluder, NONE, NONE
+    near, found = np.empty(len(targets.rank) + 1, np.int64), np.empty((cast.FOUND + 1, len(targets.rank) + 1), np.int64)
     wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
-    origin_x, origin_y = (x + HALF) >> 8, (y + HALF) >> 8
-    count = follow(0, x, y, dx, dy, wide, items, NOWHERE, bounds, most, NONE, NOBODY, near, found, ends)
+    origin_x, origin_y, first = (x + HALF) >> 8, (y + HALF) >> 8, (-1, 0, 0, 0, 0)
+    count = follow(0, x, y, dx, dy, wide, items, NOWHERE, targets.bounds, most, NONE, NOBODY, near, found, ends)
     for i in range(count):
         at = near[i]
-        out[0, i], out[1, i], out[4, i] = rank[found[cast.RANK, at]], found[cast.COUNT, at], found[cast.ENTRY, at]
-        out[2, i], out[3, i] = found[cast.X, at] + origin_x, found[cast.Y, at] + origin_y
-    return count, ends[1, 0]
+        rank, column, row = (
+            targets.rank[found[cast.RANK, at]],
+            found[cast.X, at] + origin_x,
+            found[cast.Y, at] + origin_y,
+        )
+        if i == 0:
+            first = rank, found[cast.COUNT, at], column, row, found[cast.ENTRY, at]
+            continue
+        others[0, i - 1], others[1, i - 1], others[2, i - 1] = rank, found[cast.COUNT, at], column
+        others[3, i - 1], others[4, i - 1] = row, found[cast.ENTRY, at]
+    return count, ends[1, 0], first[0], first[1], first[2], first[3], first[4]
 
 
 one_ray = _one_ray.overloads[_one_ray.signatures[0]].entry_point
@@ -273,10 +302,10 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
     """See `rays.one_ray.follower`."""
     rank = np.flatnonzero(view.accepts(stack))
     some = slice(None) if len(rank) == len(stack) else rank
-    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some]
-    items = *map(np.ascontiguousarray, columns), NONE, NONE
-    within = EVERYWHERE if bounds is None else bounds
-    room, limit = len(rank) if most is None else min(most, len(rank)), most or 0
+    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some], rank
+    targets = _targets(*map(np.ascontiguousarray, columns), EVERYWHERE if bounds is None else tuple(bounds))
+    room, limit = (len(rank) if most is None else min(most, len(rank))) - 1, most or 0
+    none = np.empty((5, 0), np.int64)
 
     def followed(x: int, y: int, dx: int, dy: int) -> Followed | None:
         """Follow one ray."""
@@ -288,8 +317,10 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
             side = wide_side = isqrt(radius * radius * length2)
             if radius < DIAGONAL:
                 wide_side = isqrt(DIAGONAL * DIAGONAL * length2)
-        hit = np.empty((5, room), np.int64)
-        count, time = one_ray(x, y, dx, dy, radius, side, wide_side, limit, items, rank, within, hit)
-        return time, hit[:, :count].T.tolist()
+        others = np.empty((5, room), np.int64) if room > 0 else none
+        count, time, *first = one_ray(x, y, dx, dy, radius, side, wide_side, limit, targets, others)
+        if count < 2:
+            return time, [first] if count else []
+        return time, [first, *others[:, : count - 1].T.tolist()]
 
     return followed
