@@ -64,11 +64,11 @@ BOUNDS = types.UniTuple(types.int64, 4)
 
 
 @structref.register
-class PlaceType(types.StructRef):
-    """Type of `Place` in kernels."""
+class ShotTilesType(types.StructRef):
+    """Type of `ShotTiles` in kernels."""
 
 
-class Place(structref.StructRefProxy):
+class ShotTiles(structref.StructRefProxy):
     """What shots at a scene look up, in kernels.
 
     Parameters
@@ -81,7 +81,7 @@ class Place(structref.StructRefProxy):
     """
 
 
-OF_PLACE = [
+OF_TILES = [
     ("item", NUMBERS), ("rank", NUMBERS), ("box", BOXES), ("begin", NUMBERS), ("words", WORDS), ("occluder", FLAGS),
     ("grid", GRID), ("cell_begin", NUMBERS), ("listed", NUMBERS), ("pierce", types.boolean), ("bounds", BOUNDS),
     ("worth", types.int64), ("spent", types.int64),
@@ -99,15 +99,15 @@ class Shape(structref.StructRefProxy):
 
 OF_SHAPE = [("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1])]
 
-for proxy, of, fields in ((Place, PlaceType, OF_PLACE), (Shape, ShapeType, OF_SHAPE)):
+for proxy, of, fields in ((ShotTiles, ShotTilesType, OF_TILES), (Shape, ShapeType, OF_SHAPE)):
     structref.define_constructor(proxy, of, [name for name, _ in fields])
     structref.define_boxing(of, proxy)
-PLACE, SHAPE = PlaceType(OF_PLACE), ShapeType(OF_SHAPE)
+SHOT_TILES, SHAPE = ShotTilesType(OF_TILES), ShapeType(OF_SHAPE)
 
 
-@compiled(PLACE(*[of for _, of in OF_PLACE[:-1]]))
-def _place(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth):
-    return Place(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth, 0)
+@compiled(SHOT_TILES(*[of for _, of in OF_TILES[:-1]]))
+def _shot_tiles(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth):
+    return ShotTiles(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth, 0)
 
 
 @compiled(SHAPE(*[of for _, of in OF_SHAPE]))
@@ -115,20 +115,20 @@ def _shape(box, first, rows, words):
     return Shape(box, first, rows, words)
 
 
-@compiled(types.int64(types.float64, types.float64, PLACE, SHAPE, types.int64[:, ::1]), nogil=False)
-def _shot(at_x, at_y, place, shape, found):
+@compiled(types.int64(types.float64, types.float64, SHOT_TILES, SHAPE, types.int64[:, ::1]), nogil=False)
+def _shot(at_x, at_y, tiles, shape, found):
     """Number of rows of a round at a position, which are written to `found`, (FEW_ROWS, ROW)."""
     if not (-FARTHEST < at_x < FARTHEST and -FARTHEST < at_y < FARTHEST) or at_x == ODD or at_y == ODD:
         return UNKNOWN
     column, row = np.int64(np.floor(at_x + PIXEL)), np.int64(np.floor(at_y + PIXEL))
-    (left, top, bits, wide, high), begin, count = place.grid, place.cell_begin, len(place.rank)
+    (left, top, bits, wide, high), begin, count = tiles.grid, tiles.cell_begin, len(tiles.rank)
     if wide:
         cell = cell_at(column, row, left, top, bits, wide, high)
         if cell < 0 or begin[cell] == begin[cell + 1]:
             return 0
-    elif place.worth:
-        place.spent += EACH_TILE * count + EACH_SHOT
-        if place.spent > place.worth:
+    elif tiles.worth:
+        tiles.spent += EACH_TILE * count + EACH_SHOT
+        if tiles.spent > tiles.worth:
             return MAKE_VISIBLE
     scratch, rest, none = np.empty(OUT + 2 + count, np.int64), np.empty_like(shape.words), NO_NUMBERS
     out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 : OUT + 2]
@@ -136,14 +136,14 @@ def _shot(at_x, at_y, place, shape, found):
     turn, rows, _ = match(
         0, 1, 0, out, ZERO, x, y, x, y,
         shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, NO_SUMS, ZERO,
-        place.rank, place.box, place.begin, place.words, place.occluder, none, none,
-        left, top, bits, wide, high, begin, place.listed,
-        place.pierce, place.bounds, none, NOBODY, 1, near, rest, near, near, near, rest,
+        tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, none, none,
+        left, top, bits, wide, high, begin, tiles.listed,
+        tiles.pierce, tiles.bounds, none, NOBODY, 1, near, rest, near, near, near, rest,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
     for row in range(rows):
-        found[row, 0], found[row, 1], found[row, 2] = place.item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
+        found[row, 0], found[row, 1], found[row, 2] = tiles.item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
         found[row, 3], found[row, 4] = out[X, row], out[Y, row]
     return rows
 
@@ -163,7 +163,7 @@ class PositionCache:
         self._forms = -1
         self._there: Ints
         self._tiles: OrderedTiles
-        self._place: Any  # a Place
+        self._shot_tiles: Any  # a ShotTiles
         self._is_visible = False
         self._lock = threading.Lock()
 
@@ -200,7 +200,7 @@ class PositionCache:
         """Let shots look up tiles; `worth` is the time to make the visible set, ns, or 0."""
         columns = map(np.ascontiguousarray, (stack.ids, *tiles[:5]))
         lists = tuple(cells[:5]), np.ascontiguousarray(cells.begin), np.ascontiguousarray(cells.listed)
-        self._place, self._is_visible = _place(*columns, *lists, pierce, tuple(bounds), worth), not worth
+        self._shot_tiles, self._is_visible = _shot_tiles(*columns, *lists, pierce, tuple(bounds), worth), not worth
 
     def look(self, one: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
@@ -214,7 +214,7 @@ class PositionCache:
             except IndexError:
                 found = np.empty((FEW_ROWS, ROW), np.int64)
                 buffer = found, memoryview(found).cast("B")
-            count = shot(x, y, self._place, shape, buffer[0])
+            count = shot(x, y, self._shot_tiles, shape, buffer[0])
             if count:
                 if count < 0:
                     buffers.append(buffer)

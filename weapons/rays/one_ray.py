@@ -33,7 +33,7 @@ Spell = tuple[int, int]
 """Times at which a ray enters and leaves a box or a cell."""
 
 
-class Near(NamedTuple):
+class Entered(NamedTuple):
     """Items (n,) that a ray may touch, in the order in which it enters their boxes.
 
     Parameters
@@ -148,7 +148,7 @@ class Ray:
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
 
-def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Near:
+def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
     """Accepted items whose boxes a ray touches, in order of entry."""
     ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
     around = [(low - HALF) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
@@ -163,10 +163,10 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
     entry, leave = ray.times(box)
     rows = np.flatnonzero((entry <= leave) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
     rows = rows[np.argsort(entry[rows], kind="stable")]
-    return Near(rank[rows], entry[rows], leave[rows], box[rows])
+    return Entered(rank[rows], entry[rows], leave[rows], box[rows])
 
 
-def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> Followed | None:
+def _first(ray: Ray, origin: Pair, near: Entered, stack: Stack) -> Followed | None:
     """What a ray touches first; None if it looks at too many rows."""
     best: tuple[int, int, int] | None = None
     left = ROWS_MOST
@@ -199,7 +199,7 @@ def _first(ray: Ray, origin: Pair, near: Near, stack: Stack) -> Followed | None:
     return best[0], [] if stack.occluder[rank] else [[rank, 1, x, y, best[0]]]
 
 
-def _holders(x: int, y: int, origin: Pair, near: Near, stack: Stack) -> Ints:
+def _holders(x: int, y: int, origin: Pair, near: Entered, stack: Stack) -> Ints:
     """Ranks of the items that cover a pixel."""
     rank = near.rank[meets(np.array([x, y, x, y]), near.box_xyxy)]
     own_x, own_y = x + origin[0] - stack.box_xyxy[rank, 0], y + origin[1] - stack.box_xyxy[rank, 1]

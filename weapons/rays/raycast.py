@@ -54,7 +54,7 @@ a box as take the time of a round."""
 
 
 @dataclass(frozen=True, eq=False)
-class Near(Columns):
+class Crossed(Columns):
     """Pairs of a ray and an item whose box it enters, sorted by (ray, least).
 
     Parameters
@@ -187,7 +187,7 @@ def _hits_and_ends(
 
 def near_items(
     stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, whose: tuple[Ints, Ints] | None
-) -> Near:
+) -> Crossed:
     """Accepted items whose boxes rays enter; `own` are the lines relative to their pixels of origin."""
     ray, rank = met_boxes(lines.box_xyxy, stack.box_xyxy)
     if whose is not None:
@@ -202,7 +202,7 @@ def near_items(
     least, most = times_in(own, ray, box)
     some = np.flatnonzero((least <= most) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
     some = some[np.lexsort((least[some], ray[some]))]
-    return Near(ray[some], rank[some], box[some], least[some], most[some])
+    return Crossed(ray[some], rank[some], box[some], least[some], most[some])
 
 
 def _crossing(lines: Lines, ray: Ints, rank: Ints, boxes_xyxy: Ints) -> Ints:
@@ -243,7 +243,7 @@ def times_in(own: Lines, ray: Ints, box: Ints) -> tuple[Ints, Ints]:
     return entry, leave
 
 
-def _rounds(near: Near, rays: int, most: int | None, stack: Stack) -> Iterator[Ints]:
+def _rounds(near: Crossed, rays: int, most: int | None, stack: Stack) -> Iterator[Ints]:
     """Numbers of the pairs that are looked at one after another: occluders, and the next few objects of each ray.
 
     Of rays that go through all objects, or meet few boxes, all objects are next.
@@ -265,7 +265,7 @@ def _rounds(near: Near, rays: int, most: int | None, stack: Stack) -> Iterator[I
         first, size = first + size, size * GROWTH
 
 
-def _firsts_of(near: Near, own: Lines, origin: Ints, stack: Stack) -> Firsts:
+def _firsts_of(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
     """The first cells of items, and the numbers of their cells."""
     side = near.box_xyxy[:, 2:] - near.box_xyxy[:, :2] + 1
     parts = pieces(cells_most(own, side), CHUNK_SAMPLES) if len(near) else []
@@ -275,7 +275,7 @@ def _firsts_of(near: Near, own: Lines, origin: Ints, stack: Stack) -> Firsts:
 NO_FIRSTS = Firsts(*[np.zeros(0, np.int64)] * 7)
 
 
-def _firsts(near: Near, own: Lines, origin: Ints, stack: Stack) -> Firsts:
+def _firsts(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
     """`_firsts_of` for a part of the pairs."""
     lines = own.take(near.ray)
     pair, row, first, last = lines.runs(near.box_xyxy)
@@ -301,7 +301,7 @@ Runs = tuple[Ints, Ints, Ints]
 """Runs of cells (n,) along the longer axes of rays: pair, row, and first cell."""
 
 
-def _pixels(near: Near, lines: Lines, origin: Ints, stack: Stack, runs: Runs, length: Ints) -> tuple[Ints, Ints]:
+def _pixels(near: Crossed, lines: Lines, origin: Ints, stack: Stack, runs: Runs, length: Ints) -> tuple[Ints, Ints]:
     """Pixels of items in runs, as (run, place in it)."""
     pair, row, first = runs
     width, corner = stack.width[near.rank], stack.box_xyxy[near.rank, :2] - origin[near.ray]
