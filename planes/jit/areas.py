@@ -428,13 +428,14 @@ def match(
             types.boolean, types.UniTuple(types.int64, 4), INTS, OWNERS, types.int64
     )
 )  # fmt: skip
-def _front_to_back(
+def match_rounds(
     turn, end, count, out, pattern, x, y, origin_x, origin_y,
     pattern_box, first, following, pattern_words, strips, sums, first_sum,
     rank, box, tile_begin, tiles, occluder, categories, owner, cells_x, cells_y, bits, cells_wide, cells_high,
     begin, listed,
     pierce, bounds, meets, exclude, each,
 ):  # fmt: skip
+    """Do what `match` does, with scratch memory of its own."""
     longest = 0
     for kind in range(len(first)):
         longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
@@ -472,7 +473,7 @@ def front_to_back(
         tiles_each = len(tiles.rank) if near is None else LISTED * len(cells.listed) / max(len(cells.begin) - 1, 1)
         least = COMPILED.thread / (each * (COMPILED.tiles_placement + COMPILED.tiles_pair * tiles_each))
         found = rows_by(
-            _front_to_back, Y + 1, len(placed.origin_x), least,
+            match_rounds, Y + 1, len(placed.origin_x), least,
             *placed, *windows, *tiles, *cells, rule.pierce, EVERYWHERE if rule.bounds is None else rule.bounds,
             accepted, NOBODY if rule.exclude is None else rule.exclude, each,
         )  # fmt: skip

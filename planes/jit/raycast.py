@@ -27,8 +27,6 @@ RANK, COUNT, ENTRY, Y, X, ENTER, LAST, FOUND = range(8)
 BOUNDS = types.UniTuple(types.int64, 4)
 PAIRS = types.Array(types.int64, 2, "A", readonly=True)
 
-NO_STOP = LATE, 0, 0, True, True
-
 LISTED = 4096 * SUB
 """Longest ray of which all cells are looked at for their verdicts."""
 
@@ -264,6 +262,7 @@ def _earliest_first(found, k, count):
 @njit
 def _meet(items, origin, ray, wide, bounds, most, found, count):
     """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
+    endless = np.int64(LATE), np.int64(0), np.int64(0), np.bool_(True), np.bool_(True)  # of no literal types
     occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[FOUND]
     if count > SORTED:
         order = np.argsort(found[ENTER, :count])
@@ -275,7 +274,7 @@ def _meet(items, origin, ray, wide, bounds, most, found, count):
         if found[ENTER, k] > limit:
             break
         at = found[RANK, k]
-        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, NO_STOP, most == 1)
+        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, endless, most == 1)
         if pixels == 0:
             continue
         found[RANK, met], found[COUNT, met], found[LAST, met] = at, pixels, found[LAST, k]
@@ -380,7 +379,7 @@ def follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, 
             found[COUNT, at] = 1  # all other pixels of the item come after the first
         elif found[LAST, at] >= time:
             stop = time, last_x, last_y, alone, found[RANK, at] <= rank
-            found[COUNT, at] = _of_item(items, found[RANK, at], origin, ray, wide, bounds, stop, False)[0]
+            found[COUNT, at] = _of_item(items, found[RANK, at], origin, ray, wide, bounds, stop, np.bool_(False))[0]
     return count
 
 

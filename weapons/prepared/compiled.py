@@ -27,8 +27,8 @@ from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
-from hitplanes.planes.jit.areas import KEY, NOBODY, NONE, RANK, SAMPLES, X, Y, match
-from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, ROWS_OUT, WORDS, cell_at
+from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, RANK, SAMPLES, X, Y, match_rounds
+from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
 from hitplanes.planes.scene.derived import View
@@ -130,15 +130,14 @@ def _shot(at_x, at_y, tiles, shape, found):
         tiles.spent += EACH_TILE * count + EACH_SHOT
         if tiles.spent > tiles.worth:
             return MAKE_VISIBLE
-    scratch, rest, none = np.empty(OUT + 2 + count, np.int64), np.empty_like(shape.words), NO_NUMBERS
-    out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 : OUT + 2]
-    x[0], y[0], near = column, row, scratch[OUT + 2 :]
-    turn, rows, _ = match(
+    scratch, none = np.empty(OUT + 2, np.int64), NO_NUMBERS
+    out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 :]
+    x[0], y[0] = column, row
+    turn, rows, _ = match_rounds(
         0, 1, 0, out, ZERO, x, y, x, y,
         shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, NO_SUMS, ZERO,
         tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, none, none,
-        left, top, bits, wide, high, begin, tiles.listed,
-        tiles.pierce, tiles.bounds, none, NOBODY, 1, near, rest, near, near, near, rest,
+        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, none, NOBODY, 1,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
@@ -252,11 +251,16 @@ class TargetsType(types.StructRef):
 
 
 class Targets(structref.StructRefProxy):
-    """What single rays are cast at, in kernels: columns of the accepted items, their ranks, and the bounds."""
+    """What single rays are cast at, in kernels: columns of the accepted items, their ranks, and the bounds.
+
+    `grid`, `none` and `nobody` stand for cells and filters; they have the types of a batch, for which `follow` is
+    compiled.
+    """
 
 
 OF_TARGETS = [
-    ("box", BOXES), ("offset", NUMBERS), ("masks", FLAGS), ("occluder", FLAGS), ("rank", NUMBERS), ("bounds", BOUNDS)
+    ("box", BOXES), ("offset", INTS), ("masks", FLAGS), ("occluder", FLAGS), ("rank", NUMBERS), ("bounds", BOUNDS),
+    ("grid", GRID), ("none", INTS), ("nobody", OWNERS),
 ]  # fmt: skip
 structref.define_constructor(Targets, TargetsType, [name for name, _ in OF_TARGETS])
 structref.define_boxing(TargetsType, Targets)
@@ -264,8 +268,8 @@ TARGETS = TargetsType(OF_TARGETS)
 
 
 @compiled(TARGETS(*[of for _, of in OF_TARGETS]))
-def _targets(box, offset, masks, occluder, rank, bounds):
-    return Targets(box, offset, masks, occluder, rank, bounds)
+def _targets(box, offset, masks, occluder, rank, bounds, grid, none, nobody):
+    return Targets(box, offset, masks, occluder, rank, bounds, grid, none, nobody)
 
 
 @compiled(types.UniTuple(types.int64, 7)(*[types.int64] * 8, TARGETS, ROWS_OUT), nogil=False)
@@ -274,11 +278,17 @@ def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
 
     The other objects that it hits are written to columns with the same five numbers.
     """
-    items = targets.box, targets.offset, targets.masks, targets.occluder, NONE, NONE
+    none = targets.none
+    items, cells = (
+        (targets.box, targets.offset, targets.masks, targets.occluder, none, none),
+        (targets.grid, none, none),
+    )
     near, found = np.empty(len(targets.rank) + 1, np.int64), np.empty((cast.FOUND + 1, len(targets.rank) + 1), np.int64)
     wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
     origin_x, origin_y, first = (x + HALF) >> 8, (y + HALF) >> 8, (-1, 0, 0, 0, 0)
-    count = follow(0, x, y, dx, dy, wide, items, NOWHERE, targets.bounds, most, NONE, NOBODY, near, found, ends)
+    count = follow(
+        np.int64(0), x, y, dx, dy, wide, items, cells, targets.bounds, most, none, targets.nobody, near, found, ends
+    )
     for i in range(count):
         at = near[i]
         rank, column, row = (
@@ -303,7 +313,9 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
     rank = np.flatnonzero(view.accepts(stack))
     some = slice(None) if len(rank) == len(stack) else rank
     columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some], rank
-    targets = _targets(*map(np.ascontiguousarray, columns), EVERYWHERE if bounds is None else tuple(bounds))
+    targets = _targets(
+        *map(np.ascontiguousarray, columns), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], NOBODY
+    )
     room, limit = (len(rank) if most is None else min(most, len(rank))) - 1, most or 0
     none = np.empty((5, 0), np.int64)
 
