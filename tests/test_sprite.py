@@ -164,7 +164,7 @@ def test_a_pixel_is_set_if_a_set_square_holds_its_centre(
     which, grids = mapping(rng, frames, 5)
     quarters = np.array([rng.randrange(4) for _ in which])
     turned = kernels_of(variants).turned_masks(frames, which, grids, quarters)
-    for n, (found, corner, area) in enumerate(zip(*turned, strict=True)):
+    for n, (found, *corner, area) in enumerate(turned):
         (width, height), frame = grids.size_wh[n].tolist(), frames[which[n]]
         places = {
             (j, i): grids.first[n] + i * grids.step[n, :, 0] + j * grids.step[n, :, 1]

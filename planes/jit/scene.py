@@ -15,7 +15,7 @@ from ..common.limits import GOLDEN, HALF, MAPPED_PIXELS, POSITION_MAX, SUB, TRIG
 from ..grid.fixed_point import DOUBT, UNIT
 from ..grid.rasterize import DIAGONAL, WIDEST, RowRuns, sides_of
 from ..grid.spans import pieces
-from ..scene.variants import Grids
+from ..scene.variants import Grids, Turned
 from .bit_rows import INTS, OUT
 from .cache import compiled
 
@@ -196,22 +196,18 @@ def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
     return boxes, out
 
 
-def turned_masks(
-    masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints
-) -> tuple[list[Bools], list[list[int]], list[int]]:
+def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
     """See `scene.variants.turned_masks`; it divides once a row, not once a pixel."""
     sizes = [mask.size for mask in masks]
     shapes = [(begin, *mask.shape[::-1]) for begin, mask in zip(accumulate(sizes, initial=0), masks, strict=False)]
     flat = np.concatenate([mask.reshape(-1) for mask in masks])
-    frames, made, corners, areas = np.array(shapes), [], [], []
+    frames, made = np.array(shapes), []
     for part in pieces(grids.size_wh.prod(axis=1), MAPPED_PIXELS):
         _, size_wh, *places = (column[part] for column in grids)
         boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh, quarters[part])
         for left, top, wide, high, area, begin in boxes.tolist():
-            made.append(out[begin : begin + wide * high].reshape(high, wide))
-            corners.append([left, top])
-            areas.append(area)
-    return made, corners, areas
+            made.append(Turned(out[begin : begin + wide * high].reshape(high, wide), left, top, area))
+    return made
 
 
 @njit

@@ -287,43 +287,42 @@ def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> lis
     quarters = np.array([form.quarter for form in forms])
     found = kernels_of(sys.modules[__name__]).turned_masks(planes, which, grids, quarters)
     made = []
-    for form, pivot, mask, corner, area in zip(forms, grids.pivot_256.tolist(), *found, strict=True):
-        height, width = mask.shape[:: -1 if form.quarter & 1 else 1]
-        x, y = _turned_pivot(pivot[0] - SUB * corner[0], pivot[1] - SUB * corner[1], (width, height), form.quarter)
-        made.append(Variant(form, frozen(mask), x, y, area) if area else Variant(form, frozen(mask), 0, 0, 0))
+    for form, (x, y), (mask, left, top, area) in zip(forms, grids.pivot_256.tolist(), found, strict=True):
+        size_wh = mask.shape[:: 1 if form.quarter & 1 else -1]
+        pivot = _turned_pivot(x - SUB * left, y - SUB * top, size_wh, form.quarter) if area else (0, 0)
+        made.append(Variant(form, frozen(mask), *pivot, area))
     return made
 
 
-def turned_masks(
-    masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints
-) -> tuple[list[Bools], list[list[int]], list[int]]:
-    """Masks of frames at the centres of grids, cropped to their pixels and turned by quarter turns.
+class Turned(NamedTuple):
+    """A turned mask, the corner of its box on the grid before the quarter turns, and the number of its pixels."""
+
+    mask: Bools
+    left: int
+    top: int
+    area: int
+
+
+def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
+    """Masks of frames at the centres of grids (n,), cropped to their pixels and turned by quarter turns.
 
     Parameters
     ----------
     which, quarters : (n,) number of each grid's frame, and of its quarter turns
-
-    Returns
-    -------
-    the masks (n); the corners (n) of their boxes on the grids, before the quarter turns; and their pixels (n)
     """
-    made: dict[int, tuple[Bools, list[int], int]] = {}
+    made: dict[int, Turned] = {}
     for batch in _batches(grids):
-        used = {number: place for place, number in enumerate(dict.fromkeys(which[batch].tolist()))}
-        planes = [masks[number] for number in used]
-        own = np.array([used[number] for number in which[batch].tolist()])
+        used, own = np.unique(which[batch], return_inverse=True)
+        planes = [masks[number] for number in used.tolist()]
         held = _mapped(Grids(*(column[batch] for column in grids)), planes, own, planes)
         rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
         sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
-        areas, (height, width) = np.count_nonzero(held, axis=(1, 2)).tolist(), held.shape[1:]
-        turns = quarters[batch].tolist()
-        for row, mask, side, quarter, area in zip(batch, held, sides.tolist(), turns, areas, strict=True):
+        areas, (height, width) = np.count_nonzero(held, axis=(1, 2)), held.shape[1:]
+        told = (column.tolist() for column in (sides, quarters[batch], areas))
+        for row, mask, side, quarter, area in zip(batch, held, *told, strict=True):
             left, top, right, low = side if area else (0, 0, width, height)
-            part, _, _ = _quarter_turned(mask[top : height - low, left : width - right], 0, 0, quarter)
-            made[row] = part, [left, top], area
-    every = (made[row] for row in range(len(which)))
-    found, corners, counts = zip(*every, strict=True)
-    return list(found), list(corners), list(counts)
+            made[row] = Turned(_rotated(mask[top : height - low, left : width - right], quarter), left, top, area)
+    return [made[row] for row in range(len(which))]
 
 
 def _batches(grids: Grids) -> Iterator[list[int]]:
@@ -516,20 +515,23 @@ def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
     return RowRuns(shape[begin][own], row, parts)
 
 
-def _turned_pivot(x: int, y: int, size_wh: tuple[int, int], turns: int) -> tuple[int, int]:
+def _turned_pivot(x: int, y: int, size_wh: tuple[int, ...], turns: int) -> tuple[int, int]:
     """Pivot (x, y) of a grid, turned by quarter turns; its size is that before them."""
-    width, height = size_wh
     for _ in range(turns):
-        x, y, width, height = SUB * (height - 1) - y, x, height, width
+        x, y, size_wh = SUB * (size_wh[1] - 1) - y, x, size_wh[::-1]
     return x, y
+
+
+def _rotated(array: npt.NDArray[Any], turns: int) -> npt.NDArray[Any]:
+    """A view of an array (h, w, ...), turned by quarter turns; `numpy.rot90` takes five times as long."""
+    for _ in range(turns):
+        array = array.swapaxes(0, 1)[:, ::-1]
+    return array
 
 
 def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:
     """An array (h, w, ...) and its pivot (x, y), turned by quarter turns."""
-    x, y = _turned_pivot(x, y, (array.shape[1], array.shape[0]), turns)
-    for _ in range(turns):
-        array = array.swapaxes(0, 1)[:, ::-1]
-    return array, x, y
+    return _rotated(array, turns), *_turned_pivot(x, y, array.shape[1::-1], turns)
 
 
 def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:
