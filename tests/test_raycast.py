@@ -67,8 +67,8 @@ def first_touched(
 ) -> list[First]:
     """The ends of rays that end at their first hit, in one batch; each alone ends there, too."""
     start, step = (np.array(column) for column in zip(*rays, strict=True))
-    whose = () if meets is None or exclude is None else (np.array(meets), np.array(exclude))
-    _, (reason, time, y, x, rank, _) = kernels.hits_and_ends(stack, bounds, Lines(start, step, 0), 1, *whose)
+    filters = None if meets is None or exclude is None else (np.array(meets), np.array(exclude))
+    _, (reason, time, y, x, rank, _) = kernels.hits_and_ends(stack, bounds, Lines(start, step, 0), 1, filters)
     x, y = x + pixel(start)[:, 0], y + pixel(start)[:, 1]
     columns = (np.where(reason, column, gone) for column, gone in zip((time, x, y, rank), NOTHING, strict=True))
     found: list[First] = list(zip(*(column.tolist() for column in columns), strict=True))
@@ -320,7 +320,7 @@ def test_threads_share_rays_out(jit: bool, monkeypatch: pytest.MonkeyPatch) -> N
     for _ in range(50):
         scene.add(rng.random((9, 9)) < 0.7, rng.uniform(0, 200, 2), categories=int(rng.integers(1, 4)))
     lines = Lines(rng.integers(0, 51200, (90, 2)), rng.integers(-51200, 51200, (90, 2)), 0)
-    how = scene.items.stack(), scene.bounds, lines, 1, rng.integers(1, 4, 90), np.full((90, 1), -1)
+    how = scene.items.stack(), scene.bounds, lines, 1, (rng.integers(1, 4, 90), np.full((90, 1), -1))
     alone = kernels.hits_and_ends(*how)
     parts: list[Any] = []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -18,14 +18,13 @@ from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
 from .cache import compiled
 from .planes import LATE, half_chord, near_of, part_of, run_of, share, times_in
 
-if TYPE_CHECKING:
-    from hitplanes.weapons.rays.ray_hits import Walk
-
-RANK, COUNT, ENTRY, Y, X, ENTER, LAST, FOUND = range(8)
-"""Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels."""
+RANK, COUNT, ENTRY, Y, X, ENTER, LAST, SOONEST, COLUMNS = range(9)
+"""Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels, and SOONEST
+has the earliest times of objects, in order."""
 
 BOUNDS = types.UniTuple(types.int64, 4)
 PAIRS = types.Array(types.int64, 2, "A", readonly=True)
+ITEMS = types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS))
 
 LISTED = 4096 * SUB
 """Longest ray of which all cells are looked at for their verdicts."""
@@ -263,7 +262,7 @@ def _earliest_first(found, k, count):
 def _meet(items, origin, ray, wide, bounds, most, found, count):
     """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
     endless = np.int64(LATE), np.int64(0), np.int64(0), np.bool_(True), np.bool_(True)  # of no literal types
-    occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[FOUND]
+    occluder, met, objects, limit, last = items[3], 0, 0, np.int64(LATE), found[SOONEST]
     if count > SORTED:
         order = np.argsort(found[ENTER, :count])
         for column in (RANK, ENTER, LAST):
@@ -344,8 +343,7 @@ def _sort(found, order, count):
 
 RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
     types.int64, types.int64, types.int64, ROWS_OUT, PAIRS, PAIRS, types.int64, PAIRS, types.int64,
-    types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
-    types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
+    ITEMS, types.Tuple((types.UniTuple(types.int64, 5), INTS, INTS)), INTS, OWNERS, BOUNDS, ROWS_OUT,
 )  # fmt: skip
 
 
@@ -365,14 +363,8 @@ def follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, 
         alone = alone and found[ENTRY, at] == time
         reason, rank, time = np.int64(2), found[RANK, at], found[ENTRY, at]
         last_y, last_x = found[Y, at], found[X, at]
-    ends[0, who], ends[1, who], ends[2, who], ends[3, who], ends[4, who], ends[5, who] = (
-        reason,
-        time,
-        last_y,
-        last_x,
-        rank,
-        alone,
-    )
+    ends[0, who], ends[1, who], ends[2, who], ends[3, who] = reason, time, last_y, last_x
+    ends[4, who], ends[5, who] = rank, alone
     for i in range(count):
         at = near[i]
         if found[ENTRY, at] == time and found[Y, at] == last_y and found[X, at] == last_x:
@@ -391,7 +383,7 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     -------
     the ray that there is no room for, or `end`; the number of rows; and 0
     """
-    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((FOUND + 1, len(items[0]) + 1), np.int64)
+    near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((COLUMNS, len(items[0]) + 1), np.int64)
     for who in range(begin, end):
         x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
         wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
@@ -489,8 +481,7 @@ def _mark(items, at, origin, steep, stop, what, last_rank, rows, cells):
 
 
 @compiled(types.void(
-    PAIRS, PAIRS, PAIRS, types.int64, PAIRS, PAIRS, INTS, INTS, types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS)),
-    INTS, OWNERS, BOUNDS, ROWS_OUT,
+    PAIRS, PAIRS, PAIRS, types.int64, PAIRS, PAIRS, INTS, INTS, ITEMS, INTS, OWNERS, BOUNDS, ROWS_OUT,
 ))  # fmt: skip
 def _verdicts(start, step, origins, radius, sides, ends, hit_begin, hit_rank, items, meets, exclude, bounds, counts):
     near = np.empty(len(items[0]) + 1, np.int64)
@@ -535,43 +526,46 @@ def fits(longest: int, radius: int) -> bool:
     return longest + radius <= FARTHEST and radius * radius * far < FAR and not (0 < radius < DIAGONAL and far >= LONG)
 
 
+def _given(
+    stack: Stack, lines: Lines, filters: tuple[Ints, Ints] | None, bounds: Box | None
+) -> tuple[Ints, tuple[Ints, ...], tuple[Ints, Ints], Box]:
+    """Arguments of kernels: the sides of the rays, the items, the filters, and the bounds."""
+    sides = np.stack([lines.sides, lines.wide_sides]) if lines.radius else np.zeros((2, len(lines)), np.int64)
+    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
+    return sides, items, filters or (NONE, NOBODY), EVERYWHERE if bounds is None else bounds
+
+
+def _fit(lines: Lines) -> bool:
+    """Whether all rays fit the kernels."""
+    return fits(int(np.abs(lines.step).max(initial=0)), lines.radius)
+
+
 def hits_and_ends(
-    stack: Stack,
-    bounds: Box | None,
-    lines: Lines,
-    most: int | None,
-    meets: Ints | None = None,
-    exclude: Ints | None = None,
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: tuple[Ints, Ints] | None = None
 ) -> tuple[Ints, Ints] | None:
     """See `weapons.rays.raycast.hits_and_ends`; None if rays are so long or so wide that int64 overflows."""
-    radius = lines.radius
-    if not fits(int(np.abs(lines.step).max(initial=0)), radius):
+    if not _fit(lines):
         return None
-    sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
+    sides, items, whose, within = _given(stack, lines, filters, bounds)
     ends = np.zeros((6, len(lines)), np.int64)
-    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
-    whose = (NONE, NOBODY) if meets is None or exclude is None else (meets, exclude)
     found = rows_by(
-        _each, 6, len(lines), PART_PAIRS / (RAY_PAIRS + len(stack)), lines.start, lines.step, radius, sides,
-        most or 0, items, _cells(stack, lines), *whose, EVERYWHERE if bounds is None else bounds, ends,
+        _each, 6, len(lines), PART_PAIRS / (RAY_PAIRS + len(stack)), lines.start, lines.step, lines.radius, sides,
+        most or 0, items, _cells(stack, lines), *whose, within, ends,
     )  # fmt: skip
     assert found is not None
     return found, ends
 
 
-def verdicts_of_rays(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints | None:
+def verdicts_of_rays(walk: Any, filters: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints | None:
     """See `weapons.explain.ray_verdicts.verdicts_of_rays`; None if rays are so long or so wide that it is faster."""
     lines, ends, stack = walk.lines, walk.ends, walk.stack
-    longest, radius = int(np.abs(lines.step).max(initial=0)), lines.radius
-    if longest + radius > LISTED or not fits(longest, radius):
+    if int(np.abs(lines.step).max(initial=0)) + lines.radius > LISTED or not _fit(lines):
         return None
-    sides = np.stack([lines.sides, lines.wide_sides]) if radius else np.zeros((2, len(lines)), np.int64)
+    sides, items, whose, within = _given(stack, lines, filters, bounds)
     stops = np.stack([ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone])
     hits = np.searchsorted(walk.hit.ray, np.arange(len(lines) + 1)), walk.hit.rank
-    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
     counts = np.zeros((len(lines), 6), np.int64)
     _verdicts(
-        lines.start, lines.step, walk.rays.origin_xy, radius, sides, stops, *hits, items,
-        *(whose or (NONE, NOBODY)), EVERYWHERE if bounds is None else bounds, counts,
-    )  # fmt: skip
+        lines.start, lines.step, walk.rays.origin_xy, lines.radius, sides, stops, *hits, items, *whose, within, counts
+    )
     return counts

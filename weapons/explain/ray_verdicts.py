@@ -25,7 +25,7 @@ from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, Columns, each_pixel, pieces, sorted_once
 from hitplanes.planes.scene.items import clipped
 
-from ..fire.prefilter import may_refuse, refused
+from ..fire.prefilter import Filters, filters_of, refused, refused_by
 from ..kinds.placements import Shots
 from ..rays.contacts import NEVER, Reason, Terminations, find_contacts
 from ..rays.first_hit import FirstHits
@@ -48,13 +48,10 @@ def verdicts_of(walks: Iterable[tuple[int, Walk | FirstHits]], shots: Shots, bou
     found = np.zeros(len(shots) * n, np.int64)
     for first, part in walks:
         walk = part if isinstance(part, Walk) else _walk_of(part, shots, first)
-        whose = None
-        if may_refuse(walk.stack, shots):
-            row = walk.rays.shot + first
-            whose = shots.meets[row], shots.exclude[row]
-        of_rays = kernels_of(sys.modules[__name__]).verdicts_of_rays(walk, whose, bounds)
+        filters = filters_of(walk.stack, shots, walk.rays.shot + first)
+        of_rays = kernels_of(sys.modules[__name__]).verdicts_of_rays(walk, filters, bounds)
         if of_rays is None:
-            of_rays = verdicts_of_rays(walk, whose, bounds)
+            of_rays = verdicts_of_rays(walk, filters, bounds)
         place = (walk.rays.shot + first)[:, None] * n + np.arange(n)
         found += np.bincount(place.ravel(), of_rays.ravel(), len(found)).astype(np.int64)
     return found.reshape(-1, n)
@@ -74,11 +71,8 @@ def _walk_of(rays: FirstHits, shots: Shots, first_shot: int) -> Walk:
     return replace(walk, ends=replace(ends, alone=alone))
 
 
-def verdicts_of_rays(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
-    """Number of cells (R, 6) of rays by verdict; the compiled kernel returns None for rays that are too long for it.
-
-    `whose` is the filter of items that each ray meets (R,), and the owners (R, K) whose items it skips, or None.
-    """
+def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) -> Ints:
+    """Number of cells (R, 6) of rays by verdict; the compiled kernel returns None for rays that are too long for it."""
     lines, ends, origin = walk.lines, walk.ends, walk.rays.origin_xy
     counts = np.zeros((len(lines), len(Verdict)), np.int64)
     box = lines.box_xyxy
@@ -91,7 +85,7 @@ def verdicts_of_rays(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | 
         inside[leaving] = cells_in(lines.take(leaving), box[leaving])
     reached, ended = inside.copy(), np.flatnonzero(ends.reason != Reason.RANGE)
     reached[ended] = cells_in(lines.take(ended), box[ended], ends.take(ended))
-    met = _met(walk, whose, bounds)
+    met = _met(walk, filters, bounds)
     counts[:, Verdict.HIT : Verdict.OUTSIDE] = met
     counts[:, Verdict.EMPTY] = reached - met.sum(axis=1)
     counts[:, Verdict.OUTSIDE], counts[:, Verdict.BEYOND] = total - inside, inside - reached
@@ -267,12 +261,12 @@ def _in_rows(lines: Lines, box_xyxy: Ints, ends: Terminations | None) -> Ints:
     return found
 
 
-def _met(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
+def _met(walk: Walk, filters: Filters | None, bounds: Box | None) -> Ints:
     """Number of cells (R, 3) of rays that are hit, occluded, and filtered."""
     n, ends = len(walk.rays), walk.ends
     stopped = ends.reason == Reason.OCCLUDER
     counts = np.stack([np.bincount(walk.hit.ray, walk.hit.count, n).astype(np.int64), stopped, np.zeros(n, np.int64)])
-    skipped = _skipped(walk, whose, bounds)
+    skipped = _skipped(walk, filters, bounds)
     listed = _several_in_cells(walk)
     listed[skipped >> 2 * REACH_BITS] = True
     rays = np.flatnonzero(listed)
@@ -310,20 +304,17 @@ def _several_in_cells(walk: Walk) -> Bools:
     return several
 
 
-def _skipped(walk: Walk, whose: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints:
+def _skipped(walk: Walk, filters: Filters | None, bounds: Box | None) -> Ints:
     """Keys of the cells of items that the filter refuses, before the ends of rays."""
     keys = [np.zeros(0, np.int64)]
-    if whose is None:
+    if filters is None:
         return keys[0]
-    stack, (meets, exclude) = walk.stack, whose
     for begin in range(0, len(walk.rays), RAYS_AT_ONCE):
         some = slice(begin, begin + RAYS_AT_ONCE)
         rays, own, ends = walk.rays.take(some), walk.lines.take(some), walk.ends.take(some)
         lines = replace(own, start=rays.start_256)
         near = near_items(walk.stack, bounds, lines, own, rays.origin_xy, None)
-        row, rank = near.ray + begin, near.rank
-        unmet = (stack.categories[rank] & meets[row]) == 0
-        near = near.take(unmet | (stack.owner[rank][:, None] == exclude[row]).any(axis=1))
+        near = near.take(refused_by(filters, walk.stack, near.rank, near.ray + begin))
         met = find_contacts(own.take(near.ray), near.ray, near.rank, walk.stack, bounds, rays.origin_xy[near.ray])
         ray = met.ray[met.pair]
         before = ends.reaches(ray, met.entry, met.y, met.x)

@@ -129,10 +129,25 @@ def kinds(stack: Stack, rank: Ints, refuses: Bools | None) -> Kinds:
 
 def refused(stack: Stack, rank: Ints, shots: Shots, shot: Ints) -> Bools:
     """Whether shots refuse items: those of which they meet no category, and those of an excluded owner."""
-    foreign = (stack.categories[rank] & shots.meets[shot]) == 0
-    if not shots.exclude.shape[1]:
+    return refused_by((shots.meets, shots.exclude), stack, rank, shot)
+
+
+Filters = tuple[Ints, Ints]
+"""Of each ray or shot (n,) the bits of the items that it meets, and (n, K) the owners whose items it skips."""
+
+
+def filters_of(stack: Stack, shots: Shots, shot: Ints) -> Filters | None:
+    """Filters of the shots with the given numbers; None if they refuse nothing."""
+    return (shots.meets[shot], shots.exclude[shot]) if may_refuse(stack, shots) else None
+
+
+def refused_by(filters: Filters, stack: Stack, rank: Ints, row: Ints) -> Bools:
+    """Whether items are refused by the filters of rows (n,)."""
+    meets, exclude = filters
+    foreign = (stack.categories[rank] & meets[row]) == 0
+    if not exclude.shape[1]:
         return np.asarray(foreign)
-    return np.asarray(foreign | (stack.owner[rank][:, None] == shots.exclude[shot]).any(axis=1))
+    return np.asarray(foreign | (stack.owner[rank][:, None] == exclude[row]).any(axis=1))
 
 
 @dataclass

@@ -257,14 +257,12 @@ def chosen_ray_way(
     why = f"{name} is passed over: {passed_over}; " if passed_over else ""
     if asked or not len(stack):
         return RayChoice("walk", f"{why}every ray walks")
-    if not_cast := _not_cast(ray, scene):
-        return RayChoice("walk", f"{why}{not_cast}")
+    if refused := _not_cast(ray, scene):
+        return RayChoice("walk", f"{why}{refused}")
     return _cast_or_march(ray, scene, view, rays, prepared, why)
 
 
-def _cast_or_march(
-    ray: RayWeapon, scene: Scene, view: View | None, rays: int, prepared: bool, why: str
-) -> RayChoice:  # fmt: skip
+def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, prepared: bool, why: str) -> RayChoice:
     """Of rays that can be cast, whether they march; `why` tells what was passed over."""
     now, pairs = costs(), rays * len(scene.items.stack())
     cast = now.cast_call + rays * now.cast_ray + pairs * now.cast_pair

@@ -76,7 +76,7 @@ class ShotTiles(structref.StructRefProxy):
     item : ids by rank
     rank, box, begin, words, occluder : columns of `OrderedTiles`
     grid, cell_begin, listed : columns of `Cells`; no cells if shots walk all tiles
-    pierce, bounds : as in `Limits`
+    pierce, bounds : as in `front_to_back.Rule`
     worth, spent : ns that the visible set takes, and that shots have walked for want of it; 0 if it is there
     """
 
@@ -99,10 +99,15 @@ class Shape(structref.StructRefProxy):
 
 OF_SHAPE = [("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1])]
 
-for proxy, of, fields in ((ShotTiles, ShotTilesType, OF_TILES), (Shape, ShapeType, OF_SHAPE)):
+
+def struct_of(proxy: type, of: type, fields: list[tuple[str, Any]]) -> Any:
+    """Type of a struct with the given fields, which kernels make and Python holds."""
     structref.define_constructor(proxy, of, [name for name, _ in fields])
     structref.define_boxing(of, proxy)
-SHOT_TILES, SHAPE = ShotTilesType(OF_TILES), ShapeType(OF_SHAPE)
+    return of(fields)
+
+
+SHOT_TILES, SHAPE = struct_of(ShotTiles, ShotTilesType, OF_TILES), struct_of(Shape, ShapeType, OF_SHAPE)
 
 
 @compiled(SHOT_TILES(*[of for _, of in OF_TILES[:-1]]))
@@ -262,9 +267,7 @@ OF_TARGETS = [
     ("box", BOXES), ("offset", INTS), ("masks", FLAGS), ("occluder", FLAGS), ("rank", NUMBERS), ("bounds", BOUNDS),
     ("grid", GRID), ("none", INTS), ("nobody", OWNERS),
 ]  # fmt: skip
-structref.define_constructor(Targets, TargetsType, [name for name, _ in OF_TARGETS])
-structref.define_boxing(TargetsType, Targets)
-TARGETS = TargetsType(OF_TARGETS)
+TARGETS = struct_of(Targets, TargetsType, OF_TARGETS)
 
 
 @compiled(TARGETS(*[of for _, of in OF_TARGETS]))
@@ -279,11 +282,9 @@ def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
     The other objects that it hits are written to columns with the same five numbers.
     """
     none = targets.none
-    items, cells = (
-        (targets.box, targets.offset, targets.masks, targets.occluder, none, none),
-        (targets.grid, none, none),
-    )
-    near, found = np.empty(len(targets.rank) + 1, np.int64), np.empty((cast.FOUND + 1, len(targets.rank) + 1), np.int64)
+    items = targets.box, targets.offset, targets.masks, targets.occluder, none, none
+    cells = targets.grid, none, none
+    near, found = np.empty(len(targets.rank) + 1, np.int64), np.empty((cast.COLUMNS, len(targets.rank) + 1), np.int64)
     wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
     origin_x, origin_y, first = (x + HALF) >> 8, (y + HALF) >> 8, (-1, 0, 0, 0, 0)
     count = follow(
@@ -291,11 +292,8 @@ def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
     )
     for i in range(count):
         at = near[i]
-        rank, column, row = (
-            targets.rank[found[cast.RANK, at]],
-            found[cast.X, at] + origin_x,
-            found[cast.Y, at] + origin_y,
-        )
+        rank = targets.rank[found[cast.RANK, at]]
+        column, row = found[cast.X, at] + origin_x, found[cast.Y, at] + origin_y
         if i == 0:
             first = rank, found[cast.COUNT, at], column, row, found[cast.ENTRY, at]
             continue

@@ -24,6 +24,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from .. import late
 from ..fire.hits import HitRow
+from ..fire.prefilter import filters_of
 from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
@@ -57,7 +58,8 @@ class OneRay(OneShot, RayHits):
         assert parts is not None  # it was prepared as one
         rays, ray = rays_of(parts, self.shots), parts[2]
         lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
-        found = raycast.hits_and_ends(stack, bounds, lines, ray.hits_most, self.shots.meets, self.shots.exclude)
+        filters = filters_of(stack, self.shots, rays.shot)
+        found = raycast.hits_and_ends(stack, bounds, lines, ray.hits_most, filters)
         return raycast.walk_of(rays, ray, stack, bounds, found)
 
     @cached_attribute
@@ -120,7 +122,7 @@ class ReadyRay(Ready[RayHits]):
                 """March, and cast what the march leaves undecided."""
                 return march(x, y, dx, dy) or cast(x, y, dx, dy)
 
-        elif chosen.way == "walk" and RAY_WAYS["cast"](ray, self.scene, self._view):
+        elif RAY_WAYS["cast"](ray, self.scene, self._view):
 
             def follow(*_: int) -> Followed | None:
                 """Leave rays to `fire` that are not cast at the scene as it is."""

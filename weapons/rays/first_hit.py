@@ -209,6 +209,7 @@ def marcher(scene: Scene, stack: Stack, view: View) -> Follow:
     ranks, occluder = stack.rank_by_code.data, stack.occluder.data
 
     def march(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray."""
         entry, cell, several = distance_field.one_taken(flat, shape, (x - SUB * left, y - SUB * top), (dx, dy))
         if entry == NOTHING:
             return NEVER, []

@@ -63,12 +63,12 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
     """
     if not radius and most == 1:
         return _first_follower(stack, bounds, view)
-    meets, exclude = np.array([view.meets]), np.array([view.exclude], np.int64)
+    filters = np.array([view.meets]), np.array([view.exclude], np.int64)
 
     def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
         """Follow one ray."""
         lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
-        hit, ends = hits_and_ends(stack, bounds, lines, most, meets, exclude)
+        hit, ends = hits_and_ends(stack, bounds, lines, most, filters)
         hit[3:5] += pixel(lines.start).T
         return int(ends[1, 0]), hit[1:].T.tolist()
 

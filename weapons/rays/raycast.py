@@ -26,7 +26,7 @@ from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
 from hitplanes.planes.scene.items import Stack, clipped
 
-from ..fire.prefilter import may_refuse
+from ..fire.prefilter import Filters, filters_of, refused_by
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon
 from .contacts import (
@@ -96,10 +96,9 @@ class Firsts(Columns):
 def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
     """Follow rays to their ends; None if they are too long or too wide for the kernel."""
     stack, plan = through.stack, through.plan
-    lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
-    whose = (shots.meets[rays.shot], shots.exclude[rays.shot]) if may_refuse(stack, shots) else ()
-    this = sys.modules[__name__]
-    found = kernels_of(this).hits_and_ends(stack, through.bounds, lines, ray.hits_most, *whose)
+    lines, filters = Lines(rays.start_256, rays.step_256, ray.radius_256), filters_of(stack, shots, rays.shot)
+    kernels = kernels_of(sys.modules[__name__])
+    found = kernels.hits_and_ends(stack, through.bounds, lines, ray.hits_most, filters)
     if found is None:
         return None
     plan.run("cast", "each ray to its end: boxes, filters and occluders, too", sum(part.nbytes for part in found))
@@ -126,12 +125,7 @@ def cast_to_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tu
 
 # house: hit rule of rays
 def hits_and_ends(
-    stack: Stack,
-    bounds: Box | None,
-    lines: Lines,
-    most: int | None,
-    meets: Ints | None = None,
-    exclude: Ints | None = None,
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None = None
 ) -> tuple[Ints, Ints]:
     """Follow rays to their ends, as `trace` does, and count the cells of what they hit.
 
@@ -139,7 +133,7 @@ def hits_and_ends(
     ----------
     lines : (R,) the rays, in the world
     most : number of objects that a ray may hit, or None
-    meets, exclude : (R,) filter of items that a ray meets, and (R, K) owners whose items are skipped; or None, both
+    filters : of each ray; None refuses nothing
 
     Returns
     -------
@@ -151,8 +145,8 @@ def hits_and_ends(
         step = max(1, min(step, BRUTE_PAIRS // max(len(stack), 1)))
     for begin in range(0, max(len(lines), 1), step):
         some = slice(begin, begin + step)
-        whose = (meets[some], exclude[some]) if meets is not None and exclude is not None else None
-        found.append(_hits_and_ends(stack, bounds, lines.take(some), most, whose))
+        own = filters and (filters[0][some], filters[1][some])
+        found.append(_hits_and_ends(stack, bounds, lines.take(some), most, own))
         found[-1][0][0] += begin
     if len(found) == 1:
         return found[0]
@@ -161,12 +155,12 @@ def hits_and_ends(
 
 
 def _hits_and_ends(
-    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, whose: tuple[Ints, Ints] | None
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None
 ) -> tuple[Ints, Ints]:
     """`hits_and_ends` of some rays."""
     origin = pixel(lines.start)
     own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
-    near = near_items(stack, bounds, lines, own, origin, whose)
+    near = near_items(stack, bounds, lines, own, origin, filters)
     firsts, ends = NO_FIRSTS, endless(len(lines))
     for some in _rounds(near, len(lines), most, stack):
         now = some[near.least[some] <= ends.time[near.ray[some]]]
@@ -186,14 +180,12 @@ def _hits_and_ends(
 
 
 def near_items(
-    stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, whose: tuple[Ints, Ints] | None
+    stack: Stack, bounds: Box | None, lines: Lines, own: Lines, origin: Ints, filters: Filters | None
 ) -> Crossed:
     """Accepted items whose boxes rays enter; `own` are the lines relative to their pixels of origin."""
     ray, rank = met_boxes(lines.box_xyxy, stack.box_xyxy)
-    if whose is not None:
-        meets, exclude = whose
-        accepted = (stack.categories[rank] & meets[ray]) != 0
-        accepted &= ~(stack.owner[rank][:, None] == exclude[ray]).any(axis=1)
+    if filters is not None:
+        accepted = ~refused_by(filters, stack, rank, ray)
         ray, rank = ray[accepted], rank[accepted]
     some = _crossing(lines, ray, rank, stack.box_xyxy)
     ray, rank = ray[some], rank[some]
