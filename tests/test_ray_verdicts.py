@@ -157,6 +157,8 @@ def battle(seed: int) -> tuple[Scene, Weapon, dict[str, Any]]:
             "accept": rng.choice([["a"], ["b"], ["a", "c"]]),
             "blocked_by": rng.choice([["a"], [], ["a", "b", "c"]]),
         }
+    if len(scene.ids()) and rng.random() < 0.4:
+        how["exclude"] = [rng.randrange(len(scene.ids())) for _ in range(20)]
     return scene, weapon, how
 
 
@@ -182,6 +184,19 @@ def test_verdicts_of_battles_are_those_of_the_cells(part: int, monkeypatch: pyte
         assert told(monkeypatch, hits) == listed(hits), (seed, weapon)
         seen += hits.verdicts.sum(axis=0)
     assert seen.all()
+
+
+@pytest.mark.parametrize("width", [0, 1])
+@pytest.mark.usefixtures("jit")
+def test_an_object_behind_the_wall_that_stops_a_ray_is_not_hit_in_the_last_cell(width: float) -> None:
+    """It lies on both sides of the edge of the wall, and was hit before it."""
+    scene = Scene((30, 9))
+    scene.add(np.ones((1, 10), np.bool_), (10, 4))
+    scene.add(np.ones((1, 5), np.bool_), (12, 4), role="occluder", layer=1)
+    (left, *_), (wall, *_) = scene.box(0), scene.box(1)
+    counts = fire(scene, Laser(25, width=width), (2, 4)).verdicts[0]
+    assert counts[Verdict.HIT] == wall - left > 0 and counts[Verdict.OCCLUDED] == 1
+    assert counts[Verdict.EMPTY] == left - 2 and counts[Verdict.BEYOND] == 27 - wall
 
 
 @pytest.mark.long
