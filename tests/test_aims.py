@@ -15,8 +15,8 @@ from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.tiles import big_pattern
 from hitplanes.planes.common.backend import COMPILED
 from hitplanes.planes.common.limits import REACH_MAX
-from hitplanes.planes.grid import rasterize
-from hitplanes.planes.grid.fixed_point import ONE, turned, unit
+from hitplanes.planes.grid import rasterize, turns
+from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
 
@@ -85,6 +85,40 @@ def test_masks_are_turned_by_their_runs_as_by_their_pixels(mask: list[str], pivo
         own = runs.shape == i
         parts = [(first[own], last[own]) for first, last in runs.parts]
         assert rasterize.RowRuns(runs.shape[own], runs.y[own], parts).spans() == weapon.spans(c, s)
+
+
+def each_run(runs: rasterize.RowRuns, count: int) -> list[list[tuple[int, int, int]]]:
+    """Runs of each shape as (y, first, last), united."""
+    return [list(zip(*(c.tolist() for c in (one.y, one.x_first, one.x_last)), strict=True)) for one in runs.each(count)]
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.text("#.", min_size=17, max_size=17), min_size=1, max_size=17),
+    st.tuples(st.integers(-9999, 9999), st.integers(-9999, 9999)),
+    st.lists(st.one_of(st.sampled_from(SPECIAL), st.floats(-360, 360)), min_size=1, max_size=5),
+)
+def test_compiled_turned_masks_are_those_of_numpy(mask: list[str], pivot: tuple[int, int], aims: list[float]) -> None:
+    pytest.importorskip("numba")
+    kernels = importlib.import_module(COMPILED[turns.__name__])
+    edges = turns.edges_of(np.array([[c == "#" for c in row] for row in [*mask, "#" * 17]]), pivot)
+    split = all_quarters(np.stack(unit(np.array(aims, float)), axis=1))
+    own, other = (each_run(one.turned_runs(edges, *split), len(aims)) for one in (turns, kernels))
+    assert own == other
+
+
+def test_rectangles_of_a_mask_are_runs_of_equal_columns_in_adjacent_rows() -> None:
+    mask = np.array([[c == "#" for c in row] for row in ("##.#", "##.#", ".#..", "....", "##..")])
+    edges = turns.edges_of(mask, (0, 0))
+    left, right, top, low = (edges.sides[:, : edges.begin[1]] + 128) // 256
+    assert sorted(zip(left, right, top, low, strict=True)) == [(0, 2, 0, 2), (0, 2, 4, 5), (1, 2, 2, 3), (3, 4, 0, 2)]
+
+
+def test_directions_are_split_together_as_one_by_one() -> None:
+    every = np.concatenate(
+        [directions(40), [[ONE, 0], [0, ONE], [-ONE, 0], [0, -ONE], [5, 5], [-5, 5], [5, -5], [-5, -5]]]
+    )
+    assert np.stack(all_quarters(every), axis=1).tolist() == [list(quarters(c, s)) for c, s in every.tolist()]
 
 
 def test_stencils_that_may_be_too_large_are_turned_one_by_one() -> None:

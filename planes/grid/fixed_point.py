@@ -136,6 +136,15 @@ def quarters(c: int, s: int) -> tuple[int, int, int]:
     return k, c, s
 
 
+def all_quarters(direction: Ints) -> tuple[Ints, Ints, Ints]:
+    """`quarters` of directions (n, 2)."""
+    (c, s), k = direction.T, np.zeros(len(direction), np.int64)
+    for _ in range(3):
+        more = (s < -c) | (s >= c)
+        k, c, s = k + more, np.where(more, s, c), np.where(more, -c, s)
+    return k, c, s
+
+
 FEW_ANGLES = 8
 """Most angles that are split one by one."""
 

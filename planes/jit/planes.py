@@ -1,7 +1,9 @@
-"""Compiled kernels of the label plane, of the distance field and the march by it, and of rays at pixels."""
+"""Compiled kernels of the label plane, the distance field and its march, of rays at pixels, and of turned masks."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -10,11 +12,14 @@ from numba import njit, types
 from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 from ..bits.label_plane import CELL_BITS, Front
 from ..common.checks import Bools, Ints, Labels
-from ..common.limits import HALF, SUB
-from ..grid.spans import Box
-from .bit_rows import BOXES, FLAGS, OUT, ROWS_OUT
+from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
+from ..grid.rasterize import WIDEST, RowRuns
+from ..grid.spans import Box, pieces
+from ..grid.turns import Edges
+from ..scene.variants import Grids, Turned
+from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
 from .cache import compiled
-from .scene import root_of
+from .scene import PELLETS, STEPS, at_least, at_most, layout, root_of
 
 BLOCK = 128
 """Rays that march together, so that reads overlap; their columns fit the fastest cache."""
@@ -349,3 +354,195 @@ def half_chord(radius, v, length2):
         return root_of(root * root + left)
     step = left // (2 * root)
     return root + step - (left - 2 * root * step - step * step < 0)
+
+
+MASKS = types.Array(types.boolean, 1, "C", readonly=True)
+
+
+@njit
+def _is_beside(flat, begin, wide, high, column, row, left, up):
+    """Whether any of the squares of a frame that meet at a border is set."""
+    for j in (row, row - 1) if up else (row, row):
+        for i in (column, column - 1) if left else (column, column):
+            if 0 <= j < high and 0 <= i < wide and flat[begin + j * wide + i]:
+                return True
+    return False
+
+
+@njit
+def _within(value, step, most, near, far):
+    """The part of near .. far - 1 in which 0 <= value + k * step <= most."""
+    if step == 0:
+        return (near, far) if 0 <= value <= most else (near, near)
+    first, last = -(value // step), (most - value) // step
+    if step < 0:
+        first, last = -((value - most) // step), -value // step
+    near = max(near, first)
+    return near, max(min(far, last + 1), near)
+
+
+@njit
+def _map(flat, frame, first, step, unit, size_wh, held):
+    """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels."""
+    (begin, wide, high), (unit_x, unit_y), width = frame, unit, size_wh[0]
+    (across_x, down_x), (across_y, down_y) = step[0], step[1]
+    along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
+    columns, rows, first_place, at = np.uint64(wide), np.uint64(high), np.uint64(begin), 0
+    left, top, right, low, area = width, size_wh[1], 0, 0, 0
+    for y in range(size_wh[1]):
+        begin_x, begin_y = first[0] + y * down_x, first[1] + y * down_y
+        near, far = _within(begin_x, across_x, wide * unit_x, 0, width)
+        near, far = _within(begin_y, across_y, high * unit_y, near, far)
+        held[at : at + width] = False
+        place_x, place_y = begin_x + near * across_x, begin_y + near * across_y
+        column, x_rest, row, y_rest = place_x // unit_x, place_x % unit_x, place_y // unit_y, place_y % unit_y
+        count = 0
+        for x in range(at + near, at + far):
+            j, i = np.uint64(row), np.uint64(column)
+            on = j < rows and i < columns and flat[first_place + j * columns + i]
+            if x_rest == 0 or y_rest == 0:
+                on = on or _is_beside(flat, begin, wide, high, column, row, x_rest == 0, y_rest == 0)
+            held[np.uint64(x)] = on
+            count += on
+            x_rest, y_rest = x_rest + over_x, y_rest + over_y
+            carried_x, carried_y = x_rest >= unit_x, y_rest >= unit_y  # without a branch
+            column, row = column + along_x + carried_x, row + along_y + carried_y
+            x_rest, y_rest = x_rest - (unit_x if carried_x else 0), y_rest - (unit_y if carried_y else 0)
+        if count:
+            area, top, low = area + count, min(top, y), y + 1
+            first_x, last_x = near, far - 1
+            while first_x < left and not held[at + first_x]:
+                first_x += 1
+            while last_x >= right and not held[at + last_x]:
+                last_x -= 1
+            left, right = min(left, first_x), max(right, last_x + 1)
+        at += width
+    return left, top, right, low, area
+
+
+@njit
+def _crop(held, width, left, top, wide, high, quarter, out):
+    """Write a part of a grid to `out`, turned by quarter turns."""
+    begin, down, right = 0, wide, 1
+    if quarter == 1:
+        begin, down, right = high - 1, -1, high
+    elif quarter == 2:
+        begin, down, right = high * wide - 1, -wide, -1
+    elif quarter == 3:
+        begin, down, right = (wide - 1) * high, 1, -high
+    for y in range(high):
+        source, place = (top + y) * width + left, begin + y * down
+        for x in range(wide):
+            out[place + x * right] = held[source + x]
+
+
+@compiled(types.Tuple((types.int64[:, ::1], types.boolean[::1]))(
+    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS, INTS
+))  # fmt: skip
+def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
+    boxes, room, most, used = np.empty((len(which), 6), np.int64), 0, 0, 0
+    for n in range(len(which)):
+        room, most = room + size_wh[n, 0] * size_wh[n, 1], max(most, size_wh[n, 0] * size_wh[n, 1])
+    out, held = np.empty(room, np.bool_), np.empty(most, np.bool_)
+    for n in range(len(which)):
+        left, top, right, low, area = _map(flat, frames[which[n]], first[n], step[n], unit[n], size_wh[n], held)
+        wide, high = max(right - left, 0), max(low - top, 0)
+        _crop(held, size_wh[n, 0], left, top, wide, high, quarter[n], out[used:])
+        boxes[n, 0], boxes[n, 1], boxes[n, 4], boxes[n, 5] = left, top, area, used
+        boxes[n, 2], boxes[n, 3] = (high, wide) if quarter[n] & 1 else (wide, high)
+        used += wide * high
+    return boxes, out
+
+
+def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
+    """See `scene.variants.turned_masks`; it divides once a row, not once a pixel."""
+    sizes = [mask.size for mask in masks]
+    shapes = [(begin, *mask.shape[::-1]) for begin, mask in zip(accumulate(sizes, initial=0), masks, strict=False)]
+    flat = np.concatenate([mask.reshape(-1) for mask in masks])
+    frames, made = np.array(shapes), []
+    for part in pieces(grids.size_wh.prod(axis=1), MAPPED_PIXELS):
+        _, size_wh, *places = (column[part] for column in grids)
+        boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh, quarters[part])
+        for left, top, wide, high, area, begin in boxes.tolist():
+            made.append(Turned(out[begin : begin + wide * high].reshape(high, wide), left, top, area))
+    return made
+
+
+PLACES = types.int64[:, :, ::1]
+
+
+@njit
+def _rows_of(sides, pivot_y, c, s):
+    """First and last row of pixels that a turned rectangle may hold."""
+    left, right, top, low = sides
+    first = (min(left * s, right * s) + top * c >> TRIG_BITS) + pivot_y
+    return first >> 8, (max(left * s, right * s) + low * c >> TRIG_BITS) + pivot_y >> 8
+
+
+@njit
+def _turned_rows(sides, pivot, c, s, row, first, last):
+    """Fill the first and last pixel that a turned rectangle holds in each row from `row` on; see `turned_runs`."""
+    (left, right, top, low), (x, y) = sides, pivot
+    first[:], last[:] = -WIDEST, WIDEST
+    down = SUB * row - y
+    at_least((left << TRIG_BITS) - down * s + x * c, -SUB * s, SUB * c, first)
+    at_most((right << TRIG_BITS) - down * s + x * c, -SUB * s, SUB * c, last)
+    above, below = down * c - (low << TRIG_BITS) + x * s, down * c - (top << TRIG_BITS) + x * s
+    if s >= 0:
+        at_least(above, SUB * c, SUB * max(s, 1), first)
+        at_most(below, SUB * c, SUB * max(s, 1), last)
+    else:
+        at_least(-below, -SUB * c, -SUB * s, first)
+        at_most(-above, -SUB * c, -SUB * s, last)
+
+
+@njit
+def _add(parts, used, row, first, last):
+    """Add a run to a row: to the run that was added last, if it touches that one."""
+    part = used[row] - 1
+    if part >= 0 and first <= parts[part, 1, row] + 1 and last >= parts[part, 0, row] - 1:
+        parts[part, 0, row], parts[part, 1, row] = min(parts[part, 0, row], first), max(parts[part, 1, row], last)
+    else:
+        parts[part + 1, 0, row], parts[part + 1, 1, row] = first, last
+        used[row] += 1
+
+
+@njit
+def _with_more(parts):
+    """Twice as many parts."""
+    more = np.empty((2 * len(parts), 2, parts.shape[2]), np.int64)
+    more[: len(parts)], more[len(parts) :, 0], more[len(parts) :, 1] = parts, WIDEST, -WIDEST
+    return more
+
+
+@compiled(types.Tuple((OUT, OUT, PLACES))(INTS, BOXES, BOXES, INTS, INTS, INTS))
+def _turned_runs(begin, sides, pivots, quarter, c, s):
+    count, most = len(quarter), 0
+    top, low = np.empty(count, np.int64), np.empty(count, np.int64)
+    for k in range(count):
+        turns, top[k], low[k] = quarter[k], LATE, -LATE
+        for r in range(begin[turns], begin[turns + 1]):
+            upper, lower = _rows_of(sides[r], pivots[turns, 1], c[k], s[k])
+            top[k], low[k], most = min(top[k], upper), max(low[k], lower), max(most, lower - upper + 1)
+    shape, y, start = layout(top, low)
+    parts, used = np.empty((2, 2, len(y)), np.int64), np.zeros(len(y), np.int64)
+    parts[:, 0], parts[:, 1] = WIDEST, -WIDEST
+    first, last = np.empty(most, np.int64), np.empty(most, np.int64)
+    for k in range(count):
+        turns = quarter[k]
+        for r in range(begin[turns], begin[turns + 1]):
+            upper, lower = _rows_of(sides[r], pivots[turns, 1], c[k], s[k])
+            high, at = lower - upper + 1, start[k] + upper - top[k]
+            _turned_rows(sides[r], pivots[turns], c[k], s[k], upper, first[:high], last[:high])
+            for i in range(high):
+                if first[i] <= last[i]:
+                    if used[at + i] == len(parts):
+                        parts = _with_more(parts)
+                    _add(parts, used, at + i, first[i], last[i])
+    return shape, y, parts
+
+
+def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
+    """See `scene.variants.turned_runs`."""
+    shape, y, parts = _turned_runs(edges.begin, np.ascontiguousarray(edges.sides.T), edges.pivots, quarter, c, s)
+    return RowRuns(shape, y, list(parts))

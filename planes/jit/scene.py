@@ -1,21 +1,17 @@
-"""Compiled kernels of fixed point, shapes and turned masks, and of the draws of pellets."""
+"""Compiled kernels of fixed point and shapes, and of the draws of pellets."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 from numba import njit, types
 
-from ..common.checks import Bools, Floats, Ints
-from ..common.limits import GOLDEN, HALF, MAPPED_PIXELS, POSITION_MAX, SUB, TRIG_BITS
+from ..common.checks import Floats, Ints
+from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import DOUBT, UNIT
 from ..grid.rasterize import DIAGONAL, WIDEST, RowRuns, sides_of
-from ..grid.spans import pieces
-from ..scene.variants import Grids, Turned
 from .bit_rows import INTS, OUT
 from .cache import compiled
 
@@ -98,118 +94,6 @@ STEPS = types.Array(types.int64, 3, "A", readonly=True)
 WHOLE = types.int64
 
 
-MASKS = types.Array(types.boolean, 1, "C", readonly=True)
-
-
-@njit
-def _is_beside(flat, begin, wide, high, column, row, left, up):
-    """Whether any of the squares of a frame that meet at a border is set."""
-    for j in (row, row - 1) if up else (row, row):
-        for i in (column, column - 1) if left else (column, column):
-            if 0 <= j < high and 0 <= i < wide and flat[begin + j * wide + i]:
-                return True
-    return False
-
-
-@njit
-def _within(value, step, most, near, far):
-    """The part of near .. far - 1 in which 0 <= value + k * step <= most."""
-    if step == 0:
-        return (near, far) if 0 <= value <= most else (near, near)
-    first, last = -(value // step), (most - value) // step
-    if step < 0:
-        first, last = -((value - most) // step), -value // step
-    near = max(near, first)
-    return near, max(min(far, last + 1), near)
-
-
-@njit
-def _map(flat, frame, first, step, unit, size_wh, held):
-    """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels."""
-    (begin, wide, high), (unit_x, unit_y), width = frame, unit, size_wh[0]
-    (across_x, down_x), (across_y, down_y) = step[0], step[1]
-    along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
-    columns, rows, first_place, at = np.uint64(wide), np.uint64(high), np.uint64(begin), 0
-    left, top, right, low, area = width, size_wh[1], 0, 0, 0
-    for y in range(size_wh[1]):
-        begin_x, begin_y = first[0] + y * down_x, first[1] + y * down_y
-        near, far = _within(begin_x, across_x, wide * unit_x, 0, width)
-        near, far = _within(begin_y, across_y, high * unit_y, near, far)
-        held[at : at + width] = False
-        place_x, place_y = begin_x + near * across_x, begin_y + near * across_y
-        column, x_rest, row, y_rest = place_x // unit_x, place_x % unit_x, place_y // unit_y, place_y % unit_y
-        count = 0
-        for x in range(at + near, at + far):
-            j, i = np.uint64(row), np.uint64(column)
-            on = j < rows and i < columns and flat[first_place + j * columns + i]
-            if x_rest == 0 or y_rest == 0:
-                on = on or _is_beside(flat, begin, wide, high, column, row, x_rest == 0, y_rest == 0)
-            held[np.uint64(x)] = on
-            count += on
-            x_rest, y_rest = x_rest + over_x, y_rest + over_y
-            carried_x, carried_y = x_rest >= unit_x, y_rest >= unit_y  # without a branch
-            column, row = column + along_x + carried_x, row + along_y + carried_y
-            x_rest, y_rest = x_rest - (unit_x if carried_x else 0), y_rest - (unit_y if carried_y else 0)
-        if count:
-            area, top, low = area + count, min(top, y), y + 1
-            first_x, last_x = near, far - 1
-            while first_x < left and not held[at + first_x]:
-                first_x += 1
-            while last_x >= right and not held[at + last_x]:
-                last_x -= 1
-            left, right = min(left, first_x), max(right, last_x + 1)
-        at += width
-    return left, top, right, low, area
-
-
-@njit
-def _crop(held, width, left, top, wide, high, quarter, out):
-    """Write a part of a grid to `out`, turned by quarter turns."""
-    begin, down, right = 0, wide, 1
-    if quarter == 1:
-        begin, down, right = high - 1, -1, high
-    elif quarter == 2:
-        begin, down, right = high * wide - 1, -wide, -1
-    elif quarter == 3:
-        begin, down, right = (wide - 1) * high, 1, -high
-    for y in range(high):
-        source, place = (top + y) * width + left, begin + y * down
-        for x in range(wide):
-            out[place + x * right] = held[source + x]
-
-
-@compiled(types.Tuple((types.int64[:, ::1], types.boolean[::1]))(
-    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS, INTS
-))  # fmt: skip
-def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
-    boxes, room, most, used = np.empty((len(which), 6), np.int64), 0, 0, 0
-    for n in range(len(which)):
-        room, most = room + size_wh[n, 0] * size_wh[n, 1], max(most, size_wh[n, 0] * size_wh[n, 1])
-    out, held = np.empty(room, np.bool_), np.empty(most, np.bool_)
-    for n in range(len(which)):
-        left, top, right, low, area = _map(flat, frames[which[n]], first[n], step[n], unit[n], size_wh[n], held)
-        wide, high = max(right - left, 0), max(low - top, 0)
-        _crop(held, size_wh[n, 0], left, top, wide, high, quarter[n], out[used:])
-        boxes[n, 0], boxes[n, 1], boxes[n, 4], boxes[n, 5] = left, top, area, used
-        boxes[n, 2], boxes[n, 3] = (high, wide) if quarter[n] & 1 else (wide, high)
-        used += wide * high
-    return boxes, out
-
-
-def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
-    """See `scene.variants.turned_masks`; it divides once a row, not once a pixel."""
-    sizes = [mask.size for mask in masks]
-    shapes = [(begin, *mask.shape[::-1]) for begin, mask in zip(accumulate(sizes, initial=0), masks, strict=False)]
-    flat = np.concatenate([mask.reshape(-1) for mask in masks])
-    frames, made = np.array(shapes), []
-    for part in pieces(grids.size_wh.prod(axis=1), MAPPED_PIXELS):
-        _, size_wh, *places = (column[part] for column in grids)
-        boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh, quarters[part])
-        for left, top, wide, high, area, begin in boxes.tolist():
-            made.append(Turned(out[begin : begin + wide * high].reshape(high, wide), left, top, area))
-    return made
-
-
 @njit
 def _lower(quotient, rest, more, over, per, out):
     """Lower out[k] to the whole part of a quotient, which grows by more + over / per from each to the next.
@@ -236,13 +120,13 @@ def _raise(quotient, rest, more, over, per, out):
 
 
 @njit
-def _at_most(value, step, per, last):
+def at_most(value, step, per, last):
     """Lower last[k] to the floor of (value + k * step) / per."""
     _lower(value // per, value % per, step // per, step % per, per, last)
 
 
 @njit
-def _at_least(value, step, per, first):
+def at_least(value, step, per, first):
     """Raise first[k] to the ceiling of (value + k * step) / per."""
     _raise(-value // per, -value % per, -step // per, -step % per, per, first)
 
@@ -264,7 +148,7 @@ def root_of(value):
 
 
 @njit
-def _layout(top, low):
+def layout(top, low):
     """Shape and row of all rows top .. low of shapes, and where those of each begin (n + 1,)."""
     begin = np.zeros(len(top) + 1, np.int64)
     for k in range(len(top)):
@@ -307,7 +191,7 @@ def _convex_polygons(points):
         top[k], low[k] = _ceil(points[k, :, 1].min(), SUB), points[k, :, 1].max() // SUB
     if not winding.all():
         return False, top, low, top, low
-    shape, y, begin = _layout(top, low)
+    shape, y, begin = layout(top, low)
     first, last = np.full(len(y), -WIDEST), np.full(len(y), WIDEST)
     for k in range(count):
         for i in range(corners):
@@ -320,9 +204,9 @@ def _convex_polygons(points):
                 continue
             across, at = x0 * dy - y0 * dx + SUB * dx * upper, begin[k] - top[k]
             if is_first:
-                _at_least(across, SUB * dx, SUB * dy, first[at + upper : at + lower + 1])
+                at_least(across, SUB * dx, SUB * dy, first[at + upper : at + lower + 1])
             else:
-                _at_most(across, SUB * dx, SUB * dy, last[at + upper : at + lower + 1])
+                at_most(across, SUB * dx, SUB * dy, last[at + upper : at + lower + 1])
     return True, shape, y, first, last
 
 
@@ -347,8 +231,8 @@ def _axis_rows(x0, y0, dx, dy, top, first, last):
     half, begin = cell >> 1, base + (SUB * upper - HALF) * slope
     ahead = SUB * slope
     first[:], last[:] = -WIDEST, WIDEST
-    _at_least(min(begin, begin + ahead) - half, ahead, cell, first)
-    _at_most(max(begin, begin + ahead) + half, ahead, cell, last)
+    at_least(min(begin, begin + ahead) - half, ahead, cell, first)
+    at_most(max(begin, begin + ahead) + half, ahead, cell, last)
     enter, leave = base + low_y * slope, base + high_y * slope  # its ends lie within the first and the last row
     if slope >= 0:
         first[0], last[-1] = _ceil(enter - half, cell), (leave + half) // cell
@@ -360,9 +244,9 @@ def _axis_rows(x0, y0, dx, dy, top, first, last):
 def _side(value, step, slope, first, last):
     """Keep of runs the centres with slope * x >= value + k * step in row k, x in 1/256 px."""
     if slope > 0:
-        _at_least(value, step, SUB * slope, first)
+        at_least(value, step, SUB * slope, first)
     elif slope < 0:
-        _at_most(-value, -step, -SUB * slope, last)
+        at_most(-value, -step, -SUB * slope, last)
     else:
         for k in range(len(first)):
             if value + k * step > 0:
@@ -405,7 +289,7 @@ def _beams(x, y, ends, radius, sides):
     top, low = np.empty(count, np.int64), np.empty(count, np.int64)
     for k in range(count):
         top[k], low[k] = _ceil(min(y, ends[k, 1]) - reach, SUB), (max(y, ends[k, 1]) + reach) // SUB
-    shape, row, begin = _layout(top, low)
+    shape, row, begin = layout(top, low)
     parts = np.empty((1 if radius >= DIAGONAL else 2, 2, len(row)), np.int64)
     for k in range(count):
         dx, dy = ends[k, 0] - x, ends[k, 1] - y
@@ -471,7 +355,7 @@ def _cones(reach, direction, c_half, s_half):
         most = UNIT if s >= c_half else max(max(one, other) >> TRIG_BITS, 0)
         top[k] = ((reach * least >> TRIG_BITS) - 1 - HALF) // SUB
         low[k] = _ceil((reach * most >> TRIG_BITS) + 2 + HALF, SUB)
-    shape, y, begin = _layout(top, low)
+    shape, y, begin = layout(top, low)
     wide = s_half != 0 or c_half < 0
     half = np.empty(reach // SUB + 1, np.int64)
     for row in range(len(half) if wide else 0):

@@ -33,9 +33,10 @@ from ..common.limits import (
     VARIANT_CACHE_BYTES,
 )
 from ..grid import rasterize
-from ..grid.fixed_point import over_one, pixel, quarter_turns, quarters, rounded_div, turned
-from ..grid.rasterize import WIDEST, RowRuns, ellipse, polygon
-from ..grid.spans import Spans, begins, each_pixel, merged_runs, ragged
+from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
+from ..grid.rasterize import ellipse, polygon
+from ..grid.spans import Spans
+from ..grid.turns import quarter_turned, rotated, turned_pivot
 from .sprite import (
     UIDS,
     Known,
@@ -208,7 +209,7 @@ def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> 
         grids = _grids_of([mask], [(x, y)], [form])
         image = _mapped(grids, [mask], np.zeros(1, np.int64), [image])[0]
         x, y = grids.pivot_256[0].tolist()
-    image, x, y = _quarter_turned(image, x, y, form.quarter)
+    image, x, y = quarter_turned(image, x, y, form.quarter)
     if form.frame in sprite.carvings:
         image = image.copy()
         image[~_left(sprite, form, image.shape[1::-1], (x, y), masked=False), 3] = 0
@@ -223,7 +224,7 @@ def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant
             shapes[row] = next(iter(sprite.source or {}), "sprite"), sprite.outline, form
         elif form.plain:
             mask, pivot = _flipped_frame(sprite, form)
-            mask, x, y = _quarter_turned(mask, *pivot, form.quarter)
+            mask, x, y = quarter_turned(mask, *pivot, form.quarter)
             made[row] = cropped(form, mask, (x, y))
         else:
             mapped[row] = sprite, form
@@ -253,7 +254,7 @@ def _left(
         left &= sprite.frames[form.frame].mask.repeat(carving.per_px, axis=0).repeat(carving.per_px, axis=1)
     left, (x, y) = _flipped(left, form.flip), _flipped_pivot(size, pivot, form.flip)
     if form.plain and carving.per_px == 1:
-        turned_left, x, y = _quarter_turned(left, x, y, form.quarter)
+        turned_left, x, y = quarter_turned(left, x, y, form.quarter)
         row, column = (y - pivot_256[1]) // SUB, (x - pivot_256[0]) // SUB
         return turned_left[row : row + size_wh[1], column : column + size_wh[0]]
     c, s = form.direction
@@ -289,7 +290,7 @@ def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> lis
     made = []
     for form, (x, y), (mask, left, top, area) in zip(forms, grids.pivot_256.tolist(), found, strict=True):
         size_wh = mask.shape[:: 1 if form.quarter & 1 else -1]
-        pivot = _turned_pivot(x - SUB * left, y - SUB * top, size_wh, form.quarter) if area else (0, 0)
+        pivot = turned_pivot(x - SUB * left, y - SUB * top, size_wh, form.quarter) if area else (0, 0)
         made.append(Variant(form, frozen(mask), *pivot, area))
     return made
 
@@ -321,7 +322,7 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: In
         told = (column.tolist() for column in (sides, quarters[batch], areas))
         for row, mask, side, quarter, area in zip(batch, held, *told, strict=True):
             left, top, right, low = side if area else (0, 0, width, height)
-            made[row] = Turned(_rotated(mask[top : height - low, left : width - right], quarter), left, top, area)
+            made[row] = Turned(rotated(mask[top : height - low, left : width - right], quarter), left, top, area)
     return [made[row] for row in range(len(which))]
 
 
@@ -452,86 +453,6 @@ def _at_borders(planes: Bools, which: Ints, column: Ints, row: Ints, unit: tuple
         found[inside] = cell
         held[inside] = planes.reshape(-1).take(cell)
     return np.asarray(found)
-
-
-def turned_runs(mask: Bools, pivot_256: tuple[int, int], direction: Ints) -> RowRuns:
-    """Runs of a mask that is turned to directions (n, 2), as `variants_of` turns it, from the pixel of its pivot.
-
-    A pixel is set if its centre, turned back, lies in the closed rectangle of a run of the mask: between its ends,
-    `left <= dx c + dy s <= right`, and between its sides, `top <= dy c - dx s <= low`.
-    """
-    quarter, c, s = np.array([quarters(*one) for one in direction.tolist()], np.int64).T
-    sources = [_quarter_turned(mask, *pivot_256, turns) for turns in range(4)]
-    pivots = np.array([pivot for _, *pivot in sources], np.int64)
-    spans = [Spans.from_mask(np.asarray(source)) for source, *_ in sources]
-    counts = np.array([len(one) for one in spans])
-    edges = np.concatenate([np.stack([one.x_first, one.x_last + 1, one.y, one.y + 1]) for one in spans], axis=1)
-    aim, place = ragged(counts[quarter])
-    c, s, pivot = c[aim], s[aim], pivots[quarter][aim]
-    left, right, top, low = (
-        SUB * edges[:, place + (np.cumsum(counts) - counts)[quarter][aim]] - HALF - pivot.T.repeat(2, 0)
-    )
-    ends = left * s, right * s
-    first_row = (np.minimum(*ends) + top * c >> TRIG_BITS) + pivot[:, 1] >> 8
-    last_row = (np.maximum(*ends) + low * c >> TRIG_BITS) + pivot[:, 1] >> 8
-    run, row = each_pixel(first_row, last_row)
-    c, s, (x, y) = c[run], s[run], pivot[run].T
-    down = SUB * row - y
-    first, last = _between(c, (left[run] << TRIG_BITS) - down * s + x * c, (right[run] << TRIG_BITS) - down * s + x * c)
-    sides = (down * c - (low[run] << TRIG_BITS) + x * s, down * c - (top[run] << TRIG_BITS) + x * s)
-    from_, to = _between(s, *sides)
-    corner = pixel(-pivots)[quarter][aim[run]]
-    return _in_rows(
-        aim[run], row + corner[:, 1], np.maximum(first, from_) + corner[:, 0], np.minimum(last, to) + corner[:, 0]
-    )
-
-
-def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """First and last whole number k with low <= k * 256 * per_256 <= high.
-
-    If that is 0 the mask is not turned, and no bound is nearer to 0 than 2**37: they hold all k of a mask, or none.
-    """
-    per, back = SUB * np.maximum(np.abs(per_256), 1), per_256 < 0
-    return -(-np.where(back, -high, low) // per), np.where(back, -low, high) // per
-
-
-def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
-    """Unite the runs of each row of each shape, which has all rows from its first to its last."""
-    some = np.flatnonzero(first <= last)
-    shape, y, first, last = shape[some], y[some], first[some], last[some]
-    top = int(y.min(initial=0))
-    line = shape * (int(y.max(initial=0)) - top + 1) + (y - top)
-    which, first, last = merged_runs(line, first, last)
-    shape, y, line = shape[which], y[which], line[which]
-    begin = np.flatnonzero(begins(shape))
-    end = np.append(begin[1:], len(y))[: len(begin)]
-    own, row = each_pixel(y[begin], y[end - 1])
-    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(end - begin)
-    place = np.arange(len(line)) - np.searchsorted(line, line)
-    parts = [(np.full(len(row), WIDEST), np.full(len(row), -WIDEST)) for _ in range(int(place.max(initial=0)) + 1)]
-    for number, ends in enumerate(parts):
-        here = place == number
-        ends[0][at[here]], ends[1][at[here]] = first[here], last[here]
-    return RowRuns(shape[begin][own], row, parts)
-
-
-def _turned_pivot(x: int, y: int, size_wh: tuple[int, ...], turns: int) -> tuple[int, int]:
-    """Pivot (x, y) of a grid, turned by quarter turns; its size is that before them."""
-    for _ in range(turns):
-        x, y, size_wh = SUB * (size_wh[1] - 1) - y, x, size_wh[::-1]
-    return x, y
-
-
-def _rotated(array: npt.NDArray[Any], turns: int) -> npt.NDArray[Any]:
-    """A view of an array (h, w, ...), turned by quarter turns; `numpy.rot90` takes five times as long."""
-    for _ in range(turns):
-        array = array.swapaxes(0, 1)[:, ::-1]
-    return array
-
-
-def _quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple[npt.NDArray[Any], int, int]:
-    """An array (h, w, ...) and its pivot (x, y), turned by quarter turns."""
-    return _rotated(array, turns), *_turned_pivot(x, y, array.shape[1::-1], turns)
 
 
 def _flipped(array: npt.NDArray[Any], flip: str) -> npt.NDArray[Any]:

@@ -15,13 +15,14 @@ from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
-from hitplanes.planes.grid import rasterize
-from hitplanes.planes.grid.fixed_point import ONE, pixel, quarters, snap, turned, unit
+from hitplanes.planes.grid import rasterize, turns
+from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit
 from hitplanes.planes.grid.rasterize import RowRuns, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.grid.turns import Edges, edges_of
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
-from hitplanes.planes.scene.variants import Transform, turned_runs, variant_of
+from hitplanes.planes.scene.variants import Transform, variant_of
 
 from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
 from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
@@ -53,7 +54,6 @@ class AreaWeapon(Weapon):
         "inside": Word(INSIDE),
     }
     directed: ClassVar[bool] = False
-    compiled: ClassVar[bool] = True  # whether `runs` has a compiled form, which pays for a single direction, too
     pierce: bool = field(default=False, kw_only=True)
     falloff: str | None = field(default=None, kw_only=True)
     line_of_sight: str | None = field(default=None, kw_only=True)
@@ -276,7 +276,6 @@ class Stencil(AreaWeapon):
 
     kind: ClassVar[str] = "stencil"
     directed: ClassVar[bool] = True
-    compiled: ClassVar[bool] = False
     table: ClassVar[dict[str, Value]] = AreaWeapon.table | {
         "mask": Mask(),
         "pivot_xy": Optional(Numbers((2,), MASK_SIDE_MAX)),
@@ -305,10 +304,18 @@ class Stencil(AreaWeapon):
         x, y = pixel(np.array([-variant.pivot_x, -variant.pivot_y])).tolist()
         return Spans.from_mask(variant.mask, (x, y))
 
+    @cached_property
+    def _edges(self) -> Edges:
+        frame = self._sprite.frames[0]
+        return edges_of(frame.mask, frame_pivot(self._sprite, frame))
+
     def runs(self, direction: Ints) -> RowRuns | None:
         """The turned masks, along directions (n, 2); None if they may be too large."""
-        side, frame = 2 * -(-self.reach_256 // SUB) + 3, self._sprite.frames[0]
-        return turned_runs(frame.mask, frame_pivot(self._sprite, frame), direction) if fits(side, side) else None
+        side = 2 * -(-self.reach_256 // SUB) + 3
+        if not fits(side, side):
+            return None
+        runs: RowRuns = kernels_of(turns).turned_runs(self._edges, *all_quarters(direction))
+        return runs
 
 
 Pellet = TypeVar("Pellet", bound=AreaWeapon | RayWeapon, covariant=True)
@@ -464,7 +471,7 @@ def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
     Without compiled kernels a few are made one by one, because that is faster, and other calls may need some again.
     """
     far = weapon.falloff is not None and weapon.reach_256 > SUB * FADING_MOST
-    few = len(direction) <= FEW_AIMS and not (jit_is_on() and weapon.compiled)
+    few = len(direction) <= FEW_AIMS and not jit_is_on()
     if few or type(weapon).runs is AreaWeapon.runs or far:
         return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
 
