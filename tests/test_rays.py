@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import oracle_rays
 import pytest
-from hypothesis import given, note, settings
+from examples import examples
+from hypothesis import given, note
 from hypothesis import strategies as st
 from oracle_rays import Item, StartsInside, Walk, mask_normal
 from ray_battles import (
@@ -178,7 +179,7 @@ def check(battle: Battle, samples: bool = True) -> list[list[tuple[Ray, Walk]]]:
     return walks
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80, deadline=None)
 @given(worlds)
 def test_random_worlds(rng: random.Random) -> None:
     battle = some_battle(rng)
@@ -263,7 +264,7 @@ def harmless(battle: Battle) -> Battle:
     return battle
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_no_prefilter_changes_a_row(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -275,7 +276,7 @@ def test_no_prefilter_changes_a_row(rng: random.Random) -> None:
     same(first, battle.fired(battle.scene(), prefilter=prefilter, broadphase=broadphase))
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_batch_is_its_shots_one_by_one(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -292,7 +293,7 @@ def test_a_batch_is_its_shots_one_by_one(rng: random.Random) -> None:
         assert verdicts[which] == alone[3][0]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.integers(1, 60), st.integers(1, 60))
 def test_the_size_of_parts_changes_nothing(rng: random.Random, cells_at_once: int, pairs_at_once: int) -> None:
     battle = harmless(some_battle(rng))
@@ -329,7 +330,7 @@ def test_many_rays_through_a_crowd_need_little_memory(weapon: Weapon, shots: int
         tracemalloc.stop()
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from([-FAR, -1, 0, 7, FAR]), st.sampled_from([-FAR, 3, FAR]))
 def test_a_world_elsewhere_is_the_same_world(rng: random.Random, dx: int, dy: int) -> None:
     """Everything but the floats of points is the same to the last bit."""
@@ -358,7 +359,7 @@ def cells_between(a: Place, b: Place, width: float = 0) -> list[Pixel]:
 WIDTHS = [0, 1 / 128, 0.5, 1, 1.5, 2, 3.25, 6]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(WIDTHS))
 def test_a_ray_and_the_way_back_meet_the_same_cells(rng: random.Random, width: float) -> None:
     a = some_place(rng)
@@ -367,7 +368,7 @@ def test_a_ray_and_the_way_back_meet_the_same_cells(rng: random.Random, width: f
     assert set(there) == set(back) and len(set(there)) == len(there) == len(back)
 
 
-@settings(max_examples=27, deadline=None)
+@examples(27, deadline=None)
 @given(worlds)
 def test_a_wider_ray_covers_a_narrower_one(rng: random.Random) -> None:
     a = some_place(rng)
@@ -396,7 +397,7 @@ def turned_world(battle: Battle, turn: Callable[[Any, Any], Any]) -> Battle:
     return replace(battle, bodies=bodies, shots=shots, bounds=bounds)
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(sorted(TURNS)))
 def test_a_mirrored_or_turned_world_is_hit_alike(rng: random.Random, name: str) -> None:
     """Where no limit and no wall choose among cells that are entered at once, all but their order is the same."""
@@ -422,7 +423,7 @@ def test_a_mirrored_or_turned_world_is_hit_alike(rng: random.Random, name: str) 
         assert {TURNS[name](*cell) for cell in xy} == {tuple(c) for c in there.samples_at(which).xy.tolist()}
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(sorted(TURNS)))
 def test_walls_stop_alike_in_a_mirrored_or_turned_world(rng: random.Random, name: str) -> None:
     """The place of the stop, and all that was entered before it."""
@@ -439,7 +440,7 @@ def test_walls_stop_alike_in_a_mirrored_or_turned_world(rng: random.Random, name
     assert answer(battle.fired()) == answer(turned_world(battle, TURNS[name]).fired())
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_rows_and_passes_have_a_total_order(rng: random.Random) -> None:
     hits = harmless(some_battle(rng)).fired()
@@ -471,14 +472,14 @@ def test_cells_past_the_stop_keep_the_order_of_the_walk() -> None:
             assert [(x, y) for x, y in hits.samples_at(which).xy.tolist()] == order, f"{seed=}"
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_pass_tells_its_row(rng: random.Random) -> None:
     hits = harmless(some_battle(rng)).fired()
     assert hits.passes.row.tolist() == [row["row"] for row in told(hits)[1]]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_shotgun_of_rays_is_its_pellets_one_by_one(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -507,7 +508,7 @@ def test_a_shotgun_of_rays_is_its_pellets_one_by_one(rng: random.Random) -> None
         assert {row[2] for row in rows if row[0] == which} == {part[2] for p in pellets for part in p[0]}
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_budget_is_never_overspent_and_more_of_it_reaches_as_far(rng: random.Random) -> None:
     """What is spent, by the materials of the passes, is the budget where that ends a ray, and else no more."""

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, note, settings
+from examples import examples
+from hypothesis import HealthCheck, given, note
 from hypothesis import strategies as st
 from ray_battles import some_battle
 from some_of import some_of
@@ -62,7 +63,7 @@ def both(
     return ready.fire(**shot), truth
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
     """Any weapon of rays, half of them of one that ends at its first hit, while the scene changes between the shots."""

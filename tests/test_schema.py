@@ -13,7 +13,8 @@ import jsonschema
 import numpy as np
 import pytest
 from bench.schemas import COMMAND, FOLDER, schemas, write_schemas
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes import Disc, InputError, Rounds, Spread, arsenal_of, fire, load_scene, report_of, weapon_from_json
@@ -107,7 +108,7 @@ def schema_of(part: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("part", PARTS)
-@settings(max_examples=67, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(67, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(value=values)
 def test_a_part_checks_what_its_schema_tells(part: str, value: Any) -> None:
     schema = schema_of(part)

@@ -18,7 +18,8 @@ import numpy as np
 import oracle_raster
 import oracle_sprite as oracle
 import pytest
-from hypothesis import HealthCheck, assume, example, given, settings
+from examples import examples
+from hypothesis import HealthCheck, assume, example, given
 from hypothesis import strategies as st
 
 from hitplanes.planes.common.backend import LruCache, kernels_of
@@ -33,8 +34,8 @@ from hitplanes.planes.volumes.fit import KINDS, Kind, bounding
 
 ROOT = Path(__file__).parent.parent
 
-AGAINST = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-LAWS = settings(max_examples=54, deadline=None)
+AGAINST = examples(80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+LAWS = examples(54, deadline=None)
 
 FULL = 1 << 16
 FLIPS = ("none", "x", "y", "xy")
@@ -827,7 +828,7 @@ SHAPES: list[Callable[[], Sprite]] = [
 
 
 @given(st.randoms(use_true_random=False), st.integers(2, 12))
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @pytest.mark.usefixtures("jit")
 def test_shapes_made_together_are_those_of_each_alone(rng: random.Random, count: int) -> None:
     makers = [rng.choice(SHAPES) for _ in range(count)]

@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from some_of import some_of
 
@@ -93,7 +94,7 @@ unusual = st.one_of(
 )
 
 
-@settings(max_examples=17, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(17, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(shots=st.lists(st.one_of(aimed, aimed, aimed, aimed, unusual), max_size=40), chunk=st.sampled_from([1, 7, 1024]))
 def test_a_line_answers_what_its_shot_answers_alone(shots: list[dict[str, Any]], chunk: int, tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
