@@ -20,4 +20,4 @@ def in_turn(ones: Iterable[Any], others: Collection[Any]) -> list[Any]:
 
 
 def _long(case: Any) -> Any:
-    return pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
+    return pytest.param(*(case if type(case) is tuple else (case,)), marks=pytest.mark.long)

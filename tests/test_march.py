@@ -14,6 +14,7 @@ from examples import examples
 from hypothesis import HealthCheck, example, given, note
 from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Shot, some_battle, some_place, some_target
+from some_of import in_turn
 from test_rays import check_columns
 
 from hitplanes import (
@@ -211,8 +212,7 @@ CORNERS: dict[str, tuple[list[Body], int]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("turn", range(4))
-@pytest.mark.parametrize("name", CORNERS)
+@pytest.mark.parametrize(("name", "turn"), in_turn(CORNERS, range(4)))
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, 0.5), (-3.0, -3.0)])
 def test_what_comes_first_at_a_corner(
     kernels: ModuleType, name: str, turn: int, start: tuple[float, float], monkeypatch: pytest.MonkeyPatch

@@ -5,6 +5,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from examples import examples
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from some_of import some_of
 
 from hitplanes.planes.grid import rasterize
 from hitplanes.planes.grid.spans import Spans
@@ -339,8 +341,7 @@ def test_a_flat_ellipse_all_but_along_an_axis_has_its_middle_alone(radii: tuple[
         assert pixel_set(rasterize.ellipse(*radii, c, s)) == {(0, 0)}
 
 
-@pytest.mark.parametrize("linear", MAPS)
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(("family", "linear"), some_of(product(FAMILIES, MAPS)))
 def test_mirrors_and_quarter_turns(family: str, linear: str) -> None:
     shape, f = FAMILIES[family], MAPS[linear]
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from importlib.util import find_spec
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from ray_battles import (
     some_target,
     stop_of,
 )
+from some_of import in_turn, some_of
 
 from hitplanes import Hits, InputError, Laser, Scene, Sprite, Sweep, Verdict, Weapon, fire, use_jit
 from hitplanes.planes.grid import fixed_point, rasterize
@@ -636,7 +637,9 @@ def far_battle(reach: int, slope: float, width: float, name: str) -> Battle:
     return turned_world(battle, TURNS[name])
 
 
-@pytest.mark.parametrize(("reach", "name"), [*((150, name) for name in TURNS), (2000, "half"), (2000, "a quarter")])
+@pytest.mark.parametrize(
+    ("reach", "name"), some_of([*((150, name) for name in TURNS), (2000, "half"), (2000, "a quarter")], 2)
+)
 @pytest.mark.parametrize("width", [0, pytest.param(2, marks=pytest.mark.long), 6.5])
 def test_long_rays(reach: int, width: float, name: str) -> None:
     """As far as products of lengths are large, and the middle of a thick ray does not tell all."""
@@ -650,8 +653,7 @@ def test_the_longest_rays(reach: int, width: float) -> None:
     check(far_battle(reach, 0.75, width, "left to right"))
 
 
-@pytest.mark.parametrize("width", [1 / 128, 0.25, 0.5, 1, 1.25, 1.75])
-@pytest.mark.parametrize("reach", [20, 150, 2000])
+@pytest.mark.parametrize(("width", "reach"), in_turn([1 / 128, 0.25, 0.5, 1, 1.25, 1.75], [20, 150, 2000]))
 def test_narrow_rays(reach: int, width: float) -> None:
     """Thick, but less than a pixel's diagonal: the square of a cell may last longer than its centre."""
     for slope, name in ((0.25, "half"), (0.25 + 1 / 256, "a quarter"), (1.5, "about the diagonal"), (-2, "half")):
@@ -740,16 +742,14 @@ PICTURES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", PICTURES)
-@pytest.mark.parametrize("bounds", [None, (0, 0, 9, 9)])
+@pytest.mark.parametrize(("name", "bounds"), in_turn(PICTURES, [None, (0, 0, 9, 9)]))
 def test_pictures(name: str, bounds: tuple[int, int, int, int] | None) -> None:
     gun, shot, bodies = PICTURES[name]
     check(Battle(gun, [shot], bodies, bounds))
 
 
-@pytest.mark.parametrize("times", [1, 7, 40])
+@pytest.mark.parametrize(("times", "short"), some_of(product([1, 7, 40], [-1, 0, 1]), 2))
 @pytest.mark.parametrize("cost", [1, 7])
-@pytest.mark.parametrize("short", [-1, 0, 1])
 def test_a_slanted_budget_is_compared_exactly(times: int, cost: int, short: int) -> None:
     """5 px through 3 columns, 3 : 4 down: only 1/256 px more than enough lets the ray meet the second board."""
     boards = [bar(2, 4, -1, 20, cost=cost), bar(7, 9, -1, 20)]

@@ -265,7 +265,7 @@ def test_directions_are_those_of_unit(degrees: float) -> None:
 def test_threads_fire_one_ready_weapon(kernels: ModuleType, weapon: Weapon) -> None:
     scene, rng = crowd(9), np.random.default_rng(9)
     ready = prepare(scene, weapon)
-    shots = [(tuple(at), aim) for at, aim in zip(rng.uniform(0, 160, (400, 2)).tolist(), range(400), strict=True)]
+    shots = [(tuple(at), aim) for at, aim in zip(rng.uniform(0, 160, (150, 2)).tolist(), range(0, 450, 3), strict=True)]
     truths = [fire(scene, weapon, at, aim=aim, strategy="walk") for at, aim in shots]
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda one: ready.fire(one[0], aim=one[1]), shots))
