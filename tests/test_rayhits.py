@@ -17,6 +17,7 @@ from examples import examples
 from hypothesis import given, note
 from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Pixel, Shot, some_battle, some_body, some_place, some_target
+from some_of import some_of
 from test_rays import bar, harmless, same
 
 from hitplanes import (
@@ -551,13 +552,12 @@ def test_rays_of_every_weapon_through_nothing() -> None:
             assert none.to_dict()["stops"] == [] and none.by_owner() == []
 
 
-@pytest.mark.parametrize("at", [(FAR, -FAR), (-FAR, FAR), (2**40, -(2**40))])
-def test_a_battle_far_away(at: Pixel) -> None:
+@pytest.mark.parametrize(("x", "y"), some_of([(FAR, -FAR), (-FAR, FAR), (2**40, -(2**40))], 2))
+def test_a_battle_far_away(x: int, y: int) -> None:
     """All that is derived, too, is what it is at home; points to what a float64 holds there."""
     for seed in range(20):
         battle = many(random.Random(seed), 3)
-        x, y = (v - 40 * (v > 0) + 40 * (v < 0) for v in at)
-        here, there = fired(battle), fired(battle.moved(x, y))
+        here, there = fired(battle), fired(battle.moved(*(v - 40 * (v > 0) + 40 * (v < 0) for v in (x, y))))
         for which in range(3):
             assert here.why_not(which) == there.why_not(which)
             assert here.verdict_counts(which) == there.verdict_counts(which)

@@ -372,9 +372,10 @@ def recorded(every: int) -> History:
     return history
 
 
-def test_the_rate_at_which_it_is_recorded_changes_no_row() -> None:
+@pytest.mark.parametrize("rates", [(3, 12), pytest.param((2, 3, 6, 12), marks=pytest.mark.long)], ids=str)
+def test_the_rate_at_which_it_is_recorded_changes_no_row(rates: tuple[int, ...]) -> None:
     dense = recorded(1)
-    for every in (2, 3, 6, 12):
+    for every in rates:
         sparse = recorded(every)
         ticks = [step for step in range(25) if step % every == 0]
         assert sparse.ticks == ticks
