@@ -6,12 +6,35 @@ from collections.abc import Iterator
 from functools import cache
 
 import pytest
+from examples import ALL, SOME
+from hypothesis import is_hypothesis_test, settings
 
 from hitplanes import use_jit, warm_up
 from hitplanes.planes.common import backend, costs
 
 if os.name == "nt":
     collect_ignore = ["test_bad_files.py", "test_record.py", "test_stream.py"]  # they set limits, which Windows lacks
+
+
+settings.register_profile("all", max_examples=ALL)
+settings.register_profile("some", max_examples=SOME)
+
+
+def whole(config: pytest.Config) -> bool:
+    """Whether long tests are asked for, and so every example of a property test."""
+    return config.option.markexpr != "not long"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("all" if whole(config) else "some")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Property tests belong to the long run, too, which draws all their examples."""
+    for item in items:
+        if whole(config) and is_hypothesis_test(getattr(item, "obj", None)):
+            item.add_marker(pytest.mark.long)
 
 
 class HangError(BaseException):

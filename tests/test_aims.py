@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from some_of import in_turn
 
 from hitplanes import Beam, Box, Cone, Disc, Polygon, Rounds, Scene, Spread, Stencil, Weapon, fire
 from hitplanes.planes.bits import bit_rows
@@ -292,8 +293,7 @@ MORE: dict[str, Weapon] = {
 }
 
 
-@pytest.mark.parametrize("corner", [(0, 0), (-(10**9), 10**9)])
-@pytest.mark.parametrize("name", [*WEAPONS, *MORE])
+@pytest.mark.parametrize(("name", "corner"), in_turn([*WEAPONS, *MORE], [(0, 0), (-(10**9), 10**9)]))
 def test_shots_at_many_aims_are_those_of_each_alone(name: str, corner: tuple[int, int], jit: bool) -> None:
     weapon, scene, rng = (WEAPONS | MORE)[name], crowd(corner), np.random.default_rng(9)
     at = np.array(corner) + rng.integers(0, 500, (40, 2))

@@ -17,7 +17,8 @@ from weakref import ref
 import numpy as np
 import oracle_raster
 import pytest
-from hypothesis import HealthCheck, assume, example, given, settings
+from examples import examples
+from hypothesis import HealthCheck, assume, example, given
 from hypothesis import strategies as st
 from some_of import some_of
 
@@ -130,7 +131,7 @@ masks = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
     )
 )
 pivots = st.none() | st.tuples(*2 * [st.integers(-4, 9).map(lambda n: n / 2)])
-TURNS = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+TURNS = examples(150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def fired_pixels(stencil: Stencil, **aimed: Any) -> set[tuple[int, int]]:

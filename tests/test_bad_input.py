@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import (  # fmt: skip
@@ -816,7 +817,7 @@ def test_other_calls_with_what_they_do_not_take() -> None:
     check(lambda: arsenal_of(scene), "^weapons: expected an object, got ")
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30, deadline=None)
 @given(st.text("ab/\n\t\x1b\x7f\x9b\u2028\u202e\u2066\u061c\u200f\ud800", min_size=1))
 def test_an_error_can_be_printed_whatever_it_names(text: str) -> None:
     calls: list[Callable[[], object]] = [

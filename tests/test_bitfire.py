@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
+from some_of import some_of
 from test_fire import Placements, Shot, expected, told
 
 from hitplanes import (
@@ -185,7 +187,7 @@ def test_the_oracle_says_the_same(kernels: str) -> None:
     assert rows > 40
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", some_of(range(2)))
 def test_changes_between_shots_are_seen(kernels: str, seed: int) -> None:
     """No visible set, cell list, tile or plane is older than the scene."""
     rng = np.random.default_rng([seed, 11])
@@ -334,9 +336,9 @@ def test_large_discs_hit_the_nearest_pixel_of_what_is_far(radius: int) -> None:
     assert len(hits) > 1000 and hits == by_runs(scene, Disc(radius), at)
 
 
-@pytest.mark.parametrize("pierce", [False, True])
-@pytest.mark.parametrize("strategy", ["direct", "built"])
-@pytest.mark.parametrize("name", ["disc", "spread", "ready"])
+@pytest.mark.parametrize(
+    ("name", "strategy", "pierce"), some_of(product(["disc", "spread", "ready"], ["direct", "built"], [False, True]), 5)
+)
 def test_a_shot_that_hits_hundreds_tells_them_in_order(name: str, strategy: str, pierce: bool, jit: bool) -> None:
     """Objects of one pixel, some on one another: the nearest first, by (y, x), front to back."""
     rng = np.random.default_rng(1)

@@ -10,6 +10,7 @@ from typing import Any
 import hypothesis.strategies as st
 import numpy as np
 import pytest
+from examples import examples
 from hypothesis import given, settings
 
 from hitplanes import Disc, Scene, Sprite, fire, use_jit
@@ -154,7 +155,7 @@ class Case:
         return sorted(rows, key=lambda row: (row[3], row[5], row[4], row[1]))
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120, deadline=None)
 @given(SEEDS, st.sampled_from([64, 200, 2**15]))
 def test_what_patterns_and_tiles_share(seed: int, at_once: int) -> None:
     """Of given pairs, which may not meet."""
@@ -171,7 +172,7 @@ def columns_of(found: front_to_back.RoundHits, weighted: bool) -> list[tuple[int
     return list(zip(*(column.tolist() for column in found if column is not None), strict=True))
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80, deadline=None)
 @given(SEEDS, st.sampled_from([1, 64]), st.sampled_from([5, 2**16]))
 @pytest.mark.parametrize("name", ["hitplanes.planes.bits.front_to_back", "hitplanes.planes.jit.areas"])
 def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: int, at_once: int) -> None:
@@ -201,7 +202,7 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
     assert columns_of(found, case.weighted) == told
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 @given(SEEDS, st.sampled_from([64, 2**15]))
 @pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
 def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> None:
@@ -247,7 +248,7 @@ def boxes(rng: np.random.Generator, count: int, far: int, side: int) -> np.ndarr
     return np.concatenate([low, low + rng.integers(0, side, (count, 2))], axis=1)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 @given(SEEDS, st.sampled_from([5, 90, 2**40]), st.integers(0, 7), st.sampled_from([1, 9, 2**20]))
 def test_no_box_that_meets_is_missing_in_a_cell(seed: int, far: int, bits: int, most: int) -> None:
     rng = np.random.default_rng(seed)
@@ -266,7 +267,7 @@ def test_no_box_that_meets_is_missing_in_a_cell(seed: int, far: int, bits: int, 
                 assert (i, k) in told
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 @given(
     SEEDS,
     st.sampled_from([5, 90, 2**14, 40_000, 2**30, 2**31, 2**40]),
@@ -308,7 +309,7 @@ def pixels_in(words: np.ndarray, begin: int, left: int, top: int, height: int) -
     return {(left + x, top + y) for y, word in enumerate(rows_) for x in range(WORD) if word >> x & 1}
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60, deadline=None)
 @given(SEEDS)
 def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
     """Of any size, some of them empty; beyond the bounds, and under what is in front, nothing is seen."""
@@ -356,7 +357,7 @@ def test_masks_are_cut_into_tiles_and_seen(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=30, deadline=None)
+@examples(30, deadline=None)
 def test_rows_are_cropped_to_their_pixels(seed: int) -> None:
     """Few pixels, many or none, also in the first and last row and column."""
     rng = random.Random(seed)

@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from examples import examples
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hitplanes import Scene
@@ -369,7 +370,7 @@ OVAL = (0.01 * ACROSS + 0.23 * DOWN) ** 2 + (0.22 * DOWN - 0.18 * ACROSS) ** 2 <
 FLIPPED = np.array([[1, 0, 1], [0, 1, 0], [0, 1, 0]], np.bool_)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 @pytest.mark.parametrize("kind", EVERY, ids=str)
 @given(pixels, flips, scales, turns, st.tuples(far, far))
 @example(FLIPPED, "y", (1.0, 1.0), 0.0, (0.0, 0.0))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from some_of import some_of
 
 from hitplanes import InputError
 from hitplanes.planes.broadphase import BroadPhase, BruteForce, Bvh, Grid, PartsBvh, Quadtree
@@ -73,6 +74,7 @@ def in_line(rng: np.random.Generator, n: int, d: int) -> Floats:
 
 
 WORLDS = [uniform, whole, clustered, one_huge, one_spot, extreme, in_line]
+EVERYWHERE = some_of((name, d, world) for name, (_, dims) in MAKERS.items() for d in dims for world in WORLDS)
 
 
 def meets_plainly(a: Floats, b: Floats) -> bool:
@@ -99,20 +101,18 @@ def test_brute_force_is_the_definition(world: Callable[..., Floats], d: int) -> 
     assert list(map(tuple, plain.pairs().T.tolist())) == due
 
 
-@pytest.mark.parametrize("world", WORLDS)
-@pytest.mark.parametrize(("make", "d"), STRUCTURES)
-def test_equals_brute_force(make: Maker, d: int, world: Callable[..., Floats]) -> None:
-    rng = np.random.default_rng(d)
+@pytest.mark.parametrize(("name", "d", "world"), EVERYWHERE)
+def test_equals_brute_force(name: str, d: int, world: Callable[..., Floats]) -> None:
+    make, rng = MAKERS[name][0], np.random.default_rng(d)
     for n in (0, 1, 2, 17, 400):
         rows = world(rng, n, d)
         queries = np.concatenate((world(rng, 30, d), uniform(rng, 5, d), rows[:5]))
         assert_same(BruteForce(rows), make(rows), queries)
 
 
-@pytest.mark.parametrize("world", WORLDS)
-@pytest.mark.parametrize(("make", "d"), STRUCTURES)
-def test_equals_brute_force_while_boxes_come_move_and_go(make: Maker, d: int, world: Callable[..., Floats]) -> None:
-    rng = np.random.default_rng(d + 10)
+@pytest.mark.parametrize(("name", "d", "world"), EVERYWHERE)
+def test_equals_brute_force_while_boxes_come_move_and_go(name: str, d: int, world: Callable[..., Floats]) -> None:
+    make, rng = MAKERS[name][0], np.random.default_rng(d + 10)
     rows = world(rng, 200, d)
     plain, other = BruteForce(rows), make(rows)
     for step in range(6):

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from some_of import some_of
+from some_of import in_turn
 
 from hitplanes import (
     Beam,
@@ -168,10 +168,7 @@ def test_candidates_are_fewer_with_tighter_volumes() -> None:
     assert len(hits) < tested["polygon"]
 
 
-@pytest.mark.parametrize("name", VOLUMES)
-@pytest.mark.parametrize(
-    "weapon", some_of([w for w in WEAPONS if isinstance(w, AreaWeapon)], 2), ids=lambda w: type(w).__name__
-)
+@pytest.mark.parametrize(("weapon", "name"), in_turn([w for w in WEAPONS if isinstance(w, AreaWeapon)], VOLUMES))
 def test_a_pattern_lies_in_its_volume(weapon: AreaWeapon, name: str) -> None:
     """A one-pixel object at each pixel of the pattern is a candidate, wherever in the world."""
     for angle in (0, 30, 45, 131):
@@ -340,8 +337,7 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
         scene.move(some, rng.uniform(0, 60, (len(some), 2)))
 
 
-@pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize("remembered", [0, 5, 10**6])
+@pytest.mark.parametrize(("structure", "remembered"), in_turn(STRUCTURES, [0, 5, 10**6]))
 def test_an_index_follows_its_scene(structure: str, remembered: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(items, "JOURNAL_ROWS", remembered)
     rng = np.random.default_rng(8)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import (
@@ -79,7 +80,7 @@ def rows(pixels: Pixels) -> np.ndarray:
 # The law
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.sampled_from(sorted(SHAPES)), st.lists(POSES, min_size=1, max_size=3), st.integers(0, 10**6), st.data())
 def test_an_object_loses_exactly_what_was_carved(
     kind: str, poses: list[dict[str, Any]], seed: int, data: st.DataObject

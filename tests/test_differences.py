@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from some_of import some_of
 
@@ -140,7 +141,7 @@ def test_a_change_of_any_kind_of_leaf_is_told(number: int) -> None:
 
 
 @given(st.data(), OTHER)
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 def test_any_change_of_any_leaf_is_told(data: st.DataObject, other: Json) -> None:
     number, steps = data.draw(st.sampled_from(paths()))
     report = reports()[number]
@@ -325,7 +326,7 @@ def test_of_rays_what_has_no_words_is_told_beside_what_has() -> None:
     assert "shot 0 (rifle at 190, 104): rays: 2 entries, was 1" in differences(one, other)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60, deadline=None)
 @given(st.tuples(*[st.text("ab\n\x7f\x9b\u2028\u202e\u2066\u061c\ud800", min_size=1, max_size=5)] * 4))
 def test_lines_can_be_printed_whatever_things_are_called(names: tuple[str, ...]) -> None:
     was = told(game(), Rounds(Spread(Disc(3), count=6, radius=20), count=3), seed=5, exclude=[1])

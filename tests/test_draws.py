@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes.weapons.kinds import placements
 
 GOLDEN_GAMMA = 0x9E3779B97F4A7C15
 WRAP = 2**64
-FEW = settings(max_examples=60, deadline=None)
+FEW = examples(60, deadline=None)
 
 # First outputs of splitmix64: seed 1234567 as listed by Rosetta Code, seed 0 as in Java's SplittableRandom tests.
 PUBLISHED = {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from some_of import in_turn
 
 from hitplanes import InputError
 from hitplanes.planes.common.limits import CHUNK_ROWS
@@ -140,8 +141,7 @@ def wrong(predicate: Callable[..., Any], arrays: Arrays) -> list[int]:
     return np.flatnonzero(got != truth).tolist()
 
 
-@pytest.mark.parametrize("ratio", [1.0, 1e6, 1e12, 1e-12])
-@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize(("length", "ratio"), in_turn(LENGTHS, [1.0, 1e6, 1e12, 1e-12]))
 @pytest.mark.parametrize("predicate", CASES, ids=lambda p: p.__name__)
 def test_signs_are_exact_within_three_ulp(predicate: Callable[..., Any], length: str, ratio: float) -> None:
     scale, offset = LENGTHS[length]

@@ -15,7 +15,8 @@ import oracle_raster
 import oracle_shelter
 import oracle_stack
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import (
@@ -454,7 +455,7 @@ def test_the_order_of_a_batch_changes_no_shot(seed: int) -> None:
 SEEDS = st.sampled_from([0, 1, 2**53 + 1, 2**63 - 1, 2**63, 2**64 - 2, 2**64 - 1])
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20, deadline=None)
 @given(st.lists(st.tuples(SEEDS, st.integers(0, 9)), min_size=1, max_size=12), st.booleans())
 def test_shots_with_seeds_of_their_own_are_the_shots_fired_one_by_one(
     shots: list[tuple[int, int]], as_array: bool

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from ray_battles import some_battle as some_ray_battle
 from test_fire import Placements, expected, some_battle, told
@@ -95,7 +96,7 @@ def test_every_weapon_in_a_crowd_that_changes(name: str, jit: bool) -> None:
             changed(scene, rng)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25, deadline=None)
 @given(st.integers(0, 10**6))
 def test_random_scenes_against_the_oracle(seed: int) -> None:
     battle = some_battle(seed)
@@ -106,7 +107,7 @@ def test_random_scenes_against_the_oracle(seed: int) -> None:
             assert told(volley.alone(scene, which)) == truth, f"{seed=}"
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25, deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_random_rays_against_the_walk(rng: random.Random) -> None:
     battle = some_ray_battle(rng)

@@ -8,7 +8,8 @@ from importlib.util import find_spec
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 
 from hitplanes.planes.bits import front_to_back
 from hitplanes.planes.bits.bit_rows import Placed
@@ -132,7 +133,7 @@ class Case:
         return [(who, item, count, d2, x, y) for who, d2, y, x, item, count in sorted(rows)]
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([64, 2**15]), st.sampled_from([0, 2**14]))
 def judged(seed: int, at_once: int, crowd: int) -> None:
     case = Case(seed)

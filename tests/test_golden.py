@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import Disc, Hits, InputError, Scene, Sprite, fire, read_png
@@ -394,7 +395,7 @@ NAMES = st.none() | st.text(min_size=1, max_size=4) | st.from_regex(r"\A[a-z-]{0
 
 
 @given(st.lists(st.tuples(TESTS, NAMES), unique=True, max_size=8))
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 def test_no_two_tests_share_a_file(ids: list[tuple[str, str | None]]) -> None:
     like = safe_name("test_b[a/b]").removeprefix("test_b-")
     ids += [("test_x", None), ("test_X", None), ("test_x", "a"), ("test_x-a", None), ("test_b[a/b]", None)]

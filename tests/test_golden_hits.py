@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from some_of import in_turn
 from test_golden import AT, CAN, DUCK, WALL, call, contents, shot, without
 
 from hitplanes import Disc, Hits, InputError, Laser, Pistol, Scene, Spread, Sprite, Weapon, fire, read_png
@@ -64,8 +65,9 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("case", ELSEWHERE)
-@pytest.mark.parametrize("weapon", [Disc(4), Spread(Disc(2), 5, 3), Laser(5), Pistol(5)], ids=repr)
+@pytest.mark.parametrize(
+    ("weapon", "case"), in_turn([Disc(4), Spread(Disc(2), 5, 3), Laser(5), Pistol(5)], ELSEWHERE), ids=str
+)
 def test_a_crate_that_moves_elsewhere_fails_nothing(tmp_path: Path, case: str, weapon: Weapon) -> None:
     at = (6, 8) if weapon.kind in ("disc", "spread") else (2, 10)
     before, after = yard(weapon=weapon, at=at), yard(weapon=weapon, at=at, **ELSEWHERE[case])

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from some_of import some_of
 
 from hitplanes import Scene
 from hitplanes.planes.common.checks import Image
@@ -232,7 +233,7 @@ def pytest_runtest_protocol(item, nextitem):
 
 
 @pytest.mark.parametrize(
-    "words", ["-p no:cacheprovider", "-p no:xdist", "-p no:terminal", "--rootdir=..", "-qq", "--no-summary"]
+    "words", some_of(["-p no:cacheprovider", "-p no:xdist", "-p no:terminal", "--rootdir=..", "-qq", "--no-summary"])
 )
 def test_runs_of_other_kinds(game: pytest.Pytester, words: str) -> None:
     assert game.runpytest_inprocess("--hits-stale", *words.split()).ret == 0
@@ -328,7 +329,7 @@ STALE: dict[str, tuple[Callable[[pytest.Pytester], object], list[str], list[str]
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", STALE)
+@pytest.mark.parametrize("case", some_of(STALE, 2))
 def test_goldens_that_no_test_uses(game: pytest.Pytester, case: str) -> None:
     prepare, words, stale = STALE[case]
     prepare(game)

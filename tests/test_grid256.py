@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import oracle_raster as oracle
 import pytest
-from hypothesis import example, given, settings
+from examples import examples
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hitplanes.planes.common.checks import InputError
@@ -19,8 +20,8 @@ from hitplanes.planes.grid import fixed_point
 
 SNAPPING = [fixed_point, *([importlib.import_module("hitplanes.planes.jit.scene")] if find_spec("numba") else [])]
 
-MANY = settings(max_examples=300, deadline=None)
-FEW = settings(max_examples=100, deadline=None)
+MANY = examples(300, deadline=None)
+FEW = examples(100, deadline=None)
 MAX_PX = 2.0**40  # the largest position
 
 # Positions that fall between two grid points as often as not: whole numbers of 1/1024 px.
@@ -203,7 +204,7 @@ def test_unit_known_directions(degrees: float, expected: tuple[int, int]) -> Non
     assert unit(degrees) == expected
 
 
-@settings(max_examples=1000, deadline=None)
+@examples(1000, deadline=None)
 @given(any_angle)
 @example(1.7976931348623157e308)
 @example(-1.7976931348623157e308)
@@ -248,7 +249,7 @@ def test_unit_is_correctly_rounded_next_to_ties(degrees: float, more: float) -> 
 
 
 @pytest.mark.long
-@settings(max_examples=1500, deadline=None)
+@examples(1500, deadline=None)
 @given(near_halves, turns)
 def test_unit_is_correctly_rounded_next_to_many_ties(degrees: float, more: float) -> None:
     assert unit(degrees + more) == oracle.unit(degrees + more)

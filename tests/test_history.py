@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import hypothesis.strategies as st
 import numpy as np
 import pytest
+from examples import examples
 from hypothesis import Phase, given, settings
 from hypothesis.stateful import initialize, precondition, rule, run_state_machine_as_test
 from test_fire import some_volley, some_weapon, square
@@ -546,7 +547,7 @@ whole = st.integers(-(2**48), 2**48)
 near = st.integers(-600, 600)
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300, deadline=None)
 @given(
     st.tuples(near | whole, near | whole),
     st.tuples(near | whole, near | whole),

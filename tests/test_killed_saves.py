@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from some_of import in_turn
 
 from hitplanes import Disc, Scene, Sprite, fire, load_scene
 
@@ -65,8 +66,7 @@ def killed_after(step: int, save: Callable[[], None], folder: Path, *, halfway: 
         os._exit(1)
 
 
-@pytest.mark.parametrize("halfway", [False, True], ids=["between steps", "halfway in a write"])
-@pytest.mark.parametrize("first", [True, False], ids=["over an old scene", "into a new folder"])
+@pytest.mark.parametrize(("first", "halfway"), in_turn([True, False], [False, True]))
 def test_a_save_that_is_killed_leaves_one_of_the_scenes_whole(tmp_path: Path, first: bool, halfway: bool) -> None:
     old, new = scene_of(50), scene_of(100)
     whole, folder = {}, tmp_path / "level"

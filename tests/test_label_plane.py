@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes.planes.bits import label_plane as module
@@ -101,7 +102,7 @@ def change(scene: Scene, rng: np.random.Generator) -> None:
 # The label plane
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20, deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 12))
 def test_the_label_plane_follows_every_change(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -253,7 +254,7 @@ def boxes_in(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.stack([x[0], y[0], x[1], y[1]], axis=1)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.sampled_from([0, 1, 3, 7, 8, 9, 16, 17, 40]), st.integers(0, 9))
 @pytest.mark.parametrize("kind", [np.uint16, np.uint32])
 def test_drawn_anew_is_what_each_pixel_says(kernels: Any, kind: Any, seed: int, count: int, n: int) -> None:
@@ -358,7 +359,7 @@ def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
 # The label plane, and limits
 
 
-@settings(max_examples=14, deadline=None)
+@examples(14, deadline=None)
 @given(st.integers(0, 2**32), st.tuples(*2 * [st.integers(-9, 9)]), st.tuples(*2 * [st.integers(1, 20)]))
 def test_the_label_plane_of_any_box(seed: int, corner: tuple[int, int], size: tuple[int, int]) -> None:
     scene = random_scene(np.random.default_rng(seed), 8)

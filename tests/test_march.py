@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import oracle_rays
 import pytest
-from hypothesis import HealthCheck, example, given, note, settings
+from examples import examples
+from hypothesis import HealthCheck, example, given, note
 from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Shot, some_battle, some_place, some_target
+from some_of import in_turn
 from test_rays import check_columns
 
 from hitplanes import (
@@ -63,7 +65,7 @@ def some_plane(rng: random.Random) -> np.ndarray[Any, np.dtype[np.bool_]]:
 # Kernels
 
 
-@settings(max_examples=34, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(34, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_the_clearance_is_the_distance_in_city_blocks(kernels: ModuleType, rng: random.Random) -> None:
     plane = some_plane(rng)
@@ -95,7 +97,7 @@ def some_ray(rng: random.Random, h: int, w: int) -> tuple[tuple[int, int], tuple
     return (x, y), step.get(kind, (dx, dy))
 
 
-@settings(max_examples=134, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(134, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_the_first_taken_cell_is_the_first_that_the_oracle_meets(kernels: ModuleType, rng: random.Random) -> None:
     plane = some_plane(rng)
@@ -173,7 +175,7 @@ def answer(battle: Battle, strategy: str) -> Hits | str:
         return str(error)
 
 
-@settings(max_examples=70, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(70, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds, count=st.integers(1, 12))
 def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
     battle = single(rng, count)
@@ -184,7 +186,7 @@ def test_rays_that_jump_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: ra
         assert walked.verdicts.tolist() == marched.verdicts.tolist()  # type: ignore[union-attr]
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_rays_that_jump_hit_what_the_oracle_hits(kernels: ModuleType, rng: random.Random) -> None:
     battle = single(rng, 3)
@@ -210,8 +212,7 @@ CORNERS: dict[str, tuple[list[Body], int]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("turn", range(4))
-@pytest.mark.parametrize("name", CORNERS)
+@pytest.mark.parametrize(("name", "turn"), in_turn(CORNERS, range(4)))
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, 0.5), (-3.0, -3.0)])
 def test_what_comes_first_at_a_corner(
     kernels: ModuleType, name: str, turn: int, start: tuple[float, float], monkeypatch: pytest.MonkeyPatch
@@ -481,7 +482,7 @@ def test_planes_of_the_last_filters_are_kept_and_a_large_one_alone(monkeypatch: 
 @example(1)
 @example(50)
 @given(st.integers(1, 200))
-@settings(max_examples=15, deadline=None)
+@examples(15, deadline=None)
 def test_how_many_are_followed_together_changes_nothing(few: int) -> None:
     rng = np.random.default_rng(few)
     plane = rng.random((60, 90)) < 0.01

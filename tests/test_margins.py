@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import Beam, Box, Cone, Disc, Hits, Point, Ring, Rounds, Scene, Spread, Sprite, Stencil, Weapon, fire
@@ -56,7 +57,7 @@ def steps(before: Hits, after: Hits) -> set[tuple[int, int]]:
     return moved
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(scenes(), weapons, places, st.sampled_from(((1, 0), (0, 1), (-1, 0), (0, -1))), options)
 def test_a_small_step_changes_little(
     scene: Scene, weapon: Weapon, at_256: tuple[int, int], step: tuple[int, int], how: dict[str, Any]
@@ -95,7 +96,7 @@ def test_of_256_small_steps_one_moves_the_shot(weapon: Weapon, axis: int) -> Non
     assert moved[:, axis].sum() == 1
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(scenes(), weapons, places, options)
 def test_a_verdict_holds_for_all_shifts_shorter_than_its_margin(
     scene: Scene, weapon: Weapon, at_256: tuple[int, int], how: dict[str, Any]

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from examples import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_label_plane import MASKS, add_one, change, changed_boxes, front_to_back, random_scene
@@ -63,7 +64,7 @@ def moved(scene: Scene, rng: np.random.Generator) -> None:
     scene.move(chosen, xy if n > 1 else xy.reshape(2))
 
 
-@settings(max_examples=27, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(27, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(0, 12))
 def test_the_stack_after_any_change_is_the_one_made_anew(
     monkeypatch: pytest.MonkeyPatch, jit: bool, seed: int, count: int

@@ -20,6 +20,7 @@ from oracle_rays import (
     thin_times,
     walk,
 )
+from some_of import some_of
 
 PX = 256
 Point = tuple[float, float]
@@ -132,7 +133,7 @@ def test_whole_numbers_and_fractions_find_the_same_cells(seed: int) -> None:
         assert exact == {c: (Fraction(entry, scale), Fraction(leave, scale)) for c, (entry, leave) in cells.items()}
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", some_of(range(20)))
 def test_cells_are_those_that_a_fine_walk_along_the_ray_sees(seed: int) -> None:
     """At every moment that divides the ray, the squares about the point are cells, at a time within theirs."""
     rng = random.Random(seed)

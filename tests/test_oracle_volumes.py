@@ -571,7 +571,7 @@ def test_plain_formulas_are_wrong(kind_a: str, kind_b: str, dim: int, plain: Cal
     assert sum(plain(a, b) is not meets(kind_a, a, kind_b, b) for _, a, b in made) >= 6
 
 
-@pytest.mark.parametrize(("kind_a", "kind_b"), [pair for pair in PAIRS if pair != ("aabb", "aabb")])
+@pytest.mark.parametrize(("kind_a", "kind_b"), some_of([pair for pair in PAIRS if pair != ("aabb", "aabb")]))
 def test_the_oracle_itself_would_be_wrong_in_float64(kind_a: str, kind_b: str) -> None:
     made = list(adversarial.cases(kind_a, kind_b, 800, 23, families=ORDINARY))
     assert any(exact.meets_exactly_as(kind_a, kind_b, a, b) is not meets(kind_a, a, kind_b, b) for _, a, b in made)

@@ -29,13 +29,13 @@ CLOSED = [
 ]  # fmt: skip
 MANY = [("obb", "obb"), ("polygon", "polygon"), ("obb", "polygon")]
 REST = [pair for pair in ALL_PAIRS if pair[:2] not in MANY and pair not in CLOSED]
-COUNT = 402
+COUNT = 204
 FINITE = [name for name in adversarial.FAMILIES if name != "greatest"]
 
 Shape = tuple[Any, ...]
 
 
-@pytest.fixture(params=[COUNT, pytest.param(3 * COUNT, marks=pytest.mark.long)])
+@pytest.fixture(params=[COUNT, pytest.param(6 * COUNT, marks=pytest.mark.long)])
 def count(request: pytest.FixtureRequest) -> int:
     """Cases of what is asked in no other long test."""
     return request.param

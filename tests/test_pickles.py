@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from some_of import some_of
+from some_of import in_turn
 
 from hitplanes import (
     Beam,
@@ -96,8 +96,7 @@ def told(hits: Hits, shots: int) -> Any:
     return parts, hits.plan, hits.to_dict()
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", some_of(WEAPONS, 2))
+@pytest.mark.parametrize(("name", "way"), in_turn(WEAPONS, WAYS))
 def test_a_weapon_of_every_kind_is_copied(name: str, way: str) -> None:
     weapon, scene = WEAPONS[name], arena()
     fire(scene, weapon, AT, aim=20)  # what it keeps for later goes along, or is made again
@@ -106,8 +105,7 @@ def test_a_weapon_of_every_kind_is_copied(name: str, way: str) -> None:
     assert fire(scene, made, AT, aim=20, seed=4) == fire(scene, weapon, AT, aim=20, seed=4)
 
 
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", some_of(WEAPONS, 2))
+@pytest.mark.parametrize(("name", "way"), in_turn(WEAPONS, WAYS))
 def test_hits_are_copied_and_tell_the_same(name: str, way: str) -> None:
     scene = arena()
     for strategy in ("direct", "built"):
@@ -124,8 +122,7 @@ def test_hits_are_copied_and_tell_the_same(name: str, way: str) -> None:
             assert made.scene.carve(made) and hits.why_not(0) is not None
 
 
-@pytest.mark.parametrize("name", some_of(["disc", "box", "spread", "pistol", "rifle"], 2))
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("name", "way"), in_turn(["disc", "box", "spread", "pistol", "rifle"], WAYS))
 def test_answers_of_prepared_weapons_become_plain_hits(name: str, way: str) -> None:
     scene = arena()
     ready, struck = prepare(scene, WEAPONS[name]), 0
@@ -178,8 +175,7 @@ def past() -> History:
     return history
 
 
-@pytest.mark.parametrize("name", ["disc", "spread", "pistol"])
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("way", "name"), in_turn(WAYS, ["disc", "spread", "pistol"]))
 def test_hits_at_a_history_are_copied(name: str, way: str) -> None:
     history = past()
     ticks = np.linspace(9, 24, len(AT))

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from oracle_projectile import Thing, Vector, doubtful, flight, impacts, last_miss
+from some_of import in_turn
 
 from hitplanes import InputError, Projectile, RayHits, Reason, Scene, fire, use_jit
 
@@ -387,8 +388,7 @@ def columns(hits: RayHits) -> list[np.ndarray]:
     return [stop.reason, stop.item, stop.cell_xy, stop.fraction, hits.passes.entry_xy, hits.passes.material]
 
 
-@pytest.mark.parametrize("steps", [None, 5], ids=str)
-@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize(("moving", "steps"), in_turn([False, True], [None, 5]))
 def test_a_batch_is_its_shots_and_whole_shifts_change_nothing(moving: bool, steps: int | None) -> None:
     for number in range(10):
         rng = np.random.default_rng((9, number))

@@ -5,19 +5,22 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 import oracle_raster as oracle
 import pytest
-from hypothesis import assume, example, given, settings
+from examples import examples
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from some_of import some_of
 
 from hitplanes.planes.grid import rasterize
 from hitplanes.planes.grid.spans import Spans
 
-AGAINST = settings(max_examples=40, deadline=None)
-LAWS = settings(max_examples=30, deadline=None)
+AGAINST = examples(40, deadline=None)
+LAWS = examples(30, deadline=None)
 
 ONE = 2**30
 REACH = 14  # px: shapes are drawn this near, so that a reference can look at every pixel
@@ -135,7 +138,7 @@ def test_ellipse(radius_x: int, radius_y: int, axis: Point) -> None:
     check(rasterize.ellipse(radius_x, radius_y, *axis), lambda x, y: oracle.in_ellipse(x, y, radius_x, radius_y, *axis))
 
 
-@settings(max_examples=67, deadline=None)
+@examples(67, deadline=None)
 @given(polygons)
 @example([[(0, 0)]])
 @example([[(1, 0)]])
@@ -149,7 +152,7 @@ def test_polygon(rings: list[list[Point]]) -> None:
     check(polygon(*rings), lambda x, y: oracle.in_polygon(x, y, rings))
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40, deadline=None)
 @given(points, points, small_lengths)
 @example((0, 0), (0, 0), 0)
 @example((0, 0), (0, 0), 256)
@@ -162,7 +165,7 @@ def test_beam(a: Point, b: Point, radius: int) -> None:
     check(beam(a, b, radius), lambda x, y: oracle.in_beam(x, y, a, b, radius), REACH + 4)
 
 
-@settings(max_examples=67, deadline=None)
+@examples(67, deadline=None)
 @given(lengths, directions, half_angles)
 @example(0, (ONE, 0), 30.0)
 @example(1, (ONE, 0), 180.0)
@@ -178,7 +181,7 @@ def test_cone(reach: int, axis: Point, half_degrees: float) -> None:
     check(cone(reach, axis, half_degrees), lambda x, y: oracle.in_cone(x, y, reach, *axis, *half))
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200, deadline=None)
 @given(points, points)
 @example((0, 0), (0, 0))
 @example((128, 128), (128, 128))
@@ -338,8 +341,7 @@ def test_a_flat_ellipse_all_but_along_an_axis_has_its_middle_alone(radii: tuple[
         assert pixel_set(rasterize.ellipse(*radii, c, s)) == {(0, 0)}
 
 
-@pytest.mark.parametrize("linear", MAPS)
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize(("family", "linear"), some_of(product(FAMILIES, MAPS)))
 def test_mirrors_and_quarter_turns(family: str, linear: str) -> None:
     shape, f = FAMILIES[family], MAPS[linear]
 
@@ -624,7 +626,7 @@ def near(a: Point, b: Point, count: int, reach_px: int, rng: random.Random) -> l
     return found
 
 
-FAR_OFF = settings(max_examples=8, deadline=None)
+FAR_OFF = examples(8, deadline=None)
 
 
 @FAR_OFF
@@ -637,7 +639,7 @@ def test_a_long_segment(a: Point, b: Point, rng: random.Random) -> None:
         assert covers(spans, x, y) == oracle.meets_segment(x, y, a, b)
 
 
-@settings(max_examples=4, deadline=None)
+@examples(4, deadline=None)
 @given(far_diagonal, far_diagonal, st.randoms(use_true_random=False))
 @example((-(2**27), -(2**27)), (-(2**27), -(2**27)), random.Random(1))
 def test_a_long_diagonal_segment(a: Point, b: Point, rng: random.Random) -> None:
@@ -727,7 +729,7 @@ long_ways = st.tuples(
     st.one_of(st.integers(2, 2**12), st.integers(2**27, 2**28), st.integers(2**27, 2**28)),
 ).filter(lambda d: math.gcd(*d) == 1 and math.hypot(*d) < 2**29 - 2**12)
 any_maps = st.sampled_from([lambda v: v, *MAPS.values()])
-HAIR = settings(max_examples=11, deadline=None)
+HAIR = examples(11, deadline=None)
 
 
 @HAIR

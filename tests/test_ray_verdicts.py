@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from some_of import some_of
 
 from hitplanes import (
     History,
@@ -174,7 +175,7 @@ def told(monkeypatch: pytest.MonkeyPatch, hits: Hits) -> list[list[int]]:
         return hits.verdicts.tolist()
 
 
-@pytest.mark.parametrize("part", range(8))
+@pytest.mark.parametrize("part", some_of(range(8)))
 @pytest.mark.usefixtures("jit")
 def test_verdicts_of_battles_are_those_of_the_cells(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = np.zeros(6, np.int64)

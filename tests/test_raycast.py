@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import oracle_rays
 import pytest
-from hypothesis import HealthCheck, given, note, settings
+from examples import examples
+from hypothesis import HealthCheck, given, note
 from hypothesis import strategies as st
 from test_march import answer, single, some_ray
 from test_rays import check_columns
@@ -121,7 +122,7 @@ def first_by_the_oracle(
     return time, x, y, rank
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_what_a_ray_touches_first_is_what_the_oracle_meets_first(kernels: ModuleType, rng: random.Random) -> None:
     stack, bounds = some_stack(rng), rng.choice([None, (-4, -3, 5, 6), (2, 2, 2, 2), (-30, -30, 30, 30)])
@@ -276,7 +277,7 @@ def test_a_true_byte_may_be_any(kernels: ModuleType) -> None:
 # Fired
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds, count=st.integers(1, 4))
 def test_rays_that_are_cast_hit_what_rays_that_walk_hit(kernels: ModuleType, rng: random.Random, count: int) -> None:
     battle = single(rng, count)

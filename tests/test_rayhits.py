@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, note, settings
+from examples import examples
+from hypothesis import given, note
 from hypothesis import strategies as st
 from ray_battles import Battle, Body, Gun, Pixel, Shot, some_battle, some_body, some_place, some_target
+from some_of import some_of
 from test_rays import bar, harmless, same
 
 from hitplanes import (
@@ -62,7 +64,7 @@ def many(rng: random.Random, count: int = 9) -> Battle:
 # Parts of a batch
 
 
-@settings(max_examples=17, deadline=None)
+@examples(17, deadline=None)
 @given(worlds, st.sampled_from([1, 3, 10, 40]))
 def test_a_batch_cut_anywhere_is_the_same(rng: random.Random, chunk: int) -> None:
     battle = many(rng)
@@ -153,7 +155,7 @@ def test_a_way_that_cannot_serve_is_passed_over() -> None:
 # What is told
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40, deadline=None)
 @given(worlds)
 def test_rows_are_added_up_by_body(rng: random.Random) -> None:
     battle = many(rng, 4)
@@ -177,7 +179,7 @@ def test_rows_are_added_up_by_body(rng: random.Random) -> None:
         assert one.pellets == len(struck)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40, deadline=None)
 @given(worlds)
 def test_the_answer_as_json_is_the_answer(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -229,7 +231,7 @@ def test_no_column_can_be_written() -> None:
 # Cells
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40, deadline=None)
 @given(worlds)
 def test_verdicts_add_up_to_all_cells(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -276,7 +278,7 @@ def test_the_cells_of_a_thin_ray_are_columns_and_rows_and_corners() -> None:
     assert passed > 67
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40, deadline=None)
 @given(worlds)
 def test_pixels_are_those_of_the_rows_and_the_passes(rng: random.Random) -> None:
     hits = fired(many(rng, 4))
@@ -344,7 +346,7 @@ def some_bounds(rng: random.Random, at: tuple[float, float]) -> tuple[int, int, 
     return rng.choice([None, (*near, near[0] + rng.randint(3, 15), near[1] + rng.randint(3, 15))])
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120, deadline=None)
 @given(worlds)
 def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
     battle = many(rng, 2)
@@ -550,13 +552,12 @@ def test_rays_of_every_weapon_through_nothing() -> None:
             assert none.to_dict()["stops"] == [] and none.by_owner() == []
 
 
-@pytest.mark.parametrize("at", [(FAR, -FAR), (-FAR, FAR), (2**40, -(2**40))])
-def test_a_battle_far_away(at: Pixel) -> None:
+@pytest.mark.parametrize(("x", "y"), some_of([(FAR, -FAR), (-FAR, FAR), (2**40, -(2**40))], 2))
+def test_a_battle_far_away(x: int, y: int) -> None:
     """All that is derived, too, is what it is at home; points to what a float64 holds there."""
     for seed in range(20):
         battle = many(random.Random(seed), 3)
-        x, y = (v - 40 * (v > 0) + 40 * (v < 0) for v in at)
-        here, there = fired(battle), fired(battle.moved(x, y))
+        here, there = fired(battle), fired(battle.moved(*(v - 40 * (v > 0) + 40 * (v < 0) for v in (x, y))))
         for which in range(3):
             assert here.why_not(which) == there.why_not(which)
             assert here.verdict_counts(which) == there.verdict_counts(which)

@@ -10,13 +10,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from importlib.util import find_spec
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 import oracle_rays
 import pytest
-from hypothesis import given, note, settings
+from examples import examples
+from hypothesis import given, note
 from hypothesis import strategies as st
 from oracle_rays import Item, StartsInside, Walk, mask_normal
 from ray_battles import (
@@ -36,6 +37,7 @@ from ray_battles import (
     some_target,
     stop_of,
 )
+from some_of import in_turn, some_of
 
 from hitplanes import Hits, InputError, Laser, Scene, Sprite, Sweep, Verdict, Weapon, fire, use_jit
 from hitplanes.planes.grid import fixed_point, rasterize
@@ -178,7 +180,7 @@ def check(battle: Battle, samples: bool = True) -> list[list[tuple[Ray, Walk]]]:
     return walks
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80, deadline=None)
 @given(worlds)
 def test_random_worlds(rng: random.Random) -> None:
     battle = some_battle(rng)
@@ -263,7 +265,7 @@ def harmless(battle: Battle) -> Battle:
     return battle
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_no_prefilter_changes_a_row(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -275,7 +277,7 @@ def test_no_prefilter_changes_a_row(rng: random.Random) -> None:
     same(first, battle.fired(battle.scene(), prefilter=prefilter, broadphase=broadphase))
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_batch_is_its_shots_one_by_one(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -292,7 +294,7 @@ def test_a_batch_is_its_shots_one_by_one(rng: random.Random) -> None:
         assert verdicts[which] == alone[3][0]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.integers(1, 60), st.integers(1, 60))
 def test_the_size_of_parts_changes_nothing(rng: random.Random, cells_at_once: int, pairs_at_once: int) -> None:
     battle = harmless(some_battle(rng))
@@ -329,7 +331,7 @@ def test_many_rays_through_a_crowd_need_little_memory(weapon: Weapon, shots: int
         tracemalloc.stop()
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from([-FAR, -1, 0, 7, FAR]), st.sampled_from([-FAR, 3, FAR]))
 def test_a_world_elsewhere_is_the_same_world(rng: random.Random, dx: int, dy: int) -> None:
     """Everything but the floats of points is the same to the last bit."""
@@ -358,7 +360,7 @@ def cells_between(a: Place, b: Place, width: float = 0) -> list[Pixel]:
 WIDTHS = [0, 1 / 128, 0.5, 1, 1.5, 2, 3.25, 6]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(WIDTHS))
 def test_a_ray_and_the_way_back_meet_the_same_cells(rng: random.Random, width: float) -> None:
     a = some_place(rng)
@@ -367,7 +369,7 @@ def test_a_ray_and_the_way_back_meet_the_same_cells(rng: random.Random, width: f
     assert set(there) == set(back) and len(set(there)) == len(there) == len(back)
 
 
-@settings(max_examples=27, deadline=None)
+@examples(27, deadline=None)
 @given(worlds)
 def test_a_wider_ray_covers_a_narrower_one(rng: random.Random) -> None:
     a = some_place(rng)
@@ -396,7 +398,7 @@ def turned_world(battle: Battle, turn: Callable[[Any, Any], Any]) -> Battle:
     return replace(battle, bodies=bodies, shots=shots, bounds=bounds)
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(sorted(TURNS)))
 def test_a_mirrored_or_turned_world_is_hit_alike(rng: random.Random, name: str) -> None:
     """Where no limit and no wall choose among cells that are entered at once, all but their order is the same."""
@@ -422,7 +424,7 @@ def test_a_mirrored_or_turned_world_is_hit_alike(rng: random.Random, name: str) 
         assert {TURNS[name](*cell) for cell in xy} == {tuple(c) for c in there.samples_at(which).xy.tolist()}
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds, st.sampled_from(sorted(TURNS)))
 def test_walls_stop_alike_in_a_mirrored_or_turned_world(rng: random.Random, name: str) -> None:
     """The place of the stop, and all that was entered before it."""
@@ -439,7 +441,7 @@ def test_walls_stop_alike_in_a_mirrored_or_turned_world(rng: random.Random, name
     assert answer(battle.fired()) == answer(turned_world(battle, TURNS[name]).fired())
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_rows_and_passes_have_a_total_order(rng: random.Random) -> None:
     hits = harmless(some_battle(rng)).fired()
@@ -471,14 +473,14 @@ def test_cells_past_the_stop_keep_the_order_of_the_walk() -> None:
             assert [(x, y) for x, y in hits.samples_at(which).xy.tolist()] == order, f"{seed=}"
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_pass_tells_its_row(rng: random.Random) -> None:
     hits = harmless(some_battle(rng)).fired()
     assert hits.passes.row.tolist() == [row["row"] for row in told(hits)[1]]
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_shotgun_of_rays_is_its_pellets_one_by_one(rng: random.Random) -> None:
     battle = harmless(some_battle(rng))
@@ -507,7 +509,7 @@ def test_a_shotgun_of_rays_is_its_pellets_one_by_one(rng: random.Random) -> None
         assert {row[2] for row in rows if row[0] == which} == {part[2] for p in pellets for part in p[0]}
 
 
-@settings(max_examples=34, deadline=None)
+@examples(34, deadline=None)
 @given(worlds)
 def test_a_budget_is_never_overspent_and_more_of_it_reaches_as_far(rng: random.Random) -> None:
     """What is spent, by the materials of the passes, is the budget where that ends a ray, and else no more."""
@@ -635,7 +637,9 @@ def far_battle(reach: int, slope: float, width: float, name: str) -> Battle:
     return turned_world(battle, TURNS[name])
 
 
-@pytest.mark.parametrize(("reach", "name"), [*((150, name) for name in TURNS), (2000, "half"), (2000, "a quarter")])
+@pytest.mark.parametrize(
+    ("reach", "name"), some_of([*((150, name) for name in TURNS), (2000, "half"), (2000, "a quarter")], 2)
+)
 @pytest.mark.parametrize("width", [0, pytest.param(2, marks=pytest.mark.long), 6.5])
 def test_long_rays(reach: int, width: float, name: str) -> None:
     """As far as products of lengths are large, and the middle of a thick ray does not tell all."""
@@ -649,8 +653,7 @@ def test_the_longest_rays(reach: int, width: float) -> None:
     check(far_battle(reach, 0.75, width, "left to right"))
 
 
-@pytest.mark.parametrize("width", [1 / 128, 0.25, 0.5, 1, 1.25, 1.75])
-@pytest.mark.parametrize("reach", [20, 150, 2000])
+@pytest.mark.parametrize(("width", "reach"), in_turn([1 / 128, 0.25, 0.5, 1, 1.25, 1.75], [20, 150, 2000]))
 def test_narrow_rays(reach: int, width: float) -> None:
     """Thick, but less than a pixel's diagonal: the square of a cell may last longer than its centre."""
     for slope, name in ((0.25, "half"), (0.25 + 1 / 256, "a quarter"), (1.5, "about the diagonal"), (-2, "half")):
@@ -739,16 +742,14 @@ PICTURES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", PICTURES)
-@pytest.mark.parametrize("bounds", [None, (0, 0, 9, 9)])
+@pytest.mark.parametrize(("name", "bounds"), in_turn(PICTURES, [None, (0, 0, 9, 9)]))
 def test_pictures(name: str, bounds: tuple[int, int, int, int] | None) -> None:
     gun, shot, bodies = PICTURES[name]
     check(Battle(gun, [shot], bodies, bounds))
 
 
-@pytest.mark.parametrize("times", [1, 7, 40])
+@pytest.mark.parametrize(("times", "short"), some_of(product([1, 7, 40], [-1, 0, 1]), 2))
 @pytest.mark.parametrize("cost", [1, 7])
-@pytest.mark.parametrize("short", [-1, 0, 1])
 def test_a_slanted_budget_is_compared_exactly(times: int, cost: int, short: int) -> None:
     """5 px through 3 columns, 3 : 4 down: only 1/256 px more than enough lets the ray meet the second board."""
     boards = [bar(2, 4, -1, 20, cost=cost), bar(7, 9, -1, 20)]

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import Disc, History, InputError, Pistol, Scene, Sprite, fire, load_scene
@@ -63,7 +64,7 @@ def answers(scene: Scene) -> list[Any]:
 # What was given
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(POSES, min_size=1, max_size=5))
 def test_what_was_given_is_read(poses: list[dict[str, Any]]) -> None:
     scene = arena()

@@ -31,6 +31,7 @@ from guides import (
     section,
     text_of,
 )
+from some_of import some_of
 
 from hitplanes import arsenal_of, load_scene
 from hitplanes.planes.files.png import read_png
@@ -94,15 +95,47 @@ def test_an_example_is_shown_with_the_text_that_follows_at_once(tmp_path: Path) 
     assert examples(page) == [Example(page, 0, "a\n", "b\n"), Example(page, 1, "c\n", "")]
 
 
-@pytest.mark.parametrize("example", [one for one in EXAMPLES if "hits_golden" not in one.code], ids=named)
+RUN_ALONE = [one for one in EXAMPLES if "hits_golden" not in one.code]
+
+TOGETHER = """
+import contextlib, io, json, os, sys
+printed = []
+for number, code in enumerate(json.load(sys.stdin)):
+    os.mkdir(str(number))
+    with contextlib.chdir(str(number)), contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(code, f"example {number}", "exec"), {"__name__": "__main__"})
+    printed.append(out.getvalue())
+json.dump(printed, sys.stdout)
+"""
+
+
+def code_of(example: Example) -> str:
+    return example.code.replace("fixtures/", f"{ROOT}/fixtures/")
+
+
+def has_written_pictures(example: Example, folder: Path) -> None:
+    for name in re.findall(r"write_png\(\"(.*?)\"", example.code):
+        picture = read_png(folder / name)
+        assert picture.shape[0] > 500 and picture.std() > 10
+
+
+def test_examples_print_what_is_shown(tmp_path: Path) -> None:
+    """In one process, each with names and in a folder of its own; what prints nothing has no text after it."""
+    words, codes = [sys.executable, "-W", "error", "-c", TOGETHER], json.dumps([code_of(one) for one in RUN_ALONE])
+    done = subprocess.run(words, input=codes, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.stderr, done.returncode) == ("", 0)
+    for number, (example, printed) in enumerate(zip(RUN_ALONE, json.loads(done.stdout), strict=True)):
+        assert printed == example.shown, named(example)
+        has_written_pictures(example, tmp_path / str(number))
+
+
+@pytest.mark.parametrize("example", some_of(RUN_ALONE, 5), ids=named)
 def test_an_example_prints_what_is_shown(example: Example, tmp_path: Path) -> None:
     """In a folder of its own; what prints nothing has no text after it."""
-    words = [sys.executable, "-W", "error", "-c", example.code.replace("fixtures/", f"{ROOT}/fixtures/")]
+    words = [sys.executable, "-W", "error", "-c", code_of(example)]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.stdout, done.stderr, done.returncode) == (example.shown, "", 0)
-    for name in re.findall(r"write_png\(\"(.*?)\"", example.code):
-        picture = read_png(tmp_path / name)
-        assert picture.shape[0] > 500 and picture.std() > 10
+    has_written_pictures(example, tmp_path)
 
 
 WITHOUT_PICTURES = [
@@ -113,7 +146,7 @@ WITHOUT_PICTURES = [
 ]
 
 
-@pytest.mark.parametrize("example", WITHOUT_PICTURES, ids=named)
+@pytest.mark.parametrize("example", some_of(WITHOUT_PICTURES), ids=named)
 def test_deciding_hits_needs_no_opencv(example: Example, tmp_path: Path) -> None:
     words = [sys.executable, "-c", f"import sys\nsys.modules['cv2'] = None\n{example.code}"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from some_of import some_of
+from some_of import in_turn
 from test_fire import Placements, expected, some_battle, some_place, some_pose, told
 
 from hitplanes import (
@@ -185,13 +185,12 @@ def visible_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hitplanes.weapons.prepared.compiled.COMPILED", now)
 
 
-@pytest.mark.parametrize("name", WEAPONS)
-def test_every_weapon_in_a_crowd(name: str, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("name", "bounded"), in_turn(WEAPONS, [True, False]))
+def test_every_weapon_in_a_crowd(name: str, bounded: bool, jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wide masks, edges, shots off the bounds, an aim, a target, a number; all while the scene changes."""
     if jit:
         visible_soon(monkeypatch)
-    for bounded in (True, False):
-        check_weapon(name, bounded, monkeypatch)
+    check_weapon(name, bounded, monkeypatch)
 
 
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -377,8 +376,7 @@ BAD_SHOTS: list[dict[str, Any]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("weapon", [Disc(3), Beam(9, 2), Spread(Disc(2), 3, 4), Pistol(9)], ids=lambda w: w.kind)
-@pytest.mark.parametrize("bad", some_of(BAD_SHOTS, 2), ids=range(len(BAD_SHOTS)))
+@pytest.mark.parametrize(("bad", "weapon"), in_turn(BAD_SHOTS, [Disc(3), Beam(9, 2), Spread(Disc(2), 3, 4), Pistol(9)]))
 def test_bad_shots_are_refused_in_the_same_words(bad: dict[str, Any], weapon: Weapon) -> None:
     scene = crowd(6)
     ready = prepare(scene, weapon)

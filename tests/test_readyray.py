@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, note, settings
+from examples import examples
+from hypothesis import HealthCheck, given, note
 from hypothesis import strategies as st
 from ray_battles import some_battle
 from some_of import some_of
@@ -62,7 +63,7 @@ def both(
     return ready.fire(**shot), truth
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rng=worlds)
 def test_random_battles(kernels: ModuleType, rng: random.Random) -> None:
     """Any weapon of rays, half of them of one that ends at its first hit, while the scene changes between the shots."""
@@ -264,7 +265,7 @@ def test_directions_are_those_of_unit(degrees: float) -> None:
 def test_threads_fire_one_ready_weapon(kernels: ModuleType, weapon: Weapon) -> None:
     scene, rng = crowd(9), np.random.default_rng(9)
     ready = prepare(scene, weapon)
-    shots = [(tuple(at), aim) for at, aim in zip(rng.uniform(0, 160, (400, 2)).tolist(), range(400), strict=True)]
+    shots = [(tuple(at), aim) for at, aim in zip(rng.uniform(0, 160, (150, 2)).tolist(), range(0, 450, 3), strict=True)]
     truths = [fire(scene, weapon, at, aim=aim, strategy="walk") for at, aim in shots]
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda one: ready.fire(one[0], aim=one[1]), shots))

@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes import (
@@ -632,7 +633,7 @@ def test_each_byte_that_was_changed_is_seen_in_its_line(path: Path, monkeypatch:
             file.write(bytes([byte]))
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     order=st.one_of(
         st.permutations(range(5)),

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from some_of import some_of
 from test_fire import square
@@ -175,7 +176,7 @@ def test_each_shot_is_fired_at_its_tick(weapon: Weapon, interpolate: bool) -> No
     assert hit
 
 
-@settings(max_examples=17, deadline=None)
+@examples(17, deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_any_batch_at_any_ticks(rng: random.Random) -> None:
     interpolate = rng.random() < 0.5
@@ -371,9 +372,10 @@ def recorded(every: int) -> History:
     return history
 
 
-def test_the_rate_at_which_it_is_recorded_changes_no_row() -> None:
+@pytest.mark.parametrize("rates", [(3, 12), pytest.param((2, 3, 6, 12), marks=pytest.mark.long)], ids=str)
+def test_the_rate_at_which_it_is_recorded_changes_no_row(rates: tuple[int, ...]) -> None:
     dense = recorded(1)
-    for every in (2, 3, 6, 12):
+    for every in rates:
         sparse = recorded(every)
         ticks = [step for step in range(25) if step % every == 0]
         assert sparse.ticks == ticks

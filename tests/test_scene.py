@@ -11,7 +11,8 @@ from weakref import ref
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from test_label_plane import changed_boxes
 
@@ -606,7 +607,7 @@ def brute_planes(scene: Scene) -> Planes:
     return Planes((x, y), **out)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20, deadline=None)
 @given(st.integers(0, 2**32), st.booleans())
 def test_planes_are_the_front_most_items(seed: int, bounded: bool) -> None:
     rng = np.random.default_rng(seed)

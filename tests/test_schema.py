@@ -13,7 +13,8 @@ import jsonschema
 import numpy as np
 import pytest
 from bench.schemas import COMMAND, FOLDER, schemas, write_schemas
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes import Disc, InputError, Rounds, Spread, arsenal_of, fire, load_scene, report_of, weapon_from_json
@@ -107,7 +108,7 @@ def schema_of(part: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("part", PARTS)
-@settings(max_examples=67, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(67, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(value=values)
 def test_a_part_checks_what_its_schema_tells(part: str, value: Any) -> None:
     schema = schema_of(part)
@@ -240,13 +241,14 @@ def agree(schema: dict[str, Any], value: Any, check: Any) -> None:
             check(value)
 
 
+@pytest.mark.parametrize("count", [50, pytest.param(150, marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_the_schema_of_a_weapon_refuses_is_refused(kind: str) -> None:
+def test_what_the_schema_of_a_weapon_refuses_is_refused(kind: str, count: int) -> None:
     weapons = json.loads((ROOT / "fixtures" / "gallery" / "scene.json").read_text())["weapons"].values()
     schema = {"$ref": "#/$defs/weapon", "$defs": SCHEMAS["scene"]["$defs"]}
     rng = random.Random(kind)
     for weapon in (w for w in weapons if w["kind"] == kind):
-        for _ in range(150):
+        for _ in range(count):
             agree(schema, changed(weapon, rng), weapon_from_json)
 
 
@@ -272,7 +274,8 @@ def test_what_the_schema_of_a_report_refuses_is_refused() -> None:
             agree(SCHEMAS["report"], changed(report, rng), lambda value: REPORT.check("report", value))
 
 
-def test_what_the_schema_of_a_scene_refuses_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [50, pytest.param(150, marks=pytest.mark.long)])
+def test_what_the_schema_of_a_scene_refuses_is_refused(count: int, tmp_path: Path) -> None:
     scene = json.loads((ROOT / "fixtures" / "targets" / "scene.json").read_text())
     for path in (ROOT / "fixtures" / "targets").glob("*.png"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
@@ -283,7 +286,7 @@ def test_what_the_schema_of_a_scene_refuses_is_refused(tmp_path: Path) -> None:
         loaded = load_scene(tmp_path)
         orders_of(loaded, arsenal_of(loaded))
 
-    for _ in range(150):
+    for _ in range(count):
         agree(SCHEMAS["scene"], changed(scene, rng), load)
     assert SCENE.check("scene", scene)
 

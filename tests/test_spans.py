@@ -6,12 +6,13 @@ import random
 import numpy as np
 import oracle_raster as oracle
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes.planes.grid.spans import Spans, begins
 
-LAWS = settings(max_examples=200, deadline=None)
+LAWS = examples(200, deadline=None)
 
 Runs = list[tuple[int, int, int]]  # (y, x_first, x_last); x_first > x_last is an empty run
 

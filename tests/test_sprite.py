@@ -18,8 +18,10 @@ import numpy as np
 import oracle_raster
 import oracle_sprite as oracle
 import pytest
-from hypothesis import HealthCheck, assume, example, given, settings
+from examples import examples
+from hypothesis import HealthCheck, assume, example, given
 from hypothesis import strategies as st
+from some_of import in_turn
 
 from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError
@@ -33,8 +35,8 @@ from hitplanes.planes.volumes.fit import KINDS, Kind, bounding
 
 ROOT = Path(__file__).parent.parent
 
-AGAINST = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-LAWS = settings(max_examples=54, deadline=None)
+AGAINST = examples(80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+LAWS = examples(54, deadline=None)
 
 FULL = 1 << 16
 FLIPS = ("none", "x", "y", "xy")
@@ -199,9 +201,8 @@ def test_masks_that_are_made_together_are_those_made_alone(jit: bool, poses: lis
         assert not one.mask.flags.writeable
 
 
-@pytest.mark.parametrize("flip", FLIPS)
+@pytest.mark.parametrize(("scale", "flip"), in_turn(SCALES, FLIPS))
 @pytest.mark.parametrize("angle", [0, 90, 180, 270, 45, -45, 135, 30])
-@pytest.mark.parametrize("scale", SCALES)
 def test_every_form_of_an_uneven_mask_is_the_reference(scale: tuple[float, float], angle: float, flip: str) -> None:
     mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [1, 1, 1, 0]], np.bool_)
     expected = oracle.placed_mask(mask.tolist(), None, turn_of(flip, scale, angle), (77, -300))
@@ -827,7 +828,7 @@ SHAPES: list[Callable[[], Sprite]] = [
 
 
 @given(st.randoms(use_true_random=False), st.integers(2, 12))
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @pytest.mark.usefixtures("jit")
 def test_shapes_made_together_are_those_of_each_alone(rng: random.Random, count: int) -> None:
     makers = [rng.choice(SHAPES) for _ in range(count)]

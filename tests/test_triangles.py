@@ -13,7 +13,8 @@ import adversarial
 import numpy as np
 import oracle_volumes
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hitplanes import InputError
@@ -277,7 +278,7 @@ TRIANGLES = st.tuples(CORNERS, CORNERS, CORNERS)
 
 
 @given(st.lists(st.tuples(TRIANGLES, TRIANGLES), min_size=1, max_size=20), st.sampled_from([1.0, 2.0**-1074, 1e150]))
-@settings(max_examples=100, deadline=None)
+@examples(100, deadline=None)
 def test_a_small_lattice_is_right(cases: list[Any], unit: float) -> None:
     a, b = rows_of(cases)
     assert (triangles_meet(a * unit, b * unit) == truth(a, b)).all()
