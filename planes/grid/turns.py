@@ -1,4 +1,4 @@
-"""Turns of masks: by quarter turns, and to any directions, whose runs are found without a look at each pixel."""
+"""Turns of masks: by quarter turns, and to many directions at once, by the edges of rectangles that cover the mask."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def quarter_turned(array: npt.NDArray[Any], x: int, y: int, turns: int) -> tuple
 
 
 class Edges(NamedTuple):
-    """Rectangles that cover a mask in each of its four quarter turns, from its pivot."""
+    """Rectangles that cover a mask in each of its four quarter turns, relative to its pivot."""
 
     begin: Ints  # (5,) first rectangle of each turn, and their number
     sides: Ints  # (4, k) left, right, top and low, 1/256 px
@@ -47,9 +47,8 @@ def edges_of(mask: Bools, pivot_256: tuple[int, int]) -> Edges:
     for turns in range(4):
         source, *pivot = quarter_turned(mask, *pivot_256, turns)
         runs = Spans.from_mask(np.asarray(source))
-        y, first, last = (
-            side[np.lexsort((runs.y, runs.x_last, runs.x_first))] for side in (runs.y, runs.x_first, runs.x_last)
-        )
+        order = np.lexsort((runs.y, runs.x_last, runs.x_first))
+        y, first, last = runs.y[order], runs.x_first[order], runs.x_last[order]
         new = begins(first) | begins(last) | begins(y - np.arange(len(y)))
         begin, end = np.flatnonzero(new), np.flatnonzero(np.append(new[1:], True)[: len(y)])
         edges = np.stack([first[begin], last[begin] + 1, y[begin], y[end] + 1])
@@ -61,7 +60,7 @@ def edges_of(mask: Bools, pivot_256: tuple[int, int]) -> Edges:
 def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     """Runs of a mask that is turned to n directions, as `variants_of` turns it, from the pixel of its pivot.
 
-    A pixel is set if its centre, turned back, lies in the closed rectangle of a run of the mask: between its ends,
+    A pixel is set if its centre, turned back, lies in one of the closed rectangles: between its ends,
     `left <= dx c + dy s <= right`, and between its sides, `top <= dy c - dx s <= low`.
 
     Parameters

@@ -543,6 +543,6 @@ def _turned_runs(begin, sides, pivots, quarter, c, s):
 
 
 def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
-    """See `scene.variants.turned_runs`."""
+    """See `grid.turns.turned_runs`."""
     shape, y, parts = _turned_runs(edges.begin, np.ascontiguousarray(edges.sides.T), edges.pivots, quarter, c, s)
     return RowRuns(shape, y, list(parts))
