@@ -434,7 +434,7 @@ def work_out(weapon: AreaWeapon) -> None:
         narrow.pattern_volumes(prefilter, [pattern])
 
 
-@pytest.mark.parametrize("kind", DISTINCT)
+@pytest.mark.parametrize("kind", some_of(DISTINCT))
 @pytest.mark.usefixtures("uncollected")
 def test_caches_of_patterns_hold_no_more_than_they_count(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many patterns and all that is worked out of them, as the allocator tells, without the garbage collector."""

@@ -15,6 +15,7 @@ import pytest
 from examples import examples
 from hypothesis import given
 from hypothesis import strategies as st
+from some_of import some_of
 
 from hitplanes import Disc, Hits, InputError, Scene, Sprite, fire, read_png
 from hitplanes.planes.files.png import write_png
@@ -253,7 +254,7 @@ DAMAGE: dict[str, tuple[str, Callable[[Path], object]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("damage", DAMAGE)
+@pytest.mark.parametrize("damage", some_of(DAMAGE))
 def test_what_is_damaged_fails_by_name_and_is_repaired(
     golden: Callable[..., Outcome], tmp_path: Path, damage: str
 ) -> None:

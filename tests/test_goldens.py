@@ -20,7 +20,7 @@ FIXTURES = Path(__file__).parents[1] / "fixtures"
 SCENES = sorted(path.parent.name for path in FIXTURES.glob("*/scene.json"))
 
 
-@pytest.mark.parametrize("row", [0, 2])
+@pytest.mark.parametrize("row", [0, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", SCENES)
 def test_fired_at(name: str, row: int, hits_golden: HitsGolden) -> None:
     scene = load_scene(FIXTURES / name)
