@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from some_of import in_turn
 
@@ -17,7 +17,7 @@ from hitplanes.planes.bits.tiles import big_pattern
 from hitplanes.planes.common.backend import COMPILED
 from hitplanes.planes.common.limits import REACH_MAX
 from hitplanes.planes.grid import rasterize, turns
-from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit
+from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
 
@@ -46,6 +46,7 @@ WEAPONS: dict[str, AreaWeapon] = {
     "stencil about a place aside": Stencil(["#.#", "...", "#.#"], pivot_xy=(31.3, -17.71)),
     "stencil of one pixel": Stencil(["#"]),
 }
+SIGNS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
 SPECIAL = [0, 45, 90, 135, 180, 225, 270, 315, 17, 163, 1e-6, 90.0001, 359.99999, 26.565051177077990, 30, 60]
 
 
@@ -76,10 +77,19 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> N
     assert begin == len(bits.words) and not bits.words[:64].any()
 
 
-@given(st.lists(st.text("#.", min_size=7, max_size=7), min_size=1, max_size=9), st.tuples(*[st.floats(-20, 20)] * 2))
+WHOLE_SIDES = [(3, 4), (5, 12), (8, 15), (7, 24), (20, 21), (63, 16)]
+TIES = np.stack(unit_toward(*np.array([(u * x, v * y) for x, y in WHOLE_SIDES for u, v in SIGNS]).T), axis=1)
+"""Directions along which corners of turned pixels are centres of other pixels, but for the rounding of a direction."""
+
+
+@given(
+    st.lists(st.text("#.", min_size=7, max_size=7), min_size=1, max_size=9),
+    st.tuples(*[st.one_of(st.floats(-20, 20), st.integers(-9, 40).map(lambda n: n / 2))] * 2),
+)
+@example([".......", "......#"], (3.0, 1.0))
 def test_masks_are_turned_by_their_runs_as_by_their_pixels(mask: list[str], pivot: tuple[float, float]) -> None:
     weapon = Stencil([*mask, "#......"], pivot_xy=pivot)
-    aims = directions(len(mask), 9)
+    aims = np.concatenate([directions(len(mask), 9), TIES])
     runs = weapon.runs(aims)
     assert runs is not None
     for i, (c, s) in enumerate(aims.tolist()):
@@ -103,8 +113,8 @@ def test_compiled_turned_masks_are_those_of_numpy(mask: list[str], pivot: tuple[
     pytest.importorskip("numba")
     kernels = importlib.import_module(COMPILED[turns.__name__])
     edges = turns.edges_of(np.array([[c == "#" for c in row] for row in [*mask, "#" * 17]]), pivot)
-    split = all_quarters(np.stack(unit(np.array(aims, float)), axis=1))
-    own, other = (each_run(one.turned_runs(edges, *split), len(aims)) for one in (turns, kernels))
+    split = all_quarters(np.concatenate([np.stack(unit(np.array(aims, float)), axis=1), TIES]))
+    own, other = (each_run(one.turned_runs(edges, *split), len(split[0])) for one in (turns, kernels))
     assert own == other
 
 

@@ -162,6 +162,7 @@ def test_a_stencil_covers_the_pixels_of_a_sprite_turned_by_its_aim(
 @given(masks, pivots, st.one_of(beside_diagonals, st.tuples(*2 * [st.integers(-3000, 3000)])))
 @example(np.ones((3, 4), np.bool_), None, (2**38, 2**38 - 1))
 @example(np.ones((3, 4), np.bool_), None, (-7, -7))
+@example(np.eye(12, 1, dtype=np.bool_).reshape(3, 4) | np.eye(12, dtype=np.bool_)[11].reshape(3, 4), None, (3, 4))
 def test_a_stencil_fired_toward_a_point_is_turned_by_the_same_rule(
     jit: bool, mask: np.ndarray, pivot: tuple[float, float] | None, toward_256: tuple[int, int]
 ) -> None:

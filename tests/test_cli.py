@@ -591,15 +591,18 @@ def test_exit_codes_hold_whatever_becomes_of_the_outputs(name: str, others: bool
     pairs = [BOTH_READ, *([pair for pair in ALL_PAIRS if pair not in some] if others else some)]
     runs = {}
     for out, err in pairs:
-        mine = [word.format(f"{out} {err}") for word in words]
+        mine = [word.format(f"{out} {err} {others}") for word in words]
         runs[out, err] = started(mine, place, out, err, unbuffered=err == "full")
+    read = {pair: run.communicate() for pair, run in runs.items()}
     for (out, err), run in runs.items():
-        printed, told = run.communicate()
+        printed, told = read[out, err]
         expected = 2 if out == "full" and code < 2 else code
         assert run.returncode == expected, (out, err, told)
         assert (told or "").count("\n") == (1 if expected == 2 and err == "read" else 0), (out, err, told)
         if name == "fire":
-            assert (place / f"{out} {err}.jsonl").read_bytes() == (place / "read read.jsonl").read_bytes()
+            assert (place / f"{out} {err} {others}.jsonl").read_bytes() == (
+                place / f"read read {others}.jsonl"
+            ).read_bytes()
             assert out != "read" or printed.startswith("3 shots, 3 hit something")
 
 

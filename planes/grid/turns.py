@@ -61,7 +61,8 @@ def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     """Runs of a mask that is turned to n directions, as `variants_of` turns it, from the pixel of its pivot.
 
     A pixel is set if its centre, turned back, lies in one of the closed rectangles: between its ends,
-    `left <= dx c + dy s <= right`, and between its sides, `top <= dy c - dx s <= low`.
+    `left <= dx c + dy s <= right`, and between its sides, `top <= dy c - dx s <= low`. Rounded directions
+    are not of length 1, so that corners are up to 1/256 px beyond the rows to which they turn.
 
     Parameters
     ----------
@@ -71,8 +72,8 @@ def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     left, right, top, low = edges.sides[:, edges.begin[quarter][aim] + place]
     c, s, pivot = c[aim], s[aim], edges.pivots[quarter][aim]
     ends = left * s, right * s
-    first_row = (np.minimum(*ends) + top * c >> TRIG_BITS) + pivot[:, 1] >> 8
-    last_row = (np.maximum(*ends) + low * c >> TRIG_BITS) + pivot[:, 1] >> 8
+    first_row = (np.minimum(*ends) + top * c >> TRIG_BITS) + pivot[:, 1] - 1 >> 8
+    last_row = (np.maximum(*ends) + low * c >> TRIG_BITS) + pivot[:, 1] + 1 >> 8
     run, row = each_pixel(first_row, last_row)
     c, s, (x, y) = c[run], s[run], pivot[run].T
     down = SUB * row - y

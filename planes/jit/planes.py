@@ -473,10 +473,10 @@ PLACES = types.int64[:, :, ::1]
 
 @njit
 def _rows_of(sides, pivot_y, c, s):
-    """First and last row of pixels that a turned rectangle may hold."""
+    """First and last row of pixels that a turned rectangle may hold; see `turned_runs`."""
     left, right, top, low = sides
-    first = (min(left * s, right * s) + top * c >> TRIG_BITS) + pivot_y
-    return first >> 8, (max(left * s, right * s) + low * c >> TRIG_BITS) + pivot_y >> 8
+    first = (min(left * s, right * s) + top * c >> TRIG_BITS) + pivot_y - 1
+    return first >> 8, (max(left * s, right * s) + low * c >> TRIG_BITS) + pivot_y + 1 >> 8
 
 
 @njit
