@@ -16,7 +16,7 @@ from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.tiles import big_pattern
 from hitplanes.planes.common.backend import COMPILED
 from hitplanes.planes.common.limits import REACH_MAX
-from hitplanes.planes.grid import rasterize, turns
+from hitplanes.planes.grid import fixed_point, rasterize, turns
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
@@ -215,6 +215,16 @@ def aimed_at(aims: list[float]) -> Any:
 
 
 @settings(deadline=None)
+@given(AIMS_AT_A_TIME, st.lists(st.tuples(SIZES, SIZES.map(lambda size: -size)), max_size=4))
+def test_compiled_points_turn_as_those_of_numpy(aims: list[float], points: list[tuple[int, int]]) -> None:
+    pytest.importorskip("numba")
+    given = np.array(points, np.int64).reshape(-1, 2)
+    found = np.array([turned(given, c, s) for c, s in aimed_at(aims).tolist()])
+    for form in (fixed_point, importlib.import_module(COMPILED[fixed_point.__name__])):
+        assert np.array_equal(form.turned_to(given, aimed_at(aims)), found)
+
+
+@settings(deadline=None)
 @given(AIMS_AT_A_TIME, SIZES, SIZES, SIZES)
 def test_compiled_beams_are_those_of_numpy(aims: list[float], length: int, radius: int, x: int) -> None:
     a = np.array([x, -x // 3])
@@ -241,7 +251,7 @@ def test_compiled_polygons_are_those_of_numpy(rings: Any, aims: list[float]) -> 
     runs = same(rasterize, "convex_polygons", np.array(rings))
     if runs is not None:
         same(bit_rows, "bits_of_runs", runs, len(rings), np.array(rings)[:, 0])
-    box = Box(1 + rings[0][0][0] // 100, 1 + rings[0][0][1] // 100)._corners()
+    box = Box(1 + rings[0][0][0] // 100, 1 + rings[0][0][1] // 100)._corners
     same(
         bit_rows,
         "bits_of_runs",

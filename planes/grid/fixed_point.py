@@ -191,6 +191,11 @@ def turned(points_256: Ints, c: Ints | int, s: Ints | int) -> Ints:
     return np.stack([over_one(x * c - y * s), over_one(x * s + y * c)], axis=-1)
 
 
+def turned_to(points_256: Ints, direction: Ints) -> Ints:
+    """Turn all points (m, 2) about the origin to each of the directions (n, 2), as (n, m, 2); see `turned`."""
+    return turned(points_256, *direction.T[..., None])
+
+
 def scaled(directions: Ints, length_256: int) -> Ints:
     """Vectors of a length along directions, (cos, sin) times 2**30; rounded once, half to even."""
     return over_one(directions * length_256)

@@ -105,7 +105,7 @@ class RowRuns(NamedTuple):
 
     shape: Ints  # of each run (k,), sorted
     y: Ints  # row of each run (k,), sorted within its shape
-    parts: list[tuple[Ints, Ints]]  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
+    parts: Sequence[tuple[Ints, Ints]] | Ints  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
 
     def spans(self) -> Spans:
         """The pixels of a single shape."""

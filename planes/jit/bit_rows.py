@@ -354,7 +354,7 @@ def _bits_of_runs(shape, y, parts, count, normal):
 
 def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
     """See `bits.bit_rows.bits_of_runs`."""
-    box, corner, rows, words, strips = _bits_of_runs(runs.shape, runs.y, np.array(runs.parts), count, normal)
+    box, corner, rows, words, strips = _bits_of_runs(runs.shape, runs.y, np.asarray(runs.parts), count, normal)
     if not len(words):
         return None
     return PatternBits(

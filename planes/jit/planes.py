@@ -545,4 +545,4 @@ def _turned_runs(begin, sides, pivots, quarter, c, s):
 def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     """See `grid.turns.turned_runs`."""
     shape, y, parts = _turned_runs(edges.begin, np.ascontiguousarray(edges.sides.T), edges.pivots, quarter, c, s)
-    return RowRuns(shape, y, list(parts))
+    return RowRuns(shape, y, parts)

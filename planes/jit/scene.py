@@ -11,7 +11,7 @@ from numba import njit, types
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import DOUBT, UNIT
-from ..grid.rasterize import DIAGONAL, WIDEST, RowRuns, sides_of
+from ..grid.rasterize import DIAGONAL, ROOM, WIDEST, RowRuns, sides_of
 from .bit_rows import INTS, OUT
 from .cache import compiled
 
@@ -22,6 +22,7 @@ COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(TERMS + 1))
 
 RADIAN = math.pi / 180
 FLOATS = types.Array(types.float64, 1, "C", readonly=True)
+NO_SIDES = np.zeros(0, np.int64)
 
 
 @compiled(types.boolean(FLOATS, types.int64[::1], types.int64[::1], types.boolean[::1]))
@@ -91,7 +92,26 @@ def pixels(at_256: Ints) -> Ints:
 
 PELLETS = types.Array(types.int64, 2, "A", readonly=True)
 STEPS = types.Array(types.int64, 3, "A", readonly=True)
+PARTS = types.int64[:, :, ::1]
 WHOLE = types.int64
+
+
+@njit(inline="always")
+def _over_one(value):
+    """See `fixed_point.over_one`."""
+    return (value + (UNIT // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
+
+
+@compiled(PARTS(PELLETS, PELLETS))
+def turned_to(points_256, direction):
+    """See `grid.fixed_point.turned_to`."""
+    out = np.empty((len(direction), len(points_256), 2), np.int64)
+    for k in range(len(direction)):
+        c, s = direction[k]
+        for i in range(len(points_256)):
+            x, y = points_256[i]
+            out[k, i, 0], out[k, i, 1] = _over_one(x * c - y * s), _over_one(x * s + y * c)
+    return out
 
 
 @njit
@@ -182,7 +202,7 @@ def _winding(ring):
     return 1 if right else -1
 
 
-@compiled(types.Tuple((types.boolean, OUT, OUT, OUT, OUT))(STEPS))
+@compiled(types.Tuple((types.boolean, OUT, OUT, PARTS))(STEPS))
 def _convex_polygons(points):
     count, corners = points.shape[:2]
     top, low, winding = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
@@ -190,9 +210,11 @@ def _convex_polygons(points):
         winding[k] = _winding(points[k])
         top[k], low[k] = _ceil(points[k, :, 1].min(), SUB), points[k, :, 1].max() // SUB
     if not winding.all():
-        return False, top, low, top, low
+        return False, top, low, np.empty((0, 0, 0), np.int64)
     shape, y, begin = layout(top, low)
-    first, last = np.full(len(y), -WIDEST), np.full(len(y), WIDEST)
+    parts = np.empty((1, 2, len(y)), np.int64)
+    first, last = parts[0, 0], parts[0, 1]
+    first[:], last[:] = -WIDEST, WIDEST
     for k in range(count):
         for i in range(corners):
             (x0, y0), (x1, y1) = points[k, i], points[k, (i + 1) % corners]
@@ -207,13 +229,13 @@ def _convex_polygons(points):
                 at_least(across, SUB * dx, SUB * dy, first[at + upper : at + lower + 1])
             else:
                 at_most(across, SUB * dx, SUB * dy, last[at + upper : at + lower + 1])
-    return True, shape, y, first, last
+    return True, shape, y, parts
 
 
 def convex_polygons(points: Ints) -> RowRuns | None:
     """See `grid.rasterize.convex_polygons`."""
-    convex, shape, y, first, last = _convex_polygons(points)
-    return RowRuns(shape, y, [(first, last)]) if convex else None
+    convex, shape, y, parts = _convex_polygons(points)
+    return RowRuns(shape, y, parts) if convex else None
 
 
 @njit
@@ -283,9 +305,17 @@ def _add_disc(x, y, radius, top, first, last):
             first[row - top], last[row - top] = min(first[row - top], begin), max(last[row - top], end)
 
 
-@compiled(types.Tuple((OUT, OUT, types.int64[:, :, ::1]))(WHOLE, WHOLE, PELLETS, WHOLE, INTS))
+@compiled(types.Tuple((OUT, OUT, PARTS))(WHOLE, WHOLE, PELLETS, WHOLE, INTS))
 def _beams(x, y, ends, radius, sides):
+    """Beams as `rasterize.beams` makes them; no row if sides are missing and are beyond what their root may be of."""
     count, reach = len(ends), max(radius, HALF)
+    if not len(sides):
+        sides = np.empty(count, np.int64)
+        for k in range(count):
+            length2 = (ends[k, 0] - x) ** 2 + (ends[k, 1] - y) ** 2
+            if np.float64(radius) ** 2 * np.float64(length2) > ROOM:
+                return sides[:0], sides[:0], np.empty((0, 2, 0), np.int64)
+            sides[k] = root_of(radius * radius * length2)
     top, low = np.empty(count, np.int64), np.empty(count, np.int64)
     for k in range(count):
         top[k], low[k] = _ceil(min(y, ends[k, 1]) - reach, SUB), (max(y, ends[k, 1]) + reach) // SUB
@@ -305,8 +335,10 @@ def _beams(x, y, ends, radius, sides):
 
 def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     """See `grid.rasterize.beams`."""
-    shape, y, parts = _beams(*a.tolist(), b, radius, sides_of(radius, b - a))
-    return RowRuns(shape, y, list(parts))
+    shape, y, parts = _beams(*a.tolist(), b, radius, NO_SIDES)
+    if not len(parts):
+        shape, y, parts = _beams(*a.tolist(), b, radius, sides_of(radius, b - a))
+    return RowRuns(shape, y, parts)
 
 
 @njit
@@ -338,13 +370,7 @@ def _half_plane(slope, limit, top, first, last):
         _raise(quotient, rest, more, over, per, first)
 
 
-@njit(inline="always")
-def _over_one(value):
-    """See `fixed_point.over_one`."""
-    return (value + (UNIT // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
-
-
-@compiled(types.Tuple((OUT, OUT, types.int64[:, :, ::1]))(WHOLE, PELLETS, WHOLE, WHOLE))
+@compiled(types.Tuple((OUT, OUT, PARTS))(WHOLE, PELLETS, WHOLE, WHOLE))
 def _cones(reach, direction, c_half, s_half):
     count = len(direction)
     top, low = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -382,8 +408,7 @@ def _cones(reach, direction, c_half, s_half):
 
 def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
     """See `grid.rasterize.cones`."""
-    shape, y, parts = _cones(reach, direction, c_half, s_half)
-    return RowRuns(shape, y, list(parts))
+    return RowRuns(*_cones(reach, direction, c_half, s_half))
 
 
 @compiled()

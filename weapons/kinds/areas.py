@@ -15,8 +15,8 @@ from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
-from hitplanes.planes.grid import rasterize, turns
-from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit
+from hitplanes.planes.grid import fixed_point, rasterize, turns
+from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit_of
 from hitplanes.planes.grid.rasterize import RowRuns, disc, polygon, ring
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.planes.grid.turns import Edges, edges_of
@@ -155,16 +155,17 @@ class Box(AreaWeapon):
     @property
     def reach_256(self) -> int:
         """Distance of the farthest corner."""
-        return _farthest(self._corners())
+        return _farthest(self._corners)
 
     def spans(self, c: int, s: int) -> Spans:
         """A closed rectangle whose edges lie between the pixels."""
-        return polygon([turned(self._corners(), c, s)])
+        return polygon([turned(self._corners, c, s)])
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """Closed rectangles, along directions (n, 2)."""
-        return _convex(self._corners(), direction)
+        return _convex(self._corners, direction)
 
+    @cached_property
     def _corners(self) -> Ints:
         sides = [(HALF * (1 - n % 2), HALF * n) for n in (int(self.width), int(self.height))]
         (left, right), (top, low) = ((center - half, center + half) for center, half in sides)
@@ -190,17 +191,17 @@ class Polygon(AreaWeapon):
     @cached_property
     def reach_256(self) -> int:
         """Distance of the farthest point."""
-        return _farthest(np.concatenate(self._rings()))
+        return _farthest(np.concatenate(self._rings))
 
     def spans(self, c: int, s: int) -> Spans:
         """The filled rings."""
-        return polygon([turned(ring, c, s) for ring in self._rings()])
+        return polygon([turned(ring, c, s) for ring in self._rings])
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """The filled rings, if they are convex, along directions (n, 2)."""
-        rings = self._rings()
-        return _convex(rings[0], direction) if len(rings) == 1 else None
+        return _convex(self._rings[0], direction) if len(self._rings) == 1 else None
 
+    @cached_property
     def _rings(self) -> list[Ints]:
         return [snap(ring) for ring in (self.points, *self.holes)]
 
@@ -229,9 +230,13 @@ class Cone(AreaWeapon):
 
     def runs(self, direction: Ints) -> RowRuns:
         """Closed sectors, along directions (n, 2)."""
-        c_half, s_half = unit(self.angle / 2)
-        runs: RowRuns = kernels_of(rasterize).cones(_snapped(self.reach), direction, int(c_half), int(s_half))
+        runs: RowRuns = kernels_of(rasterize).cones(self.reach_256, direction, *self._half)
         return runs
+
+    @cached_property
+    def _half(self) -> tuple[int, int]:
+        """Direction of half the angle."""
+        return unit_of(self.angle / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +260,7 @@ class Beam(AreaWeapon):
 
     def runs(self, direction: Ints) -> RowRuns:
         """Segments with round ends, along directions (n, 2)."""
-        end = turned(np.array([_snapped(self.length), 0]), *direction.T)
+        end = kernels_of(fixed_point).turned_to(np.array([[_snapped(self.length), 0]]), direction)[:, 0]
         runs: RowRuns = kernels_of(rasterize).beams(ORIGIN, end, _snapped(self.width / 2))
         return runs
 
@@ -523,7 +528,7 @@ def arsenal_of(scene: Scene) -> dict[str, Weapon]:
 
 def _convex(ring: Ints, direction: Ints) -> RowRuns | None:
     """Runs of a ring (m, 2), turned to directions (n, 2), if it is convex."""
-    runs: RowRuns | None = kernels_of(rasterize).convex_polygons(turned(ring, *direction.T[..., None]))
+    runs: RowRuns | None = kernels_of(rasterize).convex_polygons(kernels_of(fixed_point).turned_to(ring, direction))
     return runs
 
 

@@ -21,7 +21,8 @@ from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
-from hitplanes.planes.grid.fixed_point import ONE, turned
+from hitplanes.planes.grid import fixed_point
+from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.grid.rasterize import RowRuns
 from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
 
@@ -377,20 +378,26 @@ class AimedPatterns(Sequence[Pattern]):
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
-        normal, made, lay = self._make(ONE, 0).normal, [], kernels_of(bit_rows).bits_of_runs
-        normals = turned(np.array([normal]), *self._direction.T) if normal else np.zeros((0, 2), np.int64)
+        normal, made = self._make(ONE, 0).normal, []
         at_once = max(ROWS_AT_ONCE // self._side, 1)
         for first in range(0, len(self), at_once):
-            now = slice(first, first + at_once)
-            runs = self._runs(self._direction[now])
-            part = None if runs is None else lay(runs, len(self._direction[now]), normals[now])
+            direction, normals = self._direction[first : first + at_once], NO_NORMALS
+            runs = self._runs(direction)
+            if runs is not None and normal:
+                normals = kernels_of(fixed_point).turned_to(np.array([normal]), direction)[:, 0]
+            part = None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, len(direction), normals)
             if part is None:
                 return _made(list(self))
             made.append(part)
-        begin = np.cumsum([0, *(len(part.words) for part in made[:-1])]).tolist()
-        made = [part._replace(first=part.first + at) for part, at in zip(made, begin, strict=True)]
-        bits = made[0] if len(made) == 1 else PatternBits(*map(np.concatenate, zip(*made, strict=True)))
+        bits = made[0] if len(made) == 1 else _one_after_another(made)
         return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
+
+
+def _one_after_another(parts: Sequence[PatternBits]) -> PatternBits:
+    """Bit rows of all patterns of several parts."""
+    begin = np.cumsum([0, *(len(part.words) for part in parts[:-1])]).tolist()
+    moved = [part._replace(first=part.first + at) for part, at in zip(parts, begin, strict=True)]
+    return PatternBits(*map(np.concatenate, zip(*moved, strict=True)))
 
 
 def _with_sums(bits: PatternBits, falloff: str, reach_256: int) -> PatternBits:
@@ -453,6 +460,8 @@ KEY_BYTES = 128
 def _bytes(windows: PatternBits) -> int:
     return ENTRY_BYTES + sum(column.nbytes for column in windows if isinstance(column, np.ndarray))
 
+
+NO_NORMALS = np.zeros((0, 2), np.int64)
 
 ROWS_AT_ONCE = 2**16
 """Most rows of patterns that are rasterized at a time: 512 KB for each of their columns."""

@@ -17,7 +17,6 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.cells import Cells
 from hitplanes.planes.bits.front_to_back import NO_NUMBERS, OrderedTiles
 from hitplanes.planes.bits.visible import VisibleSet
@@ -233,7 +232,7 @@ class PositionCache:
                     at += ROW_BYTES
             buffers.append(buffer)
 
-        return look, PIECE_BYTES + one.pattern.words.nbytes
+        return look, PIECE_BYTES + one.pattern.bits.words.nbytes
 
     def _make_visible(self) -> None:
         with self._lock:
@@ -245,9 +244,8 @@ class PositionCache:
 
 def _shape_of(one: Round) -> Any:
     """The Shape of a round."""
-    words = one.pattern.words
-    flat = np.concatenate([np.zeros(WORD, np.uint64), words.reshape(-1)])
-    return _shape(one.pattern.box_xyxy[:1], np.array([WORD]), np.array([words.shape[1]]), flat)
+    bits = one.pattern.bits
+    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words)
 
 
 @structref.register
