@@ -39,6 +39,9 @@ WEAPONS: dict[str, AreaWeapon] = {
     "triangle": Polygon([(0, 0), (50, 10), (30, 40)]),
     "triangle far off": Polygon([(500, -3), (530, 2.3), (515.004, 90)]),
     "points on an edge": Polygon([(0, 0), (20, 0), (40, 0), (40, 30), (0, 30)]),
+    "star": STAR,
+    "ring about a hole": Polygon([(0, 0), (40, 0), (40, 40), (0, 40)], holes=[[(10, 10), (30, 12), (20, 30)]]),
+    "two rings that cross": Polygon([(-30, 0), (30, 0), (0, 40)], holes=[[(-30, 30), (30, 30), (0, -15)]]),
     "anticlockwise": Polygon([(0, 0), (0, 30), (40, 30), (40, 0)]),
     "stencil": Stencil([".##", "###", ".#."]),
     "stencil of even sides with holes": Stencil(["##.###" * 5, "#....#" * 5, ".#.###" * 5, "######" * 5]),
@@ -133,9 +136,14 @@ def test_directions_are_split_together_as_one_by_one() -> None:
 
 
 def test_stencils_that_may_be_too_large_are_turned_one_by_one() -> None:
-    weapon, aims = Stencil(["##"], pivot_xy=(9000, 0)), directions(2)
+    weapon, aims = Stencil(["##"], pivot_xy=(5000, 0)), directions(2)
     assert weapon.runs(aims) is None
     assert np.array_equal(patterns_of(weapon, aims).bits.box_xyxy[0], weapon.spans(*aims[0].tolist()).box_xyxy)  # type: ignore[attr-defined]
+
+
+def test_patterns_without_bit_rows_are_made_one_by_one(jit: bool) -> None:
+    weapon, aims = Beam(60_000 + jit, 3), directions(2)
+    assert isinstance(patterns_of(weapon, aims), list)
 
 
 def test_stencils_without_pixels_hit_nothing_at_any_aim(jit: bool) -> None:
@@ -259,6 +267,21 @@ def test_compiled_polygons_are_those_of_numpy(rings: Any, aims: list[float]) -> 
         len(aims),
         aimed_at(aims),
     )
+
+
+places = st.one_of(coordinates, st.integers(-3, 3).map(lambda n: 256 * n))
+RINGS = st.lists(st.lists(st.tuples(places, places), min_size=3, max_size=7), min_size=1, max_size=3)
+
+
+@settings(deadline=None)
+@given(RINGS, AIMS_AT_A_TIME)
+def test_rings_at_several_aims_are_each_filled_by_the_even_odd_rule(rings: Any, aims: list[float]) -> None:
+    pytest.importorskip("numba")
+    every, starts = np.concatenate([np.array(ring) for ring in rings]), np.cumsum([0, *map(len, rings)])[:-1]
+    points = fixed_point.turned_to(every, np.concatenate([aimed_at(aims), [[ONE, 0]]]))
+    for form in (rasterize, importlib.import_module(COMPILED[rasterize.__name__])):
+        found = list(form.polygons(points, starts).each(len(points)))
+        assert found == [rasterize.polygon(np.split(one, starts[1:])) for one in points]
 
 
 @settings(deadline=None)

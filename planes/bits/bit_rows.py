@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Ints
-from ..grid.rasterize import RowRuns
-from ..grid.spans import NO_STRIPS, Box, begins, meets_strip
+from ..grid.spans import NO_STRIPS, Box, RowRuns, begins, meets_strip
 
 Words = npt.NDArray[np.uint64]
 Sums = npt.NDArray[np.uint32]

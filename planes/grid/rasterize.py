@@ -14,11 +14,10 @@ order. Coordinates of rays are relative to a whole pixel near their start.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise, starmap
-from typing import NamedTuple
+from itertools import accumulate
 
 import numpy as np
 import numpy.typing as npt
@@ -26,11 +25,10 @@ import numpy.typing as npt
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
 from .fixed_point import UNIT, far_roots, isqrt, turned
-from .spans import Spans, each_pixel, ragged
+from .spans import WIDEST, RowRuns, Spans, each_pixel, in_rows, ragged
 
 Runs = tuple[Ints, Ints, Ints]
 
-WIDEST = 2**40  # a column beyond all others, px
 QUOTIENT_ERROR = 2.0**-50  # most relative error of a quotient of two numbers, rounded to float64, times a row number
 
 
@@ -75,55 +73,43 @@ def ellipse(radius_x: int, radius_y: int, c: int, s: int) -> Spans:
 
 
 def polygon(rings: Sequence[Ints]) -> Spans:
-    """Centres inside rings of points (N, 2) by the even-odd rule over all rings, and centres on any edge.
+    """Centres inside rings of points (N, 2) by the even-odd rule over all rings, and centres on any edge."""
+    starts = list(accumulate([len(ring) for ring in rings[:-1]], initial=0))
+    _, y, first, last = _even_odd(np.concatenate(rings)[None], np.array(starts))
+    return Spans.from_runs(y, first, last)
+
+
+def polygons(points: Ints, starts: Ints) -> RowRuns:
+    """Polygons of points (n, m, 2), each as `polygon` fills it; their rings begin at points `starts` (k,)."""
+    convex = convex_polygons(points) if len(starts) == 1 else None
+    return in_rows(*_even_odd(points, starts)) if convex is None else convex
+
+
+def _even_odd(points: Ints, starts: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+    """Shape, row, and first and last pixel of runs inside polygons and on their edges, in no order.
 
     A centre is inside if an odd number of crossings lies at or left of it. Crossings are rounded up to centres before
     they are sorted, which changes no count and avoids comparing rationals.
     """
-    start = np.concatenate([np.asarray(r, np.int64) for r in rings])
-    end = np.concatenate([np.roll(np.asarray(r, np.int64), -1, axis=0) for r in rings])
+    corners = points.shape[1]
+    following = np.arange(1, corners + 1)
+    following[np.append(starts[1:], corners) - 1] = starts
+    start, end = (ends.reshape(-1, 2) for ends in (points, points[:, following]))
     down = (start[:, 1] > end[:, 1])[:, None]
-    top, low = np.where(down, end, start), np.where(down, start, end)
-    first, last = -(-top[:, 1] // SUB), low[:, 1] // SUB
-    edge, place = ragged(np.maximum(last - first + 1, 0))
-    y = first[edge] + place
-    (x0, y0), (x1, y1) = top[edge].T, low[edge].T
+    (x0, y0), (x1, y1) = np.where(down, end, start).T, np.where(down, start, end).T
+    edge, y = _ragged_rows(-(-y0 // SUB), y1 // SUB)
+    shape = edge // corners
+    x0, y0, x1, y1 = x0[edge], y0[edge], x1[edge], y1[edge]
     flat, per = y0 == y1, np.maximum(y1 - y0, 1)
     at = x0 * per + (SUB * y - y0) * (x1 - x0)  # where edges and rows cross; a flat edge extends from end to end
     left, right = np.where(flat, np.minimum(x0, x1), at), np.where(flat, np.maximum(x0, x1), at)
     left, right = -(-left // (SUB * per)), right // (SUB * per)
-    touching = (y, left, right)
     crossing = ~flat & (SUB * y < y1)  # half-open in y: a vertex between two edges counts once
-    y, x = y[crossing], left[crossing]
-    order = np.lexsort((x, y))
-    y, x = y[order], x[order]
-    return _union([touching, (y[::2], x[::2], x[1::2] - 1)])
-
-
-class RowRuns(NamedTuple):
-    """Runs of several shapes, row by row."""
-
-    shape: Ints  # of each run (k,), sorted
-    y: Ints  # row of each run (k,), sorted within its shape
-    parts: Sequence[tuple[Ints, Ints]] | Ints  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
-
-    def spans(self) -> Spans:
-        """The pixels of a single shape."""
-        (first, last), *more = self.parts
-        for begin, end in more:
-            apart = np.maximum(first, begin) > np.minimum(last, end) + 1
-            if (apart & (first <= last) & (begin <= end)).any():
-                return _union([(self.y, *part) for part in self.parts])
-            first, last = np.minimum(first, begin), np.maximum(last, end)
-        filled = first <= last
-        return Spans(self.y[filled], first[filled], last[filled])
-
-    def each(self, count: int) -> Iterator[Spans]:
-        """The pixels of each of so many shapes."""
-        edges = np.searchsorted(self.shape, np.arange(count + 1)).tolist()
-        for now in starmap(slice, pairwise(edges)):
-            parts = [(first[now], last[now]) for first, last in self.parts]
-            yield RowRuns(self.shape[now], self.y[now], parts).spans()
+    of, row, x = shape[crossing], y[crossing], left[crossing]
+    order = np.lexsort((x, row, of))
+    inside = of[order][::2], row[order][::2], x[order][::2], x[order][1::2] - 1
+    first, second, third, fourth = (np.concatenate(pair) for pair in zip((shape, y, left, right), inside, strict=True))
+    return first, second, third, fourth
 
 
 def convex_polygons(points: Ints) -> RowRuns | None:

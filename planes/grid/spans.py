@@ -7,11 +7,11 @@ y = 1   # # # # #      (1, 0, 4)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, ClassVar, Self
+from itertools import pairwise, starmap
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -296,3 +296,53 @@ def slabs(begin: Reals, step: Reals, low: Reals, high: Reals) -> tuple[Floats, F
     first = np.where(level, -np.inf, np.minimum(to_low, to_high)).max(axis=-1)
     last = np.where(level, np.inf, np.maximum(to_low, to_high)).min(axis=-1)
     return np.asarray(first), np.asarray(last)
+
+
+WIDEST = 2**40  # a column beyond all others, px
+
+
+class RowRuns(NamedTuple):
+    """Runs of several shapes, row by row."""
+
+    shape: Ints  # of each run (k,), sorted
+    y: Ints  # row of each run (k,), sorted within its shape
+    parts: Sequence[tuple[Ints, Ints]] | Ints  # first and last pixels (k,); an empty part is (WIDEST, -WIDEST)
+
+    def spans(self) -> Spans:
+        """The pixels of a single shape."""
+        (first, last), *more = self.parts
+        for begin, end in more:
+            apart = np.maximum(first, begin) > np.minimum(last, end) + 1
+            if (apart & (first <= last) & (begin <= end)).any():
+                columns = zip(*((self.y, *part) for part in self.parts), strict=True)
+                return Spans.from_runs(*map(np.concatenate, columns))
+            first, last = np.minimum(first, begin), np.maximum(last, end)
+        filled = first <= last
+        return Spans(self.y[filled], first[filled], last[filled])
+
+    def each(self, count: int) -> Iterator[Spans]:
+        """The pixels of each of so many shapes."""
+        edges = np.searchsorted(self.shape, np.arange(count + 1)).tolist()
+        for now in starmap(slice, pairwise(edges)):
+            parts = [(first[now], last[now]) for first, last in self.parts]
+            yield RowRuns(self.shape[now], self.y[now], parts).spans()
+
+
+def in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
+    """Unite the runs of each row of each shape, which has all rows from its first to its last."""
+    some = np.flatnonzero(first <= last)
+    shape, y, first, last = shape[some], y[some], first[some], last[some]
+    top = int(y.min(initial=0))
+    line = shape * (int(y.max(initial=0)) - top + 1) + (y - top)
+    which, first, last = merged_runs(line, first, last)
+    shape, y, line = shape[which], y[which], line[which]
+    begin = np.flatnonzero(begins(shape))
+    end = np.append(begin[1:], len(y))[: len(begin)]
+    own, row = each_pixel(y[begin], y[end - 1])
+    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(end - begin)
+    place = np.arange(len(line)) - np.searchsorted(line, line)
+    parts = [(np.full(len(row), WIDEST), np.full(len(row), -WIDEST)) for _ in range(int(place.max(initial=0)) + 1)]
+    for number, ends in enumerate(parts):
+        here = place == number
+        ends[0][at[here]], ends[1][at[here]] = first[here], last[here]
+    return RowRuns(shape[begin][own], row, parts)

@@ -10,8 +10,7 @@ import numpy.typing as npt
 from ..common.checks import Bools, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
 from .fixed_point import pixel
-from .rasterize import WIDEST, RowRuns
-from .spans import Spans, begins, each_pixel, merged_runs, ragged
+from .spans import RowRuns, Spans, begins, each_pixel, in_rows, ragged
 
 
 def turned_pivot(x: int, y: int, size_wh: tuple[int, ...], turns: int) -> tuple[int, int]:
@@ -80,7 +79,7 @@ def turned_runs(edges: Edges, quarter: Ints, c: Ints, s: Ints) -> RowRuns:
     first, last = _between(c, (left[run] << TRIG_BITS) - down * s + x * c, (right[run] << TRIG_BITS) - down * s + x * c)
     sides = (down * c - (low[run] << TRIG_BITS) + x * s, down * c - (top[run] << TRIG_BITS) + x * s)
     from_, to = _between(s, *sides)
-    return _in_rows(aim[run], row, np.maximum(first, from_), np.minimum(last, to))
+    return in_rows(aim[run], row, np.maximum(first, from_), np.minimum(last, to))
 
 
 def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
@@ -90,23 +89,3 @@ def _between(per_256: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
     """
     per, back = SUB * np.maximum(np.abs(per_256), 1), per_256 < 0
     return -(-np.where(back, -high, low) // per), np.where(back, -low, high) // per
-
-
-def _in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
-    """Unite the runs of each row of each shape, which has all rows from its first to its last."""
-    some = np.flatnonzero(first <= last)
-    shape, y, first, last = shape[some], y[some], first[some], last[some]
-    top = int(y.min(initial=0))
-    line = shape * (int(y.max(initial=0)) - top + 1) + (y - top)
-    which, first, last = merged_runs(line, first, last)
-    shape, y, line = shape[which], y[which], line[which]
-    begin = np.flatnonzero(begins(shape))
-    end = np.append(begin[1:], len(y))[: len(begin)]
-    own, row = each_pixel(y[begin], y[end - 1])
-    at = np.searchsorted(own, np.cumsum(begins(shape)) - 1) + y - y[begin].repeat(end - begin)
-    place = np.arange(len(line)) - np.searchsorted(line, line)
-    parts = [(np.full(len(row), WIDEST), np.full(len(row), -WIDEST)) for _ in range(int(place.max(initial=0)) + 1)]
-    for number, ends in enumerate(parts):
-        here = place == number
-        ends[0][at[here]], ends[1][at[here]] = first[here], last[here]
-    return RowRuns(shape[begin][own], row, parts)

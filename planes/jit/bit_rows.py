@@ -14,7 +14,7 @@ from ..bits import bit_rows, cells, shadows
 from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
-from ..grid.rasterize import WIDEST, RowRuns
+from ..grid.spans import WIDEST, RowRuns
 from .cache import compiled
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)

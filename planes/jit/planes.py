@@ -13,13 +13,12 @@ from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, 
 from ..bits.label_plane import CELL_BITS, Front
 from ..common.checks import Bools, Ints, Labels
 from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
-from ..grid.rasterize import WIDEST, RowRuns
-from ..grid.spans import Box, pieces
+from ..grid.spans import WIDEST, Box, RowRuns, pieces
 from ..grid.turns import Edges
 from ..scene.variants import Grids, Turned
 from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
 from .cache import compiled
-from .scene import PELLETS, STEPS, at_least, at_most, layout, root_of
+from .scene import PARTS, PELLETS, STEPS, add_run, at_least, at_most, empty_parts, layout, root_of
 
 BLOCK = 128
 """Rays that march together, so that reads overlap; their columns fit the fastest cache."""
@@ -468,9 +467,6 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: In
     return made
 
 
-PLACES = types.int64[:, :, ::1]
-
-
 @njit
 def _rows_of(sides, pivot_y, c, s):
     """First and last row of pixels that a turned rectangle may hold; see `turned_runs`."""
@@ -496,26 +492,7 @@ def _turned_rows(sides, pivot, c, s, row, first, last):
         at_most(-above, -SUB * c, -SUB * s, last)
 
 
-@njit
-def _add(parts, used, row, first, last):
-    """Add a run to a row: to the run that was added last, if it touches that one."""
-    part = used[row] - 1
-    if part >= 0 and first <= parts[part, 1, row] + 1 and last >= parts[part, 0, row] - 1:
-        parts[part, 0, row], parts[part, 1, row] = min(parts[part, 0, row], first), max(parts[part, 1, row], last)
-    else:
-        parts[part + 1, 0, row], parts[part + 1, 1, row] = first, last
-        used[row] += 1
-
-
-@njit
-def _with_more(parts):
-    """Twice as many parts."""
-    more = np.empty((2 * len(parts), 2, parts.shape[2]), np.int64)
-    more[: len(parts)], more[len(parts) :, 0], more[len(parts) :, 1] = parts, WIDEST, -WIDEST
-    return more
-
-
-@compiled(types.Tuple((OUT, OUT, PLACES))(INTS, BOXES, BOXES, INTS, INTS, INTS))
+@compiled(types.Tuple((OUT, OUT, PARTS))(INTS, BOXES, BOXES, INTS, INTS, INTS))
 def _turned_runs(begin, sides, pivots, quarter, c, s):
     count, most = len(quarter), 0
     top, low = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -525,8 +502,7 @@ def _turned_runs(begin, sides, pivots, quarter, c, s):
             upper, lower = _rows_of(sides[r], pivots[turns, 1], c[k], s[k])
             top[k], low[k], most = min(top[k], upper), max(low[k], lower), max(most, lower - upper + 1)
     shape, y, start = layout(top, low)
-    parts, used = np.empty((2, 2, len(y)), np.int64), np.zeros(len(y), np.int64)
-    parts[:, 0], parts[:, 1] = WIDEST, -WIDEST
+    parts, used = empty_parts(2, len(y)), np.zeros(len(y), np.int64)
     first, last = np.empty(most, np.int64), np.empty(most, np.int64)
     for k in range(count):
         turns = quarter[k]
@@ -535,10 +511,7 @@ def _turned_runs(begin, sides, pivots, quarter, c, s):
             high, at = lower - upper + 1, start[k] + upper - top[k]
             _turned_rows(sides[r], pivots[turns], c[k], s[k], upper, first[:high], last[:high])
             for i in range(high):
-                if first[i] <= last[i]:
-                    if used[at + i] == len(parts):
-                        parts = _with_more(parts)
-                    _add(parts, used, at + i, first[i], last[i])
+                parts = add_run(parts, used, at + i, first[i], last[i])
     return shape, y, parts
 
 

@@ -11,7 +11,8 @@ from numba import njit, types
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
 from ..grid.fixed_point import DOUBT, UNIT
-from ..grid.rasterize import DIAGONAL, ROOM, WIDEST, RowRuns, sides_of
+from ..grid.rasterize import DIAGONAL, ROOM, sides_of
+from ..grid.spans import WIDEST, RowRuns
 from .bit_rows import INTS, OUT
 from .cache import compiled
 
@@ -181,6 +182,35 @@ def layout(top, low):
 
 
 @njit
+def empty_parts(count, rows):
+    """Parts (count, 2, rows) of `RowRuns`, all of them empty."""
+    parts = np.empty((count, 2, rows), np.int64)
+    parts[:, 0], parts[:, 1] = WIDEST, -WIDEST
+    return parts
+
+
+@njit
+def add_run(parts, used, row, first, last):
+    """Add a run, if it is not empty, to a row: to the run that was added last, if it touches that one.
+
+    Parts are returned, of which there may be more; the first `used` (k,) of each row are not empty.
+    """
+    if first > last:
+        return parts
+    part = used[row] - 1
+    if part >= 0 and first <= parts[part, 1, row] + 1 and last >= parts[part, 0, row] - 1:
+        parts[part, 0, row], parts[part, 1, row] = min(parts[part, 0, row], first), max(parts[part, 1, row], last)
+        return parts
+    if part + 1 == len(parts):
+        more = empty_parts(2 * len(parts), parts.shape[2])
+        more[: len(parts)] = parts
+        parts = more
+    parts[part + 1, 0, row], parts[part + 1, 1, row] = first, last
+    used[row] += 1
+    return parts
+
+
+@njit
 def _winding(ring):
     """1 or -1 for a convex ring (m, 2) that turns right or left; 0 for any other: see `rasterize.convex_polygons`."""
     count, changes, right, left, level = len(ring), 0, 0, 0, True
@@ -236,6 +266,53 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     """See `grid.rasterize.convex_polygons`."""
     convex, shape, y, parts = _convex_polygons(points)
     return RowRuns(shape, y, parts) if convex else None
+
+
+@njit
+def _even_odd_row(corner, following, row, parts, used, at):
+    """Add to a row of a polygon what its edges touch, and what lies between every two of its crossings."""
+    level, count, crossing = SUB * row, 0, np.empty(len(corner), np.int64)
+    for i in range(len(corner)):
+        (x0, y0), (x1, y1) = corner[i], corner[following[i]]
+        if y1 < y0:
+            x0, y0, x1, y1 = x1, y1, x0, y0
+        if not y0 <= level <= y1:
+            continue
+        if y0 == y1:
+            first, last = _ceil(min(x0, x1), SUB), max(x0, x1) // SUB
+        else:
+            across, per = x0 * (y1 - y0) + (level - y0) * (x1 - x0), SUB * (y1 - y0)
+            first, last = _ceil(across, per), across // per
+            if level < y1:
+                j, count = count, count + 1
+                while j and crossing[j - 1] > first:
+                    crossing[j], j = crossing[j - 1], j - 1
+                crossing[j] = first
+        parts = add_run(parts, used, at, first, last)
+    for i in range(0, count, 2):
+        parts = add_run(parts, used, at, crossing[i], crossing[i + 1] - 1)
+    return parts
+
+
+@compiled(types.Tuple((OUT, OUT, PARTS))(STEPS, INTS))
+def _even_odd(points, starts):
+    count, corners = points.shape[:2]
+    following, top, low = np.arange(1, corners + 1), np.empty(count, np.int64), np.empty(count, np.int64)
+    for i in range(len(starts)):
+        following[(starts[i + 1] if i + 1 < len(starts) else corners) - 1] = starts[i]
+    for k in range(count):
+        top[k], low[k] = _ceil(points[k, :, 1].min(), SUB), points[k, :, 1].max() // SUB
+    shape, y, _ = layout(top, low)
+    parts, used = empty_parts(2, len(y)), np.zeros(len(y), np.int64)
+    for i in range(len(y)):
+        parts = _even_odd_row(points[shape[i]], following, y[i], parts, used, i)
+    return shape, y, parts
+
+
+def polygons(points: Ints, starts: Ints) -> RowRuns:
+    """See `grid.rasterize.polygons`; runs of a row may overlap."""
+    convex = convex_polygons(points) if len(starts) == 1 else None
+    return RowRuns(*_even_odd(points, starts)) if convex is None else convex
 
 
 @njit

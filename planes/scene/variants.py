@@ -474,24 +474,24 @@ def _flipped_pivot(size_wh: tuple[int, int], pivot_256: tuple[int, int], flip: s
 
 
 def _spans_of_shapes(shapes: Mapping[int, tuple[str, Outline, Transform]]) -> Iterator[tuple[int, Spans]]:
-    """Fill shapes, each with its row; convex polygons of the same number of points are filled together.
+    """Fill shapes, each with its row; polygons of the same numbers of points are filled together.
 
     The string of each is the field that errors name.
     """
-    alike: dict[int, dict[int, Ints]] = {}
+    alike: dict[tuple[int, ...], dict[int, Ints]] = {}
     for row, (named, outline, form) in shapes.items():
         if outline.radius is not None:
             yield row, _ellipse_of(named, outline, form)
             continue
         rings = _rings_of(named, outline, form)
-        if len(rings) > 1 or len(shapes) == 1:
+        if len(shapes) == 1:
             yield row, polygon(rings)
         else:
-            alike.setdefault(len(rings[0]), {})[row] = rings[0]
-    for polygons in alike.values():
-        runs = kernels_of(rasterize).convex_polygons(np.stack(list(polygons.values())))
-        every = (polygon([ring]) for ring in polygons.values()) if runs is None else runs.each(len(polygons))
-        yield from zip(polygons, every, strict=True)
+            starts = tuple(accumulate(map(len, rings[:-1]), initial=0))
+            alike.setdefault((*starts, sum(map(len, rings))), {})[row] = np.concatenate(rings)
+    for sizes, polygons in alike.items():
+        runs = kernels_of(rasterize).polygons(np.stack(list(polygons.values())), np.array(sizes[:-1]))
+        yield from zip(polygons, runs.each(len(polygons)), strict=True)
 
 
 def _ellipse_of(field: str, outline: Outline, form: Transform) -> Spans:

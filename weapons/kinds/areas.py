@@ -17,18 +17,18 @@ from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BY
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
 from hitplanes.planes.grid import fixed_point, rasterize, turns
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, pixel, quarters, snap, turned, unit_of
-from hitplanes.planes.grid.rasterize import RowRuns, disc, polygon, ring
-from hitplanes.planes.grid.spans import Spans
+from hitplanes.planes.grid.rasterize import disc, polygon, ring
+from hitplanes.planes.grid.spans import RowRuns, Spans
 from hitplanes.planes.grid.turns import Edges, edges_of
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, fits, frame_pivot, rows_of
 from hitplanes.planes.scene.variants import Transform, variant_of
 
 from .rays import INSIDE, Laser, Pistol, Projectile, RayWeapon, Rifle, Sweep
-from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, make_pattern
+from .weapon import FALLOFFS, LENGTH, AimedPatterns, Part, Pattern, Swept, Weapon, fits_at_reach, make_pattern
 
 SIGHTS = ("occluders", "all")
-ORIGIN = np.zeros(2, np.int64)
+ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 
 
@@ -161,9 +161,9 @@ class Box(AreaWeapon):
         """A closed rectangle whose edges lie between the pixels."""
         return polygon([turned(self._corners, c, s)])
 
-    def runs(self, direction: Ints) -> RowRuns | None:
+    def runs(self, direction: Ints) -> RowRuns:
         """Closed rectangles, along directions (n, 2)."""
-        return _convex(self._corners, direction)
+        return _polygons(self._corners, ONE_RING, direction)
 
     @cached_property
     def _corners(self) -> Ints:
@@ -191,19 +191,25 @@ class Polygon(AreaWeapon):
     @cached_property
     def reach_256(self) -> int:
         """Distance of the farthest point."""
-        return _farthest(np.concatenate(self._rings))
+        return _farthest(self._points)
 
     def spans(self, c: int, s: int) -> Spans:
         """The filled rings."""
-        return polygon([turned(ring, c, s) for ring in self._rings])
+        return polygon(np.split(turned(self._points, c, s), self._starts[1:]))
 
-    def runs(self, direction: Ints) -> RowRuns | None:
-        """The filled rings, if they are convex, along directions (n, 2)."""
-        return _convex(self._rings[0], direction) if len(self._rings) == 1 else None
+    def runs(self, direction: Ints) -> RowRuns:
+        """The filled rings, along directions (n, 2)."""
+        return _polygons(self._points, self._starts, direction)
 
     @cached_property
-    def _rings(self) -> list[Ints]:
-        return [snap(ring) for ring in (self.points, *self.holes)]
+    def _points(self) -> Ints:
+        """Points (n, 2) of all rings, in 1/256 px."""
+        return np.concatenate([snap(ring) for ring in (self.points, *self.holes)])
+
+    @cached_property
+    def _starts(self) -> Ints:
+        """Where each ring begins among the points."""
+        return np.cumsum([0, len(self.points), *map(len, self.holes)])[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -475,7 +481,8 @@ def patterns_of(weapon: AreaWeapon, direction: Ints) -> Sequence[Pattern]:
 
     Without compiled kernels a few are made one by one, because that is faster, and other calls may need some again.
     """
-    far = weapon.falloff is not None and weapon.reach_256 > SUB * FADING_MOST
+    weighted, reach = weapon.falloff is not None, -(-weapon.reach_256 // SUB)
+    far = (weighted and reach > FADING_MOST) or not fits_at_reach(reach, weighted)
     few = len(direction) <= FEW_AIMS and not jit_is_on()
     if few or type(weapon).runs is AreaWeapon.runs or far:
         return [pattern_of(weapon, c, s) for c, s in direction.tolist()]
@@ -526,9 +533,10 @@ def arsenal_of(scene: Scene) -> dict[str, Weapon]:
     return {name: weapon_from_json(data, f"weapons.{name}") for name, data in weapons.items()}
 
 
-def _convex(ring: Ints, direction: Ints) -> RowRuns | None:
-    """Runs of a ring (m, 2), turned to directions (n, 2), if it is convex."""
-    runs: RowRuns | None = kernels_of(rasterize).convex_polygons(kernels_of(fixed_point).turned_to(ring, direction))
+def _polygons(points: Ints, starts: Ints, direction: Ints) -> RowRuns:
+    """Runs of rings of points (m, 2), which begin at `starts`, turned to directions (n, 2)."""
+    turned_points = kernels_of(fixed_point).turned_to(points, direction)
+    runs: RowRuns = kernels_of(rasterize).polygons(turned_points, starts)
     return runs
 
 

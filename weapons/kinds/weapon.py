@@ -23,8 +23,7 @@ from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE
-from hitplanes.planes.grid.rasterize import RowRuns
-from hitplanes.planes.grid.spans import Spans, Strip, ragged, strip_of, strips_of
+from hitplanes.planes.grid.spans import RowRuns, Spans, Strip, ragged, strip_of, strips_of
 
 Kind = TypeVar("Kind", bound=np.generic)
 
