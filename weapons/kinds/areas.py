@@ -152,7 +152,7 @@ class Box(AreaWeapon):
     width: int
     height: int
 
-    @property
+    @cached_property
     def reach_256(self) -> int:
         """Distance of the farthest corner."""
         return _farthest(self._corners)

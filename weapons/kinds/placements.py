@@ -248,8 +248,8 @@ class Shots:
             return self._meets != EVERYTHING or bool(self._exclude)
         return bool((self.meets != EVERYTHING).any() or self.exclude.shape[1])
 
-    def aimed(self, direction: Ints) -> Shots:
-        """The same shots in other directions (N, 2)."""
+    def aimed(self, direction: Ints | tuple[int, int]) -> Shots:
+        """The same shots in other directions (N, 2), or all in one."""
         rest = self._meets, self._exclude, self._number, self._seed, self._row
         return Shots(self.at_256, direction, self.toward_256, *rest)
 
@@ -481,13 +481,13 @@ def placements_for(weapon: Weapon, shots: Shots) -> Placements:
     """Place every pellet of every round of every shot."""
     burst, spread, plain = parts_of(weapon)
     if not burst and not spread:
-        return Placements(*_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
+        return Placements(*distinct_patterns(plain, shots.one_direction or shots.direction), shots.xy, shots.xy)
     rounds, pellets = burst.count if burst else 1, spread.count if spread else 1
     shot, round_ = np.repeat(np.arange(len(shots)), rounds), np.tile(np.arange(rounds), len(shots))
     direction: Ints | tuple[int, int] = STRAIGHT
     if plain.directed:
         direction = recoiled(shots.direction[shot], round_, burst.recoil_deg if burst else 0)
-    table, pattern = _patterns(plain, direction)
+    table, pattern = distinct_patterns(plain, direction)
     turn_xy = pixel(shots.at_256[shot] + round_[:, None] * snap(burst.recoil_xy)) if burst else shots.xy
     if not spread:
         return Placements(table, pattern, turn_xy, turn_xy, rounds)
@@ -500,7 +500,7 @@ def placements_for(weapon: Weapon, shots: Shots) -> Placements:
     return Placements(table, pattern, xy.reshape(-1, 2), turn_xy, rounds, pellets)
 
 
-def _patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:
+def distinct_patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:
     """Distinct patterns of directions (P, 2), or of one, and the pattern of each direction; None if there is one."""
     if not plain.directed or not len(direction):
         direction = STRAIGHT

@@ -12,7 +12,7 @@ from hitplanes.planes.bits.span_walk import OF_PATTERNS
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
-from hitplanes.planes.grid.fixed_point import snap, unit_of, unit_toward
+from hitplanes.planes.grid.fixed_point import snap, toward, unit_of
 from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Role, Stack
@@ -24,7 +24,16 @@ from ..fire.plan import Plan, absent, unaimed, undrawn
 from ..fire.prefilter import Candidates, may_refuse
 from ..fire.spans import QueryContext, SpanHits, direct
 from ..kinds.areas import parts_of, pierces
-from ..kinds.placements import STRAIGHT, Placements, Shots, accepted_of, blocking_of, checked_shots, placements_for
+from ..kinds.placements import (
+    STRAIGHT,
+    Placements,
+    Shots,
+    accepted_of,
+    blocking_of,
+    checked_shots,
+    distinct_patterns,
+    placements_for,
+)
 from ..kinds.weapon import Pattern, PatternTable, Weapon
 
 REACH_MOST = 500
@@ -60,12 +69,16 @@ def reach_of(weapon: Weapon) -> int | None:
 def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
     """Rounds that have pixels, of a shot at the origin that is aimed toward an offset, if one is given."""
     if offset_256 is not None:
-        shots = shots.aimed(np.stack(unit_toward(*offset_256)).reshape(1, 2))
-    placements = placements_for(weapon, shots)
-    rounds = [
-        Round(x, y, number, _pattern_of_round(placements, number))
-        for number, (x, y) in enumerate(placements.turn_xy.tolist())
-    ]
+        shots = shots.aimed(toward(*offset_256))
+    burst, spread, plain = parts_of(weapon)
+    if burst is None and spread is None:
+        rounds = [Round(0, 0, 0, distinct_patterns(plain, shots.one_direction or STRAIGHT)[0])]
+    else:
+        placements = placements_for(weapon, shots)
+        rounds = [
+            Round(x, y, number, _pattern_of_round(placements, number))
+            for number, (x, y) in enumerate(placements.turn_xy.tolist())
+        ]
     return [one for one in rounds if one.pattern.box_xyxy[0, 0] <= one.pattern.box_xyxy[0, 2]]
 
 
