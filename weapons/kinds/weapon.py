@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
+from itertools import chain
 from typing import Any, ClassVar, NamedTuple, TypeVar
 from weakref import ref
 
@@ -17,7 +18,7 @@ from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
-from hitplanes.planes.common.backend import LruCache, kernels_of
+from hitplanes.planes.common.backend import LruCache, in_parts, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
@@ -377,19 +378,25 @@ class AimedPatterns(Sequence[Pattern]):
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
-        normal, made = self._make(ONE, 0).normal, []
         at_once = max(ROWS_AT_ONCE // self._side, 1)
-        for first in range(0, len(self), at_once):
-            direction, normals = self._direction[first : first + at_once], NO_NORMALS
+        parts = list(chain(*in_parts(len(self), at_once if jit_is_on() else len(self), self._parts)))
+        made = [part for part in parts if part is not None]
+        if len(made) < len(parts):
+            return _made(list(self))
+        bits = made[0] if len(made) == 1 else _one_after_another(made)
+        return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
+
+    def _parts(self, first: int, last: int) -> list[PatternBits | None]:
+        """Bit rows of patterns `first` .. `last` - 1, some at a time; None of those that must be made one by one."""
+        normal, at_once = self._make(ONE, 0).normal, max(ROWS_AT_ONCE // self._side, 1)
+        parts: list[PatternBits | None] = []
+        for begin in range(first, last, at_once):
+            direction, normals = self._direction[begin : min(begin + at_once, last)], NO_NORMALS
             runs = self._runs(direction)
             if runs is not None and normal:
                 normals = kernels_of(fixed_point).turned_to(np.array([normal]), direction)[:, 0]
-            part = None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, len(direction), normals)
-            if part is None:
-                return _made(list(self))
-            made.append(part)
-        bits = made[0] if len(made) == 1 else _one_after_another(made)
-        return bits if self._falloff is None else _with_sums(bits, self._falloff, self._reach_256)
+            parts.append(None if runs is None else kernels_of(bit_rows).bits_of_runs(runs, len(direction), normals))
+        return parts
 
 
 def _one_after_another(parts: Sequence[PatternBits]) -> PatternBits:
