@@ -38,6 +38,8 @@ from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene import variants as variants_module
 from hitplanes.weapons.fire import areas
 from hitplanes.weapons.fire import strategy as strategy_module
+from hitplanes.weapons.fire import verdicts as verdicts_module
+from hitplanes.weapons.fire.strategy import chosen_way
 from hitplanes.weapons.kinds import weapon as weapon_module
 
 STRATEGIES = ("direct", "built", "auto", "integers", "labels")
@@ -274,6 +276,38 @@ def test_verdicts_are_those_of_the_moment_of_the_shot(
     for hits, verdicts in zip(late, kept, strict=True):
         assert np.array_equal(hits.verdicts, verdicts) and len(np.unique(verdicts[:, 1])) > 1
         assert not hits.verdicts.flags.writeable
+
+
+@pytest.mark.parametrize("weapon", [Point(), Disc(9), Disc(9, pierce=True)])
+def test_verdicts_are_those_of_before_a_move(kernels: str, weapon: Weapon) -> None:
+    scene, rng = Scene((150, 150)), np.random.default_rng(3)
+    ids = [scene.add(np.ones((20, 20), np.bool_), rng.uniform(0, 150, 2)) for _ in range(20)]
+    scene.set(ids[:9], role="occluder")
+    at = rng.uniform(0, 150, (40, 2))
+    for strategy in STRATEGIES:
+        truth = by_runs(scene, weapon, at).verdicts
+        hits = fire(scene, weapon, at, strategy=strategy)
+        scene.move(ids, rng.uniform(0, 150, (20, 2)))
+        fire(scene, weapon, at, strategy="built").verdict_counts()
+        assert np.array_equal(hits.verdicts, truth)
+
+
+@pytest.mark.parametrize("way", ["tiles", "visible", "labels", "integers"])
+def test_verdicts_are_counted_by_every_way(kernels: str, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran, seen = [], 0
+    monkeypatch.setattr(
+        verdicts_module, "chosen_way", lambda _, request: ran.append(chosen_way(way, request)) or ran[-1]
+    )
+    rng = np.random.default_rng([9, len(way)])
+    for _ in range(4):
+        scene = some_scene(rng)
+        for weapon in WEAPONS:
+            at, how = some_shots(rng, scene)
+            hits = fire(scene, weapon, at, **how)
+            assert np.array_equal(hits.verdicts, by_runs(scene, weapon, at, **how).verdicts), f"{weapon} {how}"
+            seen = seen + hits.verdicts.sum(axis=0)
+    assert (way, kernels) == ("integers", "jit") or any(made.name == way for made, _ in ran)
+    assert np.all(np.array(seen) > 500), seen
 
 
 def test_no_shots_no_objects(kernels: str) -> None:

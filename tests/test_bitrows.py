@@ -445,6 +445,26 @@ def test_words_of_a_pattern_hold_its_pixels(seed: int) -> None:
     assert told == {(x, y) for x, y in spans.pixels().tolist()}
 
 
+@examples(100, deadline=None)
+@given(SEEDS, st.sampled_from([0, 2**40]))
+@pytest.mark.parametrize("name", ["hitplanes.planes.bits.bit_rows", "hitplanes.planes.jit.bit_rows"])
+def test_pixels_of_patterns_within_bounds(name: str, seed: int, far: int) -> None:
+    rows = pytest.importorskip(name) if ".jit." in name else importlib.import_module(name)
+    rng = np.random.default_rng(seed)
+    masks = [rng.random(rng.integers(0, [20, 150])) < rng.choice([0, 0.5, 1]) for _ in range(rng.integers(1, 4))]
+    spans = [Spans.from_mask(mask, tuple(rng.integers(-99, 99, 2).tolist())) for mask in masks]
+    bits = weapon.pattern_bits_of([Pattern(own, None) for own in spans])
+    count = bit_rows.pixels_of_patterns(bits)
+    assert count.tolist() == [own.count for own in spans]
+    which, place = rng.integers(0, len(spans), 30), rng.integers(-250, 250, (2, 30)) + far
+    low, size = rng.integers(-99, 99, 2) + far, rng.integers(1, 150, 2)
+    bounds = *low.tolist(), *(low + size - 1).tolist()
+    inside = rows.pixels_within(Placed(which, *place, *place), bits, count, bounds)
+    for kind, *xy, found in np.stack([which, *place, inside], axis=1).tolist():
+        pixels = spans[kind].pixels() + xy
+        assert found == ((pixels >= low) & (pixels < low + size)).all(axis=1).sum()
+
+
 # Which kernels
 
 

@@ -14,13 +14,14 @@ if TYPE_CHECKING:
     from .explain import ray_verdicts as ray_verdicts
     from .explain import samples as samples
     from .fire import shelter as shelter
+    from .fire import verdicts as verdicts
     from .prepared import prepare as prepare
     from .rays import ray_call as ray_call
     from .replay import shot_log as shot_log
 
 _PLACES = (
     "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
-    "fire.shelter", "prepared.prepare", "rays.ray_call", "replay.shot_log",
+    "fire.shelter", "fire.verdicts", "prepared.prepare", "rays.ray_call", "replay.shot_log",
 )  # fmt: skip
 
 

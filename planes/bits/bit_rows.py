@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Ints
-from ..grid.spans import NO_STRIPS, Box, RowRuns, begins, meets_strip
+from ..grid.spans import NO_STRIPS, Box, RowRuns, begins, meets_strip, ragged
 
 Words = npt.NDArray[np.uint64]
 Sums = npt.NDArray[np.uint32]
@@ -275,6 +275,35 @@ def placed_boxes(placed: Placed, windows: PatternBits) -> Ints:
     for side, place in enumerate((placed.x, placed.y, placed.x, placed.y)):
         np.add(place, box[side].take(placed.pattern) if len(windows.first) > 1 else box[side], out=asked[side])
     return asked
+
+
+def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box) -> Ints:
+    """Pixels (P,) of placed patterns within bounds; `count` has those of each pattern."""
+    left, top, right, low = placed_boxes(placed, windows)
+    over = (left < bounds[0]) | (top < bounds[1])
+    over |= (right > bounds[2]) | (low > bounds[3])
+    at, inside = over.nonzero()[0], count.take(placed.pattern)
+    if not len(at):
+        return inside
+    kind, left, top = placed.pattern[at], left[at] - (WORD - 1), top[at]
+    first = np.maximum(bounds[1] - top, 0)
+    rows = np.maximum(np.minimum(low[at], bounds[3]) - top - first + 1, 0)
+    of, column = ragged((right[at] - left >> 6) + 1)
+    left = left[of] + WORD * column
+    begin, end = np.maximum(bounds[0] - left, 0), np.maximum(left + WORD - 1 - bounds[2], 0)
+    begin, end = np.minimum(begin, WORD), np.minimum(end, WORD)
+    kept = (_FULL << begin.view(np.uint64)) & (_FULL >> end.view(np.uint64))
+    place = (windows.first[kind] + first)[of] + column * windows.rows[kind][of]
+    word, row = ragged(rows[of])
+    pixels = np.bitwise_count(windows.words[place[word] + row] & kept[word])
+    inside[at] = np.bincount(of[word], pixels, len(at)).astype(np.int64)
+    return inside
+
+
+def pixels_of_patterns(bits: PatternBits) -> Ints:
+    """Pixels (n,) of each pattern."""
+    count: Ints = np.add.reduceat(np.bitwise_count(bits.words), bits.first, dtype=np.int64)
+    return count
 
 
 def which(placed: Placed, windows: PatternBits, placement: Ints) -> Ints | int:

@@ -26,7 +26,7 @@ from ..common.checks import Bools, Ints
 from ..grid.spans import Box, Spans, ragged
 from ..scene.items import Stack
 from .bit_rows import WORD, Placed, Words, packed
-from .front_to_back import NO_FLAGS, NO_NUMBERS, OrderedTiles
+from .front_to_back import NO_NUMBERS, OrderedTiles
 
 OFTEN = 8
 """Answers of a pattern after which the planes of its depths are made; they take as long as so many answers."""
@@ -253,11 +253,16 @@ class Tiles:
             known = self.bigs[stride] = BigTiles(stride)
         return known
 
-    def ordered(self, stack: Stack, choosy: bool) -> OrderedTiles:
-        """The tiles of a stack at their places in the world; with the columns of filters if a shot may refuse items."""
-        occluder = self.each(stack.occluder) if stack.has_occluders else NO_FLAGS
+    def ordered(self, stack: Stack, covers: Bools, choosy: bool) -> OrderedTiles:
+        """The tiles of a stack at their places in the world; with the columns of filters if a shot may refuse items.
+
+        Parameters
+        ----------
+        covers : (M,) items that hide others and are not hit; (0,) if there are none
+        """
         whose = (self.each(stack.categories), self.each(stack.owner)) if choosy else ()
-        return OrderedTiles(self.rank, self.boxes(stack.box_xyxy), self.begin, self.words, occluder, *whose)
+        covers = self.each(covers) if len(covers) else covers
+        return OrderedTiles(self.rank, self.boxes(stack.box_xyxy), self.begin, self.words, covers, *whose)
 
 
 class TileAtlas:
@@ -383,6 +388,7 @@ class Ground(NamedTuple):
     tiles, boxes_xyxy : their tiles, and the boxes (T, 4) of these
     pierce : whether pixels go on through objects; they end at occluders
     bounds : box beyond which nothing is hit
+    covers : (M,) items that end pixels and are not hit: occluders; (0,) if there are none
     """
 
     stack: Stack
@@ -390,6 +396,7 @@ class Ground(NamedTuple):
     boxes_xyxy: Ints
     pierce: bool
     bounds: Box | None
+    covers: Bools
 
 
 def integers_ns(pairs: float, wide: int, high: int) -> float:
@@ -423,7 +430,7 @@ def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:
     if not len(tile):
         return iter(())
     rank, box = ground.tiles.rank[tile], ground.boxes_xyxy[tile]
-    blocks = ground.stack.occluder[rank] if ground.stack.has_occluders else np.zeros(len(rank), np.bool_)
+    blocks = ground.covers[rank] if len(ground.covers) else np.zeros(len(rank), np.bool_)
     columns = placement, box[:, 0], box[:, 1], ground.tiles.begin[tile], rank, blocks
     return zip(*(column.tolist() for column in columns), strict=True)
 
@@ -431,7 +438,7 @@ def _near(placement: Ints, tile: Ints, ground: Ground) -> Iterator[Pair]:
 # house: hit rule of areas
 def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: Ground) -> Iterator[Hit]:
     """Hits of one placed pattern on each tile, front to back."""
-    _, tiles, _, pierce, bounds = ground
+    _, tiles, _, pierce, bounds, _ = ground
     rest = pattern.rows if bounds is None else pattern.within(x, y, bounds)
     stride, known, nearest = pattern.stride, tiles.big(pattern.stride), pattern.depths.nearest
     corner = (y + pattern.y) * stride + x + pattern.x

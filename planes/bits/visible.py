@@ -81,10 +81,10 @@ class VisibleSet:
         there = view.accepts(stack)
         boxes = tiles.boxes(stack.box_xyxy)
         occluders = there & stack.occluder if stack.has_occluders else np.zeros_like(there)
-        objects = np.flatnonzero((there & ~occluders)[tiles.rank])
+        wanted = np.flatnonzero((occluders if view.of_occluders else there & ~occluders)[tiles.rank])
         blocks = (occluders if view.pierce else there)[tiles.rank]
-        rows = _rows(tiles, boxes, bounds, objects, *in_front(boxes, objects, blocks))
-        self.seen = cropped(tiles.rank[objects], boxes[objects], rows)
+        rows = _rows(tiles, boxes, bounds, wanted, *in_front(boxes, wanted, blocks))
+        self.seen = cropped(tiles.rank[wanted], boxes[wanted], rows)
         self._cells: LruCache[tuple[int, ...], Cells] = LruCache(CELLS_BYTES, lambda made: made.nbytes)
 
     def cells(self, reach_xyxy: Ints) -> Cells:

@@ -11,10 +11,10 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from ..bits import bit_rows, cells, shadows
-from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Words
+from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Placed, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
-from ..grid.spans import WIDEST, RowRuns
+from ..grid.spans import WIDEST, Box, RowRuns
 from .cache import compiled
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
@@ -360,6 +360,32 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
     return PatternBits(
         box, corner, rows, words, strips if len(normal) else NO_STRIPS, NO_SUMS, np.zeros(count, np.int64)
     )
+
+
+@compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, INTS, types.UniTuple(types.int64, 4), OUT))
+def _pixels_within(pattern, x, y, box, first, rows, words, count, bounds, inside):
+    for who in range(len(x)):
+        kind = pattern[who]
+        left, top = x[who] + box[kind, 0], y[who] + box[kind, 1]
+        right, low = x[who] + box[kind, 2], y[who] + box[kind, 3]
+        inside[who] = count[kind]
+        if left >= bounds[0] and top >= bounds[1] and right <= bounds[2] and low <= bounds[3]:
+            continue
+        pixels, begin, at = 0, left - 63, first[kind] + max(bounds[1] - top, 0)
+        for _ in range((right - begin >> 6) + 1):
+            kept = _columns(bounds[0], bounds[2], begin)
+            for row in range(min(low, bounds[3]) - max(top, bounds[1]) + 1 if kept else 0):
+                pixels += bits_of(words[at + row] & kept)
+            begin, at = begin + WORD, at + rows[kind]
+        inside[who] = pixels
+
+
+def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box) -> Ints:
+    """See `bits.bit_rows.pixels_within`."""
+    inside = np.empty(len(placed.x), np.int64)
+    bits = windows.box_xyxy, windows.first, windows.rows, windows.words
+    _pixels_within(placed.pattern, placed.x, placed.y, *bits, count, bounds, inside)
+    return inside
 
 
 BRUTE_PAIRS = 2**21  # most pairs of boxes that are compared one by one; with more, numpy lists them in cells

@@ -42,11 +42,20 @@ AGAIN_MOST = 8  # most things of a scene that are made when they are asked for a
 
 
 class View(NamedTuple):
-    """What shots see: whether they pierce, the filter of items that they meet, and the owners whose items they skip."""
+    """What shots see.
+
+    Parameters
+    ----------
+    pierce : whether they go on through objects
+    meets : the filter of items that they meet
+    exclude : the owners whose items they skip
+    of_occluders : whether the occluders that they meet are asked for, not the objects
+    """
 
     pierce: bool
     meets: int
     exclude: tuple[int, ...]
+    of_occluders: bool = False
 
     def accepts(self, stack: Stack) -> Bools:
         """Which items (M,) of a stack such shots accept."""

@@ -115,6 +115,11 @@ class Stack:
         """Whether any item is an occluder."""
         return bool(self.occluder.any())
 
+    @property
+    def covers(self) -> Bools:
+        """Items (M,) that hide others and are not hit: `occluder`; (0,) if there are none."""
+        return self.occluder if self.has_occluders else np.zeros(0, np.bool_)
+
     @cached_property
     def has_unmet(self) -> bool:
         """Whether any item has no category; every shot refuses such an item."""

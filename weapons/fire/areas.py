@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hitplanes.planes.bits import front_to_back
-from hitplanes.planes.bits.bit_rows import NO_SUMS, PatternBits, Placed
+from hitplanes.planes.bits.bit_rows import PatternBits, Placed
 from hitplanes.planes.bits.cells import met_boxes
-from hitplanes.planes.bits.front_to_back import NO_FLAGS, OrderedTiles, RoundHits, Rule
-from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
+from hitplanes.planes.bits.front_to_back import RoundHits, Rule
 from hitplanes.planes.bits.tiles import Ground, hit_by_few
 from hitplanes.planes.common.backend import kernels_of
-from hitplanes.planes.common.checks import Ints
+from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_PAIRS, CHUNK_SAMPLES
 from hitplanes.planes.grid.fixed_point import ONE
 from hitplanes.planes.scene.derived import View
@@ -38,9 +37,10 @@ from ..kinds.weapon import Weapon, fits, fits_at_reach
 from .hits import Rows, rows_of_span_hits
 from .plan import Plan
 from .prefilter import Candidates, may_refuse, refused, view_of
-from .spans import QueryContext, direct, inside, near_pairs
+from .spans import QueryContext, direct, near_pairs
 
 if TYPE_CHECKING:
+    from hitplanes.planes.bits.label_plane import LabelPlane
     from hitplanes.planes.bits.shadows import Blockers
 
 PLACEMENTS_AT_ONCE = 2**15
@@ -87,9 +87,12 @@ class Request:
     Parameters
     ----------
     view : what all shots accept; None if they accept different items
+    choosy : whether a shot may refuse an item
     filtered : whether the call names a pre-filter or a broad phase
     placements : number of placements of all shots
     blockers : items that may shelter pixels; None if there is none, or the weapon needs no line of sight
+    covers : (M,) items that end pixels and have no rows: occluders, but as verdicts are counted; (0,) if there are none
+    placed : placements of all shots, if they are made already
     """
 
     scene: Scene
@@ -98,9 +101,12 @@ class Request:
     stack: Stack
     traits: Traits
     view: View | None
+    choosy: bool
     filtered: bool
     placements: int
-    blockers: Blockers | None = None
+    blockers: Blockers | None
+    covers: Bools
+    placed: Placements | None = None
 
 
 def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtered: bool) -> Request:
@@ -108,7 +114,8 @@ def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtere
     traits = traits_of(weapon)
     view, placements = view_of(traits.pierces, shots), traits.placements * len(shots)
     blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view) if traits.sight else None
-    return Request(scene, weapon, shots, stack, traits, view, filtered, placements, blockers)
+    choosy = may_refuse(stack, shots)
+    return Request(scene, weapon, shots, stack, traits, view, choosy, filtered, placements, blockers, stack.covers)
 
 
 # house: way of areas
@@ -125,52 +132,6 @@ def by_spans(request: Request, context: QueryContext) -> list[Rows]:
         rows.append(rows_of_span_hits(direct(placements, part, context), placements, request.stack.ids, begin))
         plan.run("rows", "", rows[-1].nbytes)
     return rows
-
-
-def verdicts_by_spans(request: Request, context: QueryContext) -> Ints:
-    """Samples (N, 5) of shots by verdict, by the reference; the stack is the one that they were fired at."""
-    boxes, weapon, shots = Candidates(context.candidates.items, context.stack), request.weapon, request.shots
-    then = QueryContext(context.stack, context.bounds, context.pierce, boxes, Plan(), context.blockers)
-    verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), boxes):
-        counts = direct(placements_for(weapon, part), part, then).counts
-        verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
-    return np.concatenate(verdicts)
-
-
-def verdicts_by_tiles(request: Request, context: QueryContext) -> Ints:
-    """Samples (N, 5) of shots by verdict, by bit rows: the first item that a sample meets decides what becomes of it.
-
-    So occluders are counted like objects, and no shot pierces. A shot that refuses items is counted again as one that
-    accepts all: what it then meets besides is filtered. The tiles of a stack that the scene has left behind are gone,
-    unless items only moved; then the reference counts.
-    """
-    stack, items = request.stack, request.scene.items
-    if items.stack().forms != stack.forms or request.blockers is not None or not request.traits.fits:
-        return verdicts_by_spans(request, context)
-    choosy, free = may_refuse(stack, request.shots), Rule(False, context.bounds)
-    tiles = items.tiles().ordered(stack, choosy)._replace(occluder=NO_FLAGS)
-    then = QueryContext(stack, context.bounds, False, Candidates(items, stack), Plan())
-    verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
-    for _, part, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, then.candidates):
-        counts = inside(placements, placements.boxes, then).reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1)
-        rule = _rule(request, part, placements)._replace(pierce=False) if choosy else free
-        own = _first_met(placements, tiles, rule, stack, len(part))
-        every = _first_met(placements, tiles, free, stack, len(part)) if choosy else own
-        counts[:, (Verdict.HIT, Verdict.OCCLUDED)] = own
-        counts[:, Verdict.FILTERED] = every.sum(axis=1) - own.sum(axis=1)
-        counts[:, Verdict.EMPTY] -= every.sum(axis=1)
-        verdicts.append(counts)
-    return np.concatenate(verdicts)
-
-
-def _first_met(placements: Placements, tiles: OrderedTiles, rule: Rule, stack: Stack, shots: int) -> Ints:
-    """Samples (N, 2) of shots that meet an object first, and an occluder first."""
-    windows = placements.table.bits._replace(sums=NO_SUMS)
-    found = kernels_of(front_to_back).front_to_back(placed_of(placements), placements.pellets, windows, tiles, rule)
-    shot, _ = placements.shot_of(found.turn)
-    column = 2 * shot + stack.occluder[found.rank]
-    return np.bincount(column, found.samples, 2 * shots).astype(np.int64).reshape(-1, 2)
 
 
 def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[tuple[int, Shots]]:
@@ -193,15 +154,14 @@ def chunks(shots: Shots, first: Placements, candidates: Candidates) -> Iterator[
 def by_tiles(request: Request, context: QueryContext) -> list[Rows]:
     """Rows by the tiles of the stack, front to back: each takes its pixels from the rest of each placed pattern."""
     stack, tiles, plan, parts = request.stack, request.scene.items.tiles(), context.plan, []
-    choosy = may_refuse(stack, request.shots)
     free = Rule(request.traits.pierces, request.scene.bounds, blockers=request.blockers)
-    ordered = tiles.ordered(stack, choosy)
+    ordered = tiles.ordered(stack, request.covers, request.choosy)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ordered.box_xyxy.nbytes)
     most = NEAR_AT_ONCE if request.filtered else PLACEMENTS_AT_ONCE
     first = min(CHUNK_PAIRS // max(len(stack), 1), most) if request.filtered else most
-    for begin, part, placements in _parts(request, first, most, context.candidates):
+    for begin, part, placements in parts_of_batch(request, first, most, context.candidates):
         windows, near = _windows(placements, plan), None
-        rule = _rule(request, part, placements) if choosy else free
+        rule = _rule(request, part, placements) if request.choosy else free
         if request.filtered:
             placement, rank = near_pairs(placements, np.arange(len(placements)), placements.boxes, context)
             place, tile = tiles.of(rank)
@@ -233,7 +193,7 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     visible_set = kept or visible.read(scene.items)
     rule = Rule(True, blockers=request.blockers)
     plan.run("visible set", "what can be seen of all objects", 0 if kept else visible_set.nbytes)
-    for begin, _, placements in _parts(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
+    for begin, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, context.candidates):
         windows = _windows(placements, plan)
         listed, made = visible_set.cells_for(windows.box_xyxy, len(placements))
         text = "all tiles" if listed is None else f"cells of {1 << listed.bits} px"
@@ -246,7 +206,9 @@ def by_visible_set(request: Request, context: QueryContext) -> list[Rows]:
     return parts
 
 
-def _parts(request: Request, first: int, most: int, candidates: Candidates) -> Iterator[tuple[int, Shots, Placements]]:
+def parts_of_batch(
+    request: Request, first: int, most: int, candidates: Candidates
+) -> Iterator[tuple[int, Shots, Placements]]:
     """Parts of a batch whose pairs and patterns fit their chunks, as (first shot, shots, placements).
 
     Parameters
@@ -254,6 +216,9 @@ def _parts(request: Request, first: int, most: int, candidates: Candidates) -> I
     first, most : placements of the first part, and at most; parts grow as long as their placements meet few items
     """
     shots, each = request.shots, request.traits.placements
+    if request.placed is not None:
+        yield 0, shots, request.placed
+        return
     begin, step, most = 0, first // each, most // each
     while begin < len(shots):
         part = shots.take(begin, min(begin + max(step, 1), len(shots)))
@@ -299,13 +264,22 @@ def _rows_of(placements: Placements, found: RoundHits, ids: Ints) -> Rows:
     return Rows.of({name: column for name, column in columns.items() if column is not None})
 
 
+def labels_for(request: Request) -> LabelPlane | None:
+    """The label plane of what the shots of a request accept; None if the scene has none."""
+    assert request.view is not None  # the strategy has asked
+    return request.scene.derived.label_plane(request.view._replace(of_occluders=False))
+
+
 # house: way of areas
 def by_labels(request: Request, context: QueryContext) -> list[Rows]:
     """Rows of one-pixel shots, by the label of each pixel."""
     assert request.view is not None  # the strategy has asked
-    plane, plan, parts = request.scene.derived.label_plane(request.view), context.plan, []
+    plane, plan, parts = labels_for(request), context.plan, []
     assert plane is not None  # so here
     labels, objects = plane.read(request.scene.items), request.stack.is_object
+    if request.view.of_occluders:
+        objects = ~objects  # label 0 is of no item
+        objects[0] = False
     plan.run("label plane", f"{plane.redrawn} px drawn anew", plane.redrawn * labels.itemsize)
     for begin in range(0, len(request.shots), PLACEMENTS_AT_ONCE):
         at_256 = request.shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
@@ -322,7 +296,8 @@ def by_integers(request: Request, context: QueryContext) -> list[Rows]:
     """Rows of a few shots, counted in integers."""
     scene, shots, plan = request.scene, request.shots, context.plan
     tiles, placements = scene.items.tiles(), placements_for(request.weapon, shots)
-    ground = Ground(request.stack, tiles, tiles.boxes(request.stack.box_xyxy), context.pierce, context.bounds)
+    boxes_xyxy = tiles.boxes(request.stack.box_xyxy)
+    ground = Ground(request.stack, tiles, boxes_xyxy, context.pierce, context.bounds, request.covers)
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
     patterns = placements.table.bigs
     plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)

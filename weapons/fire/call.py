@@ -19,7 +19,7 @@ from .. import late
 from ..kinds.areas import Rays, ray_parts_of
 from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
-from .areas import request_of, verdicts_by_spans, verdicts_by_tiles
+from .areas import request_of
 from .hits import Hits, Rows
 from .plan import Plan, leave_out_unused, read_stack, unaimed
 from .prefilter import may_refuse, prefilter_of
@@ -252,8 +252,7 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
     plan.run("plan", f"{way.name}: {why}")
     parts = way.engine(request, context)
     rows = Rows.joined(parts)
-    count = verdicts_by_spans if way.name == "spans" else verdicts_by_tiles
-    hits = Hits(rows, lambda: count(request, context), scene, stack, weapon, shots, plan)
+    hits = Hits(rows, lambda: late.verdicts.verdicts_of(request, rows, way.name), scene, stack, weapon, shots, plan)
     leave_out_unused(plan, scene, candidates, request.traits.weighted, may_refuse(stack, shots), way.name)
     plan.run("rows", "in their order", rows.nbytes if len(parts) > 1 else 0)
     return hits

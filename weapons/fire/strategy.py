@@ -21,7 +21,7 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.rays import RayWeapon, is_moving, is_thin_first, not_cast
-from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set
+from .areas import Request, by_integers, by_labels, by_spans, by_tiles, by_visible_set, labels_for
 from .hits import Rows
 from .prefilter import BOX, Candidates, prefilter_of
 from .spans import QueryContext
@@ -99,14 +99,13 @@ def _labels_refuse(request: Request) -> str:
         return "shots accept different items, or pierce"
     if request.filtered:
         return "a pre-filter is asked for"
-    plane = request.scene.derived.label_plane(request.view)
+    plane = labels_for(request)
     return "" if plane is not None else "the scene has no bounds that fit one plane"
 
 
 def _labels_cost(request: Request) -> tuple[float, float]:
-    assert request.view is not None  # else it refuses
-    plane = request.scene.derived.label_plane(request.view)
-    assert plane is not None  # so here
+    plane = labels_for(request)
+    assert plane is not None  # else it refuses
     return costs().labels_call, _drawing_ns(plane, request.scene, request.stack)
 
 

@@ -245,6 +245,8 @@ class PatternTable:
     @cached_property
     def count(self) -> Ints:
         """Pixels (n,) of each."""
+        if isinstance(self.patterns, AimedPatterns):
+            return bit_rows.pixels_of_patterns(self.bits)
         return self.patterns[0].sizes[0] if len(self) == 1 else _sizes([p.spans for p in self.patterns])[0]
 
     @cached_property

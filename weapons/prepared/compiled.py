@@ -180,7 +180,7 @@ class PositionCache:
             tiles = self._scene.items.tiles()
             if stack.forms != self._forms:
                 there = self._view.accepts(stack)[tiles.rank].nonzero()[0]
-                rank, *_, occluder = tiles.ordered(stack, False)[:5]
+                rank, *_, occluder = tiles.ordered(stack, stack.covers, False)[:5]
                 blocks = occluder[there] if stack.has_occluders else occluder
                 self._tiles = OrderedTiles(rank[there], NO_BOXES, tiles.begin[there], tiles.words, blocks)
                 self._forms, self._there = stack.forms, there

@@ -217,7 +217,7 @@ class PositionCache:
                 stack, tiles = self._stack, self._scene.items.tiles()
                 assert stack is not None  # `follow` is called first
                 boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # sides are compared one by one
-                self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds)
+                self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds, stack.covers)
             return self._ground
 
     def _asked(self, i: int, j: int) -> Square:

@@ -1,0 +1,109 @@
+"""Samples of shots by verdict, counted when they are asked for, by the ways that answer shots.
+
+1. Hit: the samples in the rows of the call, or in those of the same shots without pierce.
+2. Occluded: the same for the occluders that samples meet first.
+3. Filtered, if a shot refuses items: what a shot that accepts all meets besides.
+4. Outside the bounds: by the pixels of the patterns. The rest is empty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hitplanes.planes.bits import bit_rows
+from hitplanes.planes.bits.front_to_back import NO_FLAGS
+from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
+from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.checks import Ints
+
+from ..kinds.placements import placements_for
+from .areas import PLACEMENTS_AT_ONCE, Request, by_tiles, chunks, parts_of_batch, placed_of
+from .hits import Rows
+from .plan import Plan
+from .prefilter import Candidates
+from .spans import QueryContext, direct
+from .strategy import chosen_way
+
+
+def verdicts_of(request: Request, rows: Rows, way: str) -> Ints:
+    """Samples (N, 5) of shots by verdict; the stack is the one that they were fired at.
+
+    Parameters
+    ----------
+    rows, way : what the shots hit, and the way that found it
+
+    The tiles of a stack that the scene has left behind are gone, unless items only moved; then the reference counts.
+    """
+    stack, items = request.stack, request.scene.items
+    gone = items.stack().forms != stack.forms
+    if way == "spans" or gone or request.blockers is not None or not request.traits.fits:
+        return _by_spans(request)
+    fired, inside, first = _fired_and_inside(_without_pierce(request))
+    hit = _samples(_rows(first) if request.traits.pierces else rows, len(fired))
+    occluded = np.zeros_like(hit)
+    if stack.has_occluders:
+        view = first.view and first.view._replace(of_occluders=True)
+        occluded = _samples(_rows(replace(first, view=view, covers=~stack.occluder)), len(fired))
+    met = hit + occluded
+    if request.choosy:
+        every = by_tiles(replace(first, choosy=False, covers=NO_FLAGS), _context(first))
+        met = _samples(Rows.joined(every), len(fired))
+    counts = {
+        Verdict.EMPTY: inside - met, Verdict.OUTSIDE: fired - inside, Verdict.FILTERED: met - hit - occluded,
+        Verdict.OCCLUDED: occluded, Verdict.HIT: hit,
+    }  # fmt: skip
+    return np.stack([counts[verdict] for verdict in OF_PATTERNS], axis=1)
+
+
+def _without_pierce(request: Request) -> Request:
+    """The same shots without pierce and without a pre-filter."""
+    view = request.view and request.view._replace(pierce=False)
+    return replace(request, view=view, filtered=False, traits=request.traits._replace(pierces=False))
+
+
+def _samples(rows: Rows, shots: int) -> Ints:
+    """Samples (N,) of each shot in rows."""
+    return np.bincount(rows.shot, rows.samples, shots).astype(np.int64)
+
+
+def _rows(request: Request) -> Rows:
+    """Rows by the cheapest way; what is derived from a scene serves no stack that the scene has left behind."""
+    if request.scene.items.stack() is not request.stack:
+        return Rows.joined(by_tiles(request, _context(request)))
+    return Rows.joined(chosen_way("auto", request)[0].engine(request, _context(request)))
+
+
+def _context(request: Request) -> QueryContext:
+    """What shots are tested against, with a plan of its own."""
+    candidates = Candidates(request.scene.items, request.stack)
+    bounds, pierces = request.scene.bounds, request.traits.pierces
+    return QueryContext(request.stack, bounds, pierces, candidates, Plan(), request.blockers)
+
+
+def _fired_and_inside(request: Request) -> tuple[Ints, Ints, Request]:
+    """Samples (N,) of shots, and those within the bounds; and the request with its placements, unless they are many."""
+    bounds, each = request.scene.bounds, request.traits.placements
+    fired, within = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    candidates = Candidates(request.scene.items, request.stack)
+    placements = None
+    for _, _, placements in parts_of_batch(request, PLACEMENTS_AT_ONCE, PLACEMENTS_AT_ONCE, candidates):
+        count, table = placements.count, placements.table
+        inside = count
+        if bounds is not None:
+            inside = kernels_of(bit_rows).pixels_within(placed_of(placements), table.bits, table.count, bounds)
+        fired.append(count if each == 1 else count.reshape(-1, each).sum(axis=1))
+        within.append(inside if each == 1 else inside.reshape(-1, each).sum(axis=1))
+    placed = placements if len(fired) == 2 else None
+    return np.concatenate(fired), np.concatenate(within), replace(request, placed=placed)
+
+
+def _by_spans(request: Request) -> Ints:
+    """Samples (N, 5) of shots by verdict, by the reference."""
+    weapon, shots, then = request.weapon, request.shots, _context(request)
+    verdicts = [np.zeros((0, len(OF_PATTERNS)), np.int64)]
+    for _, part in chunks(shots, placements_for(weapon, shots.take(0, 1)), then.candidates):
+        counts = direct(placements_for(weapon, part), part, then).counts
+        verdicts.append(counts.reshape(len(part), -1, len(OF_PATTERNS)).sum(axis=1))
+    return np.concatenate(verdicts)
