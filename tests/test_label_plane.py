@@ -33,7 +33,7 @@ def changed_boxes(scene: Scene, version: int) -> Any:
 
 
 BOX = (-9, 4, 40, 33)
-NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.planes"]
+NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.areas"]
 
 
 def front_to_back(scene: Scene) -> list[int]:

@@ -15,7 +15,7 @@ SEEDS = st.integers(0, 2**32)
 QUIET = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-@pytest.fixture(params=["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.planes"])
+@pytest.fixture(params=["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.areas"])
 def kernels(request: pytest.FixtureRequest) -> ModuleType:
     if ".jit." in request.param:
         pytest.importorskip("numba")

@@ -279,6 +279,18 @@ def test_an_object_before_the_occluder_that_ends_the_ray_is_hit_there() -> None:
     assert hits.verdicts.tolist() == [[9, 3, 0, 0, 0, 19]]
 
 
+@pytest.mark.usefixtures("jit")
+@pytest.mark.parametrize("width", [0, 1])
+def test_the_cell_of_the_occluder_that_ends_a_ray_is_not_filtered_too(width: int) -> None:
+    """A refused object of 3 px at 9 to 11 lies on the first cell of the occluder; it is in front of it, or behind."""
+    for layer in (-1, 1):
+        scene = Scene((60, 1), categories=["a", "b"])
+        scene.add(np.ones((1, 3), np.bool_), (10, 0), layer=layer, categories=["b"])
+        scene.add(np.ones((1, 3), np.bool_), (12, 0), role="occluder", categories=["a"])
+        hits = fire(scene, Laser(30, width=width), (0, 0), aim=0, accept=["a"], blocked_by=["a"])
+        assert hits.verdicts.tolist() == [[9, 0, 1, 2, 0, 19]] == listed(hits)
+
+
 @pytest.mark.parametrize("blocked_by", ["all", []])
 def test_cells_with_occluders_come_first_of_those_entered_at_once(
     blocked_by: Any, monkeypatch: pytest.MonkeyPatch

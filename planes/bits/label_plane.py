@@ -4,7 +4,7 @@ One read finds the first item that a sample meets:
 
     label = 2 * (id + 1) + more     the front item (0: none), and a bit for "something lies behind it"
 
-A coarse map of occupied cells spares most reads. `jit.planes` has the compiled kernels.
+A coarse map of occupied cells spares most reads. `jit.areas` has the compiled kernels.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ COMPILED = {
     "hitplanes.planes.grid.rasterize": "hitplanes.planes.jit.scene",
     "hitplanes.planes.grid.turns": "hitplanes.planes.jit.planes",
     "hitplanes.planes.scene.variants": "hitplanes.planes.jit.planes",
-    "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.planes",
+    "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.areas",
     "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",

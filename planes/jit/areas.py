@@ -1,6 +1,8 @@
-"""Compiled kernels of placed patterns: against ordered tiles, front to back, or against visible tiles, by cells."""
+"""Compiled kernels of areas: placed patterns against tiles, front to back or visible ones; and the label plane."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -9,8 +11,12 @@ from ..bits import front_to_back as front_to_back_module
 from ..bits.bit_rows import WORD, PatternBits, Placed
 from ..bits.cells import Cells
 from ..bits.front_to_back import OrderedTiles, RoundHits, Rule
-from ..common.checks import Ints
+from ..bits.label_plane import CELL_BITS as COARSE_BITS
+from ..bits.label_plane import Front
+from ..common.checks import Bools, Ints, Labels
 from ..common.costs import COMPILED
+from ..common.limits import HALF
+from ..grid.spans import Box
 from .bit_rows import (
     ALL,
     BOXES,
@@ -482,3 +488,75 @@ def front_to_back(
     several = (found[PIXELS], found[PELLETS]) if each > 1 else (None, None)
     weight = found[WEIGHT] if len(windows.sums) else None
     return RoundHits(found[TURN], found[RANK], found[SAMPLES], found[KEY], found[X], found[Y], weight, *several)
+
+
+@compiled()
+def paint(labels: Labels, x: int, y: int, dirty: Ints, places: Ints, masks: Bools) -> None:
+    """Redraw boxes of a label plane, back to front; see `bits.label_plane.paint`."""
+    for d in range(len(dirty)):
+        left, top, right, low = dirty[d, 0], dirty[d, 1], dirty[d, 2], dirty[d, 3]
+        labels[top - y : low - y + 1, left - x : right - x + 1] = 0
+        for rank in range(len(places) - 1, -1, -1):
+            place = places[rank]
+            if place[0] <= right and place[2] >= left and place[1] <= low and place[3] >= top:
+                paint_item(labels, x, y, left, top, right, low, place, masks)
+
+
+@compiled()
+def paint_item(
+    labels: Labels, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
+) -> None:
+    """Draw the part of an item that lies in a box over what is drawn there."""
+    zero, one = labels.dtype.type(0), labels.dtype.type(1)
+    code = labels.dtype.type(place[5])
+    width = place[2] - place[0] + 1
+    x0, x1, y0, y1 = max(left, place[0]), min(right, place[2]), max(top, place[1]), min(low, place[3])
+    begin = place[4] + (y0 - place[1]) * width + x0 - place[0]
+    n = x1 - x0 + 1
+    for row in range(y0 - y, y1 - y + 1):
+        part, mask = labels[row, x0 - x : x1 - x + 1], masks[begin : begin + n]
+        for i in range(n):
+            old = part[i]
+            new = code + one if old != zero else code
+            part[i] = new if mask[i] else old
+        begin += width
+
+
+CELLS = types.Array(types.boolean, 2, "C", readonly=True)
+BITS = np.uint64(COARSE_BITS)
+
+
+# house: hit rule of areas
+@compiled(
+    *(
+        types.int64(
+            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
+        )
+        for kind in (types.uint16, types.uint32)
+    )
+)  # fmt: skip
+def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
+    count = 0
+    high, wide, coarse = np.uint64(labels.shape[0]), np.uint64(labels.shape[1]), cells.size > 0
+    for i in range(len(at_256)):
+        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
+        column, row = np.uint64(x - left), np.uint64(y - top)  # negative numbers become very large
+        if (column >= wide) | (row >= high):
+            continue
+        if coarse and not cells[row >> BITS, column >> BITS]:
+            continue
+        front = np.int64(labels[row, column] >> 1)  # always written; the next one overwrites it if it is no hit
+        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
+        count += objects[front]
+    return count
+
+
+NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
+
+
+def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
+    """See `bits.label_plane.front_at`."""
+    place, item = np.empty((2, len(at_256)), np.int64)
+    xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
+    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
+    return Front(place[:count], item[:count], xy[:count])

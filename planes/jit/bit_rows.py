@@ -399,6 +399,17 @@ def cell_at(at_x, at_y, x, y, bits, wide, high):
     return np.int64(row * np.uint64(wide) + column) if inside else -1
 
 
+@njit
+def meets_any(box, at, taken, count):
+    """Whether the box of an item meets those of others."""
+    for k in range(count):
+        other = taken[k]
+        across = box[at, 0] <= box[other, 2] and box[at, 2] >= box[other, 0]
+        if across and box[at, 1] <= box[other, 3] and box[at, 3] >= box[other, 1]:
+            return True
+    return False
+
+
 @compiled(types.int64(BOXES, BOXES, OUT, OUT))
 def _met(asked, boxes, rows, others):
     count, room = 0, len(rows)

@@ -1,22 +1,21 @@
-"""Compiled kernels of the label plane, the distance field and its march, of rays at pixels, and of turned masks."""
+"""Compiled kernels of the distance field and its march, of rays at pixels, and of turned masks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 from numba import njit, types
 
 from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
-from ..bits.label_plane import CELL_BITS, Front
-from ..common.checks import Bools, Ints, Labels
+from ..common.checks import Bools, Ints
 from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
-from ..grid.spans import WIDEST, Box, RowRuns, pieces
+from ..grid.rasterize import DIAGONAL
+from ..grid.spans import WIDEST, RowRuns, pieces
 from ..grid.turns import Edges
 from ..scene.variants import Grids, Turned
-from .bit_rows import BOXES, FLAGS, INTS, OUT, ROWS_OUT
+from .bit_rows import BOXES, INTS, OUT
 from .cache import compiled
 from .scene import PARTS, PELLETS, STEPS, add_run, at_least, at_most, empty_parts, layout, root_of
 
@@ -28,78 +27,6 @@ ROUNDS = 4
 
 N, STOP, ALONG, ACROSS, BASE, A, B, C, ASIDE, RAY, COLUMNS = range(11)
 """Columns of a block: N, the crossings before a ray's next look, and those of `bits.distance_field._ways`."""
-
-
-@compiled()
-def paint(labels: Labels, x: int, y: int, dirty: Ints, places: Ints, masks: Bools) -> None:
-    """Redraw boxes of a label plane, back to front; see `bits.label_plane.paint`."""
-    for d in range(len(dirty)):
-        left, top, right, low = dirty[d, 0], dirty[d, 1], dirty[d, 2], dirty[d, 3]
-        labels[top - y : low - y + 1, left - x : right - x + 1] = 0
-        for rank in range(len(places) - 1, -1, -1):
-            place = places[rank]
-            if place[0] <= right and place[2] >= left and place[1] <= low and place[3] >= top:
-                paint_item(labels, x, y, left, top, right, low, place, masks)
-
-
-@compiled()
-def paint_item(
-    labels: Labels, x: int, y: int, left: int, top: int, right: int, low: int, place: Any, masks: Bools
-) -> None:
-    """Draw the part of an item that lies in a box over what is drawn there."""
-    zero, one = labels.dtype.type(0), labels.dtype.type(1)
-    code = labels.dtype.type(place[5])
-    width = place[2] - place[0] + 1
-    x0, x1, y0, y1 = max(left, place[0]), min(right, place[2]), max(top, place[1]), min(low, place[3])
-    begin = place[4] + (y0 - place[1]) * width + x0 - place[0]
-    n = x1 - x0 + 1
-    for row in range(y0 - y, y1 - y + 1):
-        part, mask = labels[row, x0 - x : x1 - x + 1], masks[begin : begin + n]
-        for i in range(n):
-            old = part[i]
-            new = code + one if old != zero else code
-            part[i] = new if mask[i] else old
-        begin += width
-
-
-CELLS = types.Array(types.boolean, 2, "C", readonly=True)
-BITS = np.uint64(CELL_BITS)
-
-
-# house: hit rule of areas
-@compiled(
-    *(
-        types.int64(
-            types.Array(kind, 2, "C", readonly=True), CELLS, *[types.int64] * 2, BOXES, FLAGS, OUT, OUT, ROWS_OUT
-        )
-        for kind in (types.uint16, types.uint32)
-    )
-)  # fmt: skip
-def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
-    count = 0
-    high, wide, coarse = np.uint64(labels.shape[0]), np.uint64(labels.shape[1]), cells.size > 0
-    for i in range(len(at_256)):
-        x, y = (at_256[i, 0] + HALF) >> 8, (at_256[i, 1] + HALF) >> 8
-        column, row = np.uint64(x - left), np.uint64(y - top)  # negative numbers become very large
-        if (column >= wide) | (row >= high):
-            continue
-        if coarse and not cells[row >> BITS, column >> BITS]:
-            continue
-        front = np.int64(labels[row, column] >> 1)  # always written; the next one overwrites it if it is no hit
-        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
-        count += objects[front]
-    return count
-
-
-NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
-
-
-def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
-    """See `bits.label_plane.front_at`."""
-    place, item = np.empty((2, len(at_256)), np.int64)
-    xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
-    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
-    return Front(place[:count], item[:count], xy[:count])
 
 
 @compiled()
@@ -312,6 +239,146 @@ def run_of(row, begin, step, u, along):
         per, slope = abs(step), along if step > 0 else -along
         low, high = u * per + min(first * slope, last * slope), u * per + max(first * slope, last * slope)
     return -over(HALF * per - low, SUB * per), over(high + HALF * per, SUB * per)
+
+
+@njit
+def _border(start, step):
+    """Way to the first border of pixels along an axis, the pixel before it, and the direction."""
+    ahead = 1 if step > 0 else -1
+    first = (HALF - ahead * start) % SUB
+    base = -(step > 0 and first == 0)
+    return np.int64(2 if step == 0 and first > 0 else first), np.int64(base), np.int64(ahead)
+
+
+@njit
+def borders_of(ray):
+    """Borders of pixels that a thin ray crosses; see `weapons.explain.ray_verdicts.Borders`."""
+    x, y, dx, dy, high, wide = ray
+    (first_x, base_x, sign_x), (first_y, base_y, sign_y) = _border(x, dx), _border(y, dy)
+    common, rest = wide, high
+    while rest:
+        common, rest = rest, common % rest
+    p, q = wide // common, high // common
+    odd, m = (p, first_x) if p & 1 else (q, first_y)
+    odd %= 2 * SUB
+    inverse = odd
+    for _ in range(2):
+        inverse = inverse * (2 - odd * inverse) % (2 * SUB)
+    m = m % SUB * inverse % SUB
+    both = (m * p - first_x) % SUB == 0 and (m * q - first_y) % SUB == 0
+    phase = common * p * q * m if both else np.int64(LATE)
+    still = dx == 0 or dy == 0
+    return first_x, first_y, high, wide, base_x, base_y, sign_x, sign_y, still, phase, common * p * q * SUB
+
+
+@njit
+def _crossed(first, across, time):
+    return max((time // across - first) // SUB + 1, 0)
+
+
+@njit
+def cells_by(borders, time):
+    """Number of cells that a thin ray has entered by a time."""
+    first_x, first_y, across_x, across_y, _, _, _, _, still, phase, period = borders
+    x, y = _crossed(first_x, across_x, time), _crossed(first_y, across_y, time)
+    if time < 0:
+        return np.int64(0)
+    return (1 + x) * (1 + y) if still else 1 + x + y + max((time - phase) // period + 1, 0)
+
+
+@njit
+def _cells_up_to(borders, x, y, time):
+    """Number of cells entered by a time, after at most `x` borders along x, and `y` along y."""
+    first_x, first_y, across_x, across_y, _, _, _, _, still, phase, period = borders
+    last = across_x * across_y
+    if min(x, y, time) < 0:
+        return np.int64(0)
+    out_x = (first_x + SUB * x) * across_x if x < _crossed(first_x, across_x, last) else np.int64(LATE)
+    out_y = (first_y + SUB * y) * across_y if y < _crossed(first_y, across_y, last) else np.int64(LATE)
+    out = min(out_x, out_y)
+    if still or out == 0:
+        until = time if still else np.int64(0)
+        return (1 + min(_crossed(first_x, across_x, until), x)) * (1 + min(_crossed(first_y, across_y, until), y))
+    if time < out:
+        return cells_by(borders, time)
+    return cells_by(borders, out - 1) + (out_x != out_y and out >= phase and (out - phase) % period == 0)
+
+
+@njit
+def _sides(low, high, base, sign, most):
+    """Borders before the near side of a box along an axis, and up to its far side."""
+    near, far = (low - base, high - base) if sign > 0 else (base - high, base - low)
+    return min(max(near, 0), most + 1) - 1, min(max(far, -1), most)
+
+
+@njit
+def cells_within(borders, box, time):
+    """Number of cells of a box that a thin ray has entered by a time."""
+    first_x, first_y, across_x, across_y, base_x, base_y, sign_x, sign_y, _, _, _ = borders
+    last = across_x * across_y
+    x_before, x = _sides(box[0], box[2], base_x, sign_x, _crossed(first_x, across_x, last))
+    y_before, y = _sides(box[1], box[3], base_y, sign_y, _crossed(first_y, across_y, last))
+    count = _cells_up_to(borders, x, y, time) - _cells_up_to(borders, x_before, y, time)
+    return count - _cells_up_to(borders, x, y_before, time) + _cells_up_to(borders, x_before, y_before, time)
+
+
+@njit
+def wide_run_of(row, u, along, v, step, wide, per):
+    """First and last cell of a row that a wide ray may touch, along its longer axis; `per` is 1 / step, or 0."""
+    reach = max(wide[0], DIAGONAL)
+    low, high = float(min(u, u + along) - reach), float(max(u, u + along) + reach)
+    if step != 0:
+        cross = (SUB * row - v) * along
+        middle, half = u + cross * per, wide[2] * abs(per)
+        low, high = max(low, middle - half), min(high, middle + half)
+    return np.int64(np.ceil((low - 1) / SUB)), np.int64(np.floor((high + 1) / SUB))
+
+
+@njit
+def rows_between(least, most, u, along, v, step, wide):
+    """First and last row that a ray may touch between two columns, along its longer axis; floats have room."""
+    reach = max(wide[0], DIAGONAL) if wide[0] > 0 else HALF
+    if along == 0:
+        return (v - reach) // SUB, (v + reach) // SUB + 1
+    low, high = min(u, u + along) - reach, max(u, u + along) + reach
+    near, far = min(max(SUB * least - HALF, low), high), max(min(SUB * most + HALF, high), low)
+    slope = step / along
+    one, other = v + (near - u) * slope, v + (far - u) * slope
+    half = max(float(HALF), wide[2] / abs(along)) + 1
+    return np.int64(np.floor((min(one, other) - half) / SUB)), np.int64(np.ceil((max(one, other) + half) / SUB))
+
+
+@njit
+def bounds_of_times(left, top, right, low, ray, wide):
+    """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
+    if wide[0] == 0:
+        return times_in(left, top, right, low, ray)
+    x, y, dx, dy, _, _ = ray
+    reach, length2 = wide[2], wide[3]
+    left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
+    u_least, u_most = (
+        min(left * dx, right * dx) + min(top * dy, low * dy),
+        max(left * dx, right * dx) + max(top * dy, low * dy),
+    )
+    v_least, v_most = (
+        min(left * dy, right * dy) - max(top * dx, low * dx),
+        max(left * dy, right * dy) - min(top * dx, low * dx),
+    )
+    if v_least > reach or v_most < -reach or u_least - reach - 2 > length2 or u_most + reach + 2 < 0:
+        return np.int64(1), np.int64(0)
+    return max(u_least - reach - 2, 0), u_most + reach + 2
+
+
+@njit
+def between(u, along, cells, low, high):
+    """First and last of some cells, from a product `u` on with a step, whose product is `low` .. `high`."""
+    far = u + along * (cells - 1)
+    if min(u, far) >= low and max(u, far) <= high:
+        return np.int64(0), cells - 1
+    ahead = abs(along)
+    if along > 0:
+        return max(-over(u - low, ahead), 0), min(over(high - u, ahead), cells - 1)
+    return max(-over(high - u, ahead), 0), min(over(u - low, ahead), cells - 1)
 
 
 @njit

@@ -8,15 +8,31 @@ import numpy as np
 from numba import njit, types
 
 from ..bits.cells import BRUTE_PAIRS, cells_of, is_sparse
+from ..bits.span_walk import Verdict
 from ..common.checks import Ints
-from ..common.limits import HALF, SUB
+from ..common.limits import HALF, REACH_MAX, SUB
 from ..grid.rasterize import DIAGONAL, FAR, Lines
 from ..grid.spans import Box
 from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
-from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, rows_by
+from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, meets_any, rows_by
 from .cache import compiled
-from .planes import LATE, half_chord, near_of, part_of, run_of, share, times_in
+from .planes import (
+    LATE,
+    between,
+    borders_of,
+    bounds_of_times,
+    cells_by,
+    cells_within,
+    half_chord,
+    near_of,
+    part_of,
+    rows_between,
+    run_of,
+    share,
+    times_in,
+    wide_run_of,
+)
 
 RANK, COUNT, ENTRY, Y, X, ENTER, LAST, SOONEST, COLUMNS = range(9)
 """Columns of the items that a ray touches; ENTER and LAST bound the times at which it enters their pixels, and SOONEST
@@ -27,7 +43,7 @@ PAIRS = types.Array(types.int64, 2, "A", readonly=True)
 ITEMS = types.Tuple((BOXES, INTS, FLAGS, FLAGS, INTS, INTS))
 
 LISTED = 4096 * SUB
-"""Longest ray of which all cells are looked at for their verdicts."""
+"""Longest wide ray whose cells are counted row by row; thin ones are counted in closed form."""
 
 FARTHEST, LONG = 2**29, 2**50
 """Longest ray of which sums of products fit int64, 1/256 px, and squared length below which those of `share` do."""
@@ -83,32 +99,6 @@ def _walked(at_x, at_y, u, v, ray, wide, stop):
 
 
 @njit
-def _wide_run(row, u, along, v, step, wide, per):
-    """First and last cell of a row that a wide ray may touch, along its longer axis; `per` is 1 / step, or 0."""
-    reach = max(wide[0], DIAGONAL)
-    low, high = float(min(u, u + along) - reach), float(max(u, u + along) + reach)
-    if step != 0:
-        cross = (SUB * row - v) * along
-        middle, half = u + cross * per, wide[2] * abs(per)
-        low, high = max(low, middle - half), min(high, middle + half)
-    return np.int64(np.ceil((low - 1) / SUB)), np.int64(np.floor((high + 1) / SUB))
-
-
-@njit
-def _rows(least, most, u, along, v, step, wide):
-    """First and last row that a ray may touch between two columns, along its longer axis; floats have room."""
-    reach = max(wide[0], DIAGONAL) if wide[0] > 0 else HALF
-    if along == 0:
-        return (v - reach) // SUB, (v + reach) // SUB + 1
-    low, high = min(u, u + along) - reach, max(u, u + along) + reach
-    near, far = min(max(SUB * least - HALF, low), high), max(min(SUB * most + HALF, high), low)
-    slope = step / along
-    one, other = v + (near - u) * slope, v + (far - u) * slope
-    half = max(float(HALF), wide[2] / abs(along)) + 1
-    return np.int64(np.floor((min(one, other) - half) / SUB)), np.int64(np.ceil((max(one, other) + half) / SUB))
-
-
-@njit
 def _touches(part, mask, ray, wide, stop, first_alone):
     """Number of pixels of an item that a ray enters before a stop, and time and cell of the first of them.
 
@@ -125,13 +115,13 @@ def _touches(part, mask, ray, wide, stop, first_alone):
     u_least, u_most, v_least, v_most, stride = part[0], part[2], part[1], part[3], np.int64(1)
     if steep:
         u_least, u_most, v_least, v_most, stride = part[1], part[3], part[0], part[2], width
-    top, low = _rows(u_least, u_most, u, along, v, step, wide)
+    top, low = rows_between(u_least, u_most, u, along, v, step, wide)
     per = 1 / step if step != 0 else 0.0
     first_of = np.int64(0), np.int64(LATE), np.int64(0), np.int64(0)
     top, low = max(top, v_least), min(low, v_most)
     for k in range(low - top + 1):
         row = top + k if step >= 0 else low - k
-        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
+        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else wide_run_of(row, u, along, v, step, wide, per)
         first, last = max(first, u_least), min(last, u_most)
         if first > last:
             continue
@@ -176,27 +166,6 @@ def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, fir
 
 
 @njit
-def _bounds(left, top, right, low, ray, wide):
-    """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
-    if wide[0] == 0:
-        return times_in(left, top, right, low, ray)
-    x, y, dx, dy, _, _ = ray
-    reach, length2 = wide[2], wide[3]
-    left, right, top, low = SUB * left - x, SUB * right - x, SUB * top - y, SUB * low - y
-    u_least, u_most = (
-        min(left * dx, right * dx) + min(top * dy, low * dy),
-        max(left * dx, right * dx) + max(top * dy, low * dy),
-    )
-    v_least, v_most = (
-        min(left * dy, right * dy) - max(top * dx, low * dx),
-        max(left * dy, right * dy) - min(top * dx, low * dx),
-    )
-    if v_least > reach or v_most < -reach or u_least - reach - 2 > length2 or u_most + reach + 2 < 0:
-        return np.int64(1), np.int64(0)
-    return max(u_least - reach - 2, 0), u_most + reach + 2
-
-
-@njit
 def _comes_before(found, one, other):
     """Whether a ray enters an item before another: by (time, y, x, rank)."""
     for column in (ENTRY, Y, X):
@@ -235,7 +204,7 @@ def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, ne
         if left > right or top > low:
             continue
         found[RANK, count] = at
-        found[ENTER, count], found[LAST, count] = _bounds(left, top, right, low, ray, wide)
+        found[ENTER, count], found[LAST, count] = bounds_of_times(left, top, right, low, ray, wide)
         count += found[ENTER, count] <= found[LAST, count]
     return count
 
@@ -398,117 +367,174 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     return end, row, 0
 
 
-OUTSIDE, BEYOND, EMPTY, FILTERED, OCCLUDED, HIT = range(1, 7)
-"""What is known of a cell of a ray, each more than the one before; 0 of one that the ray does not touch."""
-
-VERDICTS = 0, 4, 5, 0, 3, 2, 1
-"""The same as `bits.span_walk.Verdict`."""
-
-
 @njit
-def _cell_runs(ray, wide):
-    """Top row of a ray; the first cell of each row; and where each row begins in a list of cells, with the end."""
+def _row_cells(row, first, last, ray, wide, stop):
+    """Number of cells of a row that a wide ray enters before a stop.
+
+    `u` and `v` are products of the ray with the way to a cell, along the ray and across.
+    """
     x, y, dx, dy, _, _ = ray
-    u, along, v, step = (y, dy, x, dx) if abs(dy) > abs(dx) else (x, dx, y, dy)
-    top, low = _rows(-(2**40), 2**40, u, along, v, step, wide)
-    first, begin = np.empty(low - top + 1, np.int64), np.zeros(low - top + 2, np.int64)
-    per = 1 / step if step != 0 else 0.0
-    for k in range(low - top + 1):
-        row = top + k
-        near, far = run_of(row, v, step, u, along) if wide[0] == 0 else _wide_run(row, u, along, v, step, wide, per)
-        first[k], begin[k + 1] = near, begin[k] + max(far - near + 1, 0)
-    return top, first, begin
-
-
-@njit
-def _reached(at_x, at_y, u, v, ray, wide, bounds, stop):
-    """What a ray makes of a cell without items: OUTSIDE, BEYOND, EMPTY, or 0 if it does not touch it."""
-    radius, side, _, length2 = wide
-    inside = bounds[0] <= at_x <= bounds[2] and bounds[1] <= at_y <= bounds[3]
-    if radius > 0 and length2 > 0 and abs(v) <= side and -1 < u < length2:  # it is touched for sure
-        if not inside:
-            return OUTSIDE
-        if u < stop[0]:
-            return EMPTY
-    elif radius > 0 and _entry_of(at_x, at_y, u, v, ray, wide) == LATE:
-        return 0
-    if not inside:
-        return OUTSIDE
-    return EMPTY if stop[0] == LATE or _walked(at_x, at_y, u, v, ray, wide, stop)[0] else BEYOND
-
-
-@njit
-def _lay_row(row, first, cells, ray, wide, bounds, stop):
-    """Write what a ray makes of the cells of a row without items, from cell `first` on."""
-    x, y, dx, dy, across_x, across_y = ray
-    steep, time, last = abs(dy) > abs(dx), stop[0], first + len(cells) - 1
-    v, step, across = (x, dx, across_x) if steep else (y, dy, across_y)
-    near, far, low, high = bounds[1], bounds[3], bounds[0], bounds[2]
-    if not steep:
-        near, far, low, high = bounds[0], bounds[2], bounds[1], bounds[3]
-    inside, ahead = low <= row <= high and near <= first and last <= far, (SUB * row - v) * (1 if step > 0 else -1)
-    if wide[0] == 0 and step != 0 and inside and not (ahead - HALF) * across <= time <= (ahead + HALF) * across:
-        cells[:] = EMPTY if (ahead + HALF) * across < time else BEYOND
-        return
-    at_x, at_y = (row, first) if steep else (first, row)
-    px, py = SUB * at_x - x, SUB * at_y - y
+    (radius, side, reach, length2), steep, cells = wide, abs(dy) > abs(dx), last - first + 1
+    left, top = (row, first) if steep else (first, row)
+    px, py, end = SUB * left - x, SUB * top - y, min(stop[0], length2)
     u, v = px * dx + py * dy, px * dy - py * dx
     along, aside = (SUB * dy, -SUB * dx) if steep else (SUB * dx, SUB * dy)
-    sure = inside and wide[0] > 0 and wide[3] > 0
-    for place in range(len(cells)):
-        if sure and abs(v) <= wide[1] and -1 < u < min(time, wide[3]):
-            cells[place] = EMPTY
-        else:
-            cells[place] = _reached(at_x, at_y, u, v, ray, wide, bounds, stop)
-        at_x, at_y, u, v = at_x + (not steep), at_y + steep, u + along, v + aside
+    near, far, begin, until, count = 0, cells - 1, cells, cells - 1, 0
+    if along != 0:
+        near, far = between(u, along, cells, -reach - 2, end + reach + 2)
+    if along != 0 and radius >= DIAGONAL:
+        begin, until = between(u, along, cells, 0, end - 1)
+        while begin <= until and abs(v + aside * begin) > side:
+            begin += 1
+        while begin <= until and abs(v + aside * until) > side:
+            until -= 1
+        count = max(until - begin + 1, 0)
+    for k in range(near, far + 1):
+        if not (count and begin <= k <= until):
+            at_u, at_v = u + k * along, v + k * aside
+            count += _walked(left + k * (not steep), top + k * steep, at_u, at_v, ray, wide, stop)[0]
+    return count
 
 
 @njit
-def _mark(items, at, origin, steep, stop, what, last_rank, rows, cells):
-    """Mark the cells of an item that a ray reaches; of the last cell only if the item is not behind `last_rank`."""
-    (box, offset, masks, _, _, _), (top, first, begin) = items, rows
-    left, upper, width = box[at, 0] - origin[0], box[at, 1] - origin[1], box[at, 2] - box[at, 0] + 1
-    right, lower = box[at, 2] - origin[0], box[at, 3] - origin[1]
+def _wide_cells(ray, wide, bounds, stop):
+    """Cells that a wide ray reaches, those after its stop, and those beyond the bounds."""
+    x, y, dx, dy, _, _ = ray
+    steep, endless = abs(dy) > abs(dx), (np.int64(LATE), np.int64(0), np.int64(0), np.bool_(True), np.bool_(True))
+    u, along, v, step = (y, dy, x, dx) if steep else (x, dx, y, dy)
+    u_least, u_most, v_least, v_most = bounds[0], bounds[2], bounds[1], bounds[3]
+    if steep:
+        u_least, u_most, v_least, v_most = bounds[1], bounds[3], bounds[0], bounds[2]
+    top, low = rows_between(-(2**40), 2**40, u, along, v, step, wide)
+    per, total, inside, reached = 1 / step if step != 0 else 0.0, 0, 0, 0
+    for row in range(top, low + 1):
+        first, last = wide_run_of(row, u, along, v, step, wide, per)
+        count = _row_cells(row, first, last, ray, wide, endless)
+        total += count
+        if first < u_least or last > u_most or row < v_least or row > v_most:
+            first, last = max(first, u_least), min(last, u_most) if v_least <= row <= v_most else first - 1
+            count = _row_cells(row, first, last, ray, wide, endless)
+        inside += count
+        reached += count if stop[0] == LATE else _row_cells(row, first, last, ray, wide, stop)
+    return reached, inside - reached, total - inside
+
+
+@njit
+def _thin_cells(ray, bounds, stop):
+    """Cells that a thin ray reaches, those after its stop, and those beyond the bounds."""
+    borders = borders_of(ray)
+    last = ray[4] * ray[5]
+    total = inside = cells_by(borders, last)
+    end_x, end_y = (ray[0] + ray[2] + HALF) >> 8, (ray[1] + ray[3] + HALF) >> 8
+    leaves = min(0, end_x) - 1 < bounds[0] or min(0, end_y) - 1 < bounds[1]
+    leaves = leaves or max(0, end_x) + 1 > bounds[2] or max(0, end_y) + 1 > bounds[3]
+    if leaves:
+        inside = cells_within(borders, bounds, last)
+    if stop[0] == LATE:
+        return inside, 0, total - inside
+    time = min(stop[0] - 1, last)
+    reached = cells_within(borders, bounds, time) if leaves else cells_by(borders, time)
+    wide = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
+    for at_y in range(max(stop[2] - 1, bounds[1]), min(stop[2] + 1, bounds[3]) + 1):
+        for at_x in range(max(stop[1] - 1, bounds[0]), min(stop[1] + 1, bounds[2]) + 1):
+            walked, entry = _walked(at_x, at_y, 0, 0, ray, wide, stop)
+            reached += walked and entry == stop[0]
+    return reached, inside - reached, total - inside
+
+
+@njit
+def _new_cells(items, at, taken, count, hits, last_rank, origin, ray, wide, bounds, stop):
+    """Number of pixels of an item that a ray enters before a stop, and that none of the items before it has.
+
+    Parameters
+    ----------
+    taken, count, hits : the items before it; the first `hits` have the stop's pixel only up to `last_rank`
+    """
+    x, y, dx, dy, _, _ = ray
+    steep, (left, upper, right, lower) = abs(dy) > abs(dx), part_of(items[0], at, origin[0], origin[1], bounds)
+    u, along, v, step = (y, dy, x, dx) if steep else (x, dx, y, dy)
     u_least, u_most, v_least, v_most = (upper, lower, left, right) if steep else (left, right, upper, lower)
-    for row in range(max(v_least, top), min(v_most, top + len(first) - 1) + 1):
-        near, place = first[row - top], begin[row - top]
-        for cell in range(max(near, u_least), min(near + begin[row - top + 1] - place - 1, u_most) + 1):
+    top, low = rows_between(u_least, u_most, u, along, v, step, wide)
+    per, new = 1 / step if step != 0 else 0.0, 0
+    for row in range(max(top, v_least), min(low, v_most) + 1):
+        first, last = run_of(row, v, step, u, along) if wide[0] == 0 else wide_run_of(row, u, along, v, step, wide, per)
+        for cell in range(max(first, u_least), min(last, u_most) + 1):
             at_x, at_y = (row, cell) if steep else (cell, row)
-            if cells[place + cell - near] < EMPTY or not masks[offset[at] + (at_y - upper) * width + at_x - left]:
+            if not _covers(items, at, at_x + origin[0], at_y + origin[1], bounds):
                 continue
-            if at <= last_rank or at_x != stop[1] or at_y != stop[2]:
-                cells[place + cell - near] = max(cells[place + cell - near], what)
+            px, py = SUB * at_x - x, SUB * at_y - y
+            if not _walked(at_x, at_y, px * dx + py * dy, px * dy - py * dx, ray, wide, stop)[0]:
+                continue
+            new += not _is_taken(items, at_x, at_y, taken, count, hits, last_rank, origin, bounds, stop)
+    return new
+
+
+@njit
+def _is_taken(items, x, y, taken, count, hits, last_rank, origin, bounds, stop):
+    """Whether any of some items has a pixel that a ray enters."""
+    ends = x == stop[1] and y == stop[2]
+    for k in range(count):
+        counts = not ends or k >= hits or taken[k] <= last_rank
+        if counts and _covers(items, taken[k], x + origin[0], y + origin[1], bounds):
+            return True
+    return False
+
+
+@njit
+def _decided(items, hits, near, taken, origin, ray, wide, bounds, stop, end, refuse):
+    """Number of cells of a ray that are hit, that an occluder ends, and that items have which are refused.
+
+    Parameters
+    ----------
+    hits : ranks of the items that are hit, and numbers of their cells
+    end : why the ray ends, and the greatest rank of items that it hits in the last cell
+    refuse : filters of all rays, and the ray
+    """
+    (reason, last_rank), (meets, exclude, who), count, hit, filtered = end, refuse, 0, 0, 0
+    for i in range(len(hits[0])):
+        at, own = hits[0][i], hits[1][i]
+        if meets_any(items[0], at, taken, count):
+            takes = stop[0], stop[1], stop[2], stop[3], stop[4] and at <= last_rank
+            own = _new_cells(items, at, taken, count, count, last_rank, origin, ray, wide, bounds, takes)
+        taken[count], count, hit = at, count + 1, hit + own
+    first, blocked = count, reason == 1
+    if blocked:
+        blocked = not _is_taken(items, stop[1], stop[2], taken, count, count, last_rank, origin, bounds, stop)
+    if len(meets):
+        for i in range(near_of(items[0], origin[0], origin[1], ray, bounds, near, max(wide[0], HALF))):
+            if refuses(near[i], items[4], items[5], meets, exclude, who):
+                filtered += _new_cells(items, near[i], taken, count, first, last_rank, origin, ray, wide, bounds, stop)
+                taken[count], count = near[i], count + 1
+        others = taken[first:count]
+        if blocked and _is_taken(items, stop[1], stop[2], others, len(others), 0, LATE, origin, bounds, stop):
+            filtered -= 1  # the occluder has the cell
+    return hit, blocked, filtered
 
 
 @compiled(types.void(
-    PAIRS, PAIRS, PAIRS, types.int64, PAIRS, PAIRS, INTS, INTS, ITEMS, INTS, OWNERS, BOUNDS, ROWS_OUT,
+    PAIRS, PAIRS, PAIRS, types.int64, PAIRS, PAIRS, INTS, INTS, INTS, ITEMS, INTS, OWNERS, BOUNDS, ROWS_OUT,
 ))  # fmt: skip
-def _verdicts(start, step, origins, radius, sides, ends, hit_begin, hit_rank, items, meets, exclude, bounds, counts):
-    near = np.empty(len(items[0]) + 1, np.int64)
+def _verdicts(
+    start, step, origins, radius, sides, ends, hit_begin, hit_rank, hit_count, items, meets, exclude, bounds, counts
+):  # fmt: skip
+    near, taken = np.empty(len(items[0]) + 1, np.int64), np.empty(len(items[0]) + 1, np.int64)
     for who in range(len(start)):
         x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
         ray = x, y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
-        wide, steep = (radius, sides[0, who], sides[1, who], dx * dx + dy * dy), abs(dy) > abs(dx)
+        wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
         origin, reason = (origins[who, 0], origins[who, 1]), ends[0, who]
         within = bounds[0] - origin[0], bounds[1] - origin[1], bounds[2] - origin[0], bounds[3] - origin[1]
         stop = ends[1, who], ends[3, who], ends[2, who], ends[5, who] != 0, reason < 3  # used up budgets reach no cell
-        top, first, begin = rows = _cell_runs(ray, wide)
-        cells = np.empty(begin[-1], np.uint8)
-        for row in range(len(first)):
-            _lay_row(top + row, first[row], cells[begin[row] : begin[row + 1]], ray, wide, within, stop)
-        if len(meets):
-            for i in range(near_of(items[0], origin[0], origin[1], ray, bounds, near, max(radius, HALF))):
-                if refuses(near[i], items[4], items[5], meets, exclude, who):
-                    _mark(items, near[i], origin, steep, stop, FILTERED, LATE, rows, cells)
-        if reason == 1:
-            row, cell = (stop[1], stop[2]) if steep else (stop[2], stop[1])
-            cells[begin[row - top] + cell - first[row - top]] = OCCLUDED
-        last_rank = ends[4, who] if reason in (1, 2) else LATE
-        for i in range(hit_begin[who], hit_begin[who + 1]):
-            _mark(items, hit_rank[i], origin, steep, stop, HIT, last_rank, rows, cells)
-        for known in cells:
-            if known:
-                counts[who, VERDICTS[known]] += 1
+        reached, after, outside = _wide_cells(ray, wide, within, stop) if radius else _thin_cells(ray, within, stop)
+        own = slice(hit_begin[who], hit_begin[who + 1])
+        end = reason, ends[4, who] if reason in (1, 2) else np.int64(LATE)
+        hit, blocked, filtered = _decided(
+            items, (hit_rank[own], hit_count[own]), near, taken, origin, ray, wide, bounds, stop, end,
+            (meets, exclude, who),
+        )  # fmt: skip
+        counts[who, Verdict.HIT], counts[who, Verdict.OCCLUDED], counts[who, Verdict.FILTERED] = hit, blocked, filtered
+        counts[who, Verdict.EMPTY] = reached - hit - blocked - filtered
+        counts[who, Verdict.OUTSIDE], counts[who, Verdict.BEYOND] = outside, after
 
 
 def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:
@@ -559,11 +585,11 @@ def hits_and_ends(
 def verdicts_of_rays(walk: Any, filters: tuple[Ints, Ints] | None, bounds: Box | None) -> Ints | None:
     """See `weapons.explain.ray_verdicts.verdicts_of_rays`; None if rays are so long or so wide that it is faster."""
     lines, ends, stack = walk.lines, walk.ends, walk.stack
-    if int(np.abs(lines.step).max(initial=0)) + lines.radius > LISTED or not _fit(lines):
+    if int(np.abs(lines.step).max(initial=0)) > (LISTED if lines.radius else SUB * REACH_MAX) or not _fit(lines):
         return None
     sides, items, whose, within = _given(stack, lines, filters, bounds)
     stops = np.stack([ends.reason, ends.time, ends.y, ends.x, ends.rank, ends.alone])
-    hits = np.searchsorted(walk.hit.ray, np.arange(len(lines) + 1)), walk.hit.rank
+    hits = np.searchsorted(walk.hit.ray, np.arange(len(lines) + 1)), walk.hit.rank, walk.hit.count
     counts = np.zeros((len(lines), 6), np.int64)
     _verdicts(
         lines.start, lines.step, walk.rays.origin_xy, lines.radius, sides, stops, *hits, items, *whose, within, counts
