@@ -384,7 +384,7 @@ for jit in (False, True, True):
     hits = fire(scene, Point(), [(x, y) for x in range(50) for y in (9, 20)])
     rows = [[int(row.shot), int(row.object), row.pixels, *row.first_xy] for row in hits]
     told.append([rows, [stage.why for stage in hits.plan.ran if stage.name == "kernels"]])
-assert "hitplanes.planes.jit.planes" in sys.modules
+assert "hitplanes.planes.jit.areas" in sys.modules
 print(json.dumps(told))
 """
 
