@@ -137,7 +137,7 @@ def test_reports_and_cards_tell_what_blocks() -> None:
     told = []
     for how in ({}, {"blocked_by": ["wall", "smoke"]}, {"blocked_by": []}):
         (shot,) = report_of(scene, [fire(scene, WEAPONS["pistol"], AT, accept=["target"], **how)])["shots"]
-        told.append((shot["blocked_by"], shot_card(shot, 0, scene).told.partition("accepts target")[2]))
+        told.append((shot["blocked_by"], shot_card(shot, 0, scene).fired.partition("accepts target")[2]))
     assert told == [(None, ""), (["wall", "smoke"], ", blocked by wall smoke"), ([], ", blocked by nothing")]
 
 

@@ -296,7 +296,7 @@ def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
         kept = ready._squares.nbytes if "position_cache" in limit else ready._aims_bytes
         assert kept < 60_000
         assert sum(map(len, ready._squares.made.values())) * position_cache.CELL_BYTES < 60_000 or "AIMS" in limit
-        assert len(ready._told) <= 100
+        assert len(ready._looks_of) <= 100
 
 
 NUMBERS: list[Callable[[float], Any]] = [

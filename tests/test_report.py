@@ -71,7 +71,7 @@ def test_aim_and_filter_are_told_as_they_were_given() -> None:
 def test_places_are_told_to_a_hundredth_of_a_px(at: tuple[float, float], told: str) -> None:
     scene = street()
     (shot,) = report_of(scene, [fire(scene, Point(), at)])["shots"]
-    assert shot_card(shot, 0, scene).told == f"at {told}"
+    assert shot_card(shot, 0, scene).fired == f"at {told}"
 
 
 def test_up_to_so_many_shots_are_told_one_by_one() -> None:

@@ -279,8 +279,8 @@ class Scene:
         return 0 <= int(item) < self.items.count and bool(self.items.alive[item])
 
     def __repr__(self) -> str:
-        told = [f"{len(ids)} {role.value}" for role in ROLES if len(ids := self.ids(role))]
-        return f"<Scene {self.name!r}, bounds {self.bounds}: {', '.join(told) or 'empty'}>"
+        counts = [f"{len(ids)} {role.value}" for role in ROLES if len(ids := self.ids(role))]
+        return f"<Scene {self.name!r}, bounds {self.bounds}: {', '.join(counts) or 'empty'}>"
 
     def copy(self) -> Scene:
         """Return a scene of its own with the same objects and ids; a copy of the past can be changed, too."""

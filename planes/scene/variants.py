@@ -319,8 +319,8 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: In
         rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
         sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
         areas, (height, width) = np.count_nonzero(held, axis=(1, 2)), held.shape[1:]
-        told = (column.tolist() for column in (sides, quarters[batch], areas))
-        for row, mask, side, quarter, area in zip(batch, held, *told, strict=True):
+        details = (column.tolist() for column in (sides, quarters[batch], areas))
+        for row, mask, side, quarter, area in zip(batch, held, *details, strict=True):
             left, top, right, low = side if area else (0, 0, width, height)
             made[row] = Turned(rotated(mask[top : height - low, left : width - right], quarter), left, top, area)
     return [made[row] for row in range(len(which))]

@@ -25,7 +25,7 @@ from ..fire.plan import PlanSum, plan_lines
 from ..kinds.areas import arsenal_of
 from ..replay.shot_log import ShotRequest, fire_order, order_from_json, orders_of
 from ..replay.stream import Progress, fire_log
-from ..report.cards import place_told
+from ..report.cards import place_text
 from ..report.differences import differences
 from ..report.picture import picture_of_difference, picture_of_report
 from ..report.report import report_of
@@ -397,7 +397,7 @@ def _print_hits(facts: Mapping[str, Any], planned: Sequence[Hits]) -> None:
         hit = ", ".join(f"{row['name']} {row['pixels']} px" for row in shot["rows"][:NAMED]) or "nothing"
         if len(shot["rows"]) > NAMED:
             hit += f" and {len(shot['rows']) - NAMED} more"
-        _say(f"{shot['weapon']} at {place_told(shot['at'])}: {hit}")
+        _say(f"{shot['weapon']} at {place_text(shot['at'])}: {hit}")
         if planned:
             _print_plan(planned[i].plan.timed())
     if batch and planned:

@@ -150,13 +150,13 @@ class RayDetail:
         skipped = self.every.take(np.flatnonzero(self.refuses | (not self.in_steps)))
         stopped, ends = np.flatnonzero(self.ends.reason == Reason.OCCLUDER), self.ends
         at_stops = stopped, ends.x[stopped], ends.y[stopped], ends.rank[stopped]
-        for told, (ray, x, y, item) in (
+        for kind, (ray, x, y, item) in (
             (Verdict.FILTERED, _back_to_front(skipped)),
             (Verdict.OCCLUDED, at_stops),
             (Verdict.HIT, _back_to_front(self.walked)),
         ):
             cell, found = every.places(ray, x, y)
-            verdict[cell], rank[cell] = told, item[found]
+            verdict[cell], rank[cell] = kind, item[found]
         return verdict, rank
 
     def samples(self) -> Samples:

@@ -275,11 +275,11 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
     start = np.cumsum(runs.lengths) - runs.lengths - runs.x_first
     ended = rank.copy()
     for kind in (SKIP, BLOCK, HIT):  # the first of a kind counts; a hit outranks a block, a block a skip
-        told = events.take(np.flatnonzero(events.kind == kind)[::-1])
-        event, column = each_pixel(told.x_first, told.x_last)
-        rank[start[told.run][event] + column] = told.rank[event]
+        latest = events.take(np.flatnonzero(events.kind == kind)[::-1])
+        event, column = each_pixel(latest.x_first, latest.x_last)
+        rank[start[latest.run][event] + column] = latest.rank[event]
         if kind == BLOCK or (kind == HIT and not context.pierce):
-            ended[start[told.run][event] + column] = told.rank[event]
+            ended[start[latest.run][event] + column] = latest.rank[event]
     verdict, y = VERDICT_OF[state], runs.y[run]
     hidden = (state & SHELTERED != 0) & (verdict != Verdict.HIT)
     if blockers is not None and hidden.any():
@@ -299,11 +299,11 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
 
 
 def _refused_first(events: Events, start: Ints, samples: int) -> Ints:
-    """Rank of the first object that each sample would have hit, had nothing sheltered it; -1 for none."""
+    """Rank of the first object that each sample would have hit, had nothing hidden it; -1 for none."""
     own = np.full(samples, -1)
-    told = events.take(np.flatnonzero(events.kind == SHELTERED)[::-1])
-    event, x = each_pixel(told.x_first, told.x_last)
-    own[start[told.run][event] + x] = told.rank[event]
+    hidden = events.take(np.flatnonzero(events.kind == SHELTERED)[::-1])
+    event, x = each_pixel(hidden.x_first, hidden.x_last)
+    own[start[hidden.run][event] + x] = hidden.rank[event]
     return own
 
 

@@ -141,7 +141,7 @@ DEFAULTS: dict[str, Callable[[Rows], Ints]] = {
 """Columns that may be missing, and how each is made: round 0, one sample, full weight, one pellet, distance 0."""
 
 
-def _column(name: str, told: str) -> cached_attribute[Ints]:
+def _column(name: str, doc: str) -> cached_attribute[Ints]:
     """A column of hits, read-only."""
 
     def made(hits: Hits) -> Ints:
@@ -151,7 +151,7 @@ def _column(name: str, told: str) -> cached_attribute[Ints]:
         column.flags.writeable = False
         return column
 
-    made.__doc__ = told
+    made.__doc__ = doc
     return cached_attribute(made)
 
 

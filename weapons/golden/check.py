@@ -75,10 +75,10 @@ def draw_difference(folder: Path, expected: Golden | None, got: Golden, changed:
         picture = picture_of_report(got.whole, got.scene, text=False)
     write_png(folder / "got.png", picture)
     if expected is None or expected.picture is None or got.picture is None:
-        told = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
-        if told and changed.hits:
-            write_png(folder / COMPARED, picture_of_difference(told[0], told[1], (got.scene, got.scene)))
-        return [[("hits: expected, got, difference", COMPARED)]] * bool(told and changed.hits) + [[("got", "got.png")]]
+        pair = [] if expected is None or got.whole is None else reports_of_hits(got.whole, expected.report, got.report)
+        if pair and changed.hits:
+            write_png(folder / COMPARED, picture_of_difference(pair[0], pair[1], (got.scene, got.scene)))
+        return [[("hits: expected, got, difference", COMPARED)]] * bool(pair and changed.hits) + [[("got", "got.png")]]
     write_png(folder / "expected.png", expected.picture)
     rows: list[Row] = []
     if changed.hits:

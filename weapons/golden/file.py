@@ -80,8 +80,8 @@ class Tolerance:
         """What exceeds it in two rows of one object, and by how much; empty if nothing does."""
         count = abs(now["pixels"] - was["pixels"])
         far2 = sum((to - at) ** 2 for to, at in zip(now["first_xy"], was["first_xy"], strict=True))
-        told = [f"{count} px more or less, tolerance_pixels={self.pixels}"] if count > self.pixels else []
-        return told + ([f"first hit {far2**0.5:.1f} px away, tolerance_px={self.px}"] if far2 > self.px**2 else [])
+        lines = [f"{count} px more or less, tolerance_pixels={self.pixels}"] if count > self.pixels else []
+        return lines + ([f"first hit {far2**0.5:.1f} px away, tolerance_px={self.px}"] if far2 > self.px**2 else [])
 
 
 EXACT = Tolerance()  # no difference is tolerated
@@ -408,9 +408,9 @@ def hits_unlike(expected: Entry, got: Entry, tolerance: Tolerance) -> list[str]:
         after_of = {_key(row): row for row in now[shot]}
         for place, before in enumerate(was[shot]):
             after = after_of.get(_key(before), before)
-            told = tolerance.exceeded(before, after)
-            exceeded += [f"shot {shot}: object {after['object']}: {line}" for line in told]
-            was[shot][place] = before if told or _key(before) not in after_of else after
+            excess = tolerance.exceeded(before, after)
+            exceeded += [f"shot {shot}: object {after['object']}: {line}" for line in excess]
+            was[shot][place] = before if excess or _key(before) not in after_of else after
     parts = expected, got
     alike = got if len(was) == len(now) else expected
     objects = {entry["object"]: entry for part in parts for entry in (part["batch"] or {"objects": ()})["objects"]}
@@ -437,12 +437,12 @@ def _key(row: Entry) -> tuple[int, int]:
 
 
 def _compared(part: Entry, how: Entry, rows: list[list[Entry]], objects: list[Entry]) -> dict[str, Any]:
-    """A report of these rows, as `differences` reads it: shots are told as in `how`, and objects of a batch named."""
+    """Report of these rows for `differences`: its shots are described as in `how`, objects of a batch have names."""
     if part["batch"]:
         listed = [[row[column] for column in BATCH_COLUMNS] for own in rows for row in own]
         return {"batch": {"shots": len(rows), "objects": objects, "rows": listed}, "shots": []}
     hows = [{key: shot.get(key) for key in ("weapon", "at", "aim")} for shot in how["shots"]]
-    return {"batch": None, "shots": [{**told, "rows": own} for told, own in zip(hows, rows, strict=True)]}
+    return {"batch": None, "shots": [{**shot, "rows": own} for shot, own in zip(hows, rows, strict=True)]}
 
 
 def reports_of_hits(whole: Entry, expected: Entry, got: Entry) -> list[dict[str, Any]]:

@@ -37,12 +37,12 @@ class Part(Ref):
     """A field that holds a weapon, already made from its JSON."""
 
     kinds: tuple[type, ...]
-    told: str
+    expected: str
 
     def check(self, name: str, value: object) -> object:
         """Check that the value is a weapon of one of the kinds."""
         if not isinstance(value, self.kinds):
-            raise InputError(f"{name}: expected {self.told}, got {shown(value)}")
+            raise InputError(f"{name}: expected {self.expected}, got {shown(value)}")
         return value
 
 

@@ -99,7 +99,7 @@ def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
 
 ORIGIN: Ints = np.zeros((1, 2), np.int64)
 
-Told = tuple[object, object, object]
+Arguments = tuple[object, object, object]
 """Arguments of a shot: aim, toward, and its number."""
 
 
@@ -120,9 +120,9 @@ class Filter:
         direction = STRAIGHT if aim is None else unit_of(float(aim))
         return Shots(ORIGIN, direction, None, self.meets, self.exclude, number, self.seed, 0, aim)
 
-    def shots(self, weapon: Weapon, at: object, told: Told) -> Shots:
+    def shots(self, weapon: Weapon, at: object, arguments: Arguments) -> Shots:
         """Batch of one shot."""
-        aim, toward, number = told
+        aim, toward, number = arguments
         bits = accepted_of(self.meets), blocking_of(self.meets)
         return checked_shots(weapon, at, aim, toward, *bits, self.exclude, self.seed, number)
 
@@ -149,7 +149,7 @@ class Answer(Hits):
 
     _present: Present
     _at: tuple[float, float]
-    _told: Told = (None, None, None)
+    _arguments: Arguments = (None, None, None)
     _weighted = False
 
     scene: cached_attribute[Scene] = cached_attribute(lambda one: one._present.scene)
@@ -157,7 +157,7 @@ class Answer(Hits):
     _stack: cached_attribute[Stack] = cached_attribute(lambda one: one._present.stack)
     weapon: cached_attribute[Weapon] = cached_attribute(lambda one: one._present.weapon)
     shots: cached_attribute[Shots] = cached_attribute(
-        lambda one: one._present.filter.shots(one._present.weapon, one._at, one._told)
+        lambda one: one._present.filter.shots(one._present.weapon, one._at, one._arguments)
     )
     _rows: cached_attribute[Rows] = cached_attribute(lambda one: one._columns())
 
@@ -191,7 +191,7 @@ class Answer(Hits):
         plan.run(
             "prepared", "the weapon is ready for the scene: looked up; the stages after it ran when they were asked for"
         )
-        if self._told[:2] == (None, None):
+        if self._arguments[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)
         present, choosy = self._present, may_refuse(self._stack, self.shots)
         plan.leave_out_all(absent, self._stack, self._weighted, present.bounds is not None, choosy)

@@ -25,7 +25,7 @@ from ..kinds.placements import accepted_of, blocking_of, checked_shots
 from ..kinds.rays import not_cast
 from ..kinds.weapon import Weapon
 from . import position_cache
-from .one_shot import Answer, Filter, Present, Told, answer_of, reach_of, rounds_of
+from .one_shot import Answer, Arguments, Filter, Present, answer_of, reach_of, rounds_of
 from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class ReadyPattern(Ready[Hits]):
         self._squares: Any
         self._present: Present
         self._aims: dict[object, Looks] = {}
-        self._told: dict[tuple[object, object], Looks] = {}
+        self._looks_of: dict[tuple[object, object], Looks] = {}
         self._aims_bytes = 0
         self._straight: Look
         self._quick: Any = {}
@@ -133,7 +133,7 @@ class ReadyPattern(Ready[Hits]):
                         return hits
                     looks = self._known(aim, toward, shot)
                     if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
-                        return self._told_of(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
+                        return self._answer_at(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
         except (KeyError, ValueError, OverflowError):  # not made yet, too far, or not a pair
             pass
         return self._looked_up(at, aim, toward, shot)
@@ -145,16 +145,16 @@ class ReadyPattern(Ready[Hits]):
         if place is None or looks is None or max(map(abs, place)) > FARTHEST:
             return super().fire(at, aim, toward, shot)
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
-        told = aim, None if toward is None else plain_pair(toward), shot
+        arguments = aim, None if toward is None else plain_pair(toward), shot
         try:
-            return self._told_of(place, told, x, y, looks)
+            return self._answer_at(place, arguments, x, y, looks)
         except KeyError:  # too many items are near
             return super().fire(at, aim, toward, shot)
 
-    def _told_of(self, at: tuple[float, float], told: Told, x: int, y: int, looks: Looks) -> Answer:
+    def _answer_at(self, at: tuple[float, float], arguments: Arguments, x: int, y: int, looks: Looks) -> Answer:
         """Look up all rounds of a shot at a pixel."""
         hits = self._answer()
-        hits._present, hits._at, hits._told = self._present, at, told
+        hits._present, hits._at, hits._arguments = self._present, at, arguments
         for dx, dy, look in looks:
             look(x + dx, y + dy, hits)
         return hits
@@ -163,7 +163,7 @@ class ReadyPattern(Ready[Hits]):
         """Looks of an aim and a shot number that were used before; KeyError if they were not."""
         plain = toward is None and (type(aim) is float or aim is None or type(aim) is int)
         if plain and (shot is None or type(shot) is int):  # True is refused, though it equals the key 1
-            return self._told[aim, shot]
+            return self._looks_of[aim, shot]
         raise KeyError
 
     def _looks(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> Looks | None:
@@ -187,7 +187,7 @@ class ReadyPattern(Ready[Hits]):
         if looks is None:
             looks = self._made_looks(key, aim, offset, number)
         if looks and toward is None:
-            self._told[aim, shot] = looks
+            self._looks_of[aim, shot] = looks
             self._grow(AIM_BYTES)
         return looks
 
@@ -211,7 +211,7 @@ class ReadyPattern(Ready[Hits]):
         with self._lock:
             self._aims_bytes += size
             if self._aims_bytes > AIMS_BYTES:
-                self._aims, self._told, self._aims_bytes = {}, {}, size
+                self._aims, self._looks_of, self._aims_bytes = {}, {}, size
 
     def _follow(self) -> None:
         """Read the scene as it is now, and choose the kernels."""
@@ -223,7 +223,7 @@ class ReadyPattern(Ready[Hits]):
             if kernels is not self._kernels:
                 self._kernels = kernels
                 self._squares = kernels.PositionCache(self.scene, self.weapon, self._pierce, self._filter, self._reach)
-                self._aims, self._told, self._quick = {}, {}, {}
+                self._aims, self._looks_of, self._quick = {}, {}, {}
             stack = self._items.stack()
             self._squares.follow(stack)
             self._present = self._snapshot(version, stack)

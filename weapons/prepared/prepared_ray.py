@@ -33,7 +33,7 @@ from ..rays import one_ray, raycast
 from ..rays.contacts import rays_of
 from ..rays.first_hit import marcher
 from ..rays.one_ray import Follow, Followed
-from ..rays.ray_hits import RayHits, Told, Walk, weights_at
+from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_pair
@@ -44,7 +44,7 @@ Pair = tuple[float, float]
 class OneRay(OneShot, RayHits):
     """Answer of one prepared ray: a list of its rows; all else is made when it is asked for."""
 
-    __slots__ = ("_told",)  # set at each shot
+    __slots__ = ("_arguments",)  # set at each shot
 
     @cached_attribute
     def _weighted(self) -> bool:
@@ -63,11 +63,11 @@ class OneRay(OneShot, RayHits):
         return raycast.walk_of(rays, ray, stack, bounds, found)
 
     @cached_attribute
-    def _later(self) -> Told:
+    def _later(self) -> Later:
         def verdicts() -> Ints:
             return late.ray_verdicts.verdicts_of([(0, self._walk)], self.shots, self._present.bounds)
 
-        return Told(lambda: self._walk.passes, lambda: self._walk.stops, verdicts)
+        return Later(lambda: self._walk.passes, lambda: self._walk.stops, verdicts)
 
 
 class ReadyRay(Ready[RayHits]):
@@ -101,12 +101,12 @@ class ReadyRay(Ready[RayHits]):
         if followed is None or (followed[0] == 0 and self._ray.inside != "hit"):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
-        hits._present, hits._at, hits._told = self._present, place, (aim, target, shot)
+        hits._present, hits._at, hits._arguments = self._present, place, (aim, target, shot)
         for rank, count, x, y, entry in followed[1]:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
-            told = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
-            hits.append(new(HitRow, told))
+            columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
+            hits.append(new(HitRow, columns))
         return hits
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:

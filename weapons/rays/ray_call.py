@@ -28,7 +28,7 @@ from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
 from .contacts import Parts, Rays, Terminations, Touches, rays_of
 from .first_hit import FirstHits, ends_by_march
-from .ray_hits import Passes, RayHits, Stops, Summed, Told, Walk, pixels_of, rows_of_passes, walked_of
+from .ray_hits import Later, Passes, RayHits, Stops, Summed, Walk, pixels_of, rows_of_passes, walked_of
 from .ray_walk import Range, expected_cells, has_whole_walk, trace
 from .raycast import cast_rays, cast_to_ends
 
@@ -81,8 +81,8 @@ def fired_rays(
             found += [(begin, walk) for walk in followed]
         if begin:
             rows[-1].shot[:] += begin
-    told = _told(found, shots, ray, through)
-    hits = RayHits(Rows.joined(rows), told, each * len(shots), scene, through.stack, weapon, shots, plan)
+    later = _later_of(found, shots, ray, through)
+    hits = RayHits(Rows.joined(rows), later, each * len(shots), scene, through.stack, weapon, shots, plan)
     plan.run("rows", "")
     _leave_out_unused(plan, scene, through, shots, ray, (how[2], chosen))
     plan.run("plan", "")
@@ -124,19 +124,19 @@ def first_ends(
     return ends_of
 
 
-def _told(found: list[tuple[int, Walk | Made | FirstHits]], shots: Shots, ray: RayWeapon, through: Range) -> Told:
+def _later_of(found: list[tuple[int, Walk | Made | FirstHits]], shots: Shots, ray: RayWeapon, through: Range) -> Later:
     """Functions that tell more of chunks of shots, which are given with the number of their first shot."""
     bounds = through.bounds
     walks = [(first, part) for first, part in found if not isinstance(part, Made)]
     counted = len(walks) == len(found) and has_whole_walk(ray, through.items, through.stack)
-    return Told(
-        lambda: Passes.joined([_later(part.passes, first) for first, part in found]),
-        lambda: Stops.joined([_later(part.stops, first) for first, part in found]),
+    return Later(
+        lambda: Passes.joined([_moved_on(part.passes, first) for first, part in found]),
+        lambda: Stops.joined([_moved_on(part.stops, first) for first, part in found]),
         (lambda: late.ray_verdicts.verdicts_of(walks, shots, bounds)) if counted else None,
     )
 
 
-def _later(columns: C, first_shot: int) -> C:
+def _moved_on(columns: C, first_shot: int) -> C:
     return replace(columns, shot=columns.shot + first_shot) if first_shot else columns
 
 
@@ -202,8 +202,8 @@ def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator
         first = (column[walked.first] for column in (walked.x, walked.y, walked.entry))
         hit = Touches(walked.ray, walked.rank, walked.count, *first)
         walk = Walk(some, lines, hit, ends, through.stack, through.bounds, ray.fades, (met, relative))
-        told = "cells of each ray on each object; the rest when it is asked for"
-        through.plan.run("passes", told, walked.nbytes)
+        why = "cells of each ray on each object; the rest when it is asked for"
+        through.plan.run("passes", why, walked.nbytes)
         yield walk
         begin, cells = begin + step, cells + len(met.x)
         step = max(1, min(most, CHUNK_GROWTH * step, CHUNK_CELLS * begin // max(cells, 1)))

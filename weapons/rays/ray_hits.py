@@ -298,7 +298,7 @@ def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
 C = TypeVar("C", Passes, Stops)
 
 
-class Told(NamedTuple):
+class Later(NamedTuple):
     """Functions that tell more of rays: their passes and stops, and the verdicts of shots, if they can be counted."""
 
     passes: Callable[[], Passes]
@@ -320,10 +320,10 @@ class RayHits(Hits):
     rays: int = 1
 
     def __init__(
-        self, rows: Rows, told: Told, rays: int, scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, plan: Plan
+        self, rows: Rows, later: Later, rays: int, scene: Scene, stack: Stack, weapon: Weapon, shots: Shots, plan: Plan
     ) -> None:
         self._keep(rows, scene, stack, weapon, shots, plan)
-        self.rays, self._later = rays, told
+        self.rays, self._later = rays, later
 
     @cached_property
     def passes(self) -> Passes:
@@ -342,8 +342,8 @@ class RayHits(Hits):
     @property
     def _count(self) -> Callable[[], Ints] | None:
         """Function that counts verdicts without the scene; None if it is needed, or these are copied."""
-        told: Told | None = getattr(self, "_later", None)
-        return told.verdicts if told else None
+        later: Later | None = getattr(self, "_later", None)
+        return later.verdicts if later else None
 
     def _answers(self) -> dict[str, Any]:
         counted = {"verdicts": self.verdicts} if self._count or "verdicts" in vars(self) else {}
@@ -455,14 +455,14 @@ class RayHits(Hits):
     def gathered(cls, parts: Sequence[Hits], rows: Sequence[Ints], shots: Shots) -> RayHits:
         """Hits of shots that were fired at several ticks, in the order of the shots; parameters of `Hits.gathered`."""
         rays = [part for part in parts if isinstance(part, RayHits)]
-        told = Told(
+        later = Later(
             lambda: Passes.gathered([part.passes for part in rays], rows),
             lambda: Stops.gathered([part.stop for part in rays], rows),
             (lambda: cls._gathered_verdicts(parts, rows)) if all(part._count for part in rays) else None,
         )
         number, plan = sum(part.rays for part in rays), Plan.joined([part.plan for part in parts])
         of = *parts[0]._then(0), parts[0].weapon, shots, plan
-        found = cls(cls._gathered_rows(parts, rows), told, number, *of)
+        found = cls(cls._gathered_rows(parts, rows), later, number, *of)
         found._remember(parts, rows)
         return found
 

@@ -141,7 +141,7 @@ class Part:
         self.output, self.path = output, self.path_of(output)
         for path in (self.output, self.path):
             check_output(path)
-        with self._told():
+        with self._errors_named():
             self._file = os.open(self.path, FLAGS, 0o666)
         try:
             self._hold()
@@ -168,7 +168,7 @@ class Part:
 
     def lines(self) -> Iterator[bytes]:
         """Yield the intact lines of an older part after its header; `cut` drops all behind the last one taken."""
-        with self._told(), self.path.open("rb") as file:
+        with self._errors_named(), self.path.open("rb") as file:
             file.seek(self._end)
             for number, line in enumerate(file, 2):
                 if not line.endswith(b"\n"):
@@ -183,7 +183,7 @@ class Part:
 
     def cut(self) -> None:
         """Truncate the file after the last intact line, and write from there on."""
-        with self._told():
+        with self._errors_named():
             os.ftruncate(self._file, self._end)
             os.lseek(self._file, self._end, os.SEEK_SET)
 
@@ -205,13 +205,13 @@ class Part:
 
     def _put(self, data: bytes) -> None:
         view = memoryview(data)
-        with self._told():
+        with self._errors_named():
             while len(view):
                 view = view[os.write(self._file, view) :]
 
     def finish(self) -> None:
         """Rename the part, now complete, to the output."""
-        with self._told():
+        with self._errors_named():
             if fcntl is None:
                 os.close(self._file)
                 self._file = -1
@@ -228,13 +228,13 @@ class Part:
             raise busy from error
         except OSError:  # a file system without locks
             return
-        with self._told():
+        with self._errors_named():
             if not self.path.exists() or not os.path.samestat(os.fstat(self._file), self.path.stat()):
                 raise busy  # the process that held the lock has renamed it
 
     def _check(self, header: bytes) -> None:
         """Write the header of a new part, or compare that of an older one."""
-        with self._told():
+        with self._errors_named():
             found = os.read(self._file, len(header))
             if found == header:
                 return
@@ -247,7 +247,7 @@ class Part:
         raise InputError(f"{self.path}: {_difference(header, found)}: remove it to start anew")
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _errors_named(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:

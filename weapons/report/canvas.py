@@ -380,8 +380,8 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
         cell = report["batch"]["heat"]["cell"]
         per = f" in {cell} x {cell} px" if cell > 1 else ""
         entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{per}", np.repeat(scale, 5, axis=1)))
-    told = "other target" if painted & {"object hit", "object blocked"} else "target"
-    words = {"hit": "object hit", "blocked": "object blocked", "other": told, "now": "where it is now"}
+    target = "other target" if painted & {"object hit", "object blocked"} else "target"
+    words = {"hit": "object hit", "blocked": "object blocked", "other": target, "now": "where it is now"}
     words["shadow"] = "edge of a shadow"
     entries += [Entry(word, _outlined(kind)) for kind, word in words.items() if f"object {kind}" in painted]
     entries += [Entry(name, _sketched(color, name)) for name, color in SKETCH.items() if name in painted]
@@ -428,10 +428,10 @@ def _summary(report: Mapping[str, Any], width: int) -> Text:
     shots, batch = report["shots"], report["batch"]
     objects = {entry["object"] for shot in shots for entry in shot["rows"]}
     objects |= {entry["object"] for entry in (batch["objects"] if batch else ())}
-    told = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
+    text = f"{_counted(batch['shots'] if batch else len(shots), 'shot')}, {_counted(len(objects), 'object')} hit"
     if report.get("now", {}).get("tick") is not None:
-        told = f"tick {report['now']['tick']:g}: {told}"
-    return Text(width - EDGE, 28, told, FAINT, right=True)
+        text = f"tick {report['now']['tick']:g}: {text}"
+    return Text(width - EDGE, 28, text, FAINT, right=True)
 
 
 def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
@@ -441,9 +441,9 @@ def _footer(report: Mapping[str, Any], width: int, height: int) -> list[Text]:
     ran = dict.fromkeys(stage["stage"] for plan in plans for stage in plan["ran"])
     left = [s["stage"] for s in plans[0]["left_out"]] if plans else []
     left = [name for name in left if all(name in [s["stage"] for s in plan["left_out"]] for plan in plans)]
-    told = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
+    source = f"scene {scene['hash']}, version {scene['version']}, hitplanes {report['version']}"
     plan = "; ".join(f"{word}: {', '.join(stages)}" for word, stages in (("ran", ran), ("left out", left)) if stages)
-    return [Text(EDGE, height - 30, told, FAINT), Text(EDGE, height - 12, clipped(plan, width - 2 * EDGE), FAINT)]
+    return [Text(EDGE, height - 30, source, FAINT), Text(EDGE, height - 12, clipped(plan, width - 2 * EDGE), FAINT)]
 
 
 def _counted(n: int, what: str) -> str:

@@ -75,7 +75,7 @@ class Card:
 
     number: int | None  # of the shot in the picture, or None
     title: str  # at the left of the first line
-    told: str  # at the right of the first line
+    fired: str  # at the right of the first line
     verdicts: Mapping[str, int]  # number of samples by verdict
     inset: Inset | None  # around the first hit
     lines: Sequence[Sequence[str]]  # one cell is a sentence, two are an object and a reason, more are a row of a table
@@ -102,7 +102,7 @@ class Card:
             texts.append(Text(x + 20 - 4 * len(label), y + 22, label, INK, bold=True))
             left = x + 38
         texts.append(Text(left, y + 22, clipped(self.title, wide // 3), INK, bold=True))
-        texts.append(Text(x + wide - 10, y + 22, clipped(self.told, wide * 2 // 3 - 50), FAINT, right=True))
+        texts.append(Text(x + wide - 10, y + 22, clipped(self.fired, wide * 2 // 3 - 50), FAINT, right=True))
         _bar(page[y + 36 : y + 36 + BAR, x + 10 : x + wide - 10], self.verdicts, self.ray)
         top = y + 52
         counts_x = x + 10
@@ -160,8 +160,8 @@ def shot_card(shot: Mapping[str, Any], number: int, scene: Scene, now: str | Non
 
 def _at_risk(rows: Sequence[Mapping[str, Any]]) -> list[Sequence[str]]:
     """Lines about objects that a shift of one pixel would miss."""
-    told = {row["name"]: fragile(row, "misses it") for row in rows}
-    lines = [(name, risk) for name, risk in told.items() if risk is not None]
+    risks = {row["name"]: fragile(row, "misses it") for row in rows}
+    lines = [(name, risk) for name, risk in risks.items() if risk is not None]
     return [*lines[:NOT_LINES], *_rest(lines, NOT_LINES, " fragile")]
 
 
@@ -195,15 +195,15 @@ def hit_now(report: Mapping[str, Any], number: int) -> str | None:
     rows = report["now"]["shots"][number]
     if rows is None:
         return "starts inside of something"
-    told = ", ".join(f"{short(row['name'])} {row['pixels']} px" for row in rows[:NOT_LINES]) or "nothing"
-    return f"hits {told}" + (" and more" if len(rows) > NOT_LINES else "")
+    names = ", ".join(f"{short(row['name'])} {row['pixels']} px" for row in rows[:NOT_LINES]) or "nothing"
+    return f"hits {names}" + (" and more" if len(rows) > NOT_LINES else "")
 
 
 def batch_cards(report: Mapping[str, Any]) -> list[Card]:
     """Cards of a batch: its totals, and the objects that it hit."""
     batch = report["batch"]
     shots = batch["shots"]
-    told = f"{shots} shots, {batch['shots_that_hit']} hit something"
+    total = f"{shots} shots, {batch['shots_that_hit']} hit something"
     never = report["scene"]["hittable"] - len(batch["objects"])
     lines: list[Sequence[str]] = [BATCH_HEADER] if batch["objects"] else []
     for entry in batch["objects"][:HIT_LINES]:
@@ -216,7 +216,7 @@ def batch_cards(report: Mapping[str, Any]) -> list[Card]:
         lines.append(["volumes are drawn for a few shots only; cells for all"])
     if batch["heat"]["beyond"]:
         lines.append([f"{batch['heat']['beyond']} samples beyond the picture"])
-    return [Card(None, ", ".join(report["weapons"]), told, batch["verdicts"], None, lines)]
+    return [Card(None, ", ".join(report["weapons"]), total, batch["verdicts"], None, lines)]
 
 
 def _tested(tested: Mapping[str, Any]) -> str:
@@ -230,13 +230,13 @@ def _rest(entries: Sequence[Any], shown: int, what: str) -> list[list[str]]:
     return [[f"and {len(entries) - shown} more{what}"]] if len(entries) > shown else []
 
 
-def place_told(at: Sequence[float]) -> str:
+def place_text(at: Sequence[float]) -> str:
     """A position to 1/100 px: enough to find it; the facts have all of it."""
     return ", ".join(f"{round(value, 2) + 0.0:.15g}" for value in at)
 
 
 def _fired(shot: Mapping[str, Any]) -> str:
-    parts = [f"at {place_told(shot['at'])}"]
+    parts = [f"at {place_text(shot['at'])}"]
     if shot["aim"] is not None:
         parts.append(f"aim {shot['aim']:g} deg")
     if shot["seed"]:
@@ -265,8 +265,8 @@ def _bar(bar: Image, verdicts: Mapping[str, int], ray: Mapping[str, Any] | None)
     else:
         stop = int(ray["stop"]["fraction"] * (wide - 2))
         parts = [("beyond", stop, wide)]
-        for told in ray["passes"]:
-            parts.append(("hit", int(told["entry"] * (wide - 2)), int(told["exit"] * (wide - 2)) + 1))
+        for entry in ray["passes"]:
+            parts.append(("hit", int(entry["entry"] * (wide - 2)), int(entry["exit"] * (wide - 2)) + 1))
     for verdict, first, last in parts:
         part = bar[:, first:last]
         part[tiled_glyph(verdict, BAR, part.shape)] = MARKS[verdict][0]

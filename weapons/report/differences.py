@@ -46,8 +46,8 @@ def ray_changes(was: Entry, now: Entry) -> list[str] | None:
 def _ray_name(ray: Entry, known: list[Entry]) -> str:
     """Name of a ray, with its pellet and round if the shot has several."""
     pellet, rounds = (any(not same(other.get(key), 0) for other in known) for key in ("pellet", "round"))
-    told = f"ray {shown(ray.get('pellet'))}" if pellet else "ray"
-    return f"{told} of round {shown(ray.get('round'))}" if rounds else told
+    name = f"ray {shown(ray.get('pellet'))}" if pellet else "ray"
+    return f"{name} of round {shown(ray.get('round'))}" if rounds else name
 
 
 def _changes(was: Entry, now: Entry) -> list[str]:
@@ -78,10 +78,10 @@ def _stop(was: Any, now: Any) -> list[str] | None:
 def _passes(was: Any, now: Any) -> list[str] | None:
     lines = []
     for before, after in pairs(was, now, "object"):
-        told = after or before or {}
-        name = _name(told)
+        entry = after or before or {}
+        name = _name(entry)
         if before is None or after is None:
-            lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(told)}")
+            lines.append(f"{'newly' if before is None else 'no longer'} goes through {name}{_way(entry)}")
         elif _way(before) != _way(after):
             lines.append(f"goes through {name}{_way(after)}, was{_way(before)}")
         else:
@@ -89,8 +89,8 @@ def _passes(was: Any, now: Any) -> list[str] | None:
     return first_of(lines) or None
 
 
-def _way(told: Entry) -> str:
-    return f" from {_px(told.get('entry_px'))} to {_px(told.get('exit_px'))}"
+def _way(entry: Entry) -> str:
+    return f" from {_px(entry.get('entry_px'))} to {_px(entry.get('exit_px'))}"
 
 
 def _ray_at(item: Any) -> str:
@@ -131,10 +131,10 @@ def differences(expected: Entry, got: Entry) -> list[str]:
     was, now = decisive(expected), decisive(got)
     if same(was, now):
         return []
-    if _told_as(was) != _told_as(now):
-        return [f"{_told_as(now)}, was {_told_as(was)}"]
+    if _form_of(was) != _form_of(now):
+        return [f"{_form_of(now)}, was {_form_of(was)}"]
     words: dict[str, Words] = {"scene": _scene, "weapons": _weapons, "batch": _batch, "shots": _shots}
-    return list(map(printable, _told(was, now, words) or by_path("", was, now)))
+    return list(map(printable, _lines_of(was, now, words) or by_path("", was, now)))
 
 
 def decisive(report: Entry) -> dict[str, Any]:
@@ -152,7 +152,7 @@ Words = Callable[[Entry, Entry], list[str] | None]
 """Function (was, now) that returns lines about one part of both; None if there are no words for the change."""
 
 
-def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
+def _lines_of(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
     """Lines about each part that differs: first those in words, then the others by their paths."""
     lines = []
     for key in dict.fromkeys([*words, *was, *now]):
@@ -161,8 +161,8 @@ def _told(was: Entry, now: Entry, words: Mapping[str, Words]) -> list[str]:
             continue
         known = ABSENT not in (before, after)
         known &= key not in OBJECTS or (isinstance(before, dict) and isinstance(after, dict))
-        told = words[key](was, now) if key in words and known else None
-        lines += first_of(by_path(key, before, after)) if told is None else told
+        phrases = words[key](was, now) if key in words and known else None
+        lines += first_of(by_path(key, before, after)) if phrases is None else phrases
     return lines
 
 
@@ -205,28 +205,28 @@ def _shot(was: Entry, now: Entry) -> list[str]:
         "rows": _rows, "blockers": _blockers, "why_not": _why_not, "verdicts": _verdicts, "rays": ray_changes,
         "samples": _samples,
     }  # fmt: skip
-    return _told(_chief(was), _chief(now), words) or _told(was, now, words)
+    return _lines_of(_chief(was), _chief(now), words) or _lines_of(was, now, words)
 
 
 def _chief(shot: Entry) -> dict[str, Any]:
     """Copy of a shot without the keys that follow from the rest."""
     chief = {key: value for key, value in shot.items() if key not in SHOT_DERIVED}
-    for told in ("rows", "why_not"):
-        if isinstance(shot.get(told), list | tuple):
-            chief[told] = [
+    for part in ("rows", "why_not"):
+        if isinstance(shot.get(part), list | tuple):
+            chief[part] = [
                 {k: v for k, v in row.items() if k not in ROW_DERIVED} if isinstance(row, dict) else row
-                for row in shot[told]
+                for row in shot[part]
             ]
     return chief
 
 
 def _verdicts(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["verdicts"], now["verdicts"]
-    told = []
+    counts = []
     for key in dict.fromkeys([*after, *before]):
         had, has = before.get(key, ABSENT), after.get(key, ABSENT)
-        told += [] if same(had, has) else [f"{shown(has)} {key}, was {shown(had)}"]
-    return ["verdicts: " + "; ".join(told)]
+        counts += [] if same(had, has) else [f"{shown(has)} {key}, was {shown(had)}"]
+    return ["verdicts: " + "; ".join(counts)]
 
 
 def _rows(was: Entry, now: Entry) -> list[str] | None:
@@ -287,17 +287,17 @@ def _blocker(was: Entry, now: Entry) -> list[str]:
 def _why_not(was: Entry, now: Entry) -> list[str] | None:
     """Lines about the objects near that were not hit, without those whose row is new or missing."""
     hits = [{key_of(row, "object") for row in entries(shot.get("rows"))} for shot in (was, now)]
-    told = hits[0] ^ hits[1]
+    changed = hits[0] ^ hits[1]
     lines = []
     for before, after in pairs(was["why_not"], now["why_not"], "object"):
         entry = after or before or {}
-        if key_of(entry, "object") in told:
+        if key_of(entry, "object") in changed:
             continue
         if before is None or after is None:
             lines.append(f"{_name(entry)} is {'newly' if before is None else 'no longer'} near: {reason(entry)}")
         elif not same(before, after):
             lines.append(f"{_name(after)}: " + "; ".join(_why_changed(before, after)))
-    return first_of(lines) if lines or told else None
+    return first_of(lines) if lines or changed else None
 
 
 def _why_changed(was: Entry, now: Entry) -> list[str]:
@@ -312,8 +312,8 @@ def _samples(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["samples"], now["samples"]
     lines = []
     for verdict in dict.fromkeys([*after, *before]):
-        told = _gained_and_lost(before.get(verdict, []), after.get(verdict, []))
-        lines += [f"{verdict} samples: " + "; ".join(told)] if told else []
+        phrases = _gained_and_lost(before.get(verdict, []), after.get(verdict, []))
+        lines += [f"{verdict} samples: " + "; ".join(phrases)] if phrases else []
     return lines or None
 
 
@@ -322,7 +322,7 @@ def _batch(was: Entry, now: Entry) -> list[str] | None:
     before, after = was["batch"], now["batch"]
     words: dict[str, Words] = {"rows": lambda *_: _batch_rows(before, after), "verdicts": _verdicts}
     rest = [{key: v for key, v in batch.items() if key not in BATCH_DERIVED} for batch in (before, after)]
-    return [f"batch: {line}" for line in _told(rest[0], rest[1], words) or _told(before, after, {})]
+    return [f"batch: {line}" for line in _lines_of(rest[0], rest[1], words) or _lines_of(before, after, {})]
 
 
 def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
@@ -344,9 +344,9 @@ def _batch_rows(was: Entry, now: Entry) -> list[str] | None:
 
 def _as_row(row: Any, names: Mapping[str, Any]) -> dict[str, Any]:
     """Row of a batch in the form of a row of a shot."""
-    told = dict(zip(BATCH_COLUMNS, row, strict=True))
-    first_xy = [told.pop("x"), told.pop("y")]
-    return {**told, "first_xy": first_xy, "name": names.get(text_of_json(told["object"]))}
+    fields = dict(zip(BATCH_COLUMNS, row, strict=True))
+    first_xy = [fields.pop("x"), fields.pop("y")]
+    return {**fields, "first_xy": first_xy, "name": names.get(text_of_json(fields["object"]))}
 
 
 def _paired_shots(was: list[Entry], now: list[Entry]) -> Iterator[tuple[Entry | None, Entry | None]]:
@@ -363,15 +363,15 @@ def _gained_and_lost(was: Any, now: Any) -> list[str]:
     """Phrases about the pixels that are in only one of two lists of runs [y, x_first, x_last]."""
     if not (_are_runs(was) and _are_runs(now)):
         return []
-    told = []
+    phrases = []
     for word, some, others in (("gained", now, was), ("lost", was, now)):
         runs = _left(some, others)
         count = sum(last - first + 1 for _, first, last in runs)
         pixels = itertools.islice(((x, y) for y, first, last in runs for x in range(first, last + 1)), PIXELS_NAMED)
         names = ", ".join(f"({x}, {y})" for x, y in pixels)
         more = f" and {count - PIXELS_NAMED} more" if count > PIXELS_NAMED else ""
-        told += [f"{word} at {names}{more}"] if count else []
-    return told
+        phrases += [f"{word} at {names}{more}"] if count else []
+    return phrases
 
 
 def _left(runs: Any, taken: Any) -> list[tuple[int, int, int]]:
@@ -398,25 +398,25 @@ def _are_runs(value: Any) -> bool:
 
 def _fields(was: Entry, now: Entry, keys: Iterable[str]) -> list[str]:
     """Phrases about the given fields that differ."""
-    told = []
+    phrases = []
     for key in keys:
         before, after = was.get(key, ABSENT), now.get(key, ABSENT)
         if not same(before, after) and key == "first_xy":
-            told.append(f"first at ({_place(after)}), was ({_place(before)})")
+            phrases.append(f"first at ({_place(after)}), was ({_place(before)})")
         elif isinstance(before, dict) and isinstance(after, dict):
-            told += by_path(key, before, after)
+            phrases += by_path(key, before, after)
         elif not same(before, after):
-            told.append(f"{key} {shown(after)}, was {shown(before)}")
-    return told
+            phrases.append(f"{key} {shown(after)}, was {shown(before)}")
+    return phrases
 
 
 def _without(part: Entry, kind: str) -> dict[str, Any]:
     return {key: value for key, value in part.items() if key not in ABOUT[kind]}
 
 
-def _told_as(report: Entry) -> str:
+def _form_of(report: Entry) -> str:
     """Whether a report lists its shots one by one or as a batch, in words."""
-    return f"shots told {'as a batch' if isinstance(report.get('batch'), dict) else 'one by one'}"
+    return f"shots given {'as a batch' if isinstance(report.get('batch'), dict) else 'one by one'}"
 
 
 def _name(entry: Entry) -> str:

@@ -43,7 +43,7 @@ class Overlay:
     def keep_free(self, shots: Sequence[Mapping[str, Any]], scene: Scene) -> None:
         """Reserve the samples, the objects that were hit, and the occluders that blocked, against labels."""
         runs = [of for shot in shots for of in shot["samples"].values()]
-        items = {told["object"] for shot in shots for told in (*shot["rows"], *shot["blockers"])}
+        items = {entry["object"] for shot in shots for entry in (*shot["rows"], *shot["blockers"])}
         runs += [Spans.from_mask(*scene.mask(item)).runs() for item in items]
         targets = scene.ids(Role.HITTABLE).tolist()[:OUTLINES_MAX]
         self.taken |= enlarged(covered(self.view, runs), self.factor)
@@ -96,14 +96,14 @@ class Overlay:
     def links(self, shots: Sequence[Mapping[str, Any]], hit: Set[int]) -> None:
         """Ring samples that an occluder kept from an object, and name both; objects that were not hit come first."""
         color = MARKS["occluded"][0]
-        pairs = [(told, by) for shot in shots for by in shot["blockers"] for told in by["blocked"]]
+        pairs = [(behind, by) for shot in shots for by in shot["blockers"] for behind in by["blocked"]]
         linked: set[int] = set()
-        for told, by in sorted(pairs, key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
-            x, y = (v + self.factor // 2 for v in self._at(*told["at_xy"]))
+        for behind, by in sorted(pairs, key=lambda pair: (pair[0]["object"] in hit, -pair[0]["samples"])):
+            x, y = (v + self.factor // 2 for v in self._at(*behind["at_xy"]))
             inside = 0 <= x < self.image.shape[1] and 0 <= y < self.image.shape[0]
             if not inside or by["object"] in linked or len(linked) >= LINKS_MAX:
                 continue
-            text = f"{short(by['name'])} blocks {short(told['name'])}"
+            text = f"{short(by['name'])} blocks {short(behind['name'])}"
             if self._label(text, (x - 7, y - 7, x + 8, y + 8), color, FAR):
                 linked.add(by["object"])
                 for shade, thick in ((DARK, 3), (color, 1)):
@@ -251,11 +251,11 @@ def _arrows(signs: Signs, world: World, shot: Mapping[str, Any]) -> None:
     for ray in shot["rays"]:
         begin, at, end = world.placed(np.array([ray["start"], ray["stop"]["point"], ray["end"]]))
         signs.ray(begin, at, end, ray["stop"]["reason"])
-        for told in ray["passes"]:
-            into = world.placed(np.array([told["point"]]))[0]
-            if told["entry"] < ray["stop"]["fraction"]:  # else the head of the arrow is there
-                signs.through(into, begin + (end - begin) * told["exit"], told["exit"] < ray["stop"]["fraction"])
-            normal = np.array(told["normal"], np.float64)
+        for entry in ray["passes"]:
+            into = world.placed(np.array([entry["point"]]))[0]
+            if entry["entry"] < ray["stop"]["fraction"]:  # else the head of the arrow is there
+                signs.through(into, begin + (end - begin) * entry["exit"], entry["exit"] < ray["stop"]["fraction"])
+            normal = np.array(entry["normal"], np.float64)
             if normal.any() and len(shot["rays"]) <= NUMBERED_MAX:
                 signs.normal(into, normal)
 
@@ -267,12 +267,12 @@ def _numbers(signs: Signs, world: World, shot: Mapping[str, Any]) -> Iterator[Te
     radius = shot["radius"] * world.factor
     for ray in shot["rays"]:
         begin, end = world.placed(np.array([ray["start"], ray["end"]]))
-        for told in ray["passes"]:
-            into = world.placed(np.array([told["point"]]))[0]
-            spot = next(_spots(signs, into, end - begin, np.array(told["normal"]), radius), None)
+        for entry in ray["passes"]:
+            into = world.placed(np.array([entry["point"]]))[0]
+            spot = next(_spots(signs, into, end - begin, np.array(entry["normal"]), radius), None)
             if spot is not None:
                 signs.of("number").line(spot, spot, 2 * BADGE)
-                label = str(told["order"] + 1)
+                label = str(entry["order"] + 1)
                 x, y = np.rint(spot).astype(np.int64).tolist()
                 yield Text(x - 4 * len(label), y + 4, label, BADGE_INK, bold=True)
 

@@ -96,15 +96,15 @@ NAME_MAX = 24  # most letters of a name on a label
 
 def reason(entry: Mapping[str, Any], name_max: int | None = None) -> str:
     """Why an object was not hit, from any JSON; names are cut to `name_max` letters."""
-    told = entry.get("reason")
-    if told == "missed":
+    why = entry.get("reason")
+    if why == "missed":
         distance = entry.get("distance")
         plain = isinstance(distance, int | float) and not isinstance(distance, bool)
         return f"missed by {distance:.1f} px" if plain else f"missed by {shown(distance)}"
-    if told == "behind":
+    if why == "behind":
         names = [unquoted(by.get("name")) for by in entries(entry.get("by"))]
         return "behind " + ", ".join(name if name_max is None else short(name, name_max) for name in names)
-    return REASONS.get(str(told), shown(told))
+    return REASONS.get(str(why), shown(why))
 
 
 def apart(distance: float) -> str:
@@ -125,9 +125,9 @@ def fragile(entry: Mapping[str, Any], turned: str) -> str | None:
 def _way(shift_xy: Sequence[float]) -> str:
     """Direction of a shift on the screen: straight within 22.5 degrees, else between."""
     (x, wide), (y, high) = ((v, abs(v)) for v in shift_xy)
-    told = ["up" if y < 0 else "down"] * (high * SLANT >= wide)
-    told += ["left" if x < 0 else "right"] * (wide * SLANT >= high)
-    return " ".join(told)
+    words = ["up" if y < 0 else "down"] * (high * SLANT >= wide)
+    words += ["left" if x < 0 else "right"] * (wide * SLANT >= high)
+    return " ".join(words)
 
 
 def short(name: str, most: int = NAME_MAX) -> str:
@@ -161,13 +161,13 @@ def table(shot: Mapping[str, Any]) -> list[tuple[str, ...]]:
     lines = [(RAY_HEADER[0], *(["rays"] * several), *RAY_HEADER[1:], *(["weight"] * faded))]
     of: dict[tuple[int, int], list[Mapping[str, Any]]] = {}
     for ray in rays:
-        for told in ray["passes"]:
-            of.setdefault((ray["round"], told["object"]), []).append(told)
+        for entry in ray["passes"]:
+            of.setdefault((ray["round"], entry["object"]), []).append(entry)
     for row in rows:
         passes = of[row["round"], row["object"]]
         name = row["name"] if several else f"{passes[0]['order'] + 1}. {row['name']}"
-        ends = min(told["entry_px"] for told in passes), max(told["exit_px"] for told in passes)
-        material = sum(told["material"] for told in passes)
+        ends = min(entry["entry_px"] for entry in passes), max(entry["exit_px"] for entry in passes)
+        material = sum(entry["material"] for entry in passes)
         cells = [f"{name}, round {row['round']}" if rounds else name, *([str(row["pellets"])] * several)]
         cells += [f"{value:.1f} px" for value in (*ends, material)]
         lines.append((*cells, *([f"{row['weight'] / WEIGHT_FULL:.2f}"] * faded)))
@@ -191,11 +191,11 @@ def missed(shot: Mapping[str, Any]) -> tuple[str, str] | None:
     miss = shot["nearest_miss"]
     if miss is None or not miss["distance"]:
         return None
-    told = apart(miss["distance"])
+    gap = apart(miss["distance"])
     if any(_short(ray, miss) for ray in shot["rays"]):
-        return f"nearest {miss['name']}", f"ended {told} short of it"
+        return f"nearest {miss['name']}", f"ended {gap} short of it"
     way = " and ".join(_sides(miss["ray_xy"], miss["object_xy"]))
-    return f"nearest {miss['name']}", f"missed {way} by {told}" if way else f"missed by {told}"
+    return f"nearest {miss['name']}", f"missed {way} by {gap}" if way else f"missed by {gap}"
 
 
 def blocked(shot: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -204,13 +204,13 @@ def blocked(shot: Mapping[str, Any]) -> list[tuple[str, str]]:
     for entry in shot["blockers"]:
         name = short(entry["name"])
         if "rays" not in shot:
-            behind = ", ".join(f"{told['samples']} on {short(told['name'])}" for told in entry["blocked"])
+            behind = ", ".join(f"{hidden['samples']} on {short(hidden['name'])}" for hidden in entry["blocked"])
             lines.append((f"{name} blocks {entry['samples']}", behind or "nothing behind it"))
             continue
-        behind = ", ".join(short(told["name"]) for told in entry["blocked"])
+        behind = ", ".join(short(hidden["name"]) for hidden in entry["blocked"])
         if behind or len(shot["rays"]) > 1:
-            told = f"{name} ends {_rays(entry['samples'])}"
-            lines.append((told, f"in front of {behind}" if behind else "nothing behind it"))
+            text = f"{name} ends {_rays(entry['samples'])}"
+            lines.append((text, f"in front of {behind}" if behind else "nothing behind it"))
     return lines
 
 

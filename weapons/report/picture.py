@@ -101,7 +101,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     """Mark all samples of all shots, outline the objects, and return the labels."""
     shots = report["shots"]
     hit = {row["object"] for shot in shots for row in shot["rows"]}
-    blocked = {told["object"] for shot in shots for by in shot["blockers"] for told in by["blocked"]} - hit
+    blocked = {entry["object"] for shot in shots for by in shot["blockers"] for entry in by["blocked"]} - hit
     world.outline_seen([item for item in scene.ids(Role.HITTABLE).tolist() if item not in hit | blocked])
     for verdict in MARKS:
         world.mark_samples(marked(shots, verdict), verdict)
@@ -114,7 +114,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
 
         draw_volumes(world, report, scene)
     moved = draw_present(world, report) if "now" in report else False
-    told, drawn = draw_rays(world, report)
+    labels, drawn = draw_rays(world, report)
     overlay = Overlay(world)
     overlay.keep_free(shots, scene)
     overlay.taken |= drawn | moved
@@ -123,7 +123,7 @@ def _shots(world: World, report: Mapping[str, Any], scene: Scene) -> list[Text]:
     overlay.distances(shots)
     overlay.names(shots, scene)
     overlay.links(shots, hit)
-    return [*told, *overlay.texts]
+    return [*labels, *overlay.texts]
 
 
 WIDTH, HEIGHT, GAP = 640, 720, 12  # about the size of each of the three pictures, and the space between them, px
@@ -249,10 +249,10 @@ def _page(
     high, wide = sides[0][0].shape[:2]
     width = 2 * EDGE + 3 * wide + 2 * GAP
     below = TOP + high + 14 + max(legend.height for legend in legends)
-    told = list(words[:LINES_MAX]) or ["no difference"]
+    lines = list(words[:LINES_MAX]) or ["no difference"]
     if len(words) > LINES_MAX:
-        told.append(f"and {len(words) - LINES_MAX} more")
-    page = np.full((below + LINE * len(told) + 12, width, 3), PAGE_GROUND, np.uint8)
+        lines.append(f"and {len(words) - LINES_MAX} more")
+    page = np.full((below + LINE * len(lines) + 12, width, 3), PAGE_GROUND, np.uint8)
     texts = []
     for i, ((world, labels), title) in enumerate(zip(sides, ("expected", "got", "difference"), strict=True)):
         left = EDGE + i * (wide + GAP)
@@ -261,5 +261,6 @@ def _page(
         texts.append(Text(left, 28, title, INK, bold=True))
     for legend, left in zip(legends, (EDGE, EDGE + 2 * (wide + GAP)), strict=True):
         texts += legend.draw(page, left, TOP + high + 14)
-    lines = [Text(EDGE, below + 14 + LINE * i, clipped(line, width - 2 * EDGE), FAINT) for i, line in enumerate(told)]
-    return page, [*texts, *lines]
+    for i, line in enumerate(lines):
+        texts.append(Text(EDGE, below + 14 + LINE * i, clipped(line, width - 2 * EDGE), FAINT))
+    return page, texts

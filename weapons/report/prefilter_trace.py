@@ -58,14 +58,14 @@ class PrefilterTrace:
             "cells": cells,
         }
 
-    def told_of(self, fired: Sequence[Hits], shots: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    def add_tests(self, fired: Sequence[Hits], shots: Sequence[dict[str, Any]]) -> dict[str, Any]:
         """Add what was tested to the JSON of shots, of all of hits or of none, and return what `to_dict` does."""
         each = ((hits, row) for hits in fired for row in range(len(hits.shots)))
         for shot, (hits, row) in zip(shots, each, strict=False):
-            shot["tested"] = self.told(hits, row)
+            shot["tested"] = self.tests_of(hits, row)
         return self.to_dict(fired)
 
-    def told(self, hits: Hits, row: int) -> dict[str, Any]:
+    def tests_of(self, hits: Hits, row: int) -> dict[str, Any]:
         """Objects whose pixels a shot was tested against, number of all items, and number of opened cells, as JSON."""
         shot, stack = hits.shots.take(row, row + 1), self.scene.items.stack()
         fired: Lines | Placements

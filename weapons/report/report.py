@@ -96,7 +96,7 @@ PASS_COLUMNS = (
 """Columns of a pass through an object that a report tells."""
 
 
-def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
+def rays_json(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
     """Rays of one shot as JSON, with its nearest miss."""
     parts = ray_parts_of(hits.weapon)
     assert parts is not None  # its hits are those of rays
@@ -104,7 +104,7 @@ def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
     stops, passes = hits.stops_at(row), hits.passes_at(row)
     numbers = passes.round * (parts[1].count if parts[1] else 1) + passes.pellet
     of = np.searchsorted(numbers, np.arange(len(rays) + 1)).tolist()
-    told = [
+    entries = [
         {
             "round": int(rays.round[i]),
             "pellet": int(rays.pellet[i]),
@@ -112,7 +112,7 @@ def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
             "end": ((rays.start_256[i] + rays.step_256[i]) / SUB).tolist(),
             "stop": _stop(scene, stops, i),
             "passes": [
-                {**item_told(scene, int(passes.object[k])), **_columns(passes, PASS_COLUMNS, k)}
+                {**item_json(scene, int(passes.object[k])), **_columns(passes, PASS_COLUMNS, k)}
                 for k in range(of[i], of[i + 1])
             ],
         }
@@ -122,11 +122,11 @@ def rays_told(scene: Scene, hits: RayHits, row: int) -> dict[str, Any]:
     near = None
     if miss is not None:
         ends = {"ray_xy": list(miss.ray_xy), "object_xy": list(miss.object_xy)}
-        near = {**item_told(scene, miss.object), "distance": miss.distance, **ends}
-    return {"radius": parts[2].radius_256 / SUB, "rays": told, "nearest_miss": near}
+        near = {**item_json(scene, miss.object), "distance": miss.distance, **ends}
+    return {"radius": parts[2].radius_256 / SUB, "rays": entries, "nearest_miss": near}
 
 
-def item_told(scene: Scene, item: int) -> dict[str, Any]:
+def item_json(scene: Scene, item: int) -> dict[str, Any]:
     """Id and name of an item, as JSON."""
     return {"object": item, "name": scene.name_of(item)}
 
@@ -135,7 +135,7 @@ def _stop(scene: Scene, stops: Stops, i: int) -> dict[str, Any]:
     item = int(stops.item[i])
     return {
         "reason": Reason(int(stops.reason[i])).name.lower(),
-        "item": None if item < 0 else item_told(scene, item),
+        "item": None if item < 0 else item_json(scene, item),
         **_columns(stops, ("cell_xy", "point_xy", "distance", "fraction", "normal_xy"), i),
     }
 
@@ -166,8 +166,8 @@ def present_of(then: Scene, now: Scene, fired: Sequence[Hits], view_xyxy: Box) -
         "tick": then.tick if isinstance(then, PastScene) else None,
         "hash": now.content_hash(),
         "moved": list(islice(_moved(then, now, sorted(was & is_now), np.array(view_xyxy)), MOVED_MAX)),
-        "gone": [item_told(then, item) for item in sorted(was - is_now)],
-        "new": [item_told(now, item) for item in sorted(is_now - was)],
+        "gone": [item_json(then, item) for item in sorted(was - is_now)],
+        "new": [item_json(now, item) for item in sorted(is_now - was)],
         "shots": [_again(now, hits, shot) for hits in fired for shot in range(len(hits.shots))],
     }
 
@@ -183,7 +183,7 @@ def _moved(then: Scene, now: Scene, items: Sequence[int], view_xyxy: Ints) -> It
         if not same and meets(view_xyxy, np.stack([old, new])).any():
             from_xy, to_xy = (((box[:2] + box[2:]) / 2).tolist() for box in (old, new))
             runs = Spans.from_mask(mask, corner).runs().tolist()
-            yield {**item_told(now, item), "runs": runs, "from_xy": from_xy, "to_xy": to_xy}
+            yield {**item_json(now, item), "runs": runs, "from_xy": from_xy, "to_xy": to_xy}
 
 
 def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
@@ -192,7 +192,7 @@ def _again(now: Scene, hits: Hits, shot: int) -> list[dict[str, Any]] | None:
         found = fire_checked(now, hits.weapon, hits.shots.take(shot, shot + 1), "auto", "auto", "auto")
     except InputError:
         return None
-    return [{**item_told(now, row.object), "pixels": row.pixels} for row in found]
+    return [{**item_json(now, row.object), "pixels": row.pixels} for row in found]
 
 
 FORMAT = "hitplanes-report/1"
@@ -232,22 +232,22 @@ def report_of(
     fired = _checked(scene, fired)
     called, view = _weapon_names(fired, names), view_of(scene, fired)
     few, named = sum(len(hits.shots) for hits in fired) <= SHOTS_MAX, list(zip(called, fired, strict=True))
-    told = [_shot(scene, hits, name, row) for name, hits in named if few for row in range(len(hits.shots))]
+    entries = [_shot(scene, hits, name, row) for name, hits in named if few for row in range(len(hits.shots))]
     more: dict[str, Any] = {}
     if prefilter is not None or broadphase is not None:
         from .prefilter_trace import prefilter_trace  # few reports need it
 
         trace = prefilter_trace(scene, view, prefilter, broadphase)
-        more["filter"] = trace.told_of(fired, told)
+        more["filter"] = trace.add_tests(fired, entries)
     if now is not None:
         more["now"] = present_of(scene, now, fired, view)
     weapons, batch = {name: hits.weapon.to_json() for name, hits in named}, None if few else _batch(scene, fired, view)
-    return {**_head(scene, view), "weapons": weapons, "shots": told, "batch": batch, **more}
+    return {**_head(scene, view), "weapons": weapons, "shots": entries, "batch": batch, **more}
 
 
 def _head(scene: Scene, view: Box) -> dict[str, Any]:
     """What a report says of its scene and of itself, as JSON."""
-    told = {
+    about = {
         "name": scene.name,
         "hash": scene.content_hash(),
         "version": scene.version,
@@ -255,7 +255,7 @@ def _head(scene: Scene, view: Box) -> dict[str, Any]:
         "hittable": len(scene.ids(Role.HITTABLE)),
         "occluders": len(scene.ids(Role.OCCLUDER)),
     }
-    return {"format": FORMAT, "version": version("hitplanes"), "scene": told, "view_xyxy": list(view)}
+    return {"format": FORMAT, "version": version("hitplanes"), "scene": about, "view_xyxy": list(view)}
 
 
 def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
@@ -313,8 +313,8 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
     Text().check("scene.name", scene.name)
     if isinstance(fired, Hits):
         raise InputError("fired: expected a list of Hits, got Hits alone")
-    told: list[Hits] = listed("fired", fired, "a list of Hits")
-    for row, hits in enumerate(told):
+    batches: list[Hits] = listed("fired", fired, "a list of Hits")
+    for row, hits in enumerate(batches):
         if not isinstance(hits, Hits):
             raise InputError(f"fired[{row}]: expected Hits, got {type(hits).__name__}")
         if not hits.one_scene:
@@ -324,16 +324,16 @@ def _checked(scene: Scene, fired: object) -> list[Hits]:
         if hits.version != scene.version:
             got = f"version {hits.version}: {BEFORE}"
             raise InputError(f"fired[{row}]: expected {scene.name!r} at version {scene.version}, got {got}")
-    return told
+    return batches
 
 
 def _weapon_names(fired: Sequence[Hits], names: Sequence[str | None] | None) -> list[str]:
     """Name of each weapon; equal weapons without a name share one, others of the same kind are numbered."""
-    told = [None] * len(fired) if names is None else listed("names", names, "a list of names")
-    if len(told) != len(fired):
-        raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(told)}")
+    given = [None] * len(fired) if names is None else listed("names", names, "a list of names")
+    if len(given) != len(fired):
+        raise InputError(f"names: expected {len(fired)}, one for each hits, got {len(given)}")
     known: dict[str, Weapon] = {}
-    for i, (name, hits) in enumerate(zip(told, fired, strict=True)):
+    for i, (name, hits) in enumerate(zip(given, fired, strict=True)):
         if name is not None and known.setdefault(Text().check(f"names[{i}]", name), hits.weapon) != hits.weapon:
             raise InputError(f"names: expected one weapon for each name, got two for {name!r}")
     called = {weapon: name for name, weapon in reversed(known.items())}  # the first of several names
@@ -343,7 +343,7 @@ def _weapon_names(fired: Sequence[Hits], names: Sequence[str | None] | None) -> 
             numbered = chain([kind], (f"{kind} {number}" for number in count(2)))
             called[hits.weapon] = next(name for name in numbered if name not in known)
             known[called[hits.weapon]] = hits.weapon
-    return [called[hits.weapon] if name is None else name for name, hits in zip(told, fired, strict=True)]
+    return [called[hits.weapon] if name is None else name for name, hits in zip(given, fired, strict=True)]
 
 
 def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
@@ -369,10 +369,10 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "why_not": _why_not(scene, hits, row, margins),
         "blockers": [
             {
-                **item_told(scene, entry.occluder),
+                **item_json(scene, entry.occluder),
                 "samples": entry.samples,
                 "blocked": [
-                    {**item_told(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
+                    {**item_json(scene, b.object), "samples": b.samples, "at_xy": list(b.at_xy)} for b in entry.behind
                 ],
             }
             for entry in hits.blockers(row)
@@ -380,7 +380,7 @@ def _shot(scene: Scene, hits: Hits, weapon: str, row: int) -> dict[str, Any]:
         "samples": _sample_runs(samples),
         **({"sheltered": _runs_of(samples.xy[samples.sheltered])} if sight else {}),
         "plan": hits.plan.to_dict(),
-        **(rays_told(scene, hits, row) if isinstance(hits, RayHits) else {}),
+        **(rays_json(scene, hits, row) if isinstance(hits, RayHits) else {}),
     }
 
 
@@ -388,10 +388,10 @@ def _why_not(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str
     """Objects near a shot that it did not hit, as JSON."""
     return [
         {
-            **item_told(scene, entry.object),
+            **item_json(scene, entry.object),
             "reason": entry.reason,
             "samples": entry.samples,
-            "by": [{**item_told(scene, item), "samples": n} for item, n in entry.by.items()],
+            "by": [{**item_json(scene, item), "samples": n} for item, n in entry.by.items()],
             "distance": round(entry.distance, 3),
             **margins.get(entry.object, {}),
         }
@@ -415,7 +415,7 @@ def _rows(scene: Scene, hits: Hits, shot: int, margins: Mapping[int, dict[str, A
     shares = [None] * len(rows) if isinstance(hits, RayHits) else hits.shares(shot)
     return [
         {
-            **item_told(scene, row.object),
+            **item_json(scene, row.object),
             "round": row.round,
             "samples": row.samples,
             "pixels": row.pixels,
@@ -477,16 +477,16 @@ def _objects(scene: Scene, rows: list[list[int]]) -> list[dict[str, Any]]:
     of: dict[int, list[list[int]]] = {}
     for row in rows:
         of.setdefault(row[2], []).append(row)
-    told = [
+    entries = [
         {
-            **item_told(scene, item),
+            **item_json(scene, item),
             "shots": len({row[0] for row in own}),
             "pixels": sum(row[4] for row in own),
             "weight": sum(row[5] for row in own),
         }
         for item, own in of.items()
     ]
-    return sorted(told, key=lambda entry: (-entry["shots"], -entry["pixels"], entry["object"]))
+    return sorted(entries, key=lambda entry: (-entry["shots"], -entry["pixels"], entry["object"]))
 
 
 def _degrees(hits: Hits, row: int) -> float | None:

@@ -309,7 +309,7 @@ def sign_mark(name: str) -> Image:
     signs = Signs((14, wide), SEVERAL + 1)
     left, middle, right = (np.array([x, 7.0]) for x in (2.0, wide / 2, wide - 4.0))
     if name in ENDS.values():
-        signs.ray(left, right - 3, right - 3, next(reason for reason, told in ENDS.items() if told == name))
+        signs.ray(left, right - 3, right - 3, next(reason for reason, sign in ENDS.items() if sign == name))
     elif name == "ray":
         signs.ray(left, right, right, "range")
     elif name == "beyond its end":

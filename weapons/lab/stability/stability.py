@@ -127,8 +127,8 @@ class Study:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `stability.json`."""
-        told = {name: getattr(self, name) for name in ("seed", "quick", "complete", "versions")}
-        return {"format": FORMAT, **told, "families": FAMILIES, "cells": [asdict(cell) for cell in self.cells]}
+        about = {name: getattr(self, name) for name in ("seed", "quick", "complete", "versions")}
+        return {"format": FORMAT, **about, "families": FAMILIES, "cells": [asdict(cell) for cell in self.cells]}
 
 
 def load_study(path: Path) -> Study:
