@@ -162,8 +162,8 @@ def _met_of_few(asked_xyxy: Ints, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
     box = pair - row * len(boxes_xyxy)
     met = top[box] <= y_max[row]
     met &= bottom[box] >= y_min[row]
-    some = met.nonzero()[0]
-    return row[some], box[some]
+    kept = met.nonzero()[0]
+    return row[kept], box[kept]
 
 
 def _met(asked: npt.NDArray[Any], boxes: npt.NDArray[Any]) -> Ints:

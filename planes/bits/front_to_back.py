@@ -154,8 +154,8 @@ def front_to_back(
     for these in _parts(pairs, max(WORDS_AT_ONCE // height, 1), each):
         part, rows = these, _shared(placed, windows, tiles, these, height)
         if hides:
-            some = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
-            part, rows = these.at(some), rows[some]
+            kept = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
+            part, rows = these.at(kept), rows[kept]
             _hide(rows, tiles, part, rule.pierce)
         if rule.bounds is not None:
             bit_rows.cut_off(rows, part.left, part.top, rule.bounds)
@@ -224,9 +224,9 @@ def _parts(near: Near, most: int, each: int) -> Iterator[Near]:
 
 def _shared(placed: Placed, windows: PatternBits, tiles: OrderedTiles, near: Near, height: int) -> Words:
     """Pixels (n, height) that pairs share."""
-    rows, who = rows_of(tiles.words, height, _first(tiles, near.tile, near.top)), near.placement
-    left, top = near.left - placed.x.take(who), near.top - placed.y.take(who)
-    rows &= bit_rows.windows_at(windows, height, bit_rows.which(placed, windows, who), left, top)
+    rows, placement = rows_of(tiles.words, height, _first(tiles, near.tile, near.top)), near.placement
+    left, top = near.left - placed.x.take(placement), near.top - placed.y.take(placement)
+    rows &= bit_rows.windows_at(windows, height, bit_rows.which(placed, windows, placement), left, top)
     return rows
 
 
@@ -264,14 +264,14 @@ def _shelter(
     rows: Words, placed: Placed, windows: PatternBits, tiles: OrderedTiles, near: Near, rule: Rule, blockers: Blockers
 ) -> None:
     """Clear the pixels (n, height) that other items shelter from the pixel of their placement."""
-    who, shadows = near.placement, late.shadows
-    asked, boxes = bit_rows.placed_boxes(placed, windows)[:, who].T, tiles.box_xyxy[near.tile]
+    placement, shadows = near.placement, late.shadows
+    asked, boxes = bit_rows.placed_boxes(placed, windows)[:, placement].T, tiles.box_xyxy[near.tile]
     boxes = np.concatenate([np.maximum(boxes[:, :2], asked[:, :2]), np.minimum(boxes[:, 2:], asked[:, 2:])], axis=1)
-    origin_xy = np.stack([placed.x.take(who), placed.y.take(who)], axis=1)
+    origin_xy = np.stack([placed.x.take(placement), placed.y.take(placement)], axis=1)
     pair, blocker = shadows.ways_met(boxes, origin_xy, blockers)
     other = blockers.rank[blocker] != tiles.rank[near.tile[pair]]
     if rule.meets is not None and len(blockers.categories):
-        other &= _accepted(blockers, rule.meets, rule.exclude, who[pair], blocker)
+        other &= _accepted(blockers, rule.meets, rule.exclude, placement[pair], blocker)
     corner_xy = np.stack([near.left, near.top], axis=1)
     kernels_of(shadows).hide_behind(rows, corner_xy, origin_xy, blockers, pair[other], blocker[other])
 
@@ -320,16 +320,17 @@ def _counted(placed: Placed, each: int, windows: PatternBits, tiles: OrderedTile
     hit = samples.nonzero()[0]
     if len(hit) < len(samples):
         near, rows, samples = near.at(hit), rows.take(hit, axis=0), samples.take(hit)
-    who = near.placement
-    turn = who // each if each > 1 else who
+    placement = near.placement
+    turn = placement // each if each > 1 else placement
     origin_x, origin_y = placed.origin_x.take(turn), placed.origin_y.take(turn)
     distance2, x, y = nearest(rows, near.left - origin_x, near.top - origin_y)
     weight = None
     if len(windows.sums):
-        left, top = near.left - placed.x.take(who), near.top - placed.y.take(who)
-        weight = weights_of(rows, windows, bit_rows.which(placed, windows, who), left, top)
+        left, top = near.left - placed.x.take(placement), near.top - placed.y.take(placement)
+        weight = weights_of(rows, windows, bit_rows.which(placed, windows, placement), left, top)
     pixels = _distinct(turn, near, tiles, rows, samples) if each > 1 else None
-    return TileHits(who, tiles.rank.take(near.tile), samples, distance2, x + origin_x, y + origin_y, weight, pixels)
+    xy = x + origin_x, y + origin_y
+    return TileHits(placement, tiles.rank.take(near.tile), samples, distance2, *xy, weight, pixels)
 
 
 def _distinct(turn: Ints, near: Near, tiles: OrderedTiles, rows: Words, samples: Ints) -> Ints:

@@ -98,24 +98,24 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
     """
     x, y = (at_256[:, axis] + (HALF - SUB * plane_xyxy[axis]) for axis in (0, 1))  # from the corner of its first pixel
     high, wide = labels.shape
-    some = within(x, y, wide << SUB_BITS, high << SUB_BITS)
+    kept = within(x, y, wide << SUB_BITS, high << SUB_BITS)
     if cells is not None:
-        some = _narrowed(some, _read(cells, x, y, some, SUB_BITS + CELL_BITS).nonzero()[0])
-    front = _read(labels, x, y, some, SUB_BITS) >> 1
+        kept = _narrowed(kept, _read(cells, x, y, kept, SUB_BITS + CELL_BITS).nonzero()[0])
+    front = _read(labels, x, y, kept, SUB_BITS) >> 1
     hit = objects.take(front).nonzero()[0]
-    place = _narrowed(some, hit)
+    place = _narrowed(kept, hit)
     return Front(place, front.take(hit).astype(np.int64) - 1, pixel(at_256.take(place, axis=0)))
 
 
-def _narrowed(some: Ints | None, rows: Ints) -> Ints:
+def _narrowed(kept: Ints | None, rows: Ints) -> Ints:
     """Rows of a selection; None selects all."""
-    return rows if some is None else some.take(rows)
+    return rows if kept is None else kept.take(rows)
 
 
-def _read(plane: Labels | Bools, x: Ints, y: Ints, some: Ints | None, bits: int) -> Labels | Bools:
+def _read(plane: Labels | Bools, x: Ints, y: Ints, kept: Ints | None, bits: int) -> Labels | Bools:
     """Values of a plane (h, w) with cells of 2**bits / 256 px, at selected positions in 1/256 px."""
-    if some is not None:
-        x, y = x.take(some), y.take(some)
+    if kept is not None:
+        x, y = x.take(kept), y.take(kept)
     place = y >> bits
     place *= plane.shape[1]
     place += x >> bits
@@ -231,8 +231,10 @@ def _dirt(before: Ints, after: Ints, plane: Box) -> tuple[Ints, int]:
     old, new = clipped(before, plane), clipped(after, plane)
     was, now = _areas(old), _areas(new)
     around = np.concatenate([np.minimum(old[:, :2], new[:, :2]), np.maximum(old[:, 2:], new[:, 2:])], axis=1)
-    one = (was > 0) & (now > 0) & (_areas(around) <= was + now)
-    return np.concatenate([around[one], old[~one & (was > 0)], new[~one & (now > 0)]]), int(was.sum() + now.sum())
+    joint = (was > 0) & (now > 0) & (_areas(around) <= was + now)
+    return np.concatenate([around[joint], old[~joint & (was > 0)], new[~joint & (now > 0)]]), int(
+        was.sum() + now.sum()
+    )
 
 
 def _areas(boxes_xyxy: Ints) -> Ints:

@@ -79,8 +79,8 @@ class Blockers(NamedTuple):
         seen += np.tile(self.box_xyxy[blocker, :2], 2)[place]
         if self.bounds is not None:
             seen = clipped(seen, self.bounds)
-            some = ((seen[:, 0] <= seen[:, 2]) & (seen[:, 1] <= seen[:, 3])).nonzero()[0]
-            place, seen = place[some], seen[some]
+            kept = ((seen[:, 0] <= seen[:, 2]) & (seen[:, 1] <= seen[:, 3])).nonzero()[0]
+            place, seen = place[kept], seen[kept]
         seen -= np.tile(origin_xy, 2)[place]
         return place, seen
 
@@ -325,9 +325,9 @@ def _hidden(
     for part in (before, (np.where(bare, bare_last + 1, np.inf), last)):
         low = np.maximum(part[0], runs.x_first[run] - x[own])
         high = np.minimum(part[1], runs.x_last[run] - x[own])
-        some = (low <= high).nonzero()[0]
-        shift = x[own[some]]
-        found.append((own[some], run[some], low[some].astype(np.int64) + shift, high[some].astype(np.int64) + shift))
+        kept = (low <= high).nonzero()[0]
+        shift = x[own[kept]]
+        found.append((own[kept], run[kept], low[kept].astype(np.int64) + shift, high[kept].astype(np.int64) + shift))
     columns = [np.concatenate(column) for column in zip(*found, strict=True)]
     return columns[0], columns[1], columns[2], columns[3]
 
@@ -404,7 +404,7 @@ def sheltered_by(
     origin_xy : (P, 2) pixels from which the ways of placements begin
     own : (s,) rank of an item that does not shelter the sample, or -1
     """
-    soonest, who = np.full(len(of), NEVER), np.full(len(of), -1)
+    soonest, blocker_rank = np.full(len(of), NEVER), np.full(len(of), -1)
     for p, b in zip(placement.tolist(), blocker.tolist(), strict=True):
         rank = int(blockers.rank[b])
         these = np.arange(*of.searchsorted((p, p + 1)))
@@ -414,5 +414,5 @@ def sheltered_by(
         hidden, entry = _times(rects, x, y, blockers.until_exit and bool(_holds_origin(rects).any()))
         time = np.where(hidden, entry, NEVER).min(axis=0, initial=NEVER)
         sooner = time < soonest[these]
-        soonest[these[sooner]], who[these[sooner]] = time[sooner], rank
-    return who
+        soonest[these[sooner]], blocker_rank[these[sooner]] = time[sooner], rank
+    return blocker_rank

@@ -414,8 +414,8 @@ def hit_by_few(placed: Placed, patterns: Sequence[BigPattern], near: tuple[Ints,
     near : sorted pairs (n,) of a placement and an accepted tile that it may meet
     """
     hits: list[Hit] = []
-    for who, close in groupby(_near(*near, ground), itemgetter(0)):
-        pattern, x, y = patterns[placed.pattern.item(who)], placed.x.item(who), placed.y.item(who)
+    for placement, close in groupby(_near(*near, ground), itemgetter(0)):
+        pattern, x, y = patterns[placed.pattern.item(placement)], placed.x.item(placement), placed.y.item(placement)
         hits += _hit_by(pattern, x, y, close, ground)
     return _in_order(hits, ground)
 
@@ -442,7 +442,7 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: G
     rest = pattern.rows if bounds is None else pattern.within(x, y, bounds)
     stride, known, nearest = pattern.stride, tiles.big(pattern.stride), pattern.depths.nearest
     corner = (y + pattern.y) * stride + x + pattern.x
-    for who, left, top, begin, rank, blocks in near:
+    for placement, left, top, begin, rank, blocks in near:
         rows = known.get(begin)
         if rows is None:
             rows = known.read(tiles.words, begin)
@@ -451,7 +451,7 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: G
         if hit:
             if not blocks:
                 distance2, down, right = nearest(hit)
-                yield who, distance2, y + down, x + right, rank, hit.bit_count()
+                yield placement, distance2, y + down, x + right, rank, hit.bit_count()
             if blocks or not pierce:
                 rest ^= hit
                 if not rest:

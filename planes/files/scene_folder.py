@@ -315,9 +315,9 @@ def _saved_source(sprite: Sprite, folder: Path, images: dict[str, str | None]) -
     if sprite.carvings:
         carved = f"{PurePosixPath(_image_name(sprite)).stem[: TEXT_MAX - 20]}-carved.png"
         options["carved"] = [
-            {"image": _write_apart(folder, carved, _cells(one), images), "frame": frame,
-             "cells_per_px": one.per_px}
-            for frame, one in sorted(sprite.carvings.items())
+            {"image": _write_apart(folder, carved, _cells(carving), images), "frame": frame,
+             "cells_per_px": carving.per_px}
+            for frame, carving in sorted(sprite.carvings.items())
         ]  # fmt: skip
     if sprite.outline is not None:
         return {**(sprite.source or {}), **color, **options}
@@ -355,8 +355,8 @@ def _image_name(sprite: Sprite) -> str:
 def images_of(sprite: Sprite) -> set[str]:
     """Paths of the images in a scene's folder from which a sprite was read."""
     source = sprite.source or {}
-    one = {source["image"]} if "image" in source else set()
-    return one | {*source.get("images", ())} | {entry["image"] for entry in source.get("carved", ())}
+    single = {source["image"]} if "image" in source else set()
+    return single | {*source.get("images", ())} | {entry["image"] for entry in source.get("carved", ())}
 
 
 def _sheet(sprite: Sprite) -> tuple[Image, list[list[int]]]:

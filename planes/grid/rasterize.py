@@ -362,9 +362,9 @@ class Lines:
 
     def take(self, rows: Ints | Bools | slice) -> Lines:
         """Select segments by rows or by a mask, with their sides if these are known."""
-        some = Lines(self.start[rows], self.step[rows], self.radius, self.common)
-        vars(some).update({name: vars(self)[name][rows] for name in ("sides", "wide_sides") if name in vars(self)})
-        return some
+        taken = Lines(self.start[rows], self.step[rows], self.radius, self.common)
+        vars(taken).update({name: vars(self)[name][rows] for name in ("sides", "wide_sides") if name in vars(self)})
+        return taken
 
     @cached_property
     def steep(self) -> Bools:
@@ -443,8 +443,8 @@ class Lines:
         line, row = _ragged_rows(first, np.where(left <= right, last, first - 1))
         first, last = (self._thick_runs if self.radius else _thin_runs)(u, v, along, aside, line, row)
         first, last = np.maximum(first, left[line]), np.minimum(last, right[line])
-        some = np.flatnonzero(first <= last)
-        return line[some], row[some], first[some], last[some]
+        kept = np.flatnonzero(first <= last)
+        return line[kept], row[kept], first[kept], last[kept]
 
     def _thick_runs(self, u: Ints, v: Ints, along: Ints, aside: Ints, line: Ints, row: Ints) -> tuple[Ints, Ints]:
         """Cells at most `wide_sides` from the infinite axes of segments, in rows."""

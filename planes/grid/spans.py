@@ -330,8 +330,8 @@ class RowRuns(NamedTuple):
 
 def in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
     """Unite the runs of each row of each shape, which has all rows from its first to its last."""
-    some = np.flatnonzero(first <= last)
-    shape, y, first, last = shape[some], y[some], first[some], last[some]
+    kept = np.flatnonzero(first <= last)
+    shape, y, first, last = shape[kept], y[kept], first[kept], last[kept]
     top = int(y.min(initial=0))
     line = shape * (int(y.max(initial=0)) - top + 1) + (y - top)
     which, first, last = merged_runs(line, first, last)

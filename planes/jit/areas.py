@@ -170,23 +170,23 @@ def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
 
 
 @njit(inline="always")
-def refuses(tile, categories, owner, meets, exclude, who):
+def refuses(tile, categories, owner, meets, exclude, shot):
     """Whether a shot refuses the item of a tile; `meets` and `exclude` have one row for all shots, or one for each."""
-    if categories[tile] & meets[who if len(meets) > 1 else 0] == 0:
+    if categories[tile] & meets[shot if len(meets) > 1 else 0] == 0:
         return True
     for k in range(exclude.shape[1]):  # noqa: SIM110 - a generator costs a call of its own
-        if owner[tile] == exclude[who if len(exclude) > 1 else 0, k]:
+        if owner[tile] == exclude[shot if len(exclude) > 1 else 0, k]:
             return True
     return False
 
 
 @njit
-def _accepted(near, count, occluder, categories, owner, meets, exclude, who):
+def _accepted(near, count, occluder, categories, owner, meets, exclude, shot):
     """Keep the tiles that a shot accepts, up to the last object's; return how many."""
     kept = objects = 0
     for i in range(count):
         tile = near[i]
-        if len(meets) and refuses(tile, categories, owner, meets, exclude, who):
+        if len(meets) and refuses(tile, categories, owner, meets, exclude, shot):
             continue
         near[kept] = tile
         kept += 1
@@ -333,14 +333,14 @@ def match(
     ranks, keys, xs, ys = out[RANK], out[KEY], out[X], out[Y]
     while turn < end:
         row, hits, full = count - 1, 0, False
-        for who in range(turn * each, turn * each + each):
-            kind = pattern[who]
-            left, top = x[who] + pattern_box[kind, 0], y[who] + pattern_box[kind, 1]
-            right, bottom = x[who] + pattern_box[kind, 2], y[who] + pattern_box[kind, 3]
+        for placement in range(turn * each, turn * each + each):
+            kind = pattern[placement]
+            left, top = x[placement] + pattern_box[kind, 0], y[placement] + pattern_box[kind, 1]
+            right, bottom = x[placement] + pattern_box[kind, 2], y[placement] + pattern_box[kind, 3]
             if is_far(origin_x[turn], origin_y[turn], left, top, right, bottom):
                 return -1, 0, 0
             if cells_wide:
-                cell = cell_at(x[who], y[who], cells_x, cells_y, bits, cells_wide, cells_high)
+                cell = cell_at(x[placement], y[placement], cells_x, cells_y, bits, cells_wide, cells_high)
                 close = 0
                 for entry in range(begin[max(cell, 0)], begin[cell + 1] if cell >= 0 else begin[0]):
                     tile = listed[entry]
@@ -350,9 +350,9 @@ def match(
             else:
                 close = near_of(box, bins, binned, grid, left, top, right, bottom, near)
             if len(strips):
-                close = _crossing(strips, kind, x[who], y[who], box, near, close)
+                close = _crossing(strips, kind, x[placement], y[placement], box, near, close)
             if len(meets) or len(occluder):
-                close = _accepted(near, close, occluder, categories, owner, meets, exclude, who)
+                close = _accepted(near, close, occluder, categories, owner, meets, exclude, placement)
             full = row + 1 + close > room
             if full:
                 break
@@ -405,15 +405,15 @@ def match(
                     out[TURN, row], out[RANK, row], out[SAMPLES, row], out[KEY, row], out[X, row] = (
                         turn, item, samples, nearest, found[2],
                     )  # fmt: skip
-                    out[WEIGHT, row], out[PIXELS, row], out[PELLETS, row], out[Y, row] = weight, new, 1, who
+                    out[WEIGHT, row], out[PIXELS, row], out[PELLETS, row], out[Y, row] = weight, new, 1, placement
                     if several:
                         row_of[item] = row
                     continue
                 out[SAMPLES, mine] += samples
                 out[WEIGHT, mine] += weight
                 out[PIXELS, mine] += new
-                out[PELLETS, mine] += out[Y, mine] != who
-                out[Y, mine] = who
+                out[PELLETS, mine] += out[Y, mine] != placement
+                out[Y, mine] = placement
                 if nearest < out[KEY, mine]:
                     out[KEY, mine], out[X, mine] = nearest, found[2]
         for k in range(hits):
@@ -446,9 +446,9 @@ def match_rounds(
     for kind in range(len(first)):
         longest = max(longest, ((62 + pattern_box[kind, 2] - pattern_box[kind, 0] + 1) // 64 + 2) * following[kind])
     near, words = np.empty(len(box), np.int64), np.empty(PAD + longest, np.uint64)
-    some = len(box) if each > 1 else 0
-    row_of, part_of = np.full(rank[-1] + 1 if some else 0, -1), np.full(some, -1)
-    hit, together = np.empty(some, np.int64), np.empty(some * TOGETHER, np.uint64)
+    boxes = len(box) if each > 1 else 0
+    row_of, part_of = np.full(rank[-1] + 1 if boxes else 0, -1), np.full(boxes, -1)
+    hit, together = np.empty(boxes, np.int64), np.empty(boxes * TOGETHER, np.uint64)
     return match(
         turn, end, count, out, pattern, x, y, origin_x, origin_y,
         pattern_box, first, following, pattern_words, strips, sums, first_sum,

@@ -115,15 +115,15 @@ def rows_by(kernel: Kernel, columns: int, count: int, least: float, *given: Any)
     return known[0] if len(known) == 1 else np.concatenate(known, axis=1)
 
 
-def _filled(kernel: Kernel, columns: int, who: int, last: int, given: tuple[Any, ...]) -> Ints | None:
-    """Columns of the rows of placements `who` .. `last` - 1; memory that is never written costs nothing."""
-    count, crowd, out = 0, 0, np.empty((columns, ROOM * (last - who) + ROOM_LEAST), np.int64)
+def _filled(kernel: Kernel, columns: int, first: int, last: int, given: tuple[Any, ...]) -> Ints | None:
+    """Columns of the rows of placements `first` .. `last` - 1; memory that is never written costs nothing."""
+    count, crowd, out = 0, 0, np.empty((columns, ROOM * (last - first) + ROOM_LEAST), np.int64)
     while True:
-        who, count, most = kernel(who, last, count, out, *given)
+        first, count, most = kernel(first, last, count, out, *given)
         crowd = max(crowd, most)
-        if who < 0:
+        if first < 0:
             return None
-        if who == last:
+        if first == last:
             rows = out[:, :count]
             return rows if crowd <= FEW_ROWS else rows[:, bit_rows.row_order(rows[0], *rows[[-3, -1, -2, 1]])]
         more = np.empty((columns, 2 * out.shape[1]), np.int64)
@@ -364,11 +364,11 @@ def bits_of_runs(runs: RowRuns, count: int, normal: Ints) -> PatternBits | None:
 
 @compiled(types.void(INTS, INTS, INTS, BOXES, INTS, INTS, WORDS, INTS, types.UniTuple(types.int64, 4), OUT))
 def _pixels_within(pattern, x, y, box, first, rows, words, count, bounds, inside):
-    for who in range(len(x)):
-        kind = pattern[who]
-        left, top = x[who] + box[kind, 0], y[who] + box[kind, 1]
-        right, low = x[who] + box[kind, 2], y[who] + box[kind, 3]
-        inside[who] = count[kind]
+    for placement in range(len(x)):
+        kind = pattern[placement]
+        left, top = x[placement] + box[kind, 0], y[placement] + box[kind, 1]
+        right, low = x[placement] + box[kind, 2], y[placement] + box[kind, 3]
+        inside[placement] = count[kind]
         if left >= bounds[0] and top >= bounds[1] and right <= bounds[2] and low <= bounds[3]:
             continue
         pixels, begin, at = 0, left - 63, first[kind] + max(bounds[1] - top, 0)
@@ -377,7 +377,7 @@ def _pixels_within(pattern, x, y, box, first, rows, words, count, bounds, inside
             for row in range(min(low, bounds[3]) - max(top, bounds[1]) + 1 if kept else 0):
                 pixels += bits_of(words[at + row] & kept)
             begin, at = begin + WORD, at + rows[kind]
-        inside[who] = pixels
+        inside[placement] = pixels
 
 
 def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box) -> Ints:

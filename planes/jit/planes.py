@@ -71,14 +71,14 @@ def first_taken(distances: Clearance, start_256: Ints, step_256: Ints) -> tuple[
     ray = 0
     while left:
         while holes and ray < count:
-            x, y, one = start_256[ray, 0], start_256[ray, 1], free[holes - 1]
-            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, one)
+            x, y, slot = start_256[ray, 0], start_256[ray, 1], free[holes - 1]
+            why = _way(height, width, x, y, step_256[ray, 0], step_256[ray, 1], block, slot)
             if why < 0:
                 entry[ray] = why
-            elif block[N, one] == 0 and _between(flat, block, one, x, y):
-                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, one]), True
+            elif block[N, slot] == 0 and _between(flat, block, slot, x, y):
+                entry[ray], cell[ray], several[ray] = 0, np.int64(block[BASE, slot]), True
             else:
-                block[RAY, one] = ray
+                block[RAY, slot] = ray
                 holes -= 1
             ray += 1
         left = _closed(block, left, free, holes)
@@ -87,9 +87,9 @@ def first_taken(distances: Clearance, start_256: Ints, step_256: Ints) -> tuple[
             _jump(flat, block, left, look, jump)
         holes = _done(block, left, jump, free)
         for hole in range(holes):
-            one = free[hole]
-            if block[N, one] < block[STOP, one]:
-                done, place = np.int64(block[RAY, one]), np.int64(look[one])
+            slot = free[hole]
+            if block[N, slot] < block[STOP, slot]:
+                done, place = np.int64(block[RAY, slot]), np.int64(look[slot])
                 several[done] = place < 0
                 cell[done] = place = max(place, ~place)
                 entry[done] = _entry(place, width, start_256[done], step_256[done])
@@ -110,33 +110,33 @@ def _closed(block, left, free, holes):  # type: ignore[no-untyped-def]
 def _done(block, left, jump, free):  # type: ignore[no-untyped-def]
     """Write the places of rays that hit or ended to `free`; return how many."""
     holes = 0
-    for one in range(left):
-        free[holes] = one
-        holes += (jump[one] == 0) | (block[N, one] >= block[STOP, one])
+    for slot in range(left):
+        free[holes] = slot
+        holes += (jump[slot] == 0) | (block[N, slot] >= block[STOP, slot])
     return holes
 
 
 @compiled(error_model="numpy")
 def _look(block, count, look):  # type: ignore[no-untyped-def]
     """Write the place of the cell that each ray looks at; at a corner it is ~place, a negative number."""
-    for one in range(count):
-        n = block[N, one]
-        quotient = (block[A, one] * n + block[C, one]) / block[B, one]
+    for slot in range(count):
+        n = block[N, slot]
+        quotient = (block[A, slot] * n + block[C, slot]) / block[B, slot]
         i = np.floor(quotient)
-        place = np.int32(block[BASE, one] + i * block[ALONG, one] + n * block[ACROSS, one])
-        look[one] = ~place if i == quotient else place
+        place = np.int32(block[BASE, slot] + i * block[ALONG, slot] + n * block[ACROSS, slot])
+        look[slot] = ~place if i == quotient else place
 
 
 @compiled()
 def _jump(flat, block, count, look, jump):  # type: ignore[no-untyped-def]
     """Move rays by the distance at their cells, up to their ends."""
-    for one in range(count):
-        place = look[one]
+    for slot in range(count):
+        place = look[slot]
         far = flat[np.int64(max(place, ~place))]
         if place < 0:
-            far = min(far, flat[~place - np.int32(block[ASIDE, one])])
-        jump[one] = far
-        block[N, one] = min(block[N, one] + far, block[STOP, one])
+            far = min(far, flat[~place - np.int32(block[ASIDE, slot])])
+        jump[slot] = far
+        block[N, slot] = min(block[N, slot] + far, block[STOP, slot])
 
 
 @compiled()
@@ -149,13 +149,13 @@ def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _between(flat, block, one, x_256, y_256):  # type: ignore[no-untyped-def]
-    """Whether a ray starts on a border and touches a taken cell there, other than the one that it enters."""
+def _between(flat, block, slot, x_256, y_256):  # type: ignore[no-untyped-def]
+    """Whether a ray starts on a border and touches a taken cell there, other than the slot that it enters."""
     on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
     if not (on_x or on_y):
         return False
-    across, base = np.int64(block[ACROSS, one]), np.int64(block[BASE, one])
-    step = np.int64(block[ALONG, one]) + across
+    across, base = np.int64(block[ACROSS, slot]), np.int64(block[BASE, slot])
+    step = np.int64(block[ALONG, slot]) + across
     if on_x and flat[base - step] == 0:
         return True
     return on_y and (flat[base - across] == 0 or (on_x and flat[base - step - across] == 0))
@@ -170,7 +170,7 @@ def over(numerator, denominator):  # type: ignore[no-untyped-def]
 
 
 @compiled(error_model="numpy")
-def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: ignore[no-untyped-def]
+def _way(height, width, x_256, y_256, step_x, step_y, block, slot):  # type: ignore[no-untyped-def]
     """Write the columns of a ray to its block; return 0, or NOTHING or UNDECIDED."""
     back_x, back_y = step_x < 0, step_y < 0
     dx, dy = abs(step_x), abs(step_y)
@@ -199,9 +199,9 @@ def _way(height, width, x_256, y_256, step_x, step_y, block, one):  # type: igno
         first = max(first, over(c - b * behind_y, SUB * dy) + 1)
     if float(a) * stop + c >= EXACT:
         return UNDECIDED
-    block[A, one], block[B, one], block[C, one] = a, b, c
-    block[ALONG, one], block[ACROSS, one], block[ASIDE, one] = along, across, aside
-    block[BASE, one], block[N, one], block[STOP, one] = y * width + x, first, stop
+    block[A, slot], block[B, slot], block[C, slot] = a, b, c
+    block[ALONG, slot], block[ACROSS, slot], block[ASIDE, slot] = along, across, aside
+    block[BASE, slot], block[N, slot], block[STOP, slot] = y * width + x, first, stop
     return 0 if first < stop else NOTHING
 
 

@@ -188,17 +188,17 @@ def _listed(grid, begin, listed, ray, origin, reach, near):
 
 
 @njit
-def _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found):
+def _entered_by(items, cells, meets, exclude, row, origin, ray, wide, bounds, near, found):
     """Write rank and bounds of the times of the accepted items whose boxes a ray enters; return how many."""
     (box, _, _, _, categories, owner), (grid, begin, listed), reach = items, cells, max(wide[0], HALF)
     if len(listed) > 0:
-        some = _listed(grid, begin, listed, ray, origin, reach, near)
+        listed_count = _listed(grid, begin, listed, ray, origin, reach, near)
     else:
-        some = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
+        listed_count = near_of(box, origin[0], origin[1], ray, bounds, near, reach)
     count = 0
-    for i in range(some):
+    for i in range(listed_count):
         at = near[i]
-        if len(meets) and refuses(at, categories, owner, meets, exclude, who):
+        if len(meets) and refuses(at, categories, owner, meets, exclude, row):
             continue
         left, top, right, low = part_of(box, at, origin[0], origin[1], bounds)
         if left > right or top > low:
@@ -318,11 +318,11 @@ RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
 
 # house: hit rule of rays
 @njit
-def follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
+def follow(row, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
     """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
     origin = (x + HALF) >> 8, (y + HALF) >> 8
     ray = x - SUB * origin[0], y - SUB * origin[1], dx, dy, max(abs(dy), 1), max(abs(dx), 1)
-    count = _entered_by(items, cells, meets, exclude, who, origin, ray, wide, bounds, near, found)
+    count = _entered_by(items, cells, meets, exclude, row, origin, ray, wide, bounds, near, found)
     count = _meet(items, origin, ray, wide, bounds, most, found, count)
     count, rank, time, last_y, last_x = _blocked(items, origin, bounds, found, count)
     _sort(found, near, count)
@@ -332,8 +332,8 @@ def follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, 
         alone = alone and found[ENTRY, at] == time
         reason, rank, time = np.int64(2), found[RANK, at], found[ENTRY, at]
         last_y, last_x = found[Y, at], found[X, at]
-    ends[0, who], ends[1, who], ends[2, who], ends[3, who] = reason, time, last_y, last_x
-    ends[4, who], ends[5, who] = rank, alone
+    ends[0, row], ends[1, row], ends[2, row], ends[3, row] = reason, time, last_y, last_x
+    ends[4, row], ends[5, row] = rank, alone
     for i in range(count):
         at = near[i]
         if found[ENTRY, at] == time and found[Y, at] == last_y and found[X, at] == last_x:
@@ -353,15 +353,15 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     the ray that there is no room for, or `end`; the number of rows; and 0
     """
     near, found = np.empty(len(items[0]) + 1, np.int64), np.empty((COLUMNS, len(items[0]) + 1), np.int64)
-    for who in range(begin, end):
-        x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
-        wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
-        count = follow(who, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends)
+    for number in range(begin, end):
+        x, y, dx, dy = start[number, 0], start[number, 1], step[number, 0], step[number, 1]
+        wide = radius, sides[0, number], sides[1, number], dx * dx + dy * dy
+        count = follow(number, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends)
         if row + count > out.shape[1]:
-            return who, row, 0
+            return number, row, 0
         for i in range(count):
             at = near[i]
-            out[0, row], out[1, row], out[2, row] = who, found[RANK, at], found[COUNT, at]
+            out[0, row], out[1, row], out[2, row] = number, found[RANK, at], found[COUNT, at]
             out[3, row], out[4, row], out[5, row] = found[X, at], found[Y, at], found[ENTRY, at]
             row += 1
     return end, row, 0
@@ -490,7 +490,7 @@ def _decided(items, hits, near, taken, origin, ray, wide, bounds, stop, end, ref
     end : why the ray ends, and the greatest rank of items that it hits in the last cell
     refuse : filters of all rays, and the ray
     """
-    (reason, last_rank), (meets, exclude, who), count, hit, filtered = end, refuse, 0, 0, 0
+    (reason, last_rank), (meets, exclude, row), count, hit, filtered = end, refuse, 0, 0, 0
     for i in range(len(hits[0])):
         at, own = hits[0][i], hits[1][i]
         if meets_any(items[0], at, taken, count):
@@ -502,7 +502,7 @@ def _decided(items, hits, near, taken, origin, ray, wide, bounds, stop, end, ref
         blocked = not _is_taken(items, stop[1], stop[2], taken, count, count, last_rank, origin, bounds, stop)
     if len(meets):
         for i in range(near_of(items[0], origin[0], origin[1], ray, bounds, near, max(wide[0], HALF))):
-            if refuses(near[i], items[4], items[5], meets, exclude, who):
+            if refuses(near[i], items[4], items[5], meets, exclude, row):
                 filtered += _new_cells(items, near[i], taken, count, first, last_rank, origin, ray, wide, bounds, stop)
                 taken[count], count = near[i], count + 1
         others = taken[first:count]
@@ -518,23 +518,23 @@ def _verdicts(
     start, step, origins, radius, sides, ends, hit_begin, hit_rank, hit_count, items, meets, exclude, bounds, counts
 ):  # fmt: skip
     near, taken = np.empty(len(items[0]) + 1, np.int64), np.empty(len(items[0]) + 1, np.int64)
-    for who in range(len(start)):
-        x, y, dx, dy = start[who, 0], start[who, 1], step[who, 0], step[who, 1]
+    for row in range(len(start)):
+        x, y, dx, dy = start[row, 0], start[row, 1], step[row, 0], step[row, 1]
         ray = x, y, dx, dy, max(abs(dy), 1), max(abs(dx), 1)
-        wide = radius, sides[0, who], sides[1, who], dx * dx + dy * dy
-        origin, reason = (origins[who, 0], origins[who, 1]), ends[0, who]
+        wide = radius, sides[0, row], sides[1, row], dx * dx + dy * dy
+        origin, reason = (origins[row, 0], origins[row, 1]), ends[0, row]
         within = bounds[0] - origin[0], bounds[1] - origin[1], bounds[2] - origin[0], bounds[3] - origin[1]
-        stop = ends[1, who], ends[3, who], ends[2, who], ends[5, who] != 0, reason < 3  # used up budgets reach no cell
+        stop = ends[1, row], ends[3, row], ends[2, row], ends[5, row] != 0, reason < 3  # used up budgets reach no cell
         reached, after, outside = _wide_cells(ray, wide, within, stop) if radius else _thin_cells(ray, within, stop)
-        own = slice(hit_begin[who], hit_begin[who + 1])
-        end = reason, ends[4, who] if reason in (1, 2) else np.int64(LATE)
+        own = slice(hit_begin[row], hit_begin[row + 1])
+        end = reason, ends[4, row] if reason in (1, 2) else np.int64(LATE)
         hit, blocked, filtered = _decided(
             items, (hit_rank[own], hit_count[own]), near, taken, origin, ray, wide, bounds, stop, end,
-            (meets, exclude, who),
+            (meets, exclude, row),
         )  # fmt: skip
-        counts[who, Verdict.HIT], counts[who, Verdict.OCCLUDED], counts[who, Verdict.FILTERED] = hit, blocked, filtered
-        counts[who, Verdict.EMPTY] = reached - hit - blocked - filtered
-        counts[who, Verdict.OUTSIDE], counts[who, Verdict.BEYOND] = outside, after
+        counts[row, Verdict.HIT], counts[row, Verdict.OCCLUDED], counts[row, Verdict.FILTERED] = hit, blocked, filtered
+        counts[row, Verdict.EMPTY] = reached - hit - blocked - filtered
+        counts[row, Verdict.OUTSIDE], counts[row, Verdict.BEYOND] = outside, after
 
 
 def _cells(stack: Stack, lines: Lines) -> tuple[tuple[int, ...], Ints, Ints]:

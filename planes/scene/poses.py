@@ -71,7 +71,7 @@ class Looks(NamedTuple):
         if angle is not None:
             angles = reals("angle", each("angle", angle, n), (n,)).tolist()
         if angle is not None or sprite is not None:
-            turns = all_quarter_turns([one.stepped(angle) for one, angle in zip(sprites, angles, strict=True)])
+            turns = all_quarter_turns([sprite.stepped(angle) for sprite, angle in zip(sprites, angles, strict=True)])
         if scale is not None:
             x, y = _scale_rows(scale, n)
         if frame is not None or sprite is not None:
@@ -83,14 +83,14 @@ class Looks(NamedTuple):
 
 def _sprite_rows(sprite: object, n: int) -> list[Sprite]:
     """Check sprites, one for all or a list (n,); each may be a mask or an image."""
-    if not isinstance(sprite, list | tuple) or not any(isinstance(one, Sprite | np.ndarray) for one in sprite):
+    if not isinstance(sprite, list | tuple) or not any(isinstance(value, Sprite | np.ndarray) for value in sprite):
         return [as_sprite(sprite)] * n
     if len(sprite) != n:
         raise InputError(f"sprite: expected one for all or {n}, got {len(sprite)}")
     made = []
-    for row, one in enumerate(sprite):
+    for row, value in enumerate(sprite):
         with within(f"row {row}"):
-            made.append(as_sprite(one))
+            made.append(as_sprite(value))
     return made
 
 

@@ -317,7 +317,7 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: In
         planes = [masks[number] for number in used.tolist()]
         held = _mapped(Grids(*(column[batch] for column in grids)), planes, own, planes)
         rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
-        sides = np.stack([some.argmax(axis=1) for some in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
+        sides = np.stack([plane.argmax(axis=1) for plane in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
         areas, (height, width) = np.count_nonzero(held, axis=(1, 2)), held.shape[1:]
         details = (column.tolist() for column in (sides, quarters[batch], areas))
         for row, mask, side, quarter, area in zip(batch, held, *details, strict=True):

@@ -189,9 +189,9 @@ def _near(
         x_first, x_last, y = spans.x_first, spans.x_last, spans.y
         if bounds is not None:
             low, high = np.maximum(low, bounds[:2]), np.minimum(high, bounds[2:])
-        some = np.flatnonzero((y >= low[1]) & (y <= high[1]) & (x_first <= high[0]) & (x_last >= low[0]))
-        x_first, x_last = np.maximum(x_first[some], low[0]), np.minimum(x_last[some], high[0])
-        runs = _beside(way, Runs(y[some] - origin[1], x_first - origin[0], x_last - origin[0]))
+        kept = np.flatnonzero((y >= low[1]) & (y <= high[1]) & (x_first <= high[0]) & (x_last >= low[0]))
+        x_first, x_last = np.maximum(x_first[kept], low[0]), np.minimum(x_last[kept], high[0])
+        runs = _beside(way, Runs(y[kept] - origin[1], x_first - origin[0], x_last - origin[0]))
         if len(runs.y):
             yield way, runs
 

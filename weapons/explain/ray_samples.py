@@ -198,8 +198,8 @@ def counted_verdicts(scene_of: Callable[[int], Scene], parts: Parts, shots: Shot
     for part in pieces(each, CELLS_AT_ONCE):
         for _, same in groupby(range(part.start, part.stop), lambda shot: id(scene_of(shot))):
             numbers = list(same)
-            some = shots.take(numbers[0], numbers[-1] + 1)
-            counts.append(ray_detail(scene_of(numbers[0]), parts, some).counts())
+            chunk = shots.take(numbers[0], numbers[-1] + 1)
+            counts.append(ray_detail(scene_of(numbers[0]), parts, chunk).counts())
     return np.concatenate(counts)
 
 

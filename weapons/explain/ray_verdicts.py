@@ -94,11 +94,11 @@ def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) ->
 
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
     """Number of cells (n,) of lines in inclusive boxes (n, 4), each in its own; with ends only those before them."""
-    some = np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
-    if len(some) < len(lines):
+    kept = np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
+    if len(kept) < len(lines):
         count = np.zeros(len(lines), np.int64)
-        if len(some):
-            count[some] = cells_in(lines.take(some), box_xyxy[some], None if ends is None else ends.take(some))
+        if len(kept):
+            count[kept] = cells_in(lines.take(kept), box_xyxy[kept], None if ends is None else ends.take(kept))
         return count
     if lines.radius:
         return _wide_cells_in(lines, box_xyxy, ends)
@@ -310,8 +310,8 @@ def _skipped(walk: Walk, filters: Filters | None, bounds: Box | None) -> Ints:
     if filters is None:
         return keys[0]
     for begin in range(0, len(walk.rays), RAYS_AT_ONCE):
-        some = slice(begin, begin + RAYS_AT_ONCE)
-        rays, own, ends = walk.rays.take(some), walk.lines.take(some), walk.ends.take(some)
+        part = slice(begin, begin + RAYS_AT_ONCE)
+        rays, own, ends = walk.rays.take(part), walk.lines.take(part), walk.ends.take(part)
         lines = replace(own, start=rays.start_256)
         near = near_items(walk.stack, bounds, lines, own, rays.origin_xy, None)
         near = near.take(refused_by(filters, walk.stack, near.rank, near.ray + begin))

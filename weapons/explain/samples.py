@@ -313,8 +313,8 @@ def _inside(events: Events, runs: Runs, bounds: Box | None) -> Events:
         return events
     y = runs.y[events.run]
     first, last = np.maximum(events.x_first, bounds[0]), np.minimum(events.x_last, bounds[2])
-    some = (first <= last) & (y >= bounds[1]) & (y <= bounds[3])
-    return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(some))
+    kept = (first <= last) & (y >= bounds[1]) & (y <= bounds[3])
+    return Events(events.kind, events.rank, events.run, first, last).take(np.flatnonzero(kept))
 
 
 def _why(detail: Detail, rank: int, distance: float) -> WhyNot:

@@ -414,9 +414,9 @@ def places_256(field: str, at: object) -> tuple[Ints, bool]:
         many: Ints | None = kernels_of(fixed_point).snapped(at)
         if many is not None:
             return many, False
-    one = one_place(at)
-    if one is not None:
-        return np.array((one,), np.int64), True
+    place = one_place(at)
+    if place is not None:
+        return np.array((place,), np.int64), True
     single = array_of(field, at).shape == (2,)
     return snap(reals(field, at, (2,) if single else (None, 2), POSITION_MAX)).reshape(-1, 2), single
 

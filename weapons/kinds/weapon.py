@@ -376,7 +376,7 @@ class AimedPatterns(Sequence[Pattern]):
     @property
     def bigs(self) -> list[BigPattern]:
         """All patterns as integer rows; those of the last calls are kept."""
-        keys = ((self._text, one.tobytes()) for one in self._direction)
+        keys = ((self._text, direction.tobytes()) for direction in self._direction)
         return [_kept_bigs.get(key, lambda k=k: big_of_bits(self.bits, k)) for k, key in enumerate(keys)]  # type: ignore[misc]
 
     def _rasterized(self) -> PatternBits:
@@ -535,7 +535,7 @@ def _made(patterns: Sequence[Pattern]) -> PatternBits:
     rows = np.array([words.shape[1] for words in columns])
     first = np.cumsum([0, *(words.size for words in columns[:-1])]) + WORD
     sums = [sums_along_rows(pattern.spans, pattern.prefix) for pattern in patterns if pattern.prefix is not None]
-    first_sum = np.cumsum([0, *(one.size for one in sums[:-1])])
+    first_sum = np.cumsum([0, *(table.size for table in sums[:-1])])
     words = np.concatenate([np.zeros(WORD, np.uint64), *(words.reshape(-1) for words in columns)])
     return PatternBits(boxes, first, rows, words, strips, _joined(sums) if sums else NO_SUMS, first_sum)
 

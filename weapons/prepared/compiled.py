@@ -205,9 +205,9 @@ class PositionCache:
         lists = tuple(cells[:5]), np.ascontiguousarray(cells.begin), np.ascontiguousarray(cells.listed)
         self._shot_tiles, self._is_visible = _shot_tiles(*columns, *lists, pierce, tuple(bounds), worth), not worth
 
-    def look(self, one: Round) -> tuple[Look, int]:
+    def look(self, fired: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
-        shape, number, tell = _shape_of(one), one.number, self._tell
+        shape, number, tell = _shape_of(fired), fired.number, self._tell
         buffers: list[tuple[Any, memoryview]] = []
 
         def look(x: float, y: float, hits: Answer) -> None:
@@ -232,7 +232,7 @@ class PositionCache:
                     at += ROW_BYTES
             buffers.append(buffer)
 
-        return look, PIECE_BYTES + one.pattern.bits.words.nbytes
+        return look, PIECE_BYTES + fired.pattern.bits.words.nbytes
 
     def _make_visible(self) -> None:
         with self._lock:
@@ -242,9 +242,9 @@ class PositionCache:
                 self._use_visible(visible_set, scene.items.stack())
 
 
-def _shape_of(one: Round) -> Any:
+def _shape_of(fired: Round) -> Any:
     """The Shape of a round."""
-    bits = one.pattern.bits
+    bits = fired.pattern.bits
     return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words)
 
 
@@ -307,8 +307,8 @@ one_ray = _one_ray.overloads[_one_ray.signatures[0]].entry_point
 def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
     """See `rays.one_ray.follower`."""
     rank = np.flatnonzero(view.accepts(stack))
-    some = slice(None) if len(rank) == len(stack) else rank
-    columns = stack.box_xyxy[some], stack.offset[some], stack.masks, stack.occluder[some], rank
+    rows = slice(None) if len(rank) == len(stack) else rank
+    columns = stack.box_xyxy[rows], stack.offset[rows], stack.masks, stack.occluder[rows], rank
     targets = _targets(
         *map(np.ascontiguousarray, columns), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], NOBODY
     )

@@ -79,7 +79,7 @@ def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) 
             Round(x, y, number, _pattern_of_round(placements, number))
             for number, (x, y) in enumerate(placements.turn_xy.tolist())
         ]
-    return [one for one in rounds if one.pattern.box_xyxy[0, 0] <= one.pattern.box_xyxy[0, 2]]
+    return [each for each in rounds if each.pattern.box_xyxy[0, 0] <= each.pattern.box_xyxy[0, 2]]
 
 
 def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
@@ -93,7 +93,7 @@ def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
         return patterns[0].table
     offsets = (placements.xy[rows] - placements.turn_xy[number]).tolist()
     sets = [pattern.spans.translated(x, y) for pattern, (x, y) in zip(patterns, offsets, strict=True)]
-    runs = (np.concatenate([getattr(one, name) for one in sets]) for name in ("y", "x_first", "x_last"))
+    runs = (np.concatenate([getattr(spans, name) for spans in sets]) for name in ("y", "x_first", "x_last"))
     return Pattern(Spans.from_runs(*runs), None).table
 
 
@@ -152,14 +152,14 @@ class Answer(Hits):
     _arguments: Arguments = (None, None, None)
     _weighted = False
 
-    scene: cached_attribute[Scene] = cached_attribute(lambda one: one._present.scene)
-    version: cached_attribute[int] = cached_attribute(lambda one: one._present.version)
-    _stack: cached_attribute[Stack] = cached_attribute(lambda one: one._present.stack)
-    weapon: cached_attribute[Weapon] = cached_attribute(lambda one: one._present.weapon)
+    scene: cached_attribute[Scene] = cached_attribute(lambda hits: hits._present.scene)
+    version: cached_attribute[int] = cached_attribute(lambda hits: hits._present.version)
+    _stack: cached_attribute[Stack] = cached_attribute(lambda hits: hits._present.stack)
+    weapon: cached_attribute[Weapon] = cached_attribute(lambda hits: hits._present.weapon)
     shots: cached_attribute[Shots] = cached_attribute(
-        lambda one: one._present.filter.shots(one._present.weapon, one._at, one._arguments)
+        lambda hits: hits._present.filter.shots(hits._present.weapon, hits._at, hits._arguments)
     )
-    _rows: cached_attribute[Rows] = cached_attribute(lambda one: one._columns())
+    _rows: cached_attribute[Rows] = cached_attribute(lambda hits: hits._columns())
 
     def _columns(self) -> Rows:
         raise NotImplementedError

@@ -141,9 +141,9 @@ class PositionCache:
 
     # house: way of areas
     # house: row order
-    def look(self, one: Round) -> tuple[Look, int]:
+    def look(self, fired: Round) -> tuple[Look, int]:
         """Function that looks up what a round hits, and the bytes kept for it."""
-        pattern, made, number, tell = one.pattern.bigs[0], self.made, one.number, self._tell
+        pattern, made, number, tell = fired.pattern.bigs[0], self.made, fired.number, self._tell
         stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
         first_x, first_y, wide, high = pattern.x, pattern.y, pattern.wide - 1, pattern.high - 1
         tiles = self._bigs.setdefault(stride, BigTiles(stride))

@@ -195,9 +195,9 @@ class ReadyPattern(Ready[Hits]):
         """Make the looks of a shot; those of a shot without arguments are stored for the fastest path."""
         shots = self._filter.shot_at_origin(aim, number)
         looks: Looks = []
-        for one in rounds_of(self.weapon, shots, offset):
-            look, size = self._squares.look(one)
-            looks.append((one.x, one.y, look))
+        for fired in rounds_of(self.weapon, shots, offset):
+            look, size = self._squares.look(fired)
+            looks.append((fired.x, fired.y, look))
             self._grow(size)
         self._grow(AIM_BYTES)
         self._aims[key] = looks

@@ -222,13 +222,13 @@ def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box
         entry, leave = own.times(pair, x, y)
         met = np.flatnonzero(entry <= leave)
         count = np.bincount(pair[met], minlength=len(here))
-        some = np.flatnonzero(count)
-        found.append(Contacts(ray[here][some], item[some], count[some], x[met], y[met], entry[met], leave[met]))
+        kept = np.flatnonzero(count)
+        found.append(Contacts(ray[here][kept], item[kept], count[kept], x[met], y[met], entry[met], leave[met]))
     return Contacts.joined(found)
 
 
 def cells_most(lines: Lines, size_wh: Ints) -> Ints:
-    """Most cells of boxes of some sizes (n, 2) that are looked at for a line."""
+    """Most cells of boxes of kept sizes (n, 2) that are looked at for a line."""
     return np.asarray(np.minimum(size_wh.prod(axis=1), size_wh.max(axis=1) * (3 * lines.radius // SUB + 3)))
 
 

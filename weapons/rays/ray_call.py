@@ -66,17 +66,17 @@ def fired_rays(
     found: list[tuple[int, Walk | Made | FirstHits]] = []
     room = CELLS_KEPT
     for begin in range(0, max(len(shots), 1), step):
-        some = shots.take(begin, min(begin + step, len(shots)))
-        rays = rays_of(parts, some)
+        part = shots.take(begin, min(begin + step, len(shots)))
+        rays = rays_of(parts, part)
         plan.run("rays", "both ends on the grid", rays.nbytes)
         if ends_at_first(ray):
-            ends = _first_ends(rays, ray, some, through, chosen.way, choose)
+            ends = _first_ends(rays, ray, part, through, chosen.way, choose)
             first = FirstHits(rays, ray, ends, through.stack)
-            rows.append(first.rows(len(some)))
+            rows.append(first.rows(len(part)))
             found.append((begin, first))
             plan.run("rows", "of the first hit of each ray", rows[-1].nbytes)
         else:
-            followed, row, room = _followed(rays, ray, some, through, chosen.way, choose, room)
+            followed, row, room = _followed(rays, ray, part, through, chosen.way, choose, room)
             rows.append(row)
             found += [(begin, walk) for walk in followed]
         if begin:
@@ -195,13 +195,13 @@ def _walks(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Iterator
         most = min(most, CHUNK_PAIRS // max(len(through.stack), 1))
     step = max(1, min(most, int(CHUNK_CELLS / expected_cells(rays, ray, through.stack))))
     while begin < max(len(rays), 1):
-        some = rays.take(slice(begin, begin + step))
-        met, ends, lines, relative = trace(some, ray, shots, through)
+        part = rays.take(slice(begin, begin + step))
+        met, ends, lines, relative = trace(part, ray, shots, through)
         through.plan.run("walk", "")
         walked, _ = walked_of(met, ends, through.stack)
         first = (column[walked.first] for column in (walked.x, walked.y, walked.entry))
         hit = Touches(walked.ray, walked.rank, walked.count, *first)
-        walk = Walk(some, lines, hit, ends, through.stack, through.bounds, ray.fades, (met, relative))
+        walk = Walk(part, lines, hit, ends, through.stack, through.bounds, ray.fades, (met, relative))
         why = "cells of each ray on each object; the rest when it is asked for"
         through.plan.run("passes", why, walked.nbytes)
         yield walk

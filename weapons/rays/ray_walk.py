@@ -211,8 +211,8 @@ def _entered(
             through.plan.run("broad phase", why, row.nbytes + rank.nbytes)
     relative = relative_lines(lines, ray, live[row], through.stack.ids[rank], through.items)
     enters = _enters(rays.origin_xy[live[row]], relative, through.stack.box_xyxy[rank])
-    some = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
-    return live[row[some]], rank[some]
+    kept = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
+    return live[row[kept]], rank[kept]
 
 
 def _stretch_boxes(rays: Rays, lines: Lines, live: Ints, near: float, far: float) -> Ints:

@@ -144,9 +144,9 @@ def hits_and_ends(
     if not len(stack) or not is_sparse(stack.sizes, size):  # all boxes are compared
         step = max(1, min(step, BRUTE_PAIRS // max(len(stack), 1)))
     for begin in range(0, max(len(lines), 1), step):
-        some = slice(begin, begin + step)
-        own = filters and (filters[0][some], filters[1][some])
-        found.append(_hits_and_ends(stack, bounds, lines.take(some), most, own))
+        part = slice(begin, begin + step)
+        own = filters and (filters[0][part], filters[1][part])
+        found.append(_hits_and_ends(stack, bounds, lines.take(part), most, own))
         found[-1][0][0] += begin
     if len(found) == 1:
         return found[0]
@@ -162,8 +162,8 @@ def _hits_and_ends(
     own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
     near = near_items(stack, bounds, lines, own, origin, filters)
     firsts, ends = NO_FIRSTS, endless(len(lines))
-    for some in _rounds(near, len(lines), most, stack):
-        now = some[near.least[some] <= ends.time[near.ray[some]]]
+    for batch in _rounds(near, len(lines), most, stack):
+        now = batch[near.least[batch] <= ends.time[near.ray[batch]]]
         if len(now):
             firsts = Firsts.joined([firsts, _firsts_of(near.take(now), own, origin, stack)])
             ends = _ends(firsts, len(lines), most, origin, bounds, stack)
@@ -187,14 +187,14 @@ def near_items(
     if filters is not None:
         accepted = ~refused_by(filters, stack, rank, ray)
         ray, rank = ray[accepted], rank[accepted]
-    some = _crossing(lines, ray, rank, stack.box_xyxy)
-    ray, rank = ray[some], rank[some]
+    kept = _crossing(lines, ray, rank, stack.box_xyxy)
+    ray, rank = ray[kept], rank[kept]
     box = stack.box_xyxy[rank] if bounds is None else clipped(stack.box_xyxy[rank], bounds)
     box = box - np.concatenate([origin, origin], axis=1)[ray]
     least, most = times_in(own, ray, box)
-    some = np.flatnonzero((least <= most) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
-    some = some[np.lexsort((least[some], ray[some]))]
-    return Crossed(ray[some], rank[some], box[some], least[some], most[some])
+    kept = np.flatnonzero((least <= most) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
+    kept = kept[np.lexsort((least[kept], ray[kept]))]
+    return Crossed(ray[kept], rank[kept], box[kept], least[kept], most[kept])
 
 
 def _crossing(lines: Lines, ray: Ints, rank: Ints, boxes_xyxy: Ints) -> Ints:
@@ -273,8 +273,9 @@ def _firsts(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
     pair, row, first, last = lines.runs(near.box_xyxy)
     run, place = _pixels(near, lines, origin, stack, (pair, row, first), last - first + 1)
     cells = np.bincount(pair, np.bincount(run, minlength=len(pair)), len(near)).astype(np.int64)
-    some, entry, count = (_thick_entries if own.radius else _thin_entries)(lines, (pair, row, first), run, place, cells)
-    run, place = run[some], place[some]
+    entries = _thick_entries if own.radius else _thin_entries
+    reached, entry, count = entries(lines, (pair, row, first), run, place, cells)
+    run, place = run[reached], place[reached]
     of = pair[run]
     begin = np.flatnonzero(begins(of))
     met = of[begin]
@@ -349,13 +350,13 @@ def _thick_entries(lines: Lines, runs: Runs, run: Ints, place: Ints, cells: Ints
     latest, begin = np.full(len(cells), NEVER), np.flatnonzero(begins(pair[run]))
     if len(begin):
         latest[pair[run[begin]]] = np.minimum.reduceat(time, begin)
-    some = np.flatnonzero(time <= np.where(surely, (latest + reach + 1)[pair], np.iinfo(np.int64).max)[run])
-    there, column, line = pair[run[some]], first[run[some]] + place[some], row[run[some]]
+    kept = np.flatnonzero(time <= np.where(surely, (latest + reach + 1)[pair], np.iinfo(np.int64).max)[run])
+    there, column, line = pair[run[kept]], first[run[kept]] + place[kept], row[run[kept]]
     steep = lines.steep[there]
     entry, leave = lines.times(there, np.where(steep, line, column), np.where(steep, column, line))
     missed = np.bincount(there[entry > leave], minlength=len(cells))  # a cell that is touched surely is not missed
     touched = np.flatnonzero(entry <= leave)
-    return some[touched], entry[touched], cells - missed
+    return kept[touched], entry[touched], cells - missed
 
 
 def _ends(firsts: Firsts, rays: int, most: int | None, origin: Ints, bounds: Box | None, stack: Stack) -> Terminations:

@@ -165,6 +165,6 @@ def _ends(
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
         ends_of = first_ends(moment, ray, view, len(cells))
         for begin in range(0, len(cells), RAYS_AT_ONCE):
-            some, aimed_shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
-            if len(some):
-                yield some, *ends_of(aimed_shots)
+            cell, aimed_shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
+            if len(cell):
+                yield cell, *ends_of(aimed_shots)

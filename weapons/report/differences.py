@@ -364,8 +364,8 @@ def _gained_and_lost(was: Any, now: Any) -> list[str]:
     if not (_are_runs(was) and _are_runs(now)):
         return []
     phrases = []
-    for word, some, others in (("gained", now, was), ("lost", was, now)):
-        runs = _left(some, others)
+    for word, kept, others in (("gained", now, was), ("lost", was, now)):
+        runs = _left(kept, others)
         count = sum(last - first + 1 for _, first, last in runs)
         pixels = itertools.islice(((x, y) for y, first, last in runs for x in range(first, last + 1)), PIXELS_NAMED)
         names = ", ".join(f"({x}, {y})" for x, y in pixels)

@@ -49,8 +49,8 @@ class PrefilterTrace:
         number, boxes = self._cells()
         opened = np.unique(np.concatenate([np.zeros(0, np.int64), *(self.opened(hits) for hits in fired)]))
         if len(boxes) > CELLS_MAX:
-            some = np.flatnonzero(np.isin(number, opened))[:CELLS_MAX]
-            number, boxes = number[some], boxes[some]
+            kept = np.flatnonzero(np.isin(number, opened))[:CELLS_MAX]
+            number, boxes = number[kept], boxes[kept]
         cells = [{"box_xyxy": box, "opened": bool(n in opened)} for n, box in zip(number, boxes.tolist(), strict=True)]
         return {
             "prefilter": str(self.prefilter),
@@ -139,9 +139,9 @@ class PrefilterTrace:
             lines = fired.take(np.arange(min(len(fired), PATTERNS_MAX)))
             capsules = Capsules(lines.start / SUB, (lines.start + lines.step) / SUB, lines.radius / SUB)
             return [outline_of(capsules, i)[0] for i in range(len(lines))]
-        some = np.flatnonzero(fired.count > 0)[:PATTERNS_MAX]
-        volumes = pattern_volumes(self.prefilter.name, [fired.table.patterns[i] for i in fired.pattern[some].tolist()])
-        return [outline_of(volumes, i)[0] + fired.xy[p] for i, p in enumerate(some.tolist())]
+        kept = np.flatnonzero(fired.count > 0)[:PATTERNS_MAX]
+        volumes = pattern_volumes(self.prefilter.name, [fired.table.patterns[i] for i in fired.pattern[kept].tolist()])
+        return [outline_of(volumes, i)[0] + fired.xy[p] for i, p in enumerate(kept.tolist())]
 
 
 def prefilter_trace(scene: Scene, view_xyxy: Box, prefilter: str | None, broadphase: str | None) -> PrefilterTrace:

@@ -83,8 +83,8 @@ def _runs(counts: Ints) -> list[list[int]]:
     changed = np.flatnonzero(np.diff(flat, prepend=-1) != 0)
     first = np.union1d(changed, np.arange(height) * width)
     last = np.append(first[1:], len(flat)) - 1
-    some = flat[first] > 0
-    first, last = first[some], last[some]
+    kept = flat[first] > 0
+    first, last = first[kept], last[kept]
     runs: list[list[int]] = np.stack([first // width, first % width, last % width, flat[first]], axis=1).tolist()
     return runs
 
@@ -276,8 +276,8 @@ def view_of(scene: Scene, fired: Sequence[Hits]) -> Box:
 def _anchors(hits: Hits) -> Ints:
     """Pixel (N, 2) of each shot that the picture should show: that of its first hit, or its own."""
     at = pixel(hits.shots.at_256)
-    some = hits.starts[:-1] < hits.starts[1:]
-    at[some] = hits.first_xy[hits.starts[:-1][some]]
+    hitting = hits.starts[:-1] < hits.starts[1:]
+    at[hitting] = hits.first_xy[hits.starts[:-1][hitting]]
     return at
 
 

@@ -46,8 +46,8 @@ SHAPE_MIN = 6  # least size of a shape on the page, px; smaller samples share on
 def tiled_glyph(verdict: str, factor: int, shape: tuple[int, ...]) -> Bools:
     """Marks side by side over a page (height, width), one for each sample, or for a few where they are small."""
     size = factor if factor >= SHAPE_MIN // 2 else -(-SHAPE_MIN // factor) * factor
-    one = glyph(verdict, size)
-    return np.tile(one, (-(-shape[0] // size), -(-shape[1] // size)))[: shape[0], : shape[1]]
+    tile = glyph(verdict, size)
+    return np.tile(tile, (-(-shape[0] // size), -(-shape[1] // size)))[: shape[0], : shape[1]]
 
 
 def glyph(verdict: str, size: int) -> Bools:
@@ -167,8 +167,8 @@ def within(begin: Floats, end: Floats, size: Floats | Ints, over: float) -> tupl
     step = end - begin
     first, last = slabs(begin, step, np.full(2, -over), size + over)
     first, last = np.maximum(first, 0), np.minimum(last, 1)
-    some = first <= last
-    return (begin + first[:, None] * step)[some], (begin + last[:, None] * step)[some]
+    kept = first <= last
+    return (begin + first[:, None] * step)[kept], (begin + last[:, None] * step)[kept]
 
 
 def _blend(image: Image, color: tuple[int, int, int], alpha: Ints) -> None:

@@ -168,16 +168,16 @@ def _whole_shapes(rng: Rng, kind: str, normal: Floats, length: Floats) -> Shapes
     """Make small shapes of even integers in the frame of an integer vector; radii are multiples of its length."""
     n = len(normal)
     radius = length * rng.integers(1, 5, n) * 2
-    some = rng.integers(1, 5, (n, 2)) * 2
+    size = rng.integers(1, 5, (n, 2)) * 2
     if kind == "circle":
         return Shapes(np.zeros((n, 1, 2)), radius)
     if kind == "capsule":
-        step = np.where(rng.random((n, 1)) < 0.6, across(normal), rng.integers(-5, 6, (n, 2))) * some[:, :1]
+        step = np.where(rng.random((n, 1)) < 0.6, across(normal), rng.integers(-5, 6, (n, 2))) * size[:, :1]
         return Shapes(np.stack([-step, step], axis=1), radius)
     if kind == "box":
-        return Shapes(SQUARE * some[:, None], np.zeros(n))
+        return Shapes(SQUARE * size[:, None], np.zeros(n))
     if kind == "oriented box":
-        u, v = normal * some[:, :1], across(normal) * some[:, 1:]
+        u, v = normal * size[:, :1], across(normal) * size[:, 1:]
         return Shapes(np.stack([0 * u, u, u + v, v], axis=1), np.zeros(n))
     return Shapes(2.0 * _whole_rings(rng, n), np.zeros(n))
 
@@ -244,9 +244,9 @@ def _far(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
     by = directions(rng, n) * decades(rng, n, 0, 12)[:, None]
     a, b = _contact(rng, kinds, n)
     a, b = _nudged(rng, (a.moved(by), b.moved(by)))
-    some = rng.random(n) < 0.4
+    mask = rng.random(n) < 0.4
     one, two = (s.moved(np.rint(by)) for s in _whole_contact(rng, kinds, n))
-    return a.where(some, one), b.where(some, two)
+    return a.where(mask, one), b.where(mask, two)
 
 
 def _ratio(rng: Rng, kinds: tuple[str, str], n: int) -> Pair:
@@ -296,8 +296,8 @@ def _at_scale(rng: Rng, kinds: tuple[str, str], n: int, low: int, high: int) -> 
     a, b = _contact(rng, kinds, n)
     a, b = _nudged(rng, (a.scaled(power), b.scaled(power)))
     one, two = (s.scaled(power) for s in _whole_contact(rng, kinds, n))
-    some = rng.random(n) < 0.5
-    return a.where(some, one), b.where(some, two)
+    mask = rng.random(n) < 0.5
+    return a.where(mask, one), b.where(mask, two)
 
 
 MAKERS: dict[str, Callable[[Rng, tuple[str, str], int], Pair]] = {
@@ -510,9 +510,9 @@ def _shared3(rng: Rng, n: int) -> Columns:
 
 def _scaled3(rng: Rng, n: int, low: int, high: int) -> Columns:
     power = rng.integers(low, high, n)[:, None, None]
-    some = (rng.random(n) < 0.5)[:, None, None]
+    mask = (rng.random(n) < 0.5)[:, None, None]
     pairs = zip(_near3(rng, n), _lattice3(rng, n), strict=True)
-    return tuple(np.ldexp(np.where(some, whole, a), power) for a, whole in pairs)
+    return tuple(np.ldexp(np.where(mask, whole, a), power) for a, whole in pairs)
 
 
 _TRIANGLES: dict[str, Make] = {
