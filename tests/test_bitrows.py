@@ -161,7 +161,7 @@ def test_what_patterns_and_tiles_share(seed: int, at_once: int) -> None:
     """Of given pairs, which may not meet."""
     case = Case(seed)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
+        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         pairs = case.placement, case.near
         found = front_to_back.front_to_back(case.placed, 1, case.windows, case.seen, Rule(True), pairs)
     assert columns_of(found, case.weighted) == [row if case.weighted else row[:6] for row in case.found()]
@@ -189,7 +189,7 @@ def test_what_pellets_of_a_round_share_with_items(name: str, seed: int, room: in
     listed = cells.cells_of(seen.box_xyxy, reach, case.rng.choice([2, 5]))
     placed = case.placed._replace(origin_x=case.placed.origin_x[::each], origin_y=case.placed.origin_y[::each])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
+        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         if ".jit." in name:
             patch.setattr(bitrows_jit, "ROOM", 0)
             patch.setattr(bitrows_jit, "ROOM_LEAST", room)
@@ -220,7 +220,8 @@ def test_what_lies_in_front_is_not_seen(name: str, seed: int, at_once: int) -> N
     right, down = np.array(shift, np.int64).reshape(-1, 2).T
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
-        seen = kernels.visible(words, WORD, begin, as_read(of.copy(), rng), begin[other] - down, right)
+        seen = bit_rows.rows_of(words, WORD, begin)
+        kernels.take_away(seen, words, as_read(of.copy(), rng), begin[other] - down, right)
     for number, mask in enumerate(masks):
         left = pixels_of(mask, 0, 0)
         for (own, front), corner in zip(pairs, shift, strict=True):

@@ -20,7 +20,7 @@ from some_of import some_of
 from test_fire import Placements, expected, some_battle, some_sprite, some_volley, some_weapon, square, told
 
 from hitplanes import ALL, Disc, Hits, InputError, Point, Role, Scene, Spans, Sprite, fire, load_scene
-from hitplanes.planes.bits import bit_rows, cells, front_to_back
+from hitplanes.planes.bits import bit_rows, cells
 from hitplanes.planes.bits.bit_rows import WORD
 from hitplanes.planes.bits.label_plane import LabelPlane
 from hitplanes.planes.scene import items as items_module
@@ -404,7 +404,6 @@ def test_the_size_of_the_parts_changes_no_row(
 ) -> None:
     monkeypatch.setattr(areas, "CHUNK_SAMPLES", samples)
     monkeypatch.setattr(areas, "CHUNK_PAIRS", pairs)
-    monkeypatch.setattr(front_to_back, "WORDS_AT_ONCE", max(samples, WORD))
     monkeypatch.setattr(areas, "PLACEMENTS_AT_ONCE", samples)
     monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", max(samples, WORD))
     monkeypatch.setattr(cells, "PAIRS_AT_ONCE", pairs)

@@ -11,7 +11,7 @@ import pytest
 from examples import examples
 from hypothesis import given
 
-from hitplanes.planes.bits import front_to_back
+from hitplanes.planes.bits import bit_rows, front_to_back
 from hitplanes.planes.bits.bit_rows import Placed
 from hitplanes.planes.bits.front_to_back import OrderedTiles, Rule
 from hitplanes.planes.bits.tiles import TileAtlas
@@ -139,7 +139,7 @@ def judged(seed: int, at_once: int, crowd: int) -> None:
     case = Case(seed)
     kernels = kernels_of(front_to_back)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front_to_back, "WORDS_AT_ONCE", at_once)
+        patch.setattr(bit_rows, "WORDS_AT_ONCE", at_once)
         patch.setattr(front_to_back, "FRONTS_AT_ONCE", crowd)
         rule = Rule(case.pierce, case.bounds, case.accept, case.exclude)
         found = kernels.front_to_back(case.placed, 1, case.windows, case.ordered, rule)[:6]

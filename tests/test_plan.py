@@ -364,8 +364,7 @@ def test_bytes_are_what_was_made(name: str, monkeypatch: pytest.MonkeyPatch) -> 
         before[0], whole[0] = now, max(whole[0], most)
 
     monkeypatch.setattr(Plan, "run", measured)
-    monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", WORDS_AT_ONCE)
-    monkeypatch.setattr(front_to_back, "WORDS_AT_ONCE", WORDS_AT_ONCE // 2)
+    monkeypatch.setattr(bit_rows, "WORDS_AT_ONCE", WORDS_AT_ONCE // 2)
     tracemalloc.start()
     try:
         hits = fire(scene, weapon, at, accept=["default"], exclude=[5] * len(at), **how)

@@ -7,7 +7,6 @@ need no test. All functions map arrays to arrays; `jit.bit_rows` has the compile
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -113,8 +112,8 @@ def _aside(words: Words, column: Ints, step: Ints) -> Ints:
     return np.where(before, -step, step)
 
 
-WORDS_AT_ONCE = 2**17
-"""Words of pairs worked on at a time: 1 MB; with fewer, calls take longer, with more, the caches overflow."""
+WORDS_AT_ONCE = 2**16
+"""Words of pairs worked on at a time: 512 KB; with fewer, calls take longer, with more, the caches overflow."""
 
 _FULL = np.uint64(2**64 - 1)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
@@ -216,31 +215,30 @@ class Placed(NamedTuple):
     origin_y: Ints
 
 
-def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right: Ints) -> Words:
-    """Pixels (n, height) of tiles that no tile in front covers.
+# house: hit rule of areas
+def take_away(rows: Words, words: Words, of: Ints, front: Ints, right: Ints) -> None:
+    """Clear the pixels of rows (n, height) that tiles in front cover, because they end there.
 
     Parameters
     ----------
     words : flat rows of all tiles
-    begin : (n,) first row of each tile
-    of : (m,) sorted places of covered tiles, for pairs with a tile in front
-    front : (m,) row of the tile in front that lies on the covered tile's first row
+    of : (m,) rows that are covered, sorted
+    front : (m,) row of the tile in front that lies on the first of the covered ones
     right : (m,) columns by which the tile in front lies to the right, -63 .. 63
     """
-    seen = rows_of(words, height, begin)
-    every = every_stretch(words, height)
-    step = np.arange(len(of)) - np.searchsorted(of, of)
-    at_once = WORDS_AT_ONCE // height
-    by_step = np.argsort(step, kind="stable")
-    ends = np.searchsorted(step[by_step], np.arange(int(step.max(initial=-1)) + 2)).tolist()
-    for first, last in pairwise(ends):
-        for at in range(first, last, at_once):
-            now = by_step[at : min(at + at_once, last)]
-            cover = rows_at(every, front[now], height, words.dtype)
-            cover <<= np.maximum(right[now], 0).astype(np.uint64)[:, None]
-            cover >>= np.maximum(-right[now], 0).astype(np.uint64)[:, None]
-            seen[of[now]] &= ~cover
-    return seen
+    height = rows.shape[1]
+    step, every = max(WORDS_AT_ONCE // height, 1), every_stretch(words, height)
+    for first in range(0, len(of), step):
+        part = slice(first, first + step)
+        own, shift = of[part], right[part]
+        cover = rows_at(every, front[part], height, words.dtype)
+        cover <<= np.maximum(shift, 0).view(np.uint64)[:, None]
+        cover >>= np.maximum(-shift, 0).view(np.uint64)[:, None]
+        np.invert(cover, out=cover)
+        new = begins(own).nonzero()[0]
+        if len(new) < len(own):
+            own, cover = own[new], np.bitwise_and.reduceat(cover, new, axis=0)
+        rows[own] &= cover
 
 
 def cut_off(rows: Words, left: Ints, top: Ints, bounds: Box) -> None:

@@ -23,9 +23,6 @@ from .cells import Cells, listed_at, met_boxes
 if TYPE_CHECKING:
     from .shadows import Blockers
 
-WORDS_AT_ONCE = 2**16
-"""Words of pairs worked on at a time: 512 KB; with fewer, the calls of numpy take longer."""
-
 FRONTS_AT_ONCE = 2**14
 """Most pairs of tiles near the same placement that are all listed; of more, only those that meet are listed."""
 
@@ -151,7 +148,7 @@ def front_to_back(
     pairs, height = _near(placed, windows, tiles, rule, near)
     hides = not rule.pierce or len(tiles.occluder) > 0
     parts = []
-    for these in _parts(pairs, max(WORDS_AT_ONCE // height, 1), each):
+    for these in _parts(pairs, max(bit_rows.WORDS_AT_ONCE // height, 1), each):
         part, rows = these, _shared(placed, windows, tiles, these, height)
         if hides:
             kept = np.bitwise_or.reduce(rows, axis=1).nonzero()[0]
@@ -238,26 +235,13 @@ def _first(tiles: OrderedTiles, tile: Ints, top: Ints) -> Ints:
     return first
 
 
-# house: hit rule of areas
 def _hide(rows: Words, tiles: OrderedTiles, near: Near, pierce: bool) -> None:
     """Clear the pixels (n, height) that are covered by a tile in front at which they end."""
     of, front, right = _fronts(tiles, near, rows.shape[1])
     if pierce:
         ends = tiles.occluder[front].nonzero()[0]
         of, front, right = of[ends], front[ends], right[ends]
-    height = rows.shape[1]
-    step = max(WORDS_AT_ONCE // height, 1)
-    for first in range(0, len(of), step):
-        now = slice(first, first + step)
-        own, by = of[now], right[now]
-        cover = rows_of(tiles.words, height, _first(tiles, front[now], near.top[own]))
-        cover <<= np.maximum(by, 0).view(np.uint64)[:, None]
-        cover >>= np.maximum(-by, 0).view(np.uint64)[:, None]
-        np.invert(cover, out=cover)
-        new = begins(own).nonzero()[0]
-        if len(new) < len(own):
-            own, cover = own[new], np.bitwise_and.reduceat(cover, new, axis=0)
-        rows[own] &= cover
+    kernels_of(bit_rows).take_away(rows, tiles.words, of, _first(tiles, front, near.top[of]), right)
 
 
 def _shelter(

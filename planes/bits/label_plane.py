@@ -232,9 +232,7 @@ def _dirt(before: Ints, after: Ints, plane: Box) -> tuple[Ints, int]:
     was, now = _areas(old), _areas(new)
     around = np.concatenate([np.minimum(old[:, :2], new[:, :2]), np.maximum(old[:, 2:], new[:, 2:])], axis=1)
     joint = (was > 0) & (now > 0) & (_areas(around) <= was + now)
-    return np.concatenate([around[joint], old[~joint & (was > 0)], new[~joint & (now > 0)]]), int(
-        was.sum() + now.sum()
-    )
+    return np.concatenate([around[joint], old[~joint & (was > 0)], new[~joint & (now > 0)]]), int(was.sum() + now.sum())
 
 
 def _areas(boxes_xyxy: Ints) -> Ints:

@@ -76,7 +76,6 @@ class VisibleSet:
     view : what the shots accept
     """
 
-    # house: hit rule of areas
     def __init__(self, stack: Stack, tiles: Tiles, bounds: Box | None, view: View) -> None:
         there = view.accepts(stack)
         boxes = tiles.boxes(stack.box_xyxy)
@@ -182,10 +181,11 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
-    rows = kernels_of(bit_rows).visible(tiles.words, height, tiles.begin[which], of, tiles.begin[front] - down, right)
+    rows = bit_rows.rows_of(tiles.words, height, tiles.begin[which])
+    kernels_of(bit_rows).take_away(rows, tiles.words, of, tiles.begin[front] - down, right)
     if bounds is not None:
         bit_rows.cut_off(rows, boxes[:, 0], boxes[:, 1], bounds)
-    return np.asarray(rows)
+    return rows
 
 
 def cropped(rank: Ints, boxes_xyxy: Ints, rows: Words) -> OrderedTiles:

@@ -177,27 +177,21 @@ def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     return samples, *pixel_of(nearest, own, low - level)
 
 
-@compiled(types.void(WORDS, INTS, INTS, INTS, INTS, types.uint64[:, ::1]))
-def _visible(words, begin, of, front, right, seen):
-    height = seen.shape[1]
-    for tile in range(len(begin)):
-        for row in range(height):
-            seen[tile, row] = words[begin[tile] + row]
+@compiled(types.void(types.uint64[:, ::1], WORDS, INTS, INTS, INTS))
+def _take_away(rows, words, of, front, right):
     for pair in range(len(of)):
-        tile, shift = of[pair], right[pair]
-        for row in range(height):
+        own, shift = of[pair], right[pair]
+        for row in range(rows.shape[1]):
             cover = words[front[pair] + row]
             if shift >= 0:
-                seen[tile, row] &= ~(cover << np.uint64(shift))
+                rows[own, row] &= ~(cover << np.uint64(shift))
             else:
-                seen[tile, row] &= ~(cover >> np.uint64(-shift))
+                rows[own, row] &= ~(cover >> np.uint64(-shift))
 
 
-def visible(words: Words, height: int, begin: Ints, of: Ints, front: Ints, right: Ints) -> Words:
-    """See `bits.bit_rows.visible`."""
-    seen = np.empty((len(begin), height), np.uint64)
-    _visible(words, begin, of, front, right, seen)
-    return seen
+def take_away(rows: Words, words: Words, of: Ints, front: Ints, right: Ints) -> None:
+    """See `bits.bit_rows.take_away`."""
+    _take_away(rows, words, of, front, right)
 
 
 BEYOND = 2**40  # farther than any column
