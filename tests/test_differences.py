@@ -271,7 +271,7 @@ def test_of_a_batch_the_first_rows_are_told() -> None:
     assert lines[12] == "batch: and 48 more"
     assert lines[13].startswith("batch: verdicts: ")
     assert len(lines) == 14
-    assert differences(told(game()), told(game(), at=at)) == ["shots told as a batch, was shots told one by one"]
+    assert differences(told(game()), told(game(), at=at)) == ["shots listed as a batch, was shots listed one by one"]
 
 
 def test_a_change_that_only_samples_show_is_told() -> None:

@@ -197,7 +197,7 @@ def test_a_batch(tmp_path: Path) -> None:
     assert (
         "shot 6: object 0: 2 px more or less, tolerance_pixels=1" in alone(tmp_path, many(two), pixels=1, px=2).message
     )
-    assert alone(tmp_path, shot()).message.startswith("shots told one by one, was shots told as a batch")
+    assert alone(tmp_path, shot()).message.startswith("shots listed one by one, was shots listed as a batch")
 
 
 @pytest.mark.parametrize("first", ["hits", None])

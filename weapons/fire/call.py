@@ -5,8 +5,9 @@ scene, weapon, at -> checked shots -> `areas` or `rays.ray_call` -> hits
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, Unpack, overload
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -27,11 +28,39 @@ from .spans import QueryContext
 from .strategy import BROADPHASES, STRATEGIES, chosen_candidates, chosen_way
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from hitplanes.planes.scene.history import History
 
-    from ..kinds.arguments import Fired, Places
     from ..prepared.prepare import Ready
     from ..rays.ray_hits import RayHits
+
+    Angles = SupportsFloat | Sequence[SupportsFloat] | npt.NDArray[Any]
+    Places = Sequence[SupportsFloat] | Sequence[Sequence[SupportsFloat]] | Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
+    Wholes = SupportsIndex | Sequence[SupportsIndex] | npt.NDArray[Any]
+    Categories = str | Sequence[str] | Sequence[Sequence[str]] | Wholes
+    Owners = Wholes | Sequence[Sequence[SupportsIndex]]
+    """Numbers (N,), points (N, 2), whole numbers (N,), names or bits, and owners (N, K), for type checkers."""
+
+    class Filtered(TypedDict, total=False):
+        """What shots pass over, and the seed of their pellets, for type checkers; see `fire`."""
+
+        accept: Categories
+        blocked_by: Categories
+        exclude: Owners | None
+        seed: Wholes
+
+    class Fired(Filtered, total=False):
+        """All named arguments of `fire`, for type checkers."""
+
+        aim: Angles | None
+        toward: Places | None
+        shot: Wholes | None
+        tick: Angles | None
+        prefilter: str
+        broadphase: str
+        strategy: str
+
 
 AUTO = ("auto", "auto", "auto")
 """Pre-filter, broad phase and strategy of a call that names none."""

@@ -29,7 +29,7 @@ from .one_shot import Answer, Arguments, Filter, Present, answer_of, reach_of, r
 from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
-    from ..kinds.arguments import Angles, Filtered, Places, Wholes
+    from ..fire.call import Angles, Filtered, Places, Wholes
     from ..rays.ray_hits import RayHits
 
 AnyHits = TypeVar("AnyHits", bound=Hits, covariant=True)

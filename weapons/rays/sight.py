@@ -26,7 +26,7 @@ from .ray_walk import lines_of
 if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
-    from ..kinds.arguments import Angles, Categories, Owners, Places
+    from ..fire.call import Angles, Categories, Owners, Places
 
 Aimed = Callable[[Ints], tuple[Ints, Shots]]
 """Function that aims the shots of cells (n,) of a table; it returns the cells that have a shot, and the shots."""

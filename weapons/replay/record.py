@@ -58,7 +58,7 @@ from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
 
 if TYPE_CHECKING:
-    from ..kinds.arguments import Fired, Places
+    from ..fire.call import Fired, Places
 from ..report.phrases import Entry, by_path, first_of, key_of, pairs
 from ..report.phrases import shown as number_of
 

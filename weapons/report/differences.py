@@ -416,7 +416,7 @@ def _without(part: Entry, kind: str) -> dict[str, Any]:
 
 def _form_of(report: Entry) -> str:
     """Whether a report lists its shots one by one or as a batch, in words."""
-    return f"shots given {'as a batch' if isinstance(report.get('batch'), dict) else 'one by one'}"
+    return f"shots listed {'as a batch' if isinstance(report.get('batch'), dict) else 'one by one'}"
 
 
 def _name(entry: Entry) -> str:
