@@ -150,7 +150,7 @@ def _entry(place, width, start_256, step_256):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _between(flat, block, slot, x_256, y_256):  # type: ignore[no-untyped-def]
-    """Whether a ray starts on a border and touches a taken cell there, other than the slot that it enters."""
+    """Whether a ray starts on a border and touches a taken cell there, other than the one that it enters."""
     on_x, on_y = (x_256 & (SUB - 1)) == HALF, (y_256 & (SUB - 1)) == HALF
     if not (on_x or on_y):
         return False

@@ -299,7 +299,7 @@ def detail_of(context: QueryContext, weapon: Weapon, shots: Shots) -> Detail:
 
 
 def _refused_first(events: Events, start: Ints, samples: int) -> Ints:
-    """Rank of the first object that each sample would have hit, had nothing hidden it; -1 for none."""
+    """Rank of the first object that each sample would have hit, had nothing sheltered it; -1 for none."""
     own = np.full(samples, -1)
     hidden = events.take(np.flatnonzero(events.kind == SHELTERED)[::-1])
     event, x = each_pixel(hidden.x_first, hidden.x_last)

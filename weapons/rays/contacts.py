@@ -228,7 +228,7 @@ def find_contacts(lines: Lines, ray: Ints, rank: Ints, stack: Stack, bounds: Box
 
 
 def cells_most(lines: Lines, size_wh: Ints) -> Ints:
-    """Most cells of boxes of kept sizes (n, 2) that are looked at for a line."""
+    """Most cells of boxes of some sizes (n, 2) that are looked at for a line."""
     return np.asarray(np.minimum(size_wh.prod(axis=1), size_wh.max(axis=1) * (3 * lines.radius // SUB + 3)))
 
 
