@@ -72,7 +72,10 @@ class AreaWeapon(Weapon):
 
     def spans(self, c: int, s: int) -> Spans:
         """Pixels about the shot's pixel, aimed along the direction (c, s) of length 2**30."""
-        raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+        runs = self.runs(np.array([[c, s]]))
+        if runs is None:
+            raise InputError(f"weapon: expected a kind that has a pattern, got {type(self).__name__}")
+        return runs.spans()
 
     def runs(self, direction: Ints) -> RowRuns | None:
         """Runs of the patterns along several directions at once; None if this kind makes them one by one.
@@ -230,10 +233,6 @@ class Cone(AreaWeapon):
         """The reach."""
         return _snapped(self.reach)
 
-    def spans(self, c: int, s: int) -> Spans:
-        """A closed sector."""
-        return self.runs(np.array([[c, s]])).spans()
-
     def runs(self, direction: Ints) -> RowRuns:
         """Closed sectors, along directions (n, 2)."""
         runs: RowRuns = kernels_of(rasterize).cones(self.reach_256, direction, *self._half)
@@ -259,10 +258,6 @@ class Beam(AreaWeapon):
     def reach_256(self) -> int:
         """The length and half the width."""
         return _snapped(self.length) + _snapped(self.width / 2)
-
-    def spans(self, c: int, s: int) -> Spans:
-        """A segment with round ends."""
-        return self.runs(np.array([[c, s]])).spans()
 
     def runs(self, direction: Ints) -> RowRuns:
         """Segments with round ends, along directions (n, 2)."""
