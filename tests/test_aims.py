@@ -18,6 +18,7 @@ from hitplanes.planes.common.backend import COMPILED
 from hitplanes.planes.common.limits import REACH_MAX
 from hitplanes.planes.grid import fixed_point, rasterize, turns
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
+from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
 from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
 
@@ -96,14 +97,20 @@ def test_masks_are_turned_by_their_runs_as_by_their_pixels(mask: list[str], pivo
     runs = weapon.runs(aims)
     assert runs is not None
     for i, (c, s) in enumerate(aims.tolist()):
-        own = runs.shape == i
-        parts = [(first[own], last[own]) for first, last in runs.parts]
-        assert rasterize.RowRuns(runs.shape[own], runs.y[own], parts).spans() == weapon.spans(c, s)
+        assert spans_of(runs, i) == weapon.spans(c, s)
 
 
-def each_run(runs: rasterize.RowRuns, count: int) -> list[list[tuple[int, int, int]]]:
+def spans_of(runs: rasterize.RowRuns, i: int) -> Spans:
+    """Pixels of one of several shapes."""
+    own = runs.shape == i
+    return rasterize.RowRuns(
+        runs.shape[own], runs.y[own], [(first[own], last[own]) for first, last in runs.parts]
+    ).spans()
+
+
+def each_run(runs: rasterize.RowRuns, count: int) -> list[list[list[int]]]:
     """Runs of each shape as (y, first, last), united."""
-    return [list(zip(*(c.tolist() for c in (one.y, one.x_first, one.x_last)), strict=True)) for one in runs.each(count)]
+    return [spans_of(runs, i).runs().tolist() for i in range(count)]
 
 
 @settings(deadline=None)
@@ -280,8 +287,19 @@ def test_rings_at_several_aims_are_each_filled_by_the_even_odd_rule(rings: Any, 
     every, starts = np.concatenate([np.array(ring) for ring in rings]), np.cumsum([0, *map(len, rings)])[:-1]
     points = fixed_point.turned_to(every, np.concatenate([aimed_at(aims), [[ONE, 0]]]))
     for form in (rasterize, importlib.import_module(COMPILED[rasterize.__name__])):
-        found = list(form.polygons(points, starts).each(len(points)))
-        assert found == [rasterize.polygon(np.split(one, starts[1:])) for one in points]
+        runs, expected = form.polygons(points, starts), [rasterize.polygon(np.split(one, starts[1:])) for one in points]
+        assert [spans_of(runs, i) for i in range(len(points))] == expected
+        for (mask, corner_xy), spans in zip(runs.masks(len(points)), expected, strict=True):
+            assert Spans.from_mask(mask, corner_xy) == spans
+            assert mask.shape == spans.to_mask()[0].shape
+
+
+def test_masks_of_shapes_are_cropped_and_hold_any_number_of_runs_of_a_row() -> None:
+    runs = [(np.array([7, rasterize.WIDEST, 0]), np.array([9, -rasterize.WIDEST, k])) for k in range(300)]
+    shapes = rasterize.RowRuns(np.array([1, 1, 3]), np.array([4, 5, 6]), runs)
+    masks = [(mask.shape, mask.all(), corner_xy) for mask, corner_xy in shapes.masks(5)]
+    nothing = (0, 0), True, (0, 0)
+    assert masks == [nothing, ((1, 3), True, (7, 4)), nothing, ((1, 300), True, (0, 6)), nothing]
 
 
 @settings(deadline=None)

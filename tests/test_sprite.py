@@ -103,6 +103,7 @@ def sprite_of(mask: np.ndarray, pivot: tuple[int, int] | None = None) -> Sprite:
 @example(np.ones((3, 2), np.bool_), None, "x", (1.0, 1.0), 45.0, (128, -128))
 @example(np.eye(5, dtype=np.bool_), None, "none", (2.0, 0.5), -45.0, (0, 0))
 @example(np.ones((1, 1), np.bool_), (2000, -700), "xy", (0.3, 0.3), 135.0, (1, 1))
+@example(np.ones((60, 90), np.bool_), None, "none", (1 / 256, 8.0), 40.0, (1, 1))  # corners 120,000 px from the frame
 @example(np.ones((4, 3), np.bool_), (129, 127), "y", (1.5, 1.5), 90.0, (64, 192))
 def test_placed_mask_is_the_reference(
     jit: bool,
@@ -118,14 +119,17 @@ def test_placed_mask_is_the_reference(
 
 
 def mapping(rng: random.Random, frames: list[np.ndarray], grids: int) -> tuple[np.ndarray, variants.Grids]:
-    """Grids of one size and scale, a frame for each, with steps of a few parts, so that many places are on borders."""
-    which, unit = np.array([rng.randrange(len(frames)) for _ in range(grids)]), (rng.randint(1, 6), rng.randint(1, 6))
-    step = np.array([[[rng.randint(-9, 9) for _ in range(2)] for _ in range(2)] for _ in which])
-    first = np.array([
-        [rng.randint(-9, u * side + 9) for u, side in zip(unit, frames[k].shape[::-1], strict=True)] for k in which
-    ])  # fmt: skip
-    size = np.array([[rng.randint(1, 12), rng.randint(1, 12)]] * grids)
-    return which, variants.Grids(np.zeros_like(size), size, first, step, np.array([unit] * grids))
+    """Grids of one size, a frame and a scale for each, many of whose places are on borders, or a few parts beside."""
+    which, size = np.array([rng.randrange(len(frames)) for _ in range(grids)]), [rng.randint(1, 12), rng.randint(1, 12)]
+    fine, off = rng.choice([(1, 0), (1 << 20, 2), (1 << 40, 2)])
+    unit = np.array([[rng.randint(1, 6) * fine for _ in range(2)] for _ in which])
+    step = [[[rng.randint(-9, 9) * fine + rng.randint(-off, off) for _ in range(2)] for _ in range(2)] for _ in which]
+    sides = np.array([frames[k].shape[::-1] for k in which])
+    first = [
+        [rng.randint(-9, u * w // fine + 9) * fine for u, w in zip(*row, strict=True)]
+        for row in zip(unit.tolist(), sides.tolist(), strict=True)
+    ]
+    return which, variants.Grids(np.zeros_like(unit), np.array([size] * grids), np.array(first), np.array(step), unit)
 
 
 def squares_at(place: np.ndarray, unit: np.ndarray, shape: tuple[int, ...]) -> set[tuple[int, int]]:
@@ -146,7 +150,7 @@ def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(
     for plane, frame in zip(planes, frames, strict=True):
         plane[1 : frame.shape[0] + 1, 1 : frame.shape[1] + 1] = frame
     width, height = grids.size_wh.max(axis=0).tolist()
-    found = variants.resample(planes, which, grids.first, grids.step, tuple(grids.unit[0].tolist()), (width, height))
+    found = variants.resample(planes, which, grids.first, grids.step, grids.unit, (width, height))
     for n, j, i in itertools.product(range(3), range(height), range(width)):
         place = grids.first[n] + i * grids.step[n, :, 0] + j * grids.step[n, :, 1]
         inside = squares_at(place, grids.unit[n], (h, w))

@@ -7,10 +7,10 @@ y = 1   # # # # #      (1, 0, 4)
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise, starmap
+from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -320,12 +320,28 @@ class RowRuns(NamedTuple):
         filled = first <= last
         return Spans(self.y[filled], first[filled], last[filled])
 
-    def each(self, count: int) -> Iterator[Spans]:
-        """The pixels of each of so many shapes."""
-        edges = np.searchsorted(self.shape, np.arange(count + 1)).tolist()
-        for now in starmap(slice, pairwise(edges)):
-            parts = [(first[now], last[now]) for first, last in self.parts]
-            yield RowRuns(self.shape[now], self.y[now], parts).spans()
+    def masks(self, count: int) -> list[tuple[Bools, tuple[int, int]]]:
+        """Mask (h, w) of each of so many shapes, cropped to its pixels, and the position of its pixel [0, 0]."""
+        begin, end = self.parts[0]
+        for first, last in self.parts[1:]:
+            begin, end = np.minimum(begin, first), np.maximum(end, last)
+        rows = np.flatnonzero(begin <= end)  # the others are empty
+        starts = np.searchsorted(self.shape[rows], np.arange(count + 1))
+        full, box = np.flatnonzero(np.diff(starts)), np.zeros((4, count), np.int64)
+        top, low = self.y[rows[starts[full]]], self.y[rows[starts[full + 1] - 1]]
+        left, right = np.minimum.reduceat(begin[rows], starts[full]), np.maximum.reduceat(end[rows], starts[full])
+        box[:, full] = left, top, right - left + 2, low - top + 1  # a column beyond each mask, where its runs end
+        edges = np.concatenate([[0], np.cumsum(box[2] * box[3])])
+        shape = self.shape[rows]
+        line = edges[shape] + (self.y[rows] - box[1, shape]) * box[2, shape] - box[0, shape]
+        change = np.zeros(edges[-1], np.int8 if len(self.parts) < 128 else np.int32)
+        for first, last in self.parts:  # each has one run in a row, so no pixel is listed twice
+            here = np.flatnonzero(first[rows] <= last[rows])
+            change[line[here] + first[rows[here]]] += 1
+            change[line[here] + last[rows[here]] + 1] -= 1
+        held = np.cumsum(change, dtype=change.dtype, out=change) > 0
+        parts = zip(*box.tolist(), pairwise(edges.tolist()), strict=True)
+        return [(held[slice(*part)].reshape(h, w)[:, :-1], (x, y)) for x, y, w, h, part in parts]
 
 
 def in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:

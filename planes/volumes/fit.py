@@ -415,7 +415,7 @@ def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volu
 
 def _turned(points: Floats, form: Transform) -> Floats:
     """Vectors from the pivot, flipped, scaled and turned as the mask is."""
-    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]]) * form.signs[:, None]
+    x, y = (points / (1 << SCALE_BITS)).T * np.array([[form.scale_x], [form.scale_y]]) * np.array([form.signs]).T
     c, s = form.direction
     return np.stack([x * c - y * s, x * s + y * c], axis=1) / (1 << TRIG_BITS)
 
