@@ -29,6 +29,7 @@ from hitplanes import (
     Disc,
     InputError,
     Laser,
+    Pistol,
     Point,
     Polygon,
     Ring,
@@ -466,3 +467,22 @@ def test_a_weapon_that_was_fired_can_be_copied(weapon: Weapon) -> None:
     hits, told = fire(scene, weapon, (12, 12)), repr(weapon)
     for copied in (copy.deepcopy(weapon), pickle.loads(pickle.dumps(weapon))):
         assert copied == weapon and repr(copied) == told and fire(scene, copied, (12, 12)) == hits
+
+
+@pytest.mark.parametrize(
+    ("weapon", "text"),
+    [
+        (Point(), "Point()"),
+        (Disc(3), "Disc(radius=3.0)"),
+        (Disc(3, pierce=True, falloff="linear"), "Disc(radius=3.0, pierce=True, falloff='linear')"),
+        (Laser(None), "Laser(range=None)"),
+        (Spread(Pistol(9), count=3, radius=2), "Spread(pellet=Pistol(range=9.0), count=3, radius=2.0)"),
+    ],
+)
+def test_a_weapon_prints_as_what_made_it(weapon: Weapon, text: str) -> None:
+    assert repr(weapon) == text
+    assert eval(text, globals()) == weapon
+
+
+def test_a_long_weapon_prints_on_a_line() -> None:
+    assert len(repr(Stencil(np.ones((300, 300), np.bool_)))) < 100

@@ -848,3 +848,16 @@ def test_shapes_made_together_are_those_of_each_alone(rng: random.Random, count:
         alone = variant_of(other, form)
         assert np.array_equal(one.mask, alone.mask) and one.area == alone.area
         assert (one.pivot_x, one.pivot_y) == (alone.pivot_x, alone.pivot_y)
+
+
+@pytest.mark.parametrize(
+    ("sprite", "text"),
+    [
+        (Sprite.circle(3.5), "<Sprite: circle of radius 3.5 px>"),
+        (Sprite.polygon([(0, 0), (9, 0), (0, 9)]), "<Sprite: polygon of 3 points>"),
+        (Sprite.from_mask(np.ones((3, 4), np.bool_)), "<Sprite: 4 x 3 px>"),
+        (Sprite.from_images([np.zeros((4, 5, 4), np.uint8)] * 2), "<Sprite: 2 frames, the first 5 x 4 px>"),
+    ],
+)
+def test_a_sprite_prints_what_it_is(sprite: Sprite, text: str) -> None:
+    assert repr(sprite) == text

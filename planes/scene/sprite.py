@@ -97,7 +97,7 @@ class Outline:
     radius: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sprite(Known):
     """The look and the mask of an object: frames of image and mask, or one shape. The class methods make sprites.
 
@@ -120,6 +120,14 @@ class Sprite(Known):
         if not (isinstance(self.frames, tuple) and all(isinstance(frame, Frame) for frame in self.frames)):
             how = "Sprite.from_mask and Sprite.from_image make sprites of arrays"
             raise InputError(f"frames: expected a tuple of frames, got {shown(self.frames)}: {how}")
+
+    def __repr__(self) -> str:
+        sizes = [f"{frame.mask.shape[1]} x {frame.mask.shape[0]} px" for frame in self.frames]
+        what = f"{len(sizes)} frames, the first {sizes[0]}" if len(sizes) > 1 else "".join(sizes)
+        if self.outline is not None:
+            points, radius = sum(map(len, self.outline.rings)), self.outline.radius
+            what = f"polygon of {points} points" if radius is None else f"circle of radius {radius / SUB:g} px"
+        return f"<Sprite: {what}>"
 
     @classmethod
     def from_image(

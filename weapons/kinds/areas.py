@@ -32,7 +32,7 @@ ORIGIN, ONE_RING = np.zeros(2, np.int64), np.zeros(1, np.int64)
 RING = Numbers((None, 2), REACH_MAX / 2, least=3)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AreaWeapon(Weapon):
     """A weapon of one pattern.
 
@@ -91,7 +91,7 @@ class AreaWeapon(Weapon):
         return None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Point(AreaWeapon):
     """One pixel."""
 
@@ -102,7 +102,7 @@ class Point(AreaWeapon):
         return disc(0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Disc(AreaWeapon):
     """All pixels whose centres are at most `radius` px away: a blast."""
 
@@ -120,7 +120,7 @@ class Disc(AreaWeapon):
         return disc(_snapped(self.radius))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ring(AreaWeapon):
     """All pixels whose centres are `inner_radius` to `outer_radius` px away: a shock wave."""
 
@@ -145,7 +145,7 @@ class Ring(AreaWeapon):
         return ring(_snapped(self.inner_radius), _snapped(self.outer_radius))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Box(AreaWeapon):
     """A box of `width` x `height` px, turned with the aim; an even side is centred right of, or below, the pixel."""
 
@@ -175,7 +175,7 @@ class Box(AreaWeapon):
         return np.array([(left, top), (right, top), (right, low), (left, low)], np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Polygon(AreaWeapon):
     """A polygon about the shot, turned with the aim; convex or not, with holes, filled by the even-odd rule.
 
@@ -215,7 +215,7 @@ class Polygon(AreaWeapon):
         return np.cumsum([0, len(self.points), *map(len, self.holes)])[:-1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cone(AreaWeapon):
     """All pixels whose centres are at most `reach` px away and at most `angle` / 2 degrees off the aim: a flame.
 
@@ -244,7 +244,7 @@ class Cone(AreaWeapon):
         return unit_of(self.angle / 2)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Beam(AreaWeapon):
     """Pixels whose centres are at most `width` / 2 px from a segment of `length` px, and the segment's supercover."""
 
@@ -270,7 +270,7 @@ class Beam(AreaWeapon):
         return ORIGIN, turned(np.array([_snapped(self.length), 0]), c, s), _snapped(self.width / 2)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stencil(AreaWeapon):
     """A mask as the pattern, turned with the aim like a sprite.
 
@@ -327,7 +327,7 @@ class Stencil(AreaWeapon):
 Pellet = TypeVar("Pellet", bound=AreaWeapon | RayWeapon, covariant=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spread(Weapon, Generic[Pellet]):
     """A shotgun: `count` pellets of a weapon, with offsets uniform over a disc of `radius` px.
 
@@ -348,7 +348,7 @@ class Spread(Weapon, Generic[Pellet]):
 Repeated = TypeVar("Repeated", bound=AreaWeapon | RayWeapon | Spread[Any] | Sweep, covariant=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rounds(Weapon, Generic[Repeated]):
     """A burst: `count` rounds of a weapon, each shifted and turned by the recoil of those before it.
 

@@ -19,7 +19,7 @@ from .weapon import FALLOFFS, LENGTH, Part, Weapon
 INSIDE = ("hit", "ignore_until_exit", "error")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RayWeapon(Weapon):
     """A weapon of one ray, which touches items in order of distance, and ends at the first occluder.
 
@@ -57,7 +57,7 @@ class RayWeapon(Weapon):
         return None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Laser(RayWeapon):
     """A ray that goes through all objects.
 
@@ -95,7 +95,7 @@ class Laser(RayWeapon):
         return self.falloff
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pistol(Laser):
     """A ray that ends at the first object that it hits."""
 
@@ -107,7 +107,7 @@ class Pistol(Laser):
         return 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rifle(Laser):
     """A ray that goes through objects until it has hit `max_hits` of them, or has spent its budget.
 
@@ -139,7 +139,7 @@ class Rifle(Laser):
         return None if self.budget is None else int(snap(self.budget))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Projectile(RayWeapon):
     """A disc that flies through one frame, while objects that have a velocity move; it ends at what it touches first.
 
@@ -183,7 +183,7 @@ class Projectile(RayWeapon):
 FULL_CIRCLE = 360
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Weapon):
     """A fan of `count` rays of a weapon, spread evenly over `angle` degrees about the aim.
 

@@ -46,7 +46,7 @@ class Part(Ref):
         return value
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Weapon:
     """The base of all weapons; two weapons are equal when their JSON is equal."""
 
@@ -68,6 +68,15 @@ class Weapon:
 
     def __hash__(self) -> int:
         return hash(self.text)
+
+    def __repr__(self) -> str:
+        """The fields that are not at their defaults; those that have none come first, as they are given first."""
+        told = {
+            f.name: (f.default, getattr(self, f.name))
+            for f in sorted(fields(self), key=lambda f: f.default is not MISSING)
+        }
+        texts = [f"{name}={shown(value)}" for name, (default, value) in told.items() if value != default]
+        return f"{type(self).__name__}({', '.join(texts)})"
 
     def _keep(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
