@@ -205,8 +205,7 @@ class Tiles:
     Parameters
     ----------
     rank : (T,) place in the stack of each tile's item, rising
-    left, top : (T,) corner of the tile on its item's mask, px
-    size_wh : (T, 2) px, up to 64
+    inside_xyxy : (T, 4) inclusive box of the tile on its item's mask, up to 64 px wide and high
     begin : (T,) first row in `words`
     words : flat rows of all tiles
     whole : whether each item is one tile
@@ -214,9 +213,7 @@ class Tiles:
     """
 
     rank: Ints
-    left: Ints
-    top: Ints
-    size_wh: Ints
+    inside_xyxy: Ints
     begin: Ints
     words: Words
     whole: bool
@@ -241,8 +238,10 @@ class Tiles:
         """Inclusive boxes (T, 4) of tiles, from the boxes (M, 4) of the stack's items."""
         if self.whole:
             return items_xyxy
-        corner = np.stack([items_xyxy[self.rank, 0] + self.left, items_xyxy[self.rank, 1] + self.top], axis=1)
-        return np.concatenate([corner, corner + self.size_wh - 1], axis=1)
+        boxes: Ints = items_xyxy.take(self.rank, axis=0)
+        boxes[:, 2:] = boxes[:, :2]
+        boxes += self.inside_xyxy
+        return boxes
 
     def big(self, stride: int) -> BigTiles:
         """Tiles as integers of a stride, by `begin`."""
@@ -307,8 +306,8 @@ class TileAtlas:
         slot = first[rank] + place
         columns = self._columns.take(slot, axis=0)
         whole &= not columns[:, :2].any()
-        left, top, size = columns[:, 0], columns[:, 1], columns[:, 2:]
-        return Tiles(rank, left, top, size, slot * STRIDE + WORD, self.words, whole, self._bigs)
+        inside = np.concatenate([columns[:, :2], columns[:, :2] + columns[:, 2:] - 1], axis=1)
+        return Tiles(rank, inside, slot * STRIDE + WORD, self.words, whole, self._bigs)
 
     def _found(self, mask_of: Callable[[int], Bools], number: Ints) -> Ints:
         """First slot and count (2, M) of each mask of a stack; masks that the atlas does not hold are added."""

@@ -178,7 +178,7 @@ def _rows(tiles: Tiles, boxes_xyxy: Ints, bounds: Box | None, which: Ints, of: I
     which : (V,) the tiles to look at
     of, front : (n,) pairs of a place in `which`, sorted, and a tile that covers it
     """
-    height = -(-int(tiles.size_wh[which, 1].max(initial=1)) // 8) * 8
+    height = -(-int((tiles.inside_xyxy[which, 3] - tiles.inside_xyxy[which, 1]).max(initial=0) + 1) // 8) * 8
     boxes = boxes_xyxy[which]
     right, down = (boxes_xyxy[front, :2] - boxes[of, :2]).T
     rows = bit_rows.rows_of(tiles.words, height, tiles.begin[which])

@@ -409,9 +409,12 @@ class Items:
         seen, decided = self._decided
         if seen != self.version:
             changes = self.changes(seen)
-            boxes = ((version, box) for version, _, *both in changes or () for box in both)
-            last = next((version for version, box in boxes if _is_there(box)), decided)
-            self._decided = self.version, self.version if changes is None else last
+            last = self.version if changes is None else decided
+            for version, _, before, after in changes or ():
+                if _is_there(before) or _is_there(after):
+                    last = version
+                    break
+            self._decided = self.version, last
         return self._decided[1]
 
     def changed_ids(self, version: int) -> Ints | None:
