@@ -20,7 +20,7 @@ from hitplanes.planes.grid import fixed_point, rasterize, turns
 from hitplanes.planes.grid.fixed_point import ONE, all_quarters, quarters, turned, unit, unit_toward
 from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.kinds.areas import FEW_AIMS, AreaWeapon, pattern_of, patterns_of
-from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of_bits, columns_of
+from hitplanes.weapons.kinds.weapon import AimedPatterns, big_of, big_of_bits, columns_of
 
 STAR = Polygon([(0, 0), (50, 10), (30, 40), (20, 10)])
 WEAPONS: dict[str, AreaWeapon] = {
@@ -79,6 +79,15 @@ def test_bit_rows_of_all_directions_are_those_of_each(name: str, jit: bool) -> N
             across = spans.pixels() @ np.array([a, b])
             assert (low, high) == (across.min(), across.max())
     assert begin == len(bits.words) and not bits.words[:64].any()
+
+
+def test_weights_of_integers_are_those_of_the_pattern_however_it_was_made(jit: bool) -> None:
+    weapon = Cone(40, 50, falloff="smooth")
+    patterns = patterns_of(weapon, directions(8 + jit, 12))
+    assert isinstance(patterns, AimedPatterns)
+    for big, pattern in zip(patterns.bigs, patterns, strict=True):
+        assert pattern.prefix is not None
+        assert big.weight(big.rows, pattern.spans.count) == big_of(pattern).weight(big.rows, 0) == pattern.prefix[-1]
 
 
 WHOLE_SIDES = [(3, 4), (5, 12), (8, 15), (7, 24), (20, 21), (63, 16)]

@@ -72,7 +72,8 @@ def test_random_piles() -> None:
     """Filters, layers, bounds, wide masks, single pixels; a few shots at a time."""
     rng, rows = np.random.default_rng(4), 0
     weapons: list[Weapon] = [
-        Disc(9.3), Disc(12, pierce=True), Disc(40), Box(5, 4), Stencil([".."]), Rounds(Disc(5), 3, (3, 2))
+        Disc(9.3), Disc(12, pierce=True), Disc(40), Box(5, 4), Stencil([".."]), Rounds(Disc(5), 3, (3, 2)),
+        Disc(30, falloff="linear"), Box(41, 7, falloff="smooth"), Rounds(Disc(11, falloff="smooth"), 2, (5, 0)),
     ]  # fmt: skip
     for _ in range(120):
         scene = some_scene(rng, 40, 20)
@@ -82,6 +83,19 @@ def test_random_piles() -> None:
         assert hits == fire(scene, weapon, at, strategy="direct", **how)
         rows += len(hits)
     assert rows > 100
+
+
+def test_weights_of_a_subset_are_added_up_with_planes_and_without() -> None:
+    rng = np.random.default_rng(5)
+    spans, weights = Spans.from_mask(rng.random((9, 80)) < 0.7, (-3, -4)), rng.integers(0, 65536, 700)
+    pattern = big_pattern(spans, weights[: spans.count])
+    before = pattern.nbytes
+    for _ in range(20):
+        chosen = rng.random(spans.count) < rng.random()
+        rows = sum(1 << int(y + 4) * pattern.stride + int(x + 3) for x, y in spans.pixels()[chosen].tolist())
+        assert pattern.weight(rows, int(chosen.sum())) == int(weights[: spans.count][chosen].sum())
+    assert before == pattern.nbytes > big_pattern(spans).nbytes
+    assert big_pattern(spans).weight(0b101, 2) == 2 * 65535
 
 
 @pytest.mark.parametrize("bounds", [(-9, -9, 9, 9), (-2, -9, 9, 9), (-9, 0, 9, 9), (-9, -9, 1, 9), (-9, -9, 9, -1)])

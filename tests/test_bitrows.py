@@ -402,12 +402,14 @@ def test_an_atlas_grows_and_drops_masks(monkeypatch: pytest.MonkeyPatch) -> None
         assert atlas.tiles([].__getitem__, np.array(number), forms) is tiles
         for rank, one in enumerate(number):
             own = [k for k in range(len(tiles)) if tiles.rank[k] == rank]
-            told = [pixels_in(words, int(tiles.begin[k]), int(tiles.left[k]), int(tiles.top[k]), 64) for k in own]
+            inside = [tiles.inside_xyxy[k].tolist() for k in own]
+            told = [pixels_in(words, tiles.begin.item(k), x, y, 64) for k, (x, y, *_) in zip(own, inside, strict=True)]
             assert set().union(*told) == pixels_of(made[one], 0, 0)
-            assert [set(tiles.size_wh[k].tolist()) for k in own] == [
-                {min(64, made[one].shape[1] - tiles.left[k]), min(64, made[one].shape[0] - tiles.top[k])} for k in own
+            high, wide = made[one].shape
+            assert [box[2:] for box in inside] == [
+                [min(x + 64, wide) - 1, min(y + 64, high) - 1] for x, y, *_ in inside
             ]
-        assert tiles.whole == (tiles.rank.tolist() == list(range(len(number))) and not (tiles.left | tiles.top).any())
+        assert tiles.whole == (tiles.rank.tolist() == list(range(len(number))) and not tiles.inside_xyxy[:, :2].any())
         assert all(np.array_equal(old.words[b : b + 64], kept[b : b + 64]) for b in old.begin.tolist())
         assert len(atlas.words) <= 128 * STRIDE and len(atlas._columns) * STRIDE == len(atlas.words)
         old, kept = tiles, words

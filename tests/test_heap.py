@@ -20,8 +20,8 @@ if told is None:
 told.restype = Told
 
 scene = Scene()
-scene.add(np.ones((9, 9), np.bool_), (20, 20))
-fire(scene, Disc(3), {at})
+mask = scene.add(np.ones((9, 9), np.bool_), (20, 20))
+{then}
 before = told().blocks
 block = np.empty(2**23, np.uint8)
 print(told().blocks > before)
@@ -29,10 +29,17 @@ print(told().blocks > before)
 
 
 @pytest.mark.parametrize("environment", [{}, {"MALLOC_TRIM_THRESHOLD_": "131072"}], ids=["plain", "as in a container"])
-@pytest.mark.parametrize(("at", "from_the_system"), [("(0, 0)", True), ("np.zeros((2, 2))", False)])
-def test_a_batch_lets_large_blocks_be_kept(at: str, from_the_system: bool, environment: dict[str, str]) -> None:
+@pytest.mark.parametrize(
+    ("then", "from_the_system"),
+    [
+        ("fire(scene, Disc(3), (0, 0)); scene.set(mask, angle=3)", True),
+        ("fire(scene, Disc(3), np.zeros((2, 2)))", False),
+        ("scene.set([mask, scene.add(np.eye(3) > 0, (0, 0))], angle=3)", False),
+    ],
+)
+def test_a_batch_lets_large_blocks_be_kept(then: str, from_the_system: bool, environment: dict[str, str]) -> None:
     """Also where a variable of the environment switches off that the library learns it by itself."""
-    command = [sys.executable, "-c", BLOCKS.format(at=at)]
+    command = [sys.executable, "-c", BLOCKS.format(then=then)]
     run = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **environment})
     if "no glibc" in run.stderr:
         pytest.skip("another C library")

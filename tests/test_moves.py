@@ -101,9 +101,9 @@ def test_the_stack_after_any_change_is_the_one_made_anew(
 def masks_of(tiles: Tiles, stack: Stack) -> list[Any]:
     """The masks of a stack, put together of tiles, each of which has a pixel."""
     masks = [np.zeros_like(stack.mask(rank)) for rank in range(len(stack))]
-    for rank, left, top, (width, height), begin in zip(
-        *(column.tolist() for column in (tiles.rank, tiles.left, tiles.top, tiles.size_wh, tiles.begin)), strict=True
-    ):
+    columns = (column.tolist() for column in (tiles.rank, tiles.inside_xyxy, tiles.begin))
+    for rank, (left, top, right, low), begin in zip(*columns, strict=True):
+        width, height = right - left + 1, low - top + 1
         words = tiles.words[begin - 64 : begin + 128].tolist()
         assert not any(words[:64]) and not any(words[64 + height :]) and any(words)
         for y, x in np.ndindex(height, width):

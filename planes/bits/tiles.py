@@ -23,13 +23,14 @@ import numpy.typing as npt
 
 from ..common import costs
 from ..common.checks import Bools, Ints
+from ..common.limits import WEIGHT_FULL
 from ..grid.spans import Box, Spans, ragged
 from ..scene.items import Stack
 from .bit_rows import WORD, Placed, Words, packed
 from .front_to_back import NO_NUMBERS, OrderedTiles
 
 OFTEN = 8
-"""Answers of a pattern after which the planes of its depths are made; they take as long as so many answers."""
+"""Answers of a pattern after which the planes of its depths, and of its weights, are made; they take as long."""
 
 PATTERN_BYTES = 500
 """Memory of a pattern beside its pixels, bytes."""
@@ -116,6 +117,40 @@ class Depths:
         return [packed_integer(plane, self._stride) for plane in mask]
 
 
+class Weights:
+    """Sums of the weights of subsets of a pattern.
+
+    Each binary digit of the weights has a plane of the pixels whose weight has a 1 there.
+
+    Parameters
+    ----------
+    each : (h, w) weight of each pixel of the pattern's box, up to WEIGHT_FULL
+    stride : of the integers
+    """
+
+    def __init__(self, each: Ints, stride: int) -> None:
+        self._each, self._stride = each, stride
+        self._planes: list[int] | None = None
+        self._calls = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the weights and of the planes."""
+        planes = WEIGHT_FULL.bit_length() * len(self._each) * self._stride // 7
+        return planes + int(self._each.nbytes)
+
+    def of(self, bits: int) -> int:
+        """Sum of the weights of a subset."""
+        if self._planes is None:
+            self._calls += 1
+            if self._calls <= OFTEN:
+                x, y = pixels_of(bits, self._stride).T
+                return int(self._each[y, x].sum())
+            digits = [self._each >> digit & 1 == 1 for digit in range(WEIGHT_FULL.bit_length())]
+            self._planes = [packed_integer(plane, self._stride) for plane in digits]
+        return sum((bits & plane).bit_count() << digit for digit, plane in enumerate(self._planes))
+
+
 @dataclass(frozen=True, eq=False)
 class BigPattern:
     """A pattern as one integer, whose stride leaves room for a tile on either side.
@@ -127,6 +162,7 @@ class BigPattern:
     stride : a multiple of WORD
     rows : the pixels
     depths : the planes that find the nearest pixel
+    weights : of the pixels; None if all are at full weight
     """
 
     x: int
@@ -136,11 +172,16 @@ class BigPattern:
     stride: int
     rows: int
     depths: Depths
+    weights: Weights | None = None
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the pixels and of the planes of their depths."""
-        return PATTERN_BYTES + self.depths.nbytes
+        """Bytes of the pixels and of the planes of their depths and weights."""
+        return PATTERN_BYTES + self.depths.nbytes + (self.weights.nbytes if self.weights else 0)
+
+    def weight(self, bits: int, count: int) -> int:
+        """Sum of the weights of a subset of so many pixels."""
+        return self.weights.of(bits) if self.weights else count * WEIGHT_FULL
 
     def within(self, x: int, y: int, bounds: Box) -> int:
         """Its pixels within bounds, if it is placed on pixel (x, y)."""
@@ -160,12 +201,16 @@ def stride_of(wide: int) -> int:
     return WORD * -(-(wide + WORD - 1) // WORD)
 
 
-def big_pattern(spans: Spans) -> BigPattern:
-    """A pattern as one integer."""
+def big_pattern(spans: Spans, weights: Ints | None = None) -> BigPattern:
+    """A pattern as one integer; `weights` (n,) are those of its pixels, row by row."""
     x, y, x_max, y_max = spans.box_xyxy or (0, 0, 0, 0)
-    stride = stride_of(x_max - x + 1)
+    wide, high, stride = x_max - x + 1, y_max - y + 1, stride_of(x_max - x + 1)
     rows = rows_of_spans(spans, (x, y), stride)
-    return BigPattern(x, y, x_max - x + 1, y_max - y + 1, stride, rows, Depths(rows, stride, x, y))
+    if weights is None:
+        return BigPattern(x, y, wide, high, stride, rows, Depths(rows, stride, x, y))
+    each, pixels = np.zeros((high, wide), np.int64), spans.pixels()
+    each[pixels[:, 1] - y, pixels[:, 0] - x] = weights
+    return BigPattern(x, y, wide, high, stride, rows, Depths(rows, stride, x, y), Weights(each, stride))
 
 
 class BigTiles(dict[int, int]):
@@ -371,8 +416,8 @@ class TileAtlas:
         return np.asarray(columns[full, 0])
 
 
-Hit = tuple[int, int, int, int, int, int]
-"""Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels."""
+Hit = tuple[int, int, int, int, int, int, int]
+"""Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels, and their weight."""
 
 Pair = tuple[int, int, int, int, int, bool]
 """Placement, and a tile near it: left, top, first row in the atlas, rank of its item, whether that is an occluder."""
@@ -449,8 +494,8 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: G
         hit = (rows << shift if shift >= 0 else rows >> -shift) & rest
         if hit:
             if not blocks:
-                distance2, down, right = nearest(hit)
-                yield placement, distance2, y + down, x + right, rank, hit.bit_count()
+                (distance2, down, right), count = nearest(hit), hit.bit_count()
+                yield placement, distance2, y + down, x + right, rank, count, pattern.weight(hit, count)
             if blocks or not pierce:
                 rest ^= hit
                 if not rest:
@@ -465,6 +510,6 @@ def _in_order(hits: list[Hit], ground: Ground) -> list[Hit]:
         for hit in hits:
             key = hit[0], hit[4]
             other = every.get(key)
-            every[key] = hit if other is None else (*min(hit[:5], other[:5]), hit[5] + other[5])
+            every[key] = hit if other is None else (*min(hit[:5], other[:5]), hit[5] + other[5], hit[6] + other[6])
         hits = list(every.values())
     return sorted(hits)

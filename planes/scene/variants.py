@@ -220,7 +220,8 @@ def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> 
 
 def _made(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
     """Make masks; frames that are scaled, or turned by more than quarter turns, are mapped together."""
-    keep_arena()
+    if len(forms) > 1:
+        keep_arena()
     made, mapped, polygons = {}, {}, {}
     for row, (sprite, form) in enumerate(zip(sprites, forms, strict=True)):
         if sprite.outline is not None and sprite.outline.radius is not None:

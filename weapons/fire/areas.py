@@ -303,9 +303,9 @@ def by_integers(request: Request, context: QueryContext) -> list[Rows]:
     plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)
     near = accepted(met_boxes(placements.boxes, ground.boxes_xyxy), ground, shots, placements.shot)
     hits = hit_by_few(placed_of(placements), patterns, near, ground)
-    columns = np.array(hits, np.int64).reshape(-1, 6).T
-    turn, distance2, y, x, rank, samples = columns
-    rows = _rows_of(placements, RoundHits(turn, rank, samples, distance2, x, y), request.stack.ids)
+    turn, distance2, y, x, rank, samples, weight = np.array(hits, np.int64).reshape(-1, 7).T
+    found = RoundHits(turn, rank, samples, distance2, x, y, weight)
+    rows = _rows_of(placements, found, request.stack.ids)
     plan.run("samples", "counted in integers, front to back: boxes, filters and occluders, too", rows.nbytes)
     return [rows]
 

@@ -122,8 +122,8 @@ def _integers_refuse(request: Request) -> str:
         return "kernels are compiled"
     if request.filtered:
         return "a pre-filter is asked for"
-    if request.traits.scattered or request.traits.weighted:
-        return "there are pellets or weights"
+    if request.traits.scattered:
+        return "there are pellets"
     if request.traits.reach > INTEGERS_REACH:
         return f"patterns reach farther than {INTEGERS_REACH} px"
     if request.blockers is not None:

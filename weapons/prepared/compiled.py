@@ -26,7 +26,7 @@ from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
-from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, RANK, SAMPLES, X, Y, match_rounds
+from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, RANK, SAMPLES, SUMS, WEIGHT, X, Y, match_rounds
 from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
@@ -51,12 +51,12 @@ MAKE_VISIBLE = -1
 UNKNOWN = -2
 """Returned by `_shot` instead of a number of rows: the shot is left to `fire`."""
 
-ROW = 5
-"""Numbers of a row: item, samples, squared distance, x, y."""
+ROW = 6
+"""Numbers of a row: item, samples, squared distance, x, y, weight."""
 
 ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
-read = struct.Struct("5q").unpack_from
-NO_SUMS, NO_STRIPS, ZERO = np.zeros(0, np.uint32), np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
+read = struct.Struct("6q").unpack_from
+NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 
 NUMBERS, GRID = types.Array(types.int64, 1, "C", readonly=True), types.UniTuple(types.int64, 5)
 BOUNDS = types.UniTuple(types.int64, 4)
@@ -93,10 +93,13 @@ class ShapeType(types.StructRef):
 
 
 class Shape(structref.StructRefProxy):
-    """A round in kernels: columns `box`, `first`, `rows` and `words` of `PatternBits`, of one pattern."""
+    """A round in kernels: columns of `PatternBits`, of one pattern without a strip."""
 
 
-OF_SHAPE = [("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1])]
+OF_SHAPE = [
+    ("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1]), ("sums", SUMS),
+    ("first_sum", NUMBERS),
+]  # fmt: skip
 
 
 def struct_of(proxy: type, of: type, fields: list[tuple[str, Any]]) -> Any:
@@ -115,8 +118,8 @@ def _shot_tiles(item, rank, box, begin, words, occluder, grid, cell_begin, liste
 
 
 @compiled(SHAPE(*[of for _, of in OF_SHAPE]))
-def _shape(box, first, rows, words):
-    return Shape(box, first, rows, words)
+def _shape(box, first, rows, words, sums, first_sum):
+    return Shape(box, first, rows, words, sums, first_sum)
 
 
 @compiled(types.int64(types.float64, types.float64, SHOT_TILES, SHAPE, types.int64[:, ::1]), nogil=False)
@@ -139,7 +142,7 @@ def _shot(at_x, at_y, tiles, shape, found):
     x[0], y[0] = column, row
     turn, rows, _ = match_rounds(
         0, 1, 0, out, ZERO, x, y, x, y,
-        shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, NO_SUMS, ZERO,
+        shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, shape.sums, shape.first_sum,
         tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, none, none,
         left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, none, NOBODY, 1,
     )  # fmt: skip
@@ -148,6 +151,7 @@ def _shot(at_x, at_y, tiles, shape, found):
     for row in range(rows):
         found[row, 0], found[row, 1], found[row, 2] = tiles.item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
         found[row, 3], found[row, 4] = out[X, row], out[Y, row]
+        found[row, 5] = out[WEIGHT, row] if len(shape.sums) else WEIGHT_FULL * out[SAMPLES, row]
     return rows
 
 
@@ -227,12 +231,12 @@ class PositionCache:
                     return look(x, y, hits)
                 view, at, end = buffer[1], 0, ROW_BYTES * count
                 while at < end:  # faster than a range
-                    item, n, distance2, column, row = read(view, at)
-                    tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (column, row), distance2)))
+                    item, n, distance2, column, row, weight = read(view, at)
+                    tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (column, row), distance2)))
                     at += ROW_BYTES
             buffers.append(buffer)
 
-        return look, PIECE_BYTES + fired.pattern.bits.words.nbytes
+        return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes
 
     def _make_visible(self) -> None:
         with self._lock:
@@ -245,7 +249,7 @@ class PositionCache:
 def _shape_of(fired: Round) -> Any:
     """The Shape of a round."""
     bits = fired.pattern.bits
-    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words)
+    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words, bits.sums, bits.first_sum)
 
 
 @structref.register

@@ -55,11 +55,11 @@ class Round(NamedTuple):
 def reach_of(weapon: Weapon) -> int | None:
     """Greatest distance of a pixel of an area weapon from that of its round, px.
 
-    None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position or have weights, or
-    if a line of sight is needed.
+    None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position, if pellets have
+    weights, or if a line of sight is needed.
     """
     burst, spread, plain = parts_of(weapon)
-    if plain.line_of_sight or plain.falloff or (burst and (snap(burst.recoil_xy) % SUB).any()):
+    if plain.line_of_sight or (spread and plain.falloff) or (burst and (snap(burst.recoil_xy) % SUB).any()):
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
     reach += int(snap(spread.radius)) // SUB if spread else 0
@@ -150,8 +150,7 @@ class Answer(Hits):
     _present: Present
     _at: tuple[float, float]
     _arguments: Arguments = (None, None, None)
-    _weighted = False
-
+    _weighted: cached_attribute[bool] = cached_attribute(lambda hits: parts_of(hits.weapon)[2].falloff is not None)
     scene: cached_attribute[Scene] = cached_attribute(lambda hits: hits._present.scene)
     version: cached_attribute[int] = cached_attribute(lambda hits: hits._present.version)
     _stack: cached_attribute[Stack] = cached_attribute(lambda hits: hits._present.stack)

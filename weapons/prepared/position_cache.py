@@ -17,7 +17,7 @@ import numpy as np
 from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, hit_by_one, integers_ns
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
-from hitplanes.planes.common.limits import POSITION_MAX, WEIGHT_FULL
+from hitplanes.planes.common.limits import POSITION_MAX
 from hitplanes.planes.grid.spans import meets
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -57,9 +57,9 @@ Square = tuple[SeenTile, ...]
 UNMADE: Square = ((0, 0, 0, 0, 0, 0),)
 """Stands for a square that is not made yet."""
 
-Shared = tuple[int, int, int, int, int, int]
+Shared = tuple[int, int, int, int, int, int, int]
 """Hit of a round on an object: squared distance, y and x of the nearest pixel, relative to the round's pixel; a number
-that rises from front to back; id of the object; number of pixels."""
+that rises from front to back; id of the object; number of pixels, and their weight."""
 
 Look = Callable[[Any, Any, Answer], None]
 """Function (x, y, answer) that appends the hits of a round at pixel (x, y) to an answer, in order.
@@ -153,8 +153,8 @@ class PositionCache:
             shared: list[Shared] = []
             square = made[x >> CELL_SHIFT][y >> CELL_SHIFT]
             if square is UNMADE:
-                for distance2, py, px, item, n in self._walked(pattern, x, y):
-                    tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (px, py), distance2)))
+                for distance2, py, px, item, n, weight in self._walked(pattern, x, y):
+                    tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (px, py), distance2)))
                 return
             left, top, last = x + first_x, y + first_y, -1
             right, bottom = left + wide, top + high
@@ -166,16 +166,17 @@ class PositionCache:
                     shift = (y_min - top) * stride + x_min - left
                     hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
                     if hit:
-                        own: Shared = (*nearest(hit), len(shared), item, hit.bit_count())  # front to back
+                        n = hit.bit_count()
+                        own: Shared = (*nearest(hit), len(shared), item, n, pattern.weight(hit, n))  # front to back
                         if item == last:
                             other = shared.pop()
-                            own = (*min(own[:3], other[:3]), other[3], item, own[5] + other[5])
+                            own = (*min(own[:3], other[:3]), other[3], item, n + other[5], own[6] + other[6])
                         shared.append(own)
                         last = item
             if len(shared) > 1:
                 shared.sort()
-            for distance2, dy, dx, _, item, n in shared:
-                tell(hits, new(HitRow, (0, number, item, n, n, n * WEIGHT_FULL, 1, (x + dx, y + dy), distance2)))
+            for distance2, dy, dx, _, item, n, weight in shared:
+                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (x + dx, y + dy), distance2)))
 
         return look, pattern.nbytes
 
@@ -185,8 +186,8 @@ class PositionCache:
         assert visible is not None  # squares list its tiles
         return tiles.read(visible.seen.words, begin)
 
-    def _walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int]]:
-        """Walk the tiles that a round may meet; yield squared distance, y, x, id and count of each object that it hits.
+    def _walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
+        """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and weight of what it hits.
 
         Raises
         ------
@@ -199,7 +200,8 @@ class PositionCache:
         self._lose(integers_ns(len(tile), pattern.wide, pattern.high))
         near = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
         found: list[Hit] = hit_by_one(pattern, x, y, near, ground)
-        return ((distance2, py, px, ground.stack.ids.item(rank), n) for _, distance2, py, px, rank, n in found)
+        ids = ground.stack.ids
+        return ((distance2, py, px, ids.item(rank), n, weight) for _, distance2, py, px, rank, n, weight in found)
 
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""

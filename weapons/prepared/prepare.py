@@ -65,6 +65,7 @@ class Ready(Generic[AnyHits]):
     Patterns of up to 1000 px are looked up; weapons of one ray are cast (see `prepared_ray`). These are left to `fire`:
 
     - sweeps, spreads and bursts of rays, and rays that must walk (see `strategy.RAY_WAYS`)
+    - weapons with a line of sight, and spreads with a falloff
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
     - batches and bad input
