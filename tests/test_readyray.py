@@ -29,6 +29,7 @@ from hitplanes import (
     Rounds,
     Scene,
     Spread,
+    Sprite,
     Weapon,
     fire,
     prepare,
@@ -113,6 +114,54 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
             rows += len(got)
         scene.move(scene.ids()[step::5], rng.uniform((0, 0), (220, 160), (8, 2)))
     assert 12 < rows < (72 if weapon.hits_most == 1 else 300) and alone > 60  # type: ignore[attr-defined]
+
+
+THROUGH = Laser(300), Rifle(range=250, max_hits=2), Rifle(range=300, max_hits=4, falloff="linear"), Laser(None)
+
+
+@examples(30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32))
+def test_rays_that_go_on_through_corners_and_along_edges(kernels: ModuleType, seed: int) -> None:
+    """All places are on half pixels, so that rays enter several cells at once, and end on corners."""
+    rng, scene = np.random.default_rng(seed), Scene((300, 200)) if seed % 2 else Scene()
+    for _ in range(rng.integers(1, 25)):
+        sides = rng.integers(1, 40, 2)
+        masks = np.ones(sides, np.bool_), rng.random(sides) < rng.random(), np.eye(*sides) > 0
+        role = "occluder" if rng.random() < 0.15 else "hittable"
+        at = np.round(2 * rng.uniform((0, 0), (300, 200))) / 2
+        scene.add(masks[rng.integers(3)], at, role=role, layer=int(rng.integers(3)))
+    for weapon in THROUGH:
+        ready = prepare(scene, weapon)
+        for k in range(8):
+            at, toward = (np.round(2 * rng.uniform(-20, 320, 2)) / 2 for _ in range(2))
+            aimed = {"toward": tuple(toward.tolist())} if k % 2 or weapon.range is None else {"aim": 45.0 * k}
+            shot = {"at": tuple(at.tolist()), **aimed}
+            told = both(ready, scene, weapon, {}, shot)
+            if not isinstance(told, str):
+                same(*told)
+                assert told[0].stop == told[1].stop
+
+
+@pytest.mark.parametrize("to", [(x, y) for x in (-40, -9, 9, 40) for y in (-40, -9, 9, 40)])
+def test_a_ray_that_ends_on_a_corner_enters_cells_of_a_row_at_once(kernels: ModuleType, to: tuple[int, int]) -> None:
+    for side in [(2, 1), (1, 2), (2, 2)]:
+        for place in np.ndindex(2, 2):
+            scene, end = Scene(), (to[0] + 0.5, to[1] + 0.5)
+            scene.add(np.ones(side, np.bool_), (to[0] + place[0], to[1] + place[1]))
+            shot = {"at": (0.5, 0.5), "toward": end}
+            same(*both(prepare(scene, Laser(None)), scene, Laser(None), {}, shot))  # type: ignore[arg-type]
+
+
+def test_few_rays_that_go_on_are_left_to_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that enter two items at once, that begin in an item, and that end in one."""
+    scene, weapon, told, inner = Scene(), Rifle(400, max_hits=2), [], one_ray._passed
+    for x, y, side in [(100, 50, 9), (200, 50, 9), (203, 50, 9), (300, 80, 9), (296, 80, 17)]:
+        scene.add(Sprite.box(side, side), (x, y))
+    monkeypatch.setattr(one_ray, "_passed", lambda *of: told.append(inner(*of)) or told[-1])
+    ready = prepare(scene, weapon)
+    for at in [(20, 50), (100, 50), (150, 50), (250, 80)]:
+        assert ready.fire(at) == fire(scene, weapon, at, strategy="walk")
+    assert [found is None for found in told] == [False, True, True, True]
 
 
 @pytest.fixture

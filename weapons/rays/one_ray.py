@@ -1,13 +1,13 @@
-"""One ray a call. A thin ray up to its first hit is followed in whole numbers of Python, which is faster than numpy.
+"""One ray a call. A thin ray is followed in whole numbers of Python, which is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
-box is left that it enters before the first cell that it found. Times are those of `grid.rasterize`: whole numbers over
+box is left that it enters before its end. Times are those of `grid.rasterize`: whole numbers over
 max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on rounding.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from .contacts import NEVER
 from .first_hit import first_at_once
 from .raycast import hits_and_ends
 
-ROWS_MOST = 400
+ROWS_MOST = 300
 """Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
 
 Pair = tuple[int, int]
@@ -61,32 +61,29 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
 
     `most` is the number of objects that a ray may hit, or None.
     """
-    if not radius and most == 1:
-        return _first_follower(stack, bounds, view)
     filters = np.array([view.meets]), np.array([view.exclude], np.int64)
 
-    def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one ray."""
+    def cast(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        """Follow one ray in arrays."""
         lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
         hit, ends = hits_and_ends(stack, bounds, lines, most, filters)
         hit[3:5] += pixel(lines.start).T
         return int(ends[1, 0]), hit[1:].T.tolist()
 
-    return follow
-
-
-def _first_follower(stack: Stack, bounds: Box | None, view: View) -> Follow:
-    """Function that follows one thin ray to what it touches first; None if that takes many rows, or it is too long."""
+    if radius:
+        return cast
     accepted = view.accepts(stack)
     accepts = None if accepted.all() else accepted
 
     def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one ray."""
+        """Follow one thin ray."""
         if not (dx or dy) or max(abs(dx), abs(dy)) > LONGEST:
-            return None
+            return cast(x, y, dx, dy)
         origin = (x + HALF) // SUB, (y + HALF) // SUB
         ray = Ray((x - SUB * origin[0], y - SUB * origin[1]), (dx, dy))
-        return _first(ray, origin, _near(ray, origin, stack, bounds, accepts), stack)
+        near = _near(ray, origin, stack, bounds, accepts)
+        found = _first(ray, origin, near, stack) if most == 1 else _passed(ray, origin, near, stack, most)
+        return cast(x, y, dx, dy) if found is None else found
 
     return follow
 
@@ -132,6 +129,11 @@ class Ray:
         first, last = max(at[0] - 1, box[minor]), min(at[1] + 1, box[minor + 2])  # on a border it is in two rows
         return range(first, last + 1) if step >= 0 else range(last, first - 1, -1)
 
+    def rows_about(self, times: Ints) -> int:
+        """About how many rows it visits in boxes in which it spends so much time each."""
+        minor = abs(self.step[1 - self.major]) / (SUB * self.across[0] * self.across[1])
+        return len(times) + int(times.sum() * minor)
+
     def run(self, row: int) -> Spell:
         """First and last cell of a row that the ray touches, along its longer axis; (1, 0) if it touches none."""
         u, along = self.start[self.major], self.step[self.major]
@@ -168,7 +170,7 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
 
 def _first(ray: Ray, origin: Pair, near: Entered, stack: Stack) -> Followed | None:
     """What a ray touches first; None if it looks at too many rows."""
-    best: tuple[int, int, int] | None = None
+    best: Cell | None = None
     left = ROWS_MOST
     for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
         if best is not None and entry > best[0]:
@@ -178,13 +180,13 @@ def _first(ray: Ray, origin: Pair, near: Entered, stack: Stack) -> Followed | No
         left -= len(rows) + 1
         if left < 0:
             return None
-        found = _in(ray, origin, box, rows, stack, int(near.rank[k]))
+        found = _soonest(ray, origin, box, rows, stack, int(near.rank[k]))
         if found is not None and (best is None or found[0] < best[0]):
             best = found
     if best is None:
         return NEVER, []
     cells = []
-    for x, y in ((best[1] + k % 3 - 1, best[2] + k // 3 - 1) for k in range(9)):
+    for x, y in ((best[2] + k % 3 - 1, best[1] + k // 3 - 1) for k in range(9)):
         first, last = ray.spell(x, y)
         if first == best[0] <= last:
             ranks = _holders(x, y, origin, near, stack)
@@ -206,22 +208,87 @@ def _holders(x: int, y: int, origin: Pair, near: Entered, stack: Stack) -> Ints:
     return np.asarray(rank[stack.masks[stack.offset[rank] + own_y * stack.width[rank] + own_x]])
 
 
-def _in(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> tuple[int, int, int] | None:
-    """Time and cell at which a ray first touches an item in the given rows; None if it does not."""
-    found, major, (left, top) = [], ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
+Cell = tuple[int, int, int]
+"""When a ray enters a cell, and the cell's y and x."""
+
+
+def _soonest(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> Cell | None:
+    """The cell in which a ray first touches an item in the given rows; None if it does not."""
+    found = []
+    for row, first, run in _runs(ray, origin, box, rows, stack, rank):
+        if 1 in run:
+            found.append(_entered(ray, row, first + (run.find(1) if ray.step[ray.major] > 0 else run.rfind(1))))
+            if ray.step[1 - ray.major]:
+                break  # later rows are entered later
+    return min(found, default=None)
+
+
+def _runs(
+    ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int
+) -> Iterator[tuple[int, int, bytes]]:
+    """The cells of an item's mask that a ray touches: row, first cell along the longer axis, and one byte for each."""
+    major, (left, top) = ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
     width, corner = int(stack.width[rank]), int(stack.offset[rank])
     step = width if major else 1
     for row in rows:
         first, last = ray.run(row)
         first, last = max(first, box[major]), min(last, box[major + 2])
-        if first > last:
+        if first <= last:
+            begin = corner + ((first - top) * width + row - left if major else (row - top) * width + first - left)
+            yield row, first, stack.masks[begin : begin + (last - first) * step + 1 : step].tobytes()
+
+
+def _entered(ray: Ray, row: int, at: int) -> Cell:
+    """A cell of a row, and when a ray enters it."""
+    x, y = (row, at) if ray.major else (at, row)
+    return ray.spell(x, y)[0], y, x
+
+
+# house: hit rule of rays
+def _passed(ray: Ray, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
+    """What a ray that goes on hits, up to `most` objects; None if arrays must decide it.
+
+    They do so if it looks at too many rows, if it enters cells of two items at once, if it begins in an item, or if it
+    ends in the box of an item that it has hit before.
+    """
+    if ray.rows_about(near.leave - near.entry) > ROWS_MOST:
+        return None
+    end, times = NEVER, list[int]()
+    touched: list[tuple[int, int, int, int, int, int]] = []
+    for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
+        if entry > end:
+            break
+        box, rank = near.box_xyxy[k].tolist(), int(near.rank[k])
+        count, found = _all_in(ray, origin, box, ray.rows(box, (entry, leave)), stack, rank)
+        if found is None:
             continue
-        begin = corner + ((first - top) * width + row - left if major else (row - top) * width + first - left)
-        run = stack.masks[begin : begin + (last - first) * step + 1 : step].tobytes()
-        at = run.find(1) if ray.step[major] > 0 else run.rfind(1)
-        if at >= 0:
-            x, y = (row, first + at) if major else (first + at, row)
-            found.append((ray.spell(x, y)[0], x, y))
-            if ray.step[1 - major]:
-                break  # later rows are entered later
-    return min(found, default=None)
+        touched.append((*found, rank, count, leave))
+        if stack.occluder[rank]:
+            end = min(end, found[0])
+        elif most is not None:
+            times = sorted([*times, found[0]])[:most]
+            end = min(end, times[-1]) if len(times) == most else end
+    touched = [one for one in sorted(touched) if one[0] <= end]
+    entries = [0, *(one[0] for one in touched)]
+    if len(set(entries)) < len(entries):
+        return None
+    hits = [[rank, count, x + origin[0], y + origin[1], time] for time, y, x, rank, count, _ in touched]
+    if end < NEVER:
+        if any(leave >= end for *_, leave in touched[:-1]):
+            return None
+        hits[-1][1] = 1
+        hits = hits[:-1] if stack.occluder[touched[-1][3]] else hits
+    return end, hits
+
+
+def _all_in(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> tuple[int, Cell | None]:
+    """Number of cells of an item that a ray touches in the given rows, and the first of them."""
+    count, rows_met, ahead = 0, 0, 1 if ray.step[ray.major] > 0 else -1
+    found: list[Cell] = []
+    for row, first, run in _runs(ray, origin, box, rows, stack, rank):
+        cells = run.count(1)
+        count, rows_met = count + cells, rows_met + (cells > 0)
+        if cells and rows_met <= 2:  # through a corner it enters two cells of a row, and of the next, at once
+            at = run.find(1) if ahead > 0 else run.rfind(1)
+            found += [_entered(ray, row, first + k) for k in (at, at + ahead) if 0 <= k < len(run) and run[k] == 1]
+    return count, min(found, default=None)
