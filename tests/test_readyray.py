@@ -153,15 +153,19 @@ def test_a_ray_that_ends_on_a_corner_enters_cells_of_a_row_at_once(kernels: Modu
 
 
 def test_few_rays_that_go_on_are_left_to_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that enter two items at once, that begin in an item, and that end in one."""
+    """Those that end in an item that they have hit before, or enter it together with the occluder that ends them."""
     scene, weapon, told, inner = Scene(), Rifle(400, max_hits=2), [], one_ray._passed
-    for x, y, side in [(100, 50, 9), (200, 50, 9), (203, 50, 9), (300, 80, 9), (296, 80, 17)]:
-        scene.add(Sprite.box(side, side), (x, y))
+    for x, y, side, role in [
+        (100, 50, 9, "hittable"), (200, 50, 9, "hittable"), (203, 50, 9, "hittable"),
+        (300, 80, 9, "occluder"), (296, 80, 1, "hittable"), (100, 20, 9, "hittable"), (100, 20, 9, "hittable"),
+    ]:  # fmt: skip
+        scene.add(Sprite.box(side, side), (x, y), role=role)
     monkeypatch.setattr(one_ray, "_passed", lambda *of: told.append(inner(*of)) or told[-1])
     ready = prepare(scene, weapon)
-    for at in [(20, 50), (100, 50), (150, 50), (250, 80)]:
+    for at in [(20, 50), (100, 50), (150, 50), (250, 80), (50, 20)]:
         assert ready.fire(at) == fire(scene, weapon, at, strategy="walk")
-    assert [found is None for found in told] == [False, True, True, True]
+    assert [found is None for found in told] == [False, False, True, True, True]
+    assert prepare(scene, Pistol(400)).fire((50, 20)).object.tolist() == [6] and told[-1] is not None
 
 
 @pytest.fixture

@@ -22,10 +22,9 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 
 from .contacts import NEVER
-from .first_hit import first_at_once
 from .raycast import hits_and_ends
 
-ROWS_MOST = 300
+ROWS_MOST = 400
 """Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
 
 Pair = tuple[int, int]
@@ -82,7 +81,7 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
         origin = (x + HALF) // SUB, (y + HALF) // SUB
         ray = Ray((x - SUB * origin[0], y - SUB * origin[1]), (dx, dy))
         near = _near(ray, origin, stack, bounds, accepts)
-        found = _first(ray, origin, near, stack) if most == 1 else _passed(ray, origin, near, stack, most)
+        found = _passed(ray, origin, near, stack, most)
         return cast(x, y, dx, dy) if found is None else found
 
     return follow
@@ -168,59 +167,8 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
     return Entered(rank[rows], entry[rows], leave[rows], box[rows])
 
 
-def _first(ray: Ray, origin: Pair, near: Entered, stack: Stack) -> Followed | None:
-    """What a ray touches first; None if it looks at too many rows."""
-    best: Cell | None = None
-    left = ROWS_MOST
-    for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
-        if best is not None and entry > best[0]:
-            break
-        box = near.box_xyxy[k].tolist()
-        rows = ray.rows(box, (entry, leave))
-        left -= len(rows) + 1
-        if left < 0:
-            return None
-        found = _soonest(ray, origin, box, rows, stack, int(near.rank[k]))
-        if found is not None and (best is None or found[0] < best[0]):
-            best = found
-    if best is None:
-        return NEVER, []
-    cells = []
-    for x, y in ((best[2] + k % 3 - 1, best[1] + k // 3 - 1) for k in range(9)):
-        first, last = ray.spell(x, y)
-        if first == best[0] <= last:
-            ranks = _holders(x, y, origin, near, stack)
-            if len(ranks):
-                cells.append((x + origin[0], y + origin[1], ranks))
-    at = 0
-    if len(cells) > 1:
-        blocked = np.array([[stack.occluder[ranks].any() for _, _, ranks in cells]])
-        at = int(first_at_once(np.ones_like(blocked), blocked, np.arange(len(cells))[None])[0])
-    x, y, ranks = cells[at]
-    rank = int(ranks.min())
-    return best[0], [] if stack.occluder[rank] else [[rank, 1, x, y, best[0]]]
-
-
-def _holders(x: int, y: int, origin: Pair, near: Entered, stack: Stack) -> Ints:
-    """Ranks of the items that cover a pixel."""
-    rank = near.rank[meets(np.array([x, y, x, y]), near.box_xyxy)]
-    own_x, own_y = x + origin[0] - stack.box_xyxy[rank, 0], y + origin[1] - stack.box_xyxy[rank, 1]
-    return np.asarray(rank[stack.masks[stack.offset[rank] + own_y * stack.width[rank] + own_x]])
-
-
 Cell = tuple[int, int, int]
 """When a ray enters a cell, and the cell's y and x."""
-
-
-def _soonest(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> Cell | None:
-    """The cell in which a ray first touches an item in the given rows; None if it does not."""
-    found = []
-    for row, first, run in _runs(ray, origin, box, rows, stack, rank):
-        if 1 in run:
-            found.append(_entered(ray, row, first + (run.find(1) if ray.step[ray.major] > 0 else run.rfind(1))))
-            if ray.step[1 - ray.major]:
-                break  # later rows are entered later
-    return min(found, default=None)
 
 
 def _runs(
@@ -246,20 +194,24 @@ def _entered(ray: Ray, row: int, at: int) -> Cell:
 
 # house: hit rule of rays
 def _passed(ray: Ray, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
-    """What a ray that goes on hits, up to `most` objects; None if arrays must decide it.
+    """What a ray hits, up to `most` objects; None if arrays must decide it.
 
-    They do so if it looks at too many rows, if it enters cells of two items at once, if it begins in an item, or if it
+    They do so if it looks at too many rows, if it enters another item at once with the occluder that ends it, or if it
     ends in the box of an item that it has hit before.
     """
-    if ray.rows_about(near.leave - near.entry) > ROWS_MOST:
+    if most != 1 and ray.rows_about(near.leave - near.entry) > ROWS_MOST:
         return None
-    end, times = NEVER, list[int]()
-    touched: list[tuple[int, int, int, int, int, int]] = []
+    end, left, times = NEVER, ROWS_MOST, list[int]()
+    touched: list[Touch] = []
     for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
         if entry > end:
             break
         box, rank = near.box_xyxy[k].tolist(), int(near.rank[k])
-        count, found = _all_in(ray, origin, box, ray.rows(box, (entry, leave)), stack, rank)
+        rows = ray.rows(box, (entry, leave))
+        left -= len(rows)
+        if left < 0:
+            return None
+        count, found = _cells(_runs(ray, origin, box, rows, stack, rank), ray, most != 1)
         if found is None:
             continue
         touched.append((*found, rank, count, leave))
@@ -268,27 +220,36 @@ def _passed(ray: Ray, origin: Pair, near: Entered, stack: Stack, most: int | Non
         elif most is not None:
             times = sorted([*times, found[0]])[:most]
             end = min(end, times[-1]) if len(times) == most else end
-    touched = [one for one in sorted(touched) if one[0] <= end]
-    entries = [0, *(one[0] for one in touched)]
-    if len(set(entries)) < len(entries):
+    return _ended(sorted(met for met in touched if met[0] <= end), end, most, origin, stack)
+
+
+Touch = tuple[int, int, int, int, int, int]
+"""An item that a ray touches: time, y and x of its first cell, rank, cells, and when the ray leaves its box."""
+
+
+def _ended(touched: list[Touch], end: int, most: int | None, origin: Pair, stack: Stack) -> Followed | None:
+    """What a ray hit before its end, of what it touched until then, in order."""
+    at_end = [rank for time, _, _, rank, _, _ in touched if time == end]
+    blocked = bool(stack.occluder[at_end].any()) if at_end else False
+    hits = touched[:-1] if blocked else touched[:most]
+    if at_end and any(leave >= end for *_, leave in (hits if blocked else hits[:-1])):
         return None
-    hits = [[rank, count, x + origin[0], y + origin[1], time] for time, y, x, rank, count, _ in touched]
-    if end < NEVER:
-        if any(leave >= end for *_, leave in touched[:-1]):
-            return None
-        hits[-1][1] = 1
-        hits = hits[:-1] if stack.occluder[touched[-1][3]] else hits
-    return end, hits
+    rows = [[rank, count, x + origin[0], y + origin[1], time] for time, y, x, rank, count, _ in hits]
+    if at_end and not blocked:
+        rows[-1][1] = 1
+    return end, rows
 
 
-def _all_in(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> tuple[int, Cell | None]:
-    """Number of cells of an item that a ray touches in the given rows, and the first of them."""
+def _cells(runs: Iterator[tuple[int, int, bytes]], ray: Ray, every: bool) -> tuple[int, Cell | None]:
+    """Number of cells that are set in runs, unless only the first is looked for, and the first of them."""
     count, rows_met, ahead = 0, 0, 1 if ray.step[ray.major] > 0 else -1
     found: list[Cell] = []
-    for row, first, run in _runs(ray, origin, box, rows, stack, rank):
+    for row, first, run in runs:
         cells = run.count(1)
         count, rows_met = count + cells, rows_met + (cells > 0)
         if cells and rows_met <= 2:  # through a corner it enters two cells of a row, and of the next, at once
             at = run.find(1) if ahead > 0 else run.rfind(1)
             found += [_entered(ray, row, first + k) for k in (at, at + ahead) if 0 <= k < len(run) and run[k] == 1]
+        elif found and not every:
+            break
     return count, min(found, default=None)
