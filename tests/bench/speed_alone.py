@@ -12,7 +12,9 @@ from speed_static import Settings, modes
 from speed_weapons import AIMS, WEAPONS, questions
 from speed_world import WORLD, scene_of
 
-from hitplanes import Scene, Weapon, fire
+from hitplanes import Disc, Scene, Weapon, fire
+
+FADING: dict[str, Weapon] = {"disc r=40, linear falloff": Disc(40, falloff="linear")}
 
 MOVED = 3
 """Objects lie at so many places in turn, a pixel apart."""
@@ -22,7 +24,7 @@ def alone(settings: Settings) -> Iterator[Cell]:
     """Each weapon, each number of objects."""
     for objects in settings.single:
         scenes = {mode: scene_of(objects) for mode in modes(settings)}  # what is kept for a scene is of one mode
-        for name, weapon in WEAPONS.items():
+        for name, weapon in (WEAPONS | FADING).items():
             asked = ("aims again", "new aims", "all move") if "new aims" in questions(weapon) else ("again", "all move")
             for what in asked:
                 kind = moved if what == "all move" else still
