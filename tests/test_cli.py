@@ -202,7 +202,11 @@ def test_the_plan_of_each_shot(tmp_path: Path, capsys: pytest.CaptureFixture[str
     shown = capsys.readouterr().out
     assert shown.startswith(without) and without.count("\n") == 1
     assert shown.removeprefix(without).splitlines()[0].split() == ["stage", "time", "bytes", "why"]
-    assert re.search(r"^  weights +[\d,]+\.\d us +[\d,]+  falloff of the hit pixels, by sums along rows$", shown, re.M)
+    assert re.search(
+        r"^  weights +[\d,]+\.\d us +[\d,]+  falloff of the hit pixels, by the binary digits of their weights$",
+        shown,
+        re.M,
+    )
     assert re.search(r"^  hud +left out +drawn only for a picture$", shown, re.M)
 
 

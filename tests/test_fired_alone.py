@@ -14,8 +14,9 @@ from ray_battles import some_battle as some_ray_battle
 from test_fire import Placements, expected, some_battle, told
 from test_ready import WEAPONS, changed, crowd, same
 
-from hitplanes import Box, Disc, History, InputError, Pistol, Scene, Weapon, fire
+from hitplanes import Box, Disc, History, InputError, Pistol, Scene, Spread, Weapon, fire, weapon_from_json
 from hitplanes.planes.scene import derived
+from hitplanes.weapons.prepared import prepare
 
 AT = (60.5, 50.25)
 
@@ -38,17 +39,22 @@ def test_a_weapon_is_ready_from_the_second_shot_on(weapon: Weapon, jit: bool) ->
     assert readiness(crowd(1), weapon, 2) == [False, True]  # another scene, though like it
 
 
-def test_another_filter_or_seed_is_another_weapon() -> None:
+OTHERS: list[dict[str, Any]] = [
+    {"accept": ["glass"]}, {"blocked_by": 0}, {"exclude": 4}, {"exclude": np.int64(8)}, {"seed": 3}
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("weapon", [Disc(3), Pistol(50), Spread(Disc(1), 3, 5)], ids=lambda weapon: weapon.kind)
+def test_another_filter_or_seed_is_ready_at_once_where_that_pays(weapon: Weapon, jit: bool) -> None:
+    """It pays for a ray, and in numpy for a pattern; another weapon it is for all else."""
     scene = crowd(1)
-    assert readiness(scene, Disc(3), 2) == [False, True]
-    others: list[dict[str, Any]] = [
-        {"accept": ["glass"]}, {"blocked_by": 0}, {"exclude": 4}, {"exclude": np.int64(8)}, {"seed": 3}
-    ]  # fmt: skip
-    for how in others:
-        assert readiness(scene, Disc(3), 3, **how) == [False, True, True]
-        assert fire(scene, Disc(3), AT, **how) == fire(scene, Disc(3), AT, strategy="direct", **how)
-    assert readiness(scene, Disc(3), 1, accept="glass") == [True]
-    assert readiness(scene, Disc(3.0), 1) == [True]  # an equal one
+    assert readiness(scene, weapon, 2) == [False, True]
+    soon = isinstance(weapon, Pistol) or (isinstance(weapon, Disc) and not jit)
+    for how in OTHERS:
+        assert readiness(scene, weapon, 3, **how) == [soon, True, True]
+        assert fire(scene, weapon, AT, **how) == fire(scene, weapon, AT, strategy="direct", **how)
+    assert readiness(scene, weapon, 1, accept="glass") == [True]
+    assert readiness(scene, weapon_from_json(weapon.to_json()), 1) == [True]  # an equal one
 
 
 @pytest.mark.parametrize(
@@ -73,11 +79,22 @@ def test_batches_and_the_past_are_answered_by_the_scene() -> None:
 
 
 def test_the_last_few_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, weapons = crowd(1), [Disc(r) for r in range(1, derived.AGAIN_MOST + 2)]
+    made, inner = [0], prepare.prepare
+    monkeypatch.setattr(prepare, "prepare", lambda *of, **how: made.append(made.pop() + 1) or inner(*of, **how))
+    for many, each in ((derived.AGAIN_MOST, 1), (derived.AGAIN_MOST + 1, 2)):
+        scene, weapons = crowd(1), [Disc(radius) for radius in range(1, many + 1)]
+        made[0] = 0
+        for number in range(3):
+            for weapon in weapons:
+                assert is_ready(fire(scene, weapon, AT)) == (number > 0)
+        assert made[0] == each * many
+
+
+def test_weapons_that_were_fired_long_ago_are_forgotten() -> None:
+    scene, weapons = crowd(1), [Disc(radius) for radius in range(1, derived.ASKED_MOST + 2)]
     for _ in range(2):
         for weapon in weapons:
             assert not is_ready(fire(scene, weapon, AT))
-    assert readiness(scene, weapons[-1], 1) == [True]
 
 
 @pytest.mark.parametrize("name", WEAPONS)

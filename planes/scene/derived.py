@@ -38,6 +38,7 @@ NEVER = -1  # a version before all others
 VIEWS_MOST = 8  # most visible sets of a scene, one for each view
 PLANES_BYTES = 2**26  # most memory of the label planes and distance fields of a scene; a larger one is kept alone
 PIXEL_BYTES = 5  # of a label and a distance, at most
+ASKED_MOST = 64  # most things of a scene that are known to have been asked for
 AGAIN_MOST = 8  # most things of a scene that are made when they are asked for a second time
 
 
@@ -108,15 +109,18 @@ class Derived:
             PLANES_BYTES, lambda field: PIXEL_BYTES * field.labels.size
         )
         self._indexes: dict[str, Index] = {}
+        self._asked: LruCache[Hashable, list[Hashable]] = LruCache(ASKED_MOST, lambda _: 1)
         self._again: LruCache[Hashable, list[Any]] = LruCache(AGAIN_MOST, lambda _: 1)
 
-    def when_asked_again(self, key: Hashable, make: Callable[[], Made]) -> Made | None:
-        """What `make` makes, kept for its key; None when it is asked for the first time, which may be the last."""
-        kept: list[Made | None] = self._again.get(key, list)
+    def when_asked_again(self, what: Hashable, key: Hashable, make: Callable[[], Made]) -> Made | None:
+        """What `make` makes, kept for a key; None the first time that something is asked for, which may be the last."""
+        kept: list[Made] = self._again.get(key, list)
         if not kept:
-            kept.append(None)
-        elif kept[0] is None:
-            kept[0] = make()
+            asked = self._asked.get(what, list)
+            if not asked:
+                asked.append(what)
+                return None
+            kept.append(make())
         return kept[0]
 
     def visible(self, view: View) -> Visible:

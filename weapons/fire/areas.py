@@ -301,10 +301,12 @@ def by_integers(request: Request, context: QueryContext) -> list[Rows]:
     plan.run("tiles", "bit rows of the masks", 0 if tiles.whole else ground.boxes_xyxy.nbytes)
     patterns = placements.table.bigs
     plan.run("patterns", f"{len(patterns)} distinct", placements.nbytes)
+    if request.traits.weighted:
+        plan.run("weights", "falloff of the hit pixels, by the binary digits of their weights")
     near = accepted(met_boxes(placements.boxes, ground.boxes_xyxy), ground, shots, placements.shot)
     hits = hit_by_few(placed_of(placements), patterns, near, ground)
     turn, distance2, y, x, rank, samples, weight = np.array(hits, np.int64).reshape(-1, 7).T
-    found = RoundHits(turn, rank, samples, distance2, x, y, weight)
+    found = RoundHits(turn, rank, samples, distance2, x, y, weight if request.traits.weighted else None)
     rows = _rows_of(placements, found, request.stack.ids)
     plan.run("samples", "counted in integers, front to back: boxes, filters and occluders, too", rows.nbytes)
     return [rows]

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypedDict, 
 
 import numpy as np
 
-from hitplanes.planes.common.backend import keep_arena, news
+from hitplanes.planes.common.backend import jit_is_on, keep_arena, news
 from hitplanes.planes.common.checks import InputError, Ints, choice, each, reals, shown
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
-from ..kinds.areas import Rays, ray_parts_of
+from ..kinds.areas import Rays, parts_of, ray_parts_of
 from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import request_of
@@ -113,7 +113,7 @@ def fire(
     strategy : how the shots are answered; it changes no row. A way that cannot serve a call is passed over, and the
         plan says why.
 
-        - "auto": the cheapest way; a weapon and filter that were fired alone before are made ready, as by `prepare`
+        - "auto": the cheapest way; a weapon that was fired alone before is made ready, as by `prepare`
         - "direct": one that needs nothing but the scene; "built": one for which what is visible, labels or distances
           are worked out first, if they are not there
         - a way by its name: of areas "spans" (the reference), "tiles", "visible", "labels", "integers"; of rays "walk"
@@ -180,7 +180,7 @@ def _is_one(at: object) -> bool:
 def _ready(
     scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: Any, seed: Any
 ) -> Ready[Hits] | None:
-    """The weapon as `prepare` makes it, if it was fired at the scene with this filter, one shot a call, before."""
+    """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call; see `_is_ready_soon`."""
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owner = int(exclude) if isinstance(exclude, np.integer) else exclude
@@ -192,7 +192,19 @@ def _ready(
         own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
         return late.prepare.prepare(scene, own, accept=accepts, blocked_by=blocks, exclude=owner, seed=seed)
 
-    return scene.derived.when_asked_again((weapon.text, accepts, blocks, owner, seed), make)
+    key = weapon.text, accepts, blocks, owner, seed
+    return scene.derived.when_asked_again(weapon.text if _is_ready_soon(weapon) else key, key, make)
+
+
+def _is_ready_soon(weapon: Weapon) -> bool:
+    """Whether to make a weapon ready for a single shot, with a filter of its own, takes less time than a call of it.
+
+    So it is for one ray, and in numpy for one pattern.
+    """
+    rays = ray_parts_of(weapon)
+    if rays is not None:
+        return rays[:2] == (None, None)
+    return parts_of(weapon)[1] is None and not jit_is_on()
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

@@ -211,5 +211,5 @@ def _met(placements: Placements, runs: Runs, events: list[Events], counts: Ints,
     plan.run("rows", "hit pixels, gathered by object", joined + under.nbytes)
     weight = placements.table.weight(under.ordinal, hit.x_first, hit.x_last)
     if placements.table.prefix is not None:
-        plan.run("weights", "", weight.nbytes)
+        plan.run("weights", "falloff of the hit pixels, by prefix sums", weight.nbytes)
     return SpanHits(under.placement, hit.rank, under.y, hit.x_first, hit.x_last, weight, counts)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 BROADPHASES = ("auto", *STRUCTURES)
 
 
-INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 48, 64, 2**15
+INTEGERS_REACH, INTEGERS_PLACEMENTS, INTEGERS_PAIRS = 500, 64, 2**15
 """Largest reach of patterns, px, most placements, and most pairs of placements and items counted in integers."""
 
 
