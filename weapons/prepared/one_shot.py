@@ -187,9 +187,7 @@ class Answer(Hits):
     def plan(self) -> Plan:
         """Plan of the shot."""
         plan = Plan()
-        plan.run(
-            "prepared", "the weapon is ready for the scene: looked up; the stages after it ran when they were asked for"
-        )
+        plan.run("prepared", "the weapon is ready for the scene; the stages after it ran when they were asked for")
         if self._arguments[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)
         present, choosy = self._present, may_refuse(self._stack, self.shots)
