@@ -12,6 +12,7 @@ from hitplanes import Box, Disc, Rounds, Scene, Sprite, Stencil, Weapon, fire, p
 from hitplanes.planes.bits.tiles import BigTiles, big_pattern
 from hitplanes.planes.common import costs
 from hitplanes.planes.grid.spans import Spans
+from hitplanes.weapons.kinds.weapon import Pattern, big_of
 from hitplanes.weapons.prepared import position_cache
 
 
@@ -88,7 +89,7 @@ def test_random_piles() -> None:
 def test_weights_of_a_subset_are_added_up_with_planes_and_without() -> None:
     rng = np.random.default_rng(5)
     spans, weights = Spans.from_mask(rng.random((9, 80)) < 0.7, (-3, -4)), rng.integers(0, 65536, 700)
-    pattern = big_pattern(spans, weights[: spans.count])
+    pattern = big_of(Pattern(spans, np.cumsum([0, *weights[: spans.count]])))
     before = pattern.nbytes
     for _ in range(20):
         chosen = rng.random(spans.count) < rng.random()

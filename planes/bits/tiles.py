@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -26,7 +26,7 @@ from ..common.checks import Bools, Ints
 from ..common.limits import WEIGHT_FULL
 from ..grid.spans import Box, Spans, ragged
 from ..scene.items import Stack
-from .bit_rows import WORD, Placed, Words, packed
+from .bit_rows import WORD, Placed, Sums, Words, packed
 from .front_to_back import NO_NUMBERS, OrderedTiles
 
 OFTEN = 8
@@ -179,6 +179,11 @@ class BigPattern:
         """Bytes of the pixels and of the planes of their depths and weights."""
         return PATTERN_BYTES + self.depths.nbytes + (self.weights.nbytes if self.weights else 0)
 
+    def weighted(self, sums: Sums) -> BigPattern:
+        """The same pattern with weights, given as sums along its rows, as `PatternBits` has them."""
+        each = np.diff(sums[: self.high * (self.wide + 1)].reshape(self.high, -1), axis=1)
+        return replace(self, weights=Weights(each.astype(np.int64), self.stride))
+
     def weight(self, bits: int, count: int) -> int:
         """Sum of the weights of a subset of so many pixels."""
         return self.weights.of(bits) if self.weights else count * WEIGHT_FULL
@@ -201,16 +206,12 @@ def stride_of(wide: int) -> int:
     return WORD * -(-(wide + WORD - 1) // WORD)
 
 
-def big_pattern(spans: Spans, weights: Ints | None = None) -> BigPattern:
-    """A pattern as one integer; `weights` (n,) are those of its pixels, row by row."""
+def big_pattern(spans: Spans) -> BigPattern:
+    """A pattern as one integer."""
     x, y, x_max, y_max = spans.box_xyxy or (0, 0, 0, 0)
-    wide, high, stride = x_max - x + 1, y_max - y + 1, stride_of(x_max - x + 1)
+    stride = stride_of(x_max - x + 1)
     rows = rows_of_spans(spans, (x, y), stride)
-    if weights is None:
-        return BigPattern(x, y, wide, high, stride, rows, Depths(rows, stride, x, y))
-    each, pixels = np.zeros((high, wide), np.int64), spans.pixels()
-    each[pixels[:, 1] - y, pixels[:, 0] - x] = weights
-    return BigPattern(x, y, wide, high, stride, rows, Depths(rows, stride, x, y), Weights(each, stride))
+    return BigPattern(x, y, x_max - x + 1, y_max - y + 1, stride, rows, Depths(rows, stride, x, y))
 
 
 class BigTiles(dict[int, int]):

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from hitplanes.planes.bits import bit_rows
 from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Words
 from hitplanes.planes.bits.span_walk import Runs
-from hitplanes.planes.bits.tiles import BigPattern, Depths, Weights, big_pattern, stride_of
+from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
 from hitplanes.planes.common.backend import LruCache, in_parts, jit_is_on, kernels_of
 from hitplanes.planes.common.checks import InputError, Ints, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
@@ -524,8 +524,14 @@ def pattern_bits_of(patterns: Sequence[Pattern]) -> PatternBits:
 
 def big_of(pattern: Pattern) -> BigPattern:
     """A pattern as integer rows; those of the last calls are kept."""
-    weights = None if pattern.prefix is None else np.diff(pattern.prefix)
-    return _kept_bigs.get(ref(pattern), lambda: big_pattern(pattern.spans, weights))
+
+    def make() -> BigPattern:
+        big = big_pattern(pattern.spans)
+        if pattern.prefix is None or not len(pattern.spans):
+            return big
+        return big.weighted(sums_along_rows(pattern.spans, pattern.prefix))
+
+    return _kept_bigs.get(ref(pattern), make)
 
 
 def big_of_bits(bits: PatternBits, k: int) -> BigPattern:
@@ -535,11 +541,8 @@ def big_of_bits(bits: PatternBits, k: int) -> BigPattern:
     first = bits.first.item(k)
     columns = [bits.words[first + c * step : first + c * step + high] for c in range(stride // WORD)]
     rows = int.from_bytes(np.stack(columns, axis=1).astype("<u8", copy=False).tobytes(), "little") >> WORD - 1
-    wide, weights = x_max - x + 1, None
-    if len(bits.sums):
-        sums = bits.sums[bits.first_sum[k] :][: high * (wide + 1)].reshape(high, wide + 1)
-        weights = Weights(np.diff(sums, axis=1).astype(np.int64), stride)
-    return BigPattern(x, y, wide, high, stride, rows, Depths(rows, stride, x, y), weights)
+    big = BigPattern(x, y, x_max - x + 1, high, stride, rows, Depths(rows, stride, x, y))
+    return big.weighted(bits.sums[bits.first_sum[k] :]) if len(bits.sums) else big
 
 
 def _made(patterns: Sequence[Pattern]) -> PatternBits:
