@@ -71,11 +71,9 @@ class Weapon:
 
     def __repr__(self) -> str:
         """The fields that are not at their defaults; those that have none come first, as they are given first."""
-        told = {
-            f.name: (f.default, getattr(self, f.name))
-            for f in sorted(fields(self), key=lambda f: f.default is not MISSING)
-        }
-        texts = [f"{name}={shown(value)}" for name, (default, value) in told.items() if value != default]
+        ordered = sorted(fields(self), key=lambda f: f.default is not MISSING)
+        told = [(f.name, getattr(self, f.name), f.default) for f in ordered]
+        texts = [f"{name}={shown(value)}" for name, value, default in told if value != default]
         return f"{type(self).__name__}({', '.join(texts)})"
 
     def _keep(self, name: str, value: object) -> None:

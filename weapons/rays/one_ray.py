@@ -232,8 +232,8 @@ def _ended(touched: list[Touch], end: int, most: int | None, origin: Pair, stack
     at_end = [rank for time, _, _, rank, _, _ in touched if time == end]
     blocked = bool(stack.occluder[at_end].any()) if at_end else False
     hits = touched[:-1] if blocked else touched[:most]
-    # Of these, an item that is entered as the ray ends is also left no earlier.
-    if at_end and any(leave >= end for *_, leave in (hits if blocked else hits[:-1])):
+    passed = hits if blocked else hits[:-1]  # if one of them was entered as the ray ends, it is not left before
+    if at_end and any(leave >= end for *_, leave in passed):
         return None
     rows = [[rank, count, x + origin[0], y + origin[1], time] for time, y, x, rank, count, _ in hits]
     if at_end and not blocked:
