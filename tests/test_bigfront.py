@@ -12,7 +12,7 @@ from hitplanes import Box, Disc, Rounds, Scene, Sprite, Stencil, Weapon, fire, p
 from hitplanes.planes.bits.tiles import BigTiles, big_pattern
 from hitplanes.planes.common import costs
 from hitplanes.planes.grid.spans import Spans
-from hitplanes.weapons.kinds.weapon import Pattern, big_of
+from hitplanes.weapons.kinds.weapon import Pattern, big_of, big_of_bits, pattern_bits_of
 from hitplanes.weapons.prepared import position_cache
 
 
@@ -97,6 +97,16 @@ def test_weights_of_a_subset_are_added_up_with_planes_and_without() -> None:
         assert pattern.weight(rows, int(chosen.sum())) == int(weights[: spans.count][chosen].sum())
     assert before == pattern.nbytes > big_pattern(spans).nbytes
     assert big_pattern(spans).weight(0b101, 2) == 2 * 65535
+
+
+def test_a_pattern_without_pixels_has_no_weights_to_add_up() -> None:
+    nothing, full = (
+        Pattern(Spans.empty(), np.zeros(1, np.int64)),
+        Pattern(Spans.from_mask(np.ones((2, 3), np.bool_)), np.arange(7)),
+    )
+    bits = pattern_bits_of([full, nothing])
+    assert big_of(nothing).rows == big_of_bits(bits, 1).rows == 0
+    assert big_of_bits(bits, 0).weight(big_of(full).rows, 6) == 6
 
 
 @pytest.mark.parametrize("bounds", [(-9, -9, 9, 9), (-2, -9, 9, 9), (-9, 0, 9, 9), (-9, -9, 1, 9), (-9, -9, 9, -1)])

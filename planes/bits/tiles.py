@@ -181,7 +181,7 @@ class BigPattern:
 
     def weighted(self, sums: Sums) -> BigPattern:
         """The same pattern with weights, given as sums along its rows, as `PatternBits` has them."""
-        each = np.diff(sums[: self.high * (self.wide + 1)].reshape(self.high, -1), axis=1)
+        each = np.diff(sums[: self.high * (self.wide + 1)].reshape(self.high, self.wide + 1), axis=1)
         return replace(self, weights=Weights(each.astype(np.int64), self.stride))
 
     def weight(self, bits: int, count: int) -> int:
