@@ -164,11 +164,11 @@ def test_squares_are_made_once_the_visible_set_pays(monkeypatch: pytest.MonkeyPa
     assert not made
     cost = costs.NUMPY.visible_made + 60 * costs.NUMPY.visible_item
     shots(int(cost / costs.NUMPY.integers_placement) + 1)
-    assert made and any(ready._squares.made.values())
+    assert made and any(ready._near.made.values())
     scene.move(ids[0], (5, 5))
     made.clear()
     shots(9)
-    assert not made and not any(ready._squares.made.values())
+    assert not made and not any(ready._near.made.values())
 
 
 def test_a_visible_set_that_is_there_is_used(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,21 @@ from ray_battles import some_battle as some_ray_battle
 from test_fire import Placements, expected, some_battle, told
 from test_ready import WEAPONS, changed, crowd, same
 
-from hitplanes import Box, Disc, History, InputError, Pistol, Scene, Spread, Weapon, fire, weapon_from_json
+from hitplanes import (
+    ALL,
+    Beam,
+    Box,
+    Disc,
+    History,
+    InputError,
+    Pistol,
+    Scene,
+    Spread,
+    Weapon,
+    fire,
+    use_jit,
+    weapon_from_json,
+)
 from hitplanes.planes.scene import derived
 from hitplanes.weapons.prepared import prepare
 
@@ -45,16 +59,63 @@ OTHERS: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("weapon", [Disc(3), Pistol(50), Spread(Disc(1), 3, 5)], ids=lambda weapon: weapon.kind)
-def test_another_filter_or_seed_is_ready_at_once_where_that_pays(weapon: Weapon, jit: bool) -> None:
-    """It pays for a ray, and in numpy for a pattern; another weapon it is for all else."""
+def test_another_filter_or_seed_is_ready_at_once(weapon: Weapon, jit: bool) -> None:
+    """Except the seed of a spread, whose pellets are others."""
     scene = crowd(1)
     assert readiness(scene, weapon, 2) == [False, True]
-    soon = isinstance(weapon, Pistol) or (isinstance(weapon, Disc) and not jit)
     for how in OTHERS:
+        soon = not ("seed" in how and isinstance(weapon, Spread))
         assert readiness(scene, weapon, 3, **how) == [soon, True, True]
         assert fire(scene, weapon, AT, **how) == fire(scene, weapon, AT, strategy="direct", **how)
     assert readiness(scene, weapon, 1, accept="glass") == [True]
     assert readiness(scene, weapon_from_json(weapon.to_json()), 1) == [True]  # an equal one
+
+
+def test_each_shooter_of_many_is_ready(jit: bool) -> None:
+    """Each excludes itself, and the filters of the last few are kept; also those that are made anew hit the same."""
+    scene = crowd(3)
+    owners = scene.ids()[: prepare.FILTERS_MOST + 3].tolist()
+    assert not is_ready(fire(scene, Disc(30), AT))
+    for _ in range(2):
+        for owner in owners:
+            hits = fire(scene, Disc(30), AT, exclude=owner, seed=owner)
+            assert is_ready(hits)
+            same(hits, fire(scene, Disc(30), AT, exclude=owner, seed=owner, strategy="direct"))
+            assert hits.shots.exclude.tolist() == [[owner]]
+            assert hits.shots.seed.tolist() == [owner]
+        scene.move(owners, (3, 4))
+
+
+def test_shooters_keep_the_kernels_of_a_version() -> None:
+    """A filter that is new after `use_jit` has the other kernels; those of before keep theirs until a change."""
+    pytest.importorskip("numba")
+    scene, weapon, how = crowd(3), Beam(90, 20), {"aim": 30.0}
+    truths = [fire(scene, weapon, AT, exclude=owner, strategy="direct", **how) for owner in range(9)]
+    try:
+        for owner in range(9):
+            use_jit(owner % 2 == 1)
+            for k in range(owner + 1):
+                same(fire(scene, weapon, AT, exclude=k, **how), truths[k])
+    finally:
+        use_jit(None)
+
+
+def test_filters_of_a_spread_have_their_own_draws(jit: bool) -> None:
+    scene, weapon = crowd(3), Spread(Disc(2), 9, 40)
+    ready = prepare.prepare(scene, weapon)
+    for shot in (0, 1, 0):
+        for seed in (0, 5, 6):
+            truth = fire(scene, weapon, AT, seed=seed, shot=shot, strategy="direct")
+            same(ready.filtered(ALL, ALL, None, seed).fire(AT, shot=shot), truth)
+
+
+def test_each_draw_of_a_spread_is_asked_for_again(jit: bool) -> None:
+    scene, weapon = crowd(1), Spread(Disc(1), 3, 9)
+    for shot in range(3):
+        assert readiness(scene, weapon, 2, shot=shot) == [False, True]
+    assert readiness(scene, weapon, 1, shot=np.int64(1)) == [False]
+    with pytest.raises(InputError, match="shot"):
+        fire(scene, weapon, AT, shot=[[1]])
 
 
 @pytest.mark.parametrize(

@@ -293,10 +293,10 @@ def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for k in range(300):
         at, aim = (float(7 * k % 220), float(11 * k % 160)), float(k % 97)
         assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
-        kept = ready._squares.nbytes if "position_cache" in limit else ready._aims_bytes
+        kept = ready._near.nbytes if "position_cache" in limit else ready._aims.nbytes
         assert kept < 60_000
-        assert sum(map(len, ready._squares.made.values())) * position_cache.CELL_BYTES < 60_000 or "AIMS" in limit
-        assert len(ready._looks_of) <= 100
+        assert sum(map(len, ready._near.made.values())) * position_cache.CELL_BYTES < 60_000 or "AIMS" in limit
+        assert len(ready._aims._looks_of) <= 100
 
 
 NUMBERS: list[Callable[[float], Any]] = [
@@ -506,7 +506,7 @@ def test_kernels_may_be_changed_between_two_versions() -> None:
             scene.move(scene.ids()[:3], (60.0, 50.0))
             for how in ({}, {"aim": 30.0}, {"aim": 30.0}, {}):
                 same(ready.fire((50.0, 50.0), **how), fire(scene, weapon, (50.0, 50.0), **how))
-            assert type(ready._squares).__module__.endswith(".compiled") == compiled
+            assert type(ready._near).__module__.endswith(".compiled") == compiled
     finally:
         use_jit(None)
 

@@ -58,9 +58,13 @@ class View(NamedTuple):
     exclude: tuple[int, ...]
     of_occluders: bool = False
 
+    def may_refuse(self, stack: Stack) -> bool:
+        """Whether such shots may refuse an item of a stack."""
+        return self.meets != EVERYTHING or bool(self.exclude) or stack.has_unmet
+
     def accepts(self, stack: Stack) -> Bools:
         """Which items (M,) of a stack such shots accept."""
-        if self.meets == EVERYTHING and not (self.exclude or stack.has_unmet):
+        if not self.may_refuse(stack):
             return np.ones(len(stack), np.bool_)
         there = (stack.categories & self.meets) != 0
         for owner in self.exclude:
@@ -112,13 +116,13 @@ class Derived:
         self._asked: LruCache[Hashable, list[Hashable]] = LruCache(ASKED_MOST, lambda _: 1)
         self._again: LruCache[Hashable, list[Any]] = LruCache(AGAIN_MOST, lambda _: 1)
 
-    def when_asked_again(self, what: Hashable, key: Hashable, make: Callable[[], Made]) -> Made | None:
-        """What `make` makes, kept for a key; None the first time that something is asked for, which may be the last."""
+    def when_asked_again(self, key: Hashable, make: Callable[[], Made]) -> Made | None:
+        """What `make` makes, kept for a key; None the first time that it is asked for, which may be the last."""
         kept: list[Made] = self._again.get(key, list)
         if not kept:
-            asked = self._asked.get(what, list)
+            asked = self._asked.get(key, list)
             if not asked:
-                asked.append(what)
+                asked.append(key)
                 return None
             kept.append(make())
         return kept[0]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypedDict, 
 
 import numpy as np
 
-from hitplanes.planes.common.backend import jit_is_on, keep_arena, news
+from hitplanes.planes.common.backend import keep_arena, news
 from hitplanes.planes.common.checks import InputError, Ints, choice, each, reals, shown
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
@@ -129,7 +129,7 @@ def fire(
     _check_words(prefilter, broadphase, strategy)
     how = prefilter, broadphase, strategy
     if how == AUTO and tick is None and type(scene) is Scene and _is_one(at):
-        ready = _ready(scene, weapon, accept, blocked_by, exclude, seed)
+        ready = _ready(scene, weapon, accept, blocked_by, exclude, seed, shot)
         if ready is not None:
             return ready.fire(at, aim, toward, shot)
     return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
@@ -178,33 +178,28 @@ def _is_one(at: object) -> bool:
 
 
 def _ready(
-    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: Any, seed: Any
+    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: Any, seed: Any, shot: Any
 ) -> Ready[Hits] | None:
-    """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call; see `_is_ready_soon`."""
+    """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call.
+
+    A spread must have been fired with the same draws, because pellets that are new cost more if they are looked up.
+    """
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owner = int(exclude) if isinstance(exclude, np.integer) else exclude
     plain = type(accepts) is type(blocks) is type(seed) is int and (owner is None or type(owner) is int)
     if not plain or not isinstance(weapon, Weapon):
         return None  # also of True, which would find what is kept for 1
+    drawn = (ray_parts_of(weapon) or parts_of(weapon))[1] is not None
+    if drawn and not (shot is None or type(shot) is int):
+        return None
 
     def make() -> Ready[Hits]:
         own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
-        return late.prepare.prepare(scene, own, accept=accepts, blocked_by=blocks, exclude=owner, seed=seed)
+        return late.prepare.prepare(scene, own)
 
-    key = weapon.text, accepts, blocks, owner, seed
-    return scene.derived.when_asked_again(weapon.text if _is_ready_soon(weapon) else key, key, make)
-
-
-def _is_ready_soon(weapon: Weapon) -> bool:
-    """Whether to make a weapon ready for a single shot, with a filter of its own, takes less time than a call of it.
-
-    So it is for one ray, and in numpy for one pattern.
-    """
-    rays = ray_parts_of(weapon)
-    if rays is not None:
-        return rays[:2] == (None, None)
-    return parts_of(weapon)[1] is None and not jit_is_on()
+    ready = scene.derived.when_asked_again((weapon.text, seed, shot) if drawn else weapon.text, make)
+    return None if ready is None else ready.filtered(accepts, blocks, owner, seed)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

@@ -17,10 +17,8 @@ import numpy as np
 from numba import types
 from numba.experimental import structref
 
-from hitplanes.planes.bits.cells import Cells
-from hitplanes.planes.bits.front_to_back import NO_NUMBERS, OrderedTiles
+from hitplanes.planes.bits.front_to_back import NO_NUMBERS
 from hitplanes.planes.bits.visible import VisibleSet
-from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
@@ -31,7 +29,7 @@ from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, IN
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
 from hitplanes.planes.scene.derived import View
-from hitplanes.planes.scene.items import NO_BOXES, Stack
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
@@ -57,6 +55,9 @@ ROW = 6
 ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
 read = struct.Struct("6q").unpack_from
 NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
+ACCEPT_ALL = NO_NUMBERS, NOBODY
+NOWHERE_NEAR = (0, 0, 0, 0, 0), NO_NUMBERS, NO_NUMBERS
+"""Grid, cells and lists of shots that walk all tiles."""
 
 NUMBERS, GRID = types.Array(types.int64, 1, "C", readonly=True), types.UniTuple(types.int64, 5)
 BOUNDS = types.UniTuple(types.int64, 4)
@@ -73,16 +74,18 @@ class ShotTiles(structref.StructRefProxy):
     Parameters
     ----------
     item : ids by rank
-    rank, box, begin, words, occluder : columns of `OrderedTiles`
+    rank, box, begin, words, occluder, categories, owner : columns of `OrderedTiles`
     grid, cell_begin, listed : columns of `Cells`; no cells if shots walk all tiles
     pierce, bounds : as in `front_to_back.Rule`
+    meets, exclude : filter of the shots, as columns; (0,) and (1, 0) if they accept all items
     worth, spent : ns that the visible set takes, and that shots have walked for want of it; 0 if it is there
     """
 
 
 OF_TILES = [
     ("item", NUMBERS), ("rank", NUMBERS), ("box", BOXES), ("begin", NUMBERS), ("words", WORDS), ("occluder", FLAGS),
-    ("grid", GRID), ("cell_begin", NUMBERS), ("listed", NUMBERS), ("pierce", types.boolean), ("bounds", BOUNDS),
+    ("categories", NUMBERS), ("owner", NUMBERS), ("grid", GRID), ("cell_begin", NUMBERS), ("listed", NUMBERS),
+    ("pierce", types.boolean), ("bounds", BOUNDS), ("meets", INTS), ("exclude", OWNERS),
     ("worth", types.int64), ("spent", types.int64),
 ]  # fmt: skip
 
@@ -113,8 +116,14 @@ SHOT_TILES, SHAPE = struct_of(ShotTiles, ShotTilesType, OF_TILES), struct_of(Sha
 
 
 @compiled(SHOT_TILES(*[of for _, of in OF_TILES[:-1]]))
-def _shot_tiles(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth):
-    return ShotTiles(item, rank, box, begin, words, occluder, grid, cell_begin, listed, pierce, bounds, worth, 0)
+def _shot_tiles(
+    item, rank, box, begin, words, occluder, categories, owner, grid, cell_begin, listed, pierce, bounds,
+    meets, exclude, worth,
+):  # fmt: skip
+    return ShotTiles(
+        item, rank, box, begin, words, occluder, categories, owner, grid, cell_begin, listed, pierce, bounds,
+        meets, exclude, worth, 0,
+    )  # fmt: skip
 
 
 @compiled(SHAPE(*[of for _, of in OF_SHAPE]))
@@ -137,14 +146,14 @@ def _shot(at_x, at_y, tiles, shape, found):
         tiles.spent += EACH_TILE * count + EACH_SHOT
         if tiles.spent > tiles.worth:
             return MAKE_VISIBLE
-    scratch, none = np.empty(OUT + 2, np.int64), NO_NUMBERS
+    scratch = np.empty(OUT + 2, np.int64)
     out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 :]
     x[0], y[0] = column, row
     turn, rows, _ = match_rounds(
         0, 1, 0, out, ZERO, x, y, x, y,
         shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, shape.sums, shape.first_sum,
-        tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, none, none,
-        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, none, NOBODY, 1,
+        tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, tiles.categories, tiles.owner,
+        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, tiles.meets, tiles.exclude, 1,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
@@ -159,18 +168,34 @@ shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
+class Walk:
+    """Compiled form of `position_cache.Walk`: the items as columns of kernels."""
+
+    def __init__(self, scene: Scene, pierce: bool) -> None:
+        self.pierce = pierce
+        self._scene = scene
+        self._stack: Stack | None = None
+        self._columns: list[Any] = []
+        self._lock = threading.Lock()
+
+    def read(self, stack: Stack) -> list[Any]:
+        """Ids of the items of a stack, and the columns of its `OrderedTiles`."""
+        with self._lock:
+            if stack is not self._stack:
+                ordered = self._scene.items.tiles().ordered(stack, stack.covers, choosy=True)
+                self._columns, self._stack = list(map(np.ascontiguousarray, (stack.ids, *ordered))), stack
+            return self._columns
+
+
 class PositionCache:
     """Compiled form of `position_cache.PositionCache`, without squares: a kernel walks the stack or the visible set."""
 
-    def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, walk: Walk, kept: Filter, reach: int) -> None:
         self.quick = None  # each shot is looked up
-        self._scene, self._tell = scene, answer_of(weapon)[1]
+        self.tiles: Any  # a ShotTiles
+        self._scene, self._walk, self._view = scene, walk, kept.view(walk.pierce)
+        self._filter = np.array([kept.meets]), np.array([self._view.exclude], np.int64).reshape(1, -1)
         self._reach = np.array([-reach, -reach, reach, reach])
-        self._view = kept.view(pierce)
-        self._forms = -1
-        self._there: Ints
-        self._tiles: OrderedTiles
-        self._shot_tiles: Any  # a ShotTiles
         self._is_visible = False
         self._lock = threading.Lock()
 
@@ -181,69 +206,59 @@ class PositionCache:
             if visible_set is not None:
                 self._use_visible(visible_set, stack)
                 return
-            tiles = self._scene.items.tiles()
-            if stack.forms != self._forms:
-                there = self._view.accepts(stack)[tiles.rank].nonzero()[0]
-                rank, *_, occluder = tiles.ordered(stack, stack.covers, False)[:5]
-                blocks = occluder[there] if stack.has_occluders else occluder
-                self._tiles = OrderedTiles(rank[there], NO_BOXES, tiles.begin[there], tiles.words, blocks)
-                self._forms, self._there = stack.forms, there
-            boxes_xyxy = tiles.boxes(stack.box_xyxy)
-            if len(self._there) < len(boxes_xyxy):
-                boxes_xyxy = boxes_xyxy.take(self._there, axis=0)
-            ordered = self._tiles._replace(box_xyxy=boxes_xyxy)
             worth = max(int(COMPILED.visible_made + COMPILED.visible_item * len(stack)), 1)
             bounds = self._scene.bounds or EVERYWHERE
-            cells = Cells(0, 0, 0, 0, 0, NO_NUMBERS, NO_NUMBERS)
-            self._use(ordered, cells, stack, self._view.pierce, bounds, worth)
+            kept = self._filter if self._view.may_refuse(stack) else ACCEPT_ALL
+            self.tiles = _shot_tiles(
+                *self._walk.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
+            )
+            self._is_visible = False
 
     def _use_visible(self, visible_set: VisibleSet, stack: Stack) -> None:
         """Let shots look up the visible set; its tiles do not overlap and lie within the bounds."""
-        self._use(visible_set.seen, visible_set.cells(self._reach), stack, True, EVERYWHERE, 0)
-
-    def _use(
-        self, tiles: OrderedTiles, cells: Cells, stack: Stack, pierce: bool, bounds: tuple[int, ...], worth: int
-    ) -> None:
-        """Let shots look up tiles; `worth` is the time to make the visible set, ns, or 0."""
-        columns = map(np.ascontiguousarray, (stack.ids, *tiles[:5]))
+        cells = visible_set.cells(self._reach)
+        columns = map(np.ascontiguousarray, (stack.ids, *visible_set.seen))
         lists = tuple(cells[:5]), np.ascontiguousarray(cells.begin), np.ascontiguousarray(cells.listed)
-        self._shot_tiles, self._is_visible = _shot_tiles(*columns, *lists, pierce, tuple(bounds), worth), not worth
+        self.tiles, self._is_visible = _shot_tiles(*columns, *lists, True, EVERYWHERE, *ACCEPT_ALL, 0), True
 
-    def look(self, fired: Round) -> tuple[Look, int]:
-        """Function that looks up what a round hits, and the bytes kept for it."""
-        shape, number, tell = _shape_of(fired), fired.number, self._tell
-        buffers: list[tuple[Any, memoryview]] = []
-
-        def look(x: float, y: float, hits: Answer) -> None:
-            """Call the kernel and read its rows from a buffer."""
-            try:
-                buffer = buffers.pop()  # each thread takes its own
-            except IndexError:
-                found = np.empty((FEW_ROWS, ROW), np.int64)
-                buffer = found, memoryview(found).cast("B")
-            count = shot(x, y, self._shot_tiles, shape, buffer[0])
-            if count:
-                if count < 0:
-                    buffers.append(buffer)
-                    if count == UNKNOWN:
-                        raise KeyError
-                    self._make_visible()
-                    return look(x, y, hits)
-                view, at, end = buffer[1], 0, ROW_BYTES * count
-                while at < end:  # faster than a range
-                    item, n, distance2, column, row, weight = read(view, at)
-                    tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (column, row), distance2)))
-                    at += ROW_BYTES
-            buffers.append(buffer)
-
-        return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes
-
-    def _make_visible(self) -> None:
+    def make_visible(self) -> None:
+        """Make the visible set, if no other thread has made it."""
         with self._lock:
             if not self._is_visible:
                 scene = self._scene
                 visible_set = scene.derived.visible(self._view).read(scene.items)
                 self._use_visible(visible_set, scene.items.stack())
+
+
+def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
+    """Function that looks up what a round hits, and the bytes kept for it."""
+    shape, number, tell = _shape_of(fired), fired.number, answer_of(weapon)[1]
+    buffers: list[tuple[Any, memoryview]] = []
+
+    def look(x: float, y: float, hits: Answer) -> None:
+        """Call the kernel and read its rows from a buffer."""
+        try:
+            buffer = buffers.pop()  # each thread takes its own
+        except IndexError:
+            found = np.empty((FEW_ROWS, ROW), np.int64)
+            buffer = found, memoryview(found).cast("B")
+        near = hits._present.near
+        count = shot(x, y, near.tiles, shape, buffer[0])
+        if count:
+            if count < 0:
+                buffers.append(buffer)
+                if count == UNKNOWN:
+                    raise KeyError
+                near.make_visible()
+                return look(x, y, hits)
+            view, at, end = buffer[1], 0, ROW_BYTES * count
+            while at < end:  # faster than a range
+                item, n, distance2, column, row, weight = read(view, at)
+                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (column, row), distance2)))
+                at += ROW_BYTES
+        buffers.append(buffer)
+
+    return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes
 
 
 def _shape_of(fired: Round) -> Any:

@@ -129,7 +129,10 @@ class Filter:
 
 @dataclass(frozen=True, eq=False)
 class Present:
-    """Snapshot of a scene at one version, with the weapon and its filter; the roles are of items that decide no hit."""
+    """Snapshot of a scene at one version, with the weapon and its filter; the roles are of items that decide no hit.
+
+    `near` is where patterns look up what is near them: a `PositionCache`.
+    """
 
     scene: Scene
     version: int
@@ -138,6 +141,7 @@ class Present:
     weapon: Weapon
     filter: Filter
     imagery: Sequence[Role]
+    near: Any = None
 
 
 class Answer(Hits):

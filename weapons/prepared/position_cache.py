@@ -31,8 +31,8 @@ CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
 """Side of a square, px. A larger square has more objects near it; smaller squares are made more often."""
 
-KEPT_BYTES = 64 * 2**20
-"""Most memory of the squares of one prepared weapon, bytes; beyond it all are discarded."""
+KEPT_BYTES = 16 * 2**20
+"""Most memory of the squares of one prepared weapon and filter, bytes; beyond it all are discarded."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
 """Squares beyond this index are not made, so that a shot that finds a square needs no check of its range."""
@@ -105,24 +105,84 @@ class Column(dict[int, Square]):
         return self.made.make(self.i, j)
 
 
+class Walk:
+    """The items as shots walk them, front to back; made for the first shot of each state of a scene."""
+
+    def __init__(self, scene: Scene, pierce: bool) -> None:
+        self.pierce = pierce
+        self._scene = scene
+        self._ground: Ground | None = None
+        self._lock = threading.Lock()
+
+    def read(self, stack: Stack) -> Ground:
+        """The items of a stack."""
+        with self._lock:
+            ground = self._ground
+            if ground is None or ground.stack is not stack:
+                tiles = self._scene.items.tiles()
+                boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # sides are compared one by one
+                ground = Ground(stack, tiles, boxes_xyxy, self.pierce, self._scene.bounds, stack.covers)
+                self._ground = ground
+            return ground
+
+
+# house: way of areas
+# house: row order
+def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
+    """Function that looks up what a round hits, and the bytes kept for it."""
+    pattern, number, tell = fired.pattern.bigs[0], fired.number, answer_of(weapon)[1]
+    stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
+    first_x, first_y, wide, high = pattern.x, pattern.y, pattern.wide - 1, pattern.high - 1
+
+    def look(x: int, y: int, hits: Answer) -> None:
+        """Append the hits on the tiles near a pixel to an answer, the nearest first."""
+        shared: list[Shared] = []
+        near = hits._present.near
+        square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
+        if square is UNMADE:
+            for distance2, py, px, item, n, weight in near.walked(pattern, x, y):
+                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (px, py), distance2)))
+            return
+        left, top, last = x + first_x, y + first_y, -1
+        right, bottom = left + wide, top + high
+        for x_min, y_min, x_max, y_max, begin, item in square:
+            if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
+                bits = near.tile(stride, begin)
+                shift = (y_min - top) * stride + x_min - left
+                hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
+                if hit:
+                    n = hit.bit_count()
+                    own: Shared = (*nearest(hit), len(shared), item, n, pattern.weight(hit, n))  # front to back
+                    if item == last:
+                        other = shared.pop()
+                        own = (*min(own[:3], other[:3]), other[3], item, n + other[5], own[6] + other[6])
+                    shared.append(own)
+                    last = item
+        if len(shared) > 1:
+            shared.sort()
+        for distance2, dy, dx, _, item, n, weight in shared:
+            tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (x + dx, y + dy), distance2)))
+
+    return look, pattern.nbytes
+
+
 class PositionCache:
     """Squares of one scene for a weapon and its filter.
 
     Parameters
     ----------
+    walk : the items as shots walk them
     reach : greatest distance of a pixel of a round from the round's own, px
     made : visible tiles near each square; `prepare` reads it as `quick`, as a shot in an empty square needs no look-up
     """
 
-    def __init__(self, scene: Scene, weapon: Weapon, pierce: bool, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, walk: Walk, kept: Filter, reach: int) -> None:
         self.made = Made(self._asked)
         self.quick: Any = self.made
         self.nbytes = 0
-        self._tell = answer_of(weapon)[1]
-        self._scene, self._reach, self._pierce, self._view = scene, reach, pierce, kept.view(pierce)
-        self._shots = kept.shots(weapon, (0, 0), (None, None, None))
+        self._scene, self._walk, self._reach, self._view = scene, walk, reach, kept.view(walk.pierce)
+        self._shots = kept.shot_at_origin(None, 0)
         self._stack: Stack | None = None
-        self._ground: Ground | None = None
         self._visible: VisibleSet | None = None
         self._bigs: dict[int, BigTiles] = {}
         self._lock = threading.Lock()
@@ -130,7 +190,7 @@ class PositionCache:
     def follow(self, stack: Stack) -> None:
         """Read the scene as it is now."""
         with self._lock:
-            self._stack, self._ground, self._visible = stack, None, None
+            self._stack, self._visible = stack, None
             self._clear()
 
     def _clear(self) -> None:
@@ -139,54 +199,17 @@ class PositionCache:
             tiles.clear()
         self.nbytes = 0
 
-    # house: way of areas
-    # house: row order
-    def look(self, fired: Round) -> tuple[Look, int]:
-        """Function that looks up what a round hits, and the bytes kept for it."""
-        pattern, made, number, tell = fired.pattern.bigs[0], self.made, fired.number, self._tell
-        stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
-        first_x, first_y, wide, high = pattern.x, pattern.y, pattern.wide - 1, pattern.high - 1
-        tiles = self._bigs.setdefault(stride, BigTiles(stride))
+    def tile(self, stride: int, begin: int) -> int:
+        """A visible tile as an integer of a stride."""
+        tiles = self._bigs.get(stride) or self._bigs.setdefault(stride, BigTiles(stride))
+        bits = tiles.get(begin)
+        if bits is None:
+            visible = self._visible
+            assert visible is not None  # squares list its tiles
+            bits = tiles.read(visible.seen.words, begin)
+        return bits
 
-        def look(x: int, y: int, hits: Answer) -> None:
-            """Append the hits on the tiles near a pixel to an answer, the nearest first."""
-            shared: list[Shared] = []
-            square = made[x >> CELL_SHIFT][y >> CELL_SHIFT]
-            if square is UNMADE:
-                for distance2, py, px, item, n, weight in self._walked(pattern, x, y):
-                    tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (px, py), distance2)))
-                return
-            left, top, last = x + first_x, y + first_y, -1
-            right, bottom = left + wide, top + high
-            for x_min, y_min, x_max, y_max, begin, item in square:
-                if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
-                    bits = tiles.get(begin)
-                    if bits is None:
-                        bits = self._read(tiles, begin)
-                    shift = (y_min - top) * stride + x_min - left
-                    hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
-                    if hit:
-                        n = hit.bit_count()
-                        own: Shared = (*nearest(hit), len(shared), item, n, pattern.weight(hit, n))  # front to back
-                        if item == last:
-                            other = shared.pop()
-                            own = (*min(own[:3], other[:3]), other[3], item, n + other[5], own[6] + other[6])
-                        shared.append(own)
-                        last = item
-            if len(shared) > 1:
-                shared.sort()
-            for distance2, dy, dx, _, item, n, weight in shared:
-                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (x + dx, y + dy), distance2)))
-
-        return look, pattern.nbytes
-
-    def _read(self, tiles: BigTiles, begin: int) -> int:
-        """Make a visible tile as an integer."""
-        visible = self._visible
-        assert visible is not None  # squares list its tiles
-        return tiles.read(visible.seen.words, begin)
-
-    def _walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
+    def walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
         """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and weight of what it hits.
 
         Raises
@@ -194,7 +217,8 @@ class PositionCache:
         KeyError
             If there are so many tiles, and the round is so large, that `fire` is faster.
         """
-        ground, left, top = self._walked_on(), x + pattern.x, y + pattern.y
+        assert self._stack is not None  # `follow` is called first
+        ground, left, top = self._walk.read(self._stack), x + pattern.x, y + pattern.y
         box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
         self._lose(integers_ns(len(tile), pattern.wide, pattern.high))
@@ -211,16 +235,6 @@ class PositionCache:
             self._visible = visible.read(items)
         if ns > now.tiles_call:
             raise KeyError
-
-    def _walked_on(self) -> Ground:
-        """Items that shots walk; made for the first of them."""
-        with self._lock:
-            if self._ground is None:
-                stack, tiles = self._stack, self._scene.items.tiles()
-                assert stack is not None  # `follow` is called first
-                boxes_xyxy = np.asfortranarray(tiles.boxes(stack.box_xyxy))  # sides are compared one by one
-                self._ground = Ground(stack, tiles, boxes_xyxy, self._pierce, self._scene.bounds, stack.covers)
-            return self._ground
 
     def _asked(self, i: int, j: int) -> Square:
         """Square (i, j), which is made if it does not exist; UNMADE if there is no visible set."""

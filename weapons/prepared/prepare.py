@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
 
 import numpy as np
 
-from hitplanes.planes.common.backend import kernels_of
+from hitplanes.planes.common.backend import LruCache, kernels_of
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL, HALF, POSITION_MAX, SUB
 from hitplanes.planes.scene.items import Stack
@@ -39,6 +39,9 @@ AIMS_BYTES = 32 * 2**20
 
 AIM_BYTES = 200
 """Memory of an aim or a shot number in addition to its patterns, bytes."""
+
+FILTERS_MOST = 32
+"""Filters and seeds of a weapon that are kept ready: those of the last shots, as each shooter excludes itself."""
 
 Looks = list[tuple[int, int, Look]]
 """Each round of a shot: its pixel relative to the shot's, and the function that looks up what it hits."""
@@ -76,6 +79,15 @@ class Ready(Generic[AnyHits]):
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter) -> None:
         self.scene, self.weapon = scene, weapon
         self._filter = kept
+        self._filtered: LruCache[tuple[object, ...], Ready[AnyHits]] = LruCache(FILTERS_MOST, lambda _: 1)
+
+    def filtered(self, accept: int, blocked_by: int, owner: int | None, seed: int) -> Ready[AnyHits]:
+        """The same weapon with another filter and seed; those of the last shots are kept, and share its patterns."""
+        key = accept, blocked_by, owner, seed
+        return self._filtered.get(key, lambda: self._with(_filter_of(self.scene, self.weapon, *key)))
+
+    def _with(self, kept: Filter) -> Ready[AnyHits]:
+        return Ready(self.scene, self.weapon, kept)
 
     def fire(
         self, at: Places, aim: Angles | None = None, toward: Places | None = None, shot: Wholes | None = None
@@ -87,29 +99,101 @@ class Ready(Generic[AnyHits]):
         hits = fire_anew(self.scene, self.weapon, at, aim, toward, filters, kept.seed, shot)
         return cast("AnyHits", hits)
 
-    def _snapshot(self, version: int, stack: Stack) -> Present:
+    def _snapshot(self, version: int, stack: Stack, near: Any = None) -> Present:
         scene = self.scene
-        return Present(scene, version, stack, scene.bounds, self.weapon, self._filter, scene.items.imagery())
+        return Present(scene, version, stack, scene.bounds, self.weapon, self._filter, scene.items.imagery(), near)
+
+
+class AimCache:
+    """What a weapon looks up at each of its aims and shot numbers; all of its filters share it.
+
+    Parameters
+    ----------
+    kernels : `position_cache`, or its compiled form
+    """
+
+    def __init__(self, scene: Scene, weapon: Weapon, kernels: Any) -> None:
+        _, spread, plain = parts_of(weapon)
+        self.walk = kernels.Walk(scene, plain.pierce)
+        self._weapon, self._look = weapon, kernels.look
+        self._directed, self._drawn = plain.directed, spread is not None
+        self._looks: dict[object, Looks] = {}
+        self._looks_of: dict[tuple[object, object, int], Looks] = {}
+        self._lock = threading.Lock()
+        self.nbytes = 0
+
+    def known(self, aim: object, toward: object, shot: object, seed: int) -> Looks:
+        """Looks of an aim and a shot number that were used before; KeyError if they were not."""
+        plain = toward is None and (type(aim) is float or aim is None or type(aim) is int)
+        if plain and (shot is None or type(shot) is int):  # True is refused, though it equals the key 1
+            return self._looks_of[aim, shot, seed if self._drawn else 0]
+        raise KeyError
+
+    def looks(
+        self, place: tuple[float, float], aim: object, toward: object, shot: object, kept: Filter
+    ) -> Looks | None:
+        """Looks of a shot; None if an argument must be checked by `fire`."""
+        number, offset = 0, None
+        if shot is not None:
+            if type(shot) is not int or not 0 <= shot < 2**63:
+                return None
+            number = shot if self._drawn else 0
+        if toward is not None:
+            target = plain_pair(toward)
+            if target is None or aim is not None:
+                return None
+            offset = round(SUB * target[0]) - round(SUB * place[0]), round(SUB * target[1]) - round(SUB * place[1])
+            if offset == (0, 0):
+                return None
+        elif aim is not None and not (isinstance(aim, float | int) and type(aim) in PLAIN and abs(aim) <= POSITION_MAX):
+            return None
+        seed = kept.seed if self._drawn else 0
+        key = (number, seed, aim, offset) if self._directed else (number, seed)
+        looks = self._looks.get(key)
+        if looks is None:
+            looks = self._looks[key] = self._made(aim, offset, number, kept)
+        if looks and toward is None:
+            self._looks_of[aim, shot, seed] = looks
+            self._grow(AIM_BYTES)
+        return looks
+
+    def _made(self, aim: Any, offset: tuple[int, int] | None, number: int, kept: Filter) -> Looks:
+        looks: Looks = []
+        for fired in rounds_of(self._weapon, kept.shot_at_origin(aim, number), offset):
+            look, size = self._look(fired, self._weapon)
+            looks.append((fired.x, fired.y, look))
+            self._grow(size)
+        self._grow(AIM_BYTES)
+        return looks
+
+    def _grow(self, size: int) -> None:
+        """Count the memory of aims, and discard all of them if it exceeds AIMS_BYTES."""
+        with self._lock:
+            self.nbytes += size
+            if self.nbytes > AIMS_BYTES:
+                self._looks, self._looks_of, self.nbytes = {}, {}, size
 
 
 class ReadyPattern(Ready[Hits]):
-    """Prepared weapon whose pattern is looked up."""
+    """Prepared weapon whose pattern is looked up; `aims` are by kernels."""
 
-    def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, reach: int) -> None:
+    def __init__(
+        self, scene: Scene, weapon: Weapon, kept: Filter, reach: int, aims: dict[ModuleType, AimCache] | None = None
+    ) -> None:
         super().__init__(scene, weapon, kept)
-        _, spread, plain = parts_of(weapon)
-        self._reach, self._directed, self._drawn = reach, plain.directed, spread is not None
-        self._pierce, self._answer = plain.pierce, answer_of(weapon)[0]
+        self._reach, self._answer = reach, answer_of(weapon)[0]
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
         self._kernels: ModuleType | None = None
-        self._squares: Any
+        self._aims_by: dict[ModuleType, AimCache] = {} if aims is None else aims
+        self._aims: AimCache
+        self._near: Any
         self._present: Present
-        self._aims: dict[object, Looks] = {}
-        self._looks_of: dict[tuple[object, object], Looks] = {}
-        self._aims_bytes = 0
         self._straight: Look
         self._quick: Any = {}
+
+    def _with(self, kept: Filter) -> ReadyPattern:
+        return ReadyPattern(self.scene, self.weapon, kept, self._reach, self._aims_by)
 
     def fire(self, at: Any, aim: object = None, toward: object = None, shot: object = None) -> Hits:
         """Decide what one shot hits; the arguments are those of `fire`."""
@@ -132,7 +216,7 @@ class ReadyPattern(Ready[Hits]):
                                 return self._looked_up(at, aim, toward, shot)
                             self._straight(column, row, hits)
                         return hits
-                    looks = self._known(aim, toward, shot)
+                    looks = self._aims.known(aim, toward, shot, self._filter.seed)
                     if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
                         return self._answer_at(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
         except (KeyError, ValueError, OverflowError):  # not made yet, too far, or not a pair
@@ -142,9 +226,11 @@ class ReadyPattern(Ready[Hits]):
     def _looked_up(self, at: Any, aim: Any, toward: Any, shot: Any) -> Hits:
         """Fire with arguments that are not in the cache yet, or of unusual types."""
         place = plain_pair(at)
-        looks = None if place is None else self._looks(place, aim, toward, shot)
+        looks = None if place is None else self._aims.looks(place, aim, toward, shot, self._filter)
         if place is None or looks is None or max(map(abs, place)) > FARTHEST:
             return super().fire(at, aim, toward, shot)
+        if aim is None is toward and shot is None and len(looks) == 1 and looks[0][:2] == (0, 0):
+            self._straight, self._quick = looks[0][2], self._near.quick
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
         arguments = aim, None if toward is None else plain_pair(toward), shot
         try:
@@ -160,60 +246,6 @@ class ReadyPattern(Ready[Hits]):
             look(x + dx, y + dy, hits)
         return hits
 
-    def _known(self, aim: object, toward: object, shot: object) -> Looks:
-        """Looks of an aim and a shot number that were used before; KeyError if they were not."""
-        plain = toward is None and (type(aim) is float or aim is None or type(aim) is int)
-        if plain and (shot is None or type(shot) is int):  # True is refused, though it equals the key 1
-            return self._looks_of[aim, shot]
-        raise KeyError
-
-    def _looks(self, place: tuple[float, float], aim: object, toward: object, shot: object) -> Looks | None:
-        """Looks of a shot; None if an argument must be checked by `fire`."""
-        number, offset = 0, None
-        if shot is not None:
-            if type(shot) is not int or not 0 <= shot < 2**63:
-                return None
-            number = shot if self._drawn else 0
-        if toward is not None:
-            target = plain_pair(toward)
-            if target is None or aim is not None:
-                return None
-            offset = round(SUB * target[0]) - round(SUB * place[0]), round(SUB * target[1]) - round(SUB * place[1])
-            if offset == (0, 0):
-                return None
-        elif aim is not None and not (isinstance(aim, float | int) and type(aim) in PLAIN and abs(aim) <= POSITION_MAX):
-            return None
-        key = (number, aim, offset) if self._directed else number
-        looks = self._aims.get(key)
-        if looks is None:
-            looks = self._made_looks(key, aim, offset, number)
-        if looks and toward is None:
-            self._looks_of[aim, shot] = looks
-            self._grow(AIM_BYTES)
-        return looks
-
-    def _made_looks(self, key: object, aim: Any, offset: tuple[int, int] | None, number: int) -> Looks:
-        """Make the looks of a shot; those of a shot without arguments are stored for the fastest path."""
-        shots = self._filter.shot_at_origin(aim, number)
-        looks: Looks = []
-        for fired in rounds_of(self.weapon, shots, offset):
-            look, size = self._squares.look(fired)
-            looks.append((fired.x, fired.y, look))
-            self._grow(size)
-        self._grow(AIM_BYTES)
-        self._aims[key] = looks
-        straight = (0, None, None) if self._directed else 0
-        if key == straight and len(looks) == 1 and looks[0][:2] == (0, 0):
-            self._straight, self._quick = looks[0][2], self._squares.quick
-        return looks
-
-    def _grow(self, size: int) -> None:
-        """Count the memory of aims, and discard all of them if it exceeds AIMS_BYTES."""
-        with self._lock:
-            self._aims_bytes += size
-            if self._aims_bytes > AIMS_BYTES:
-                self._aims, self._looks_of, self._aims_bytes = {}, {}, size
-
     def _follow(self) -> None:
         """Read the scene as it is now, and choose the kernels."""
         with self._lock:
@@ -222,12 +254,13 @@ class ReadyPattern(Ready[Hits]):
                 return
             kernels = kernels_of(position_cache)
             if kernels is not self._kernels:
-                self._kernels = kernels
-                self._squares = kernels.PositionCache(self.scene, self.weapon, self._pierce, self._filter, self._reach)
-                self._aims, self._looks_of, self._quick = {}, {}, {}
+                if kernels not in self._aims_by:
+                    self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
+                self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
+                self._near = kernels.PositionCache(self.scene, self._aims.walk, self._filter, self._reach)
             stack = self._items.stack()
-            self._squares.follow(stack)
-            self._present = self._snapshot(version, stack)
+            self._near.follow(stack)
+            self._present = self._snapshot(version, stack, self._near)
             self._version = version
 
 
@@ -276,12 +309,7 @@ def prepare(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    toward = (1, 0) if has_no_range(weapon) else None
-    bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
-    shots = checked_shots(weapon, (0, 0), None, toward, *bits, exclude, seed, None)
-    if exclude is not None:
-        check_owners(scene, shots)
-    kept = Filter(int(shots.meets[0]), shots.exclude, int(shots.seed[0]))
+    kept = _filter_of(scene, weapon, accept, blocked_by, exclude, seed)
     parts = ray_parts_of(weapon)
     if parts is not None:
         from .prepared_ray import ReadyRay
@@ -290,3 +318,15 @@ def prepare(
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
+
+
+def _filter_of(
+    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: object, seed: object
+) -> Filter:
+    """Check the filter of a prepared weapon."""
+    toward = (1, 0) if has_no_range(weapon) else None
+    bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
+    shots = checked_shots(weapon, (0, 0), None, toward, *bits, exclude, seed, None)
+    if exclude is not None:
+        check_owners(scene, shots)
+    return Filter(int(shots.meets[0]), shots.exclude, int(shots.seed[0]))

@@ -87,6 +87,9 @@ class ReadyRay(Ready[RayHits]):
         self._present: Present
         self._ids: memoryview
 
+    def _with(self, kept: Filter) -> ReadyRay:
+        return ReadyRay(self.scene, self.weapon, kept, self._ray)
+
     def fire(self, at: Any, aim: Any = None, toward: Any = None, shot: Any = None) -> RayHits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         if self._items.version != self._version:
