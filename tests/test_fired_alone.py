@@ -106,7 +106,7 @@ def test_filters_of_a_spread_have_their_own_draws(jit: bool) -> None:
     for shot in (0, 1, 0):
         for seed in (0, 5, 6):
             truth = fire(scene, weapon, AT, seed=seed, shot=shot, strategy="direct")
-            same(ready.filtered(ALL, ALL, None, seed).fire(AT, shot=shot), truth)
+            same(prepare.filtered(ready, ALL, ALL, None, seed).fire(AT, shot=shot), truth)
 
 
 def test_each_draw_of_a_spread_is_asked_for_again(jit: bool) -> None:

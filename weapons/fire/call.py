@@ -199,7 +199,7 @@ def _ready(
         return late.prepare.prepare(scene, own)
 
     ready = scene.derived.when_asked_again((weapon.text, seed, shot) if drawn else weapon.text, make)
-    return None if ready is None else ready.filtered(accepts, blocks, owner, seed)
+    return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owner, seed)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

@@ -81,11 +81,6 @@ class Ready(Generic[AnyHits]):
         self._filter = kept
         self._filtered: LruCache[tuple[object, ...], Ready[AnyHits]] = LruCache(FILTERS_MOST, lambda _: 1)
 
-    def filtered(self, accept: int, blocked_by: int, owner: int | None, seed: int) -> Ready[AnyHits]:
-        """The same weapon with another filter and seed; those of the last shots are kept, and share its patterns."""
-        key = accept, blocked_by, owner, seed
-        return self._filtered.get(key, lambda: self._with(_filter_of(self.scene, self.weapon, *key)))
-
     def _with(self, kept: Filter) -> Ready[AnyHits]:
         return Ready(self.scene, self.weapon, kept)
 
@@ -318,6 +313,12 @@ def prepare(
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
+
+
+def filtered(ready: Ready[AnyHits], accept: int, blocked_by: int, exclude: int | None, seed: int) -> Ready[AnyHits]:
+    """The same weapon with another filter and seed; those of the last shots are kept, and share its patterns."""
+    key = accept, blocked_by, exclude, seed
+    return ready._filtered.get(key, lambda: ready._with(_filter_of(ready.scene, ready.weapon, *key)))
 
 
 def _filter_of(
