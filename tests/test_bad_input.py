@@ -324,6 +324,9 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "pierce": (lambda: Disc(1, pierce=1), "pierce: expected true or false, got 1"),  # type: ignore[arg-type]
     "falloff": (lambda: Disc(1, falloff="liner"), "falloff: .*got 'liner' .did you mean 'linear'"),
     "stencil, empty": (lambda: Stencil([]), r"mask: expected shape \(any, any\), got \(0,\)"),
+    "stencil without columns": (lambda: Stencil(np.zeros((3, 0), bool)), "mask: expected .* 1 to 32768 px, got 0 x 3"),
+    "stencil without rows": (lambda: Stencil(np.zeros((0, 3), bool)), "mask: expected .* 1 to 32768 px, got 3 x 0"),
+    "stencil of empty rows": (lambda: Stencil([""]), "mask: expected .* 1 to 32768 px, got 0 x 1"),
     "stencil, uneven": (lambda: Stencil(["##", "#"]), r"mask\[1\]: expected 2 of '#' and '.', got '#'"),
     "pellet, a name": (
         lambda: Spread("disc", 3, 1), "pellet: expected a weapon of one pattern or ray, got 'disc'"),  # type: ignore[arg-type]

@@ -212,9 +212,9 @@ class Mask:
         """Check a mask and return it (h, w) as booleans."""
         if not (isinstance(value, list | tuple) and value and isinstance(value[0], str)):
             array = array_of(name, value)
-            if array.ndim == 2 and max(array.shape) > MASK_SIDE_MAX:
+            if array.ndim == 2 and not 1 <= min(array.shape) <= max(array.shape) <= MASK_SIDE_MAX:
                 got = f"{array.shape[1]} x {array.shape[0]}"
-                raise InputError(f"{name}: expected a mask of sides up to {MASK_SIDE_MAX} px, got {got}")
+                raise InputError(f"{name}: expected a mask of sides of 1 to {MASK_SIDE_MAX} px, got {got}")
             return bools(name, value, (None, None))
         for i, row in enumerate(value):
             if not isinstance(row, str) or len(row) != len(value[0]) or set(row) - set("#."):
@@ -223,7 +223,7 @@ class Mask:
 
     def schema(self) -> dict[str, Any]:
         """Rows of either kind; a schema cannot say that all rows have one length."""
-        rows = {"type": "array", "items": {"type": "string", "pattern": "^[#.]*$"}, "minItems": 1}
+        rows = {"type": "array", "items": {"type": "string", "pattern": "^[#.]+$"}, "minItems": 1}
         return {"anyOf": [rows, _nested((None, None), {"enum": [0, 1, True, False]}, 1)]}
 
 
