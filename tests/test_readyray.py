@@ -39,6 +39,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
 from hitplanes.weapons.rays import one_ray, raycast
+from hitplanes.weapons.rays.one_ray import Ray, WideRay
 
 worlds = st.randoms(use_true_random=False)
 AT, TOWARD = (30.25, 40.5), (200.0, 90.75)
@@ -116,7 +117,10 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
     assert 12 < rows < (72 if weapon.hits_most == 1 else 300) and alone > 60  # type: ignore[attr-defined]
 
 
-THROUGH = Laser(300), Rifle(range=250, max_hits=2), Rifle(range=300, max_hits=4, falloff="linear"), Laser(None)
+THROUGH = [
+    Laser(300), Rifle(range=250, max_hits=2), Rifle(range=300, max_hits=4, falloff="linear"), Laser(None),
+    Laser(300, width=5), Rifle(250, max_hits=2, width=3), Rifle(range=300, max_hits=3, width=1), Pistol(None, width=8),
+]  # fmt: skip
 
 
 @examples(30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -152,20 +156,36 @@ def test_a_ray_that_ends_on_a_corner_enters_cells_of_a_row_at_once(kernels: Modu
             same(*both(prepare(scene, Laser(None)), scene, Laser(None), {}, shot))  # type: ignore[arg-type]
 
 
-def test_few_rays_that_go_on_are_left_to_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("kind", "weapon"), [(Ray, Rifle(400, max_hits=2)), (WideRay, Rifle(400, max_hits=2, width=4))], ids=repr
+)
+def test_few_rays_that_go_on_are_left_to_arrays(kind: Any, weapon: Weapon, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those that end in an item that they have hit before, or enter it together with the occluder that ends them."""
-    scene, weapon, told, inner = Scene(), Rifle(400, max_hits=2), [], one_ray._passed
+    scene, told, inner = Scene(), [], kind.passed
     for x, y, side, role in [
         (100, 50, 9, "hittable"), (200, 50, 9, "hittable"), (203, 50, 9, "hittable"),
         (300, 80, 9, "occluder"), (296, 80, 1, "hittable"), (100, 20, 9, "hittable"), (100, 20, 9, "hittable"),
     ]:  # fmt: skip
         scene.add(Sprite.box(side, side), (x, y), role=role)
-    monkeypatch.setattr(one_ray, "_passed", lambda *of: told.append(inner(*of)) or told[-1])
+    monkeypatch.setattr(kind, "passed", lambda *of: told.append(inner(*of)) or told[-1])
     ready = prepare(scene, weapon)
     for at in [(20, 50), (100, 50), (150, 50), (250, 80), (50, 20)]:
         assert ready.fire(at) == fire(scene, weapon, at, strategy="walk")
     assert [found is None for found in told] == [False, False, True, True, True]
-    assert prepare(scene, Pistol(400)).fire((50, 20)).object.tolist() == [6] and told[-1] is not None
+    first = Pistol(400, width=weapon.width)  # type: ignore[attr-defined]
+    assert prepare(scene, first).fire((50, 20)).object.tolist() == [6] and told[-1] is not None
+
+
+def test_a_wide_ray_among_many_items_is_left_to_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would look at all of them, though it ends at the first."""
+    scene, weapon, cast = Scene(), Pistol(900, width=4), []
+    for k in range(raycast.ROUND_PAIRS + 1):
+        scene.add(Sprite.box(4, 4), (20 + 6 * k, 50))
+    monkeypatch.setattr(one_ray, "hits_and_ends", lambda *of: cast.append(of) or raycast.hits_and_ends(*of))
+    ready = prepare(scene, weapon)
+    for x, left in ((0, 1), (30, 1)):
+        assert ready.fire((x, 50)) == fire(scene, weapon, (x, 50), strategy="walk")
+        assert len(cast) == left
 
 
 @pytest.fixture

@@ -435,7 +435,7 @@ class Lines:
         left, right = np.maximum(left, -(-least // SUB)), np.minimum(right, most // SUB)
         # Floats have room for the rows between two columns; the runs are exact.
         slope = aside / np.where(along == 0, 1, along)
-        sides = (np.clip(side, least, most) for side in (SUB * left - HALF, SUB * right + HALF))
+        sides = (np.minimum(np.maximum(side, least), most) for side in (SUB * left - HALF, SUB * right + HALF))
         ends = [v + (side - u) * slope for side in sides]
         half = np.maximum(reach, self.wide_sides / np.maximum(np.abs(along), 1)) if self.radius else reach
         first = np.maximum(np.floor((np.minimum(*ends) - half - 1) / SUB).astype(np.int64), top)

@@ -1,7 +1,8 @@
 """One ray a call. A thin ray is followed in whole numbers of Python, which is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
-box is left that it enters before its end. Times are those of `grid.rasterize`: whole numbers over
+box is left that it enters before its end. The cells of a wide ray are found in arrays, those of all boxes at once; both
+have one rule for what is hit and where they end. Times are those of `grid.rasterize`: whole numbers over
 max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on rounding.
 """
 
@@ -22,7 +23,7 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 
 from .contacts import NEVER
-from .raycast import hits_and_ends
+from .raycast import ROUND_PAIRS, Crossed, first_cells, hits_and_ends, times_in
 
 ROWS_MOST = 400
 """Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
@@ -38,14 +39,14 @@ class Entered(NamedTuple):
     Parameters
     ----------
     rank : (n,) places in the stack
-    entry, leave : (n,) times at which the ray enters and leaves the boxes
     box_xyxy : (n, 4) boxes within the bounds, relative to the pixel on which the ray begins
+    entry, leave : (n,) times at which the ray enters and leaves the boxes; of a wide ray their bounds
     """
 
     rank: Ints
+    box_xyxy: Ints
     entry: Ints
     leave: Ints
-    box_xyxy: Ints
 
 
 Followed = tuple[int, list[list[int]]]
@@ -69,19 +70,17 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
         hit[3:5] += pixel(lines.start).T
         return int(ends[1, 0]), hit[1:].T.tolist()
 
-    if radius:
-        return cast
     accepted = view.accepts(stack)
     accepts = None if accepted.all() else accepted
 
     def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one thin ray."""
+        """Follow one ray."""
         if not (dx or dy) or max(abs(dx), abs(dy)) > LONGEST:
             return cast(x, y, dx, dy)
         origin = (x + HALF) // SUB, (y + HALF) // SUB
-        ray = Ray((x - SUB * origin[0], y - SUB * origin[1]), (dx, dy))
-        near = _near(ray, origin, stack, bounds, accepts)
-        found = _passed(ray, origin, near, stack, most)
+        start, step = (x - SUB * origin[0], y - SUB * origin[1]), (dx, dy)
+        ray = WideRay(start, step, radius) if radius else Ray(start, step)
+        found = ray.passed(origin, _near(ray, origin, stack, bounds, accepts), stack, most)
         return cast(x, y, dx, dy) if found is None else found
 
     return follow
@@ -89,6 +88,8 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
 
 class Ray:
     """A thin ray, relative to the pixel on which it begins, in 1/256 px."""
+
+    reach = HALF
 
     def __init__(self, start: Pair, step: Pair) -> None:
         self.start, self.step = start, step
@@ -148,12 +149,71 @@ class Ray:
             per, low, high = 1, min(u, u + along), max(u, u + along)
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
+    # house: hit rule of rays
+    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
+        """What a ray hits, up to `most` objects; None if arrays must decide it.
 
-def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
+        They do so if it looks at too many rows, if it enters another item at once with the occluder that ends it, or if
+        it ends in the box of an item that it has hit before.
+        """
+        if most != 1 and self.rows_about(near.leave - near.entry) > ROWS_MOST:
+            return None
+        end, left, times = NEVER, ROWS_MOST, list[int]()
+        touched: list[Touch] = []
+        for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
+            if entry > end:
+                break
+            box, rank = near.box_xyxy[k].tolist(), int(near.rank[k])
+            rows = self.rows(box, (entry, leave))
+            left -= len(rows)
+            if left < 0:
+                return None
+            count, found = _cells(_runs(self, origin, box, rows, stack, rank), self, most != 1)
+            if found is None:
+                continue
+            touched.append((*found, rank, count, leave))
+            if stack.occluder[rank]:
+                end = min(end, found[0])
+            elif most is not None:
+                times = sorted([*times, found[0]])[:most]
+                end = min(end, times[-1]) if len(times) == most else end
+        return _ended(sorted(met for met in touched if met[0] <= end), end, most, origin, stack)
+
+
+class WideRay:
+    """A ray of half a width of `reach`, relative to the pixel on which it begins, in 1/256 px."""
+
+    def __init__(self, start: Pair, step: Pair, reach: int) -> None:
+        self.start, self.step, self.reach = start, step, max(reach, HALF)
+        self.lines = Lines(np.array([start]), np.array([step]), reach)
+
+    def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
+        """Bounds of the times at which the ray enters cells of boxes (n, 4); leave < entry if it touches none."""
+        return times_in(self.lines, np.zeros(len(boxes_xyxy), np.int64), boxes_xyxy)
+
+    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
+        """What the ray hits, up to `most` objects; None if the raycast of a batch must decide it.
+
+        It does so if the ray may end long before it meets all boxes, and as it does for thin rays; see `Ray.passed`.
+        """
+        if most is not None and len(near.rank) > ROUND_PAIRS:
+            return None
+        first = first_cells(Crossed(np.zeros_like(near.rank), *near), self.lines, np.array([origin]), stack)
+        blocks = stack.occluder[first.rank]
+        end, times = int(first.entry[blocks].min(initial=NEVER)), first.entry[~blocks]
+        if most is not None and len(times) >= most:
+            end = min(end, int(np.partition(times, most - 1)[most - 1]))
+        reached = (first.entry <= end).nonzero()[0]
+        columns = first.entry, first.y, first.x, first.rank, first.count, first.most
+        touched = zip(*(column[reached].tolist() for column in columns), strict=True)
+        return _ended(sorted(touched), end, most, origin, stack)
+
+
+def _near(ray: Ray | WideRay, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
     """Accepted items whose boxes a ray touches, in order of entry."""
     ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
-    around = [(low - HALF) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
-    around += [(high + HALF) // SUB + o for (_, high), o in zip(ends, origin, strict=True)]
+    around = [(low - ray.reach) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
+    around += [(high + ray.reach) // SUB + o for (_, high), o in zip(ends, origin, strict=True)]
     rank = np.flatnonzero(meets(np.array(around), stack.box_xyxy))
     if accepts is not None:
         rank = rank[accepts[rank]]
@@ -164,7 +224,7 @@ def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Boo
     entry, leave = ray.times(box)
     rows = np.flatnonzero((entry <= leave) & (box[:, 0] <= box[:, 2]) & (box[:, 1] <= box[:, 3]))
     rows = rows[np.argsort(entry[rows], kind="stable")]
-    return Entered(rank[rows], entry[rows], leave[rows], box[rows])
+    return Entered(rank[rows], box[rows], entry[rows], leave[rows])
 
 
 Cell = tuple[int, int, int]
@@ -190,37 +250,6 @@ def _entered(ray: Ray, row: int, at: int) -> Cell:
     """A cell of a row, and when a ray enters it."""
     x, y = (row, at) if ray.major else (at, row)
     return ray.spell(x, y)[0], y, x
-
-
-# house: hit rule of rays
-def _passed(ray: Ray, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
-    """What a ray hits, up to `most` objects; None if arrays must decide it.
-
-    They do so if it looks at too many rows, if it enters another item at once with the occluder that ends it, or if it
-    ends in the box of an item that it has hit before.
-    """
-    if most != 1 and ray.rows_about(near.leave - near.entry) > ROWS_MOST:
-        return None
-    end, left, times = NEVER, ROWS_MOST, list[int]()
-    touched: list[Touch] = []
-    for k, (entry, leave) in enumerate(zip(near.entry.tolist(), near.leave.tolist(), strict=True)):
-        if entry > end:
-            break
-        box, rank = near.box_xyxy[k].tolist(), int(near.rank[k])
-        rows = ray.rows(box, (entry, leave))
-        left -= len(rows)
-        if left < 0:
-            return None
-        count, found = _cells(_runs(ray, origin, box, rows, stack, rank), ray, most != 1)
-        if found is None:
-            continue
-        touched.append((*found, rank, count, leave))
-        if stack.occluder[rank]:
-            end = min(end, found[0])
-        elif most is not None:
-            times = sorted([*times, found[0]])[:most]
-            end = min(end, times[-1]) if len(times) == most else end
-    return _ended(sorted(met for met in touched if met[0] <= end), end, most, origin, stack)
 
 
 Touch = tuple[int, int, int, int, int, int]

@@ -165,7 +165,7 @@ def _hits_and_ends(
     for batch in _rounds(near, len(lines), most, stack):
         now = batch[near.least[batch] <= ends.time[near.ray[batch]]]
         if len(now):
-            firsts = Firsts.joined([firsts, _firsts_of(near.take(now), own, origin, stack)])
+            firsts = Firsts.joined([firsts, first_cells(near.take(now), own, origin, stack)])
             ends = _ends(firsts, len(lines), most, origin, bounds, stack)
     hit = _hit(firsts, ends, stack)
     last = (hit.entry == ends.time[hit.ray]) & (hit.x == ends.x[hit.ray]) & (hit.y == ends.y[hit.ray])
@@ -257,7 +257,7 @@ def _rounds(near: Crossed, rays: int, most: int | None, stack: Stack) -> Iterato
         first, size = first + size, size * GROWTH
 
 
-def _firsts_of(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
+def first_cells(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
     """The first cells of items, and the numbers of their cells."""
     side = near.box_xyxy[:, 2:] - near.box_xyxy[:, :2] + 1
     parts = pieces(cells_most(own, side), CHUNK_SAMPLES) if len(near) else []
@@ -268,7 +268,7 @@ NO_FIRSTS = Firsts(*[np.zeros(0, np.int64)] * 7)
 
 
 def _firsts(near: Crossed, own: Lines, origin: Ints, stack: Stack) -> Firsts:
-    """`_firsts_of` for a part of the pairs."""
+    """`first_cells` for a part of the pairs."""
     lines = own.take(near.ray)
     pair, row, first, last = lines.runs(near.box_xyxy)
     run, place = _pixels(near, lines, origin, stack, (pair, row, first), last - first + 1)
