@@ -36,7 +36,8 @@ from hitplanes import (
     scan,
     sees,
 )
-from hitplanes.weapons.rays import ray_call, sight
+from hitplanes.weapons.fire.strategy import chosen_ray_way
+from hitplanes.weapons.rays import one_ray, ray_call, sight
 
 WEAPONS: dict[str, Weapon] = {
     "disc": Disc(30),
@@ -141,13 +142,16 @@ def test_places_and_aims_of_different_numbers_are_named(how: dict[str, Any], tol
 # Lines of sight and scans, beside the oracle
 
 
-WAYS = ("auto", "walk", "cast", "march")
+WAYS = ("auto", "walk", "cast", "march", "cast alone", "march alone")
 
 
 def force(monkeypatch: pytest.MonkeyPatch, way: str) -> None:
-    """Answer by one way wherever it serves."""
-    chosen = ray_call.chosen_ray_way
-    monkeypatch.setattr(ray_call, "chosen_ray_way", lambda _, *rest: chosen(way, *rest))
+    """Answer by one way wherever it serves, together or one ray after another."""
+    way, _, alone = way.partition(" ")
+    for module in (ray_call, one_ray):
+        monkeypatch.setattr(module, "chosen_ray_way", lambda _, *rest, **how: chosen_ray_way(way, *rest, **how))
+    if way != "auto":
+        monkeypatch.setattr(ray_call, "are_faster_alone", lambda *_: bool(alone))
 
 
 @dataclass(frozen=True)
@@ -274,6 +278,24 @@ def test_beams_are_rays_of_a_pistol_and_sight_that_of_a_laser(at_once: int, monk
         assert np.array_equal(sees(scene, places, targets), clear.reshape(7, 9))
         assert np.array_equal(sees(scene, places[2], targets), clear.reshape(7, 9)[2:3])
     assert len(np.unique(far)) > 7 and 0 < clear.sum() < 63
+
+
+def test_few_rays_are_followed_one_after_another(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of several views, or too many, are not; nor are any if one of them cannot be."""
+    scene, alone = yard(), []
+    chosen = one_ray.chosen_follower
+    monkeypatch.setattr(one_ray, "chosen_follower", lambda *of: alone.append(of) or chosen(*of))
+    for places, how, expected in (
+        ([HERE], {}, 1), ([HERE] * 2, {}, 1), ([HERE] * 2, {"exclude": [0, 1]}, 0), ([HERE] * 99, {}, 0)
+    ):  # fmt: skip
+        alone.clear()
+        truth = np.concatenate([sees(scene, [place], TARGETS[:1]) for place in places])
+        alone.clear()
+        assert np.array_equal(sees(scene, places, TARGETS[:1], **how), truth) and len(alone) == expected
+    not_level = lambda *of: (lambda *line: chosen(*of)[0](*line) if line[3] else None, False)  # noqa: E731
+    monkeypatch.setattr(one_ray, "chosen_follower", not_level)
+    level = [(60, HERE[1]), (1, HERE[1])]
+    assert sees(scene, HERE, level).tolist() == [[False, True]]
 
 
 def test_who_sees_is_seen(jit: bool) -> None:

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
     from .fire import shelter as shelter
     from .fire import verdicts as verdicts
     from .prepared import prepare as prepare
+    from .rays import one_ray as one_ray
     from .rays import ray_call as ray_call
     from .replay import shot_log as shot_log
 
 _PLACES = (
     "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
-    "fire.shelter", "fire.verdicts", "prepared.prepare", "rays.ray_call", "replay.shot_log",
+    "fire.shelter", "fire.verdicts", "prepared.prepare", "rays.one_ray", "rays.ray_call", "replay.shot_log",
 )  # fmt: skip
 
 

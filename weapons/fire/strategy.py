@@ -276,6 +276,13 @@ def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, p
     return other if cast <= march else _rented_or_bought(other, field, scene, cast - march)
 
 
+def are_faster_alone(rays: int, items: int) -> bool:
+    """Whether so many rays take less time followed one after another than together."""
+    now = costs()
+    alone, together = now.prepared_cast + items * now.prepared_cast_item, now.cast_ray + items * now.cast_pair
+    return rays * alone < now.cast_call + rays * together
+
+
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:
     """March if the distance field is made, or if calls have lost as much time without it as it takes to make."""
     if field.is_made(scene.items):

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.common.backend import cached_attribute, kernels_of
+from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
@@ -25,14 +25,12 @@ from hitplanes.planes.scene.scene import Scene
 from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
-from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
-from ..rays import one_ray, raycast
+from ..rays import raycast
 from ..rays.contacts import rays_of
-from ..rays.first_hit import marcher
-from ..rays.one_ray import Follow, Followed
+from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
@@ -114,27 +112,10 @@ class ReadyRay(Ready[RayHits]):
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:
         """What a ray hits, by the way chosen now; the next rays go the same way unless it is pending."""
-        ray, stack = self._ray, self._stack
-        chosen = chosen_ray_way("auto", False, ray, self.scene, stack, self._view, 1, prepared=True)
-        most = ray.hits_most
-        follow = cast = kernels_of(one_ray).follower(stack, self.scene.bounds, self._view, ray.radius_256, most)
-        if chosen.way == "march":
-            march = marcher(self.scene, stack, self._view)
-
-            def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
-                """March, and cast what the march leaves undecided."""
-                return march(x, y, dx, dy) or cast(x, y, dx, dy)
-
-        elif RAY_WAYS["cast"](ray, self.scene, self._view):
-
-            def follow(*_: int) -> Followed | None:
-                """Leave rays to `fire` that are not cast at the scene as it is."""
-                return None
-
-        if not chosen.pending:
+        follow, pending = chosen_follower(self.scene, self._stack, self._ray, self._view)
+        if not pending:
             self._follows = follow
-        found: Followed | None = follow(x, y, dx, dy)
-        return found
+        return follow(x, y, dx, dy)
 
     def _step(self, place: Pair, aim: Any, target: Pair | None) -> tuple[int, int] | None:
         """Vector from the start of a shot to its end, 1/256 px; None if an argument must be checked by `fire`."""

@@ -8,12 +8,14 @@ max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on round
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from hitplanes.planes.bits.distance_field import LONGEST
+from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
@@ -21,8 +23,12 @@ from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import Box, meets
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.scene.scene import Scene
 
+from ..fire.strategy import RAY_WAYS, chosen_ray_way
+from ..kinds.rays import RayWeapon
 from .contacts import NEVER
+from .first_hit import marcher
 from .raycast import ROUND_PAIRS, Crossed, first_cells, hits_and_ends, times_in
 
 ROWS_MOST = 400
@@ -54,6 +60,19 @@ Followed = tuple[int, list[list[int]]]
 
 Follow = Callable[[int, int, int, int], Followed | None]
 """Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
+
+
+def chosen_follower(scene: Scene, stack: Stack, ray: RayWeapon, view: View) -> tuple[Follow, bool]:
+    """Function that follows one ray by the way chosen now, and whether the next ray may go another way.
+
+    A ray is cast if it comes to several pixels at once by march. None is returned of rays that must walk.
+    """
+    chosen = chosen_ray_way("auto", False, ray, scene, stack, view, 1, prepared=True)
+    cast: Follow = kernels_of(sys.modules[__name__]).follower(stack, scene.bounds, view, ray.radius_256, ray.hits_most)
+    if chosen.way == "march":
+        march = marcher(scene, stack, view)
+        return lambda *line: march(*line) or cast(*line), chosen.pending
+    return (lambda *_: None) if RAY_WAYS["cast"](ray, scene, view) else cast, chosen.pending
 
 
 def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:

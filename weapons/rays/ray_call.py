@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena
+from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, CHUNK_PAIRS
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.scene import Scene
@@ -22,7 +23,7 @@ from .. import late
 from ..fire.hits import Rows
 from ..fire.plan import Plan, leave_out_absent, leave_out_imagery, read_stack
 from ..fire.prefilter import Candidates, may_refuse, view_of
-from ..fire.strategy import RAY_WAYS, RayChoice, chosen_candidates, chosen_ray_way
+from ..fire.strategy import RAY_WAYS, RayChoice, are_faster_alone, chosen_candidates, chosen_ray_way
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon, ends_at_first, is_thin_first
 from ..kinds.weapon import Weapon
@@ -107,21 +108,28 @@ def _planned(
     return Range(scene.items, stack, scene.bounds, candidates, plan, field=field), chosen, choose
 
 
-def first_ends(
-    scene: Scene, ray: RayWeapon, view: View | None, count: int
-) -> Callable[[Shots], tuple[Rays, Terminations]]:
-    """Function that finds the ends of the rays of shots of one ray each, planned for so many rays of a view in all.
+def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Callable[[Shots], tuple[Rays, Ints]]:
+    """Function that finds when the rays of shots of one ray each end, planned for so many rays of a view in all.
 
-    Rays end at the first thing that they meet. Rows, passes and stops are not made.
+    Rays end at the first thing that they meet, or NEVER. Rows, passes and stops are not made.
     """
-    keep_arena()
-    through, chosen, choose = _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan())
+    stack, follow = scene.items.stack(), None
+    if view is not None and are_faster_alone(count, len(stack)):
+        follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view)
+    planned = cache(lambda: _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan()))
 
-    def ends_of(shots: Shots) -> tuple[Rays, Terminations]:
+    def ended(shots: Shots) -> tuple[Rays, Ints]:
         rays = rays_of((None, None, ray), shots)
-        return rays, _first_ends(rays, ray, shots, through, chosen.way, choose)
+        if follow is not None:
+            lines = zip(rays.start_256.tolist(), rays.step_256.tolist(), strict=True)
+            times = [found[0] for found in (follow(*start, *step) for start, step in lines) if found]
+            if len(times) == len(rays):
+                return rays, np.array(times, np.int64)
+        keep_arena()
+        through, chosen, choose = planned()
+        return rays, _first_ends(rays, ray, shots, through, chosen.way, choose).time
 
-    return ends_of
+    return ended
 
 
 def _later_of(found: list[tuple[int, Walk | Made | FirstHits]], shots: Shots, ray: RayWeapon, through: Range) -> Later:

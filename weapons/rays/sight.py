@@ -1,6 +1,6 @@
 """Lines of sight and scans: which eyes see which targets, and how far beams go, without rows, passes and stops.
 
-places and filters -> shots of one ray each, in chunks -> `ray_call.first_ends` -> a table (N, M)
+places and filters -> shots of one ray each, in chunks -> `ray_call.end_times` -> a table (N, M)
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from ..fire.call import category_bits, check_owners, moments_of, present_of
 from ..fire.prefilter import view_of
 from ..kinds.placements import Shots, places_256, unaimed_shots
 from ..kinds.rays import Pistol
-from .contacts import Rays, Reason, Terminations
-from .ray_call import RAYS_AT_ONCE, first_ends
+from .contacts import NEVER, Rays
+from .ray_call import RAYS_AT_ONCE, end_times
 from .ray_walk import lines_of
 
 if TYPE_CHECKING:
     from hitplanes.planes.scene.history import History
 
     from ..fire.call import Angles, Categories, Owners, Places
+
+GAZE = Pistol(None)
 
 Aimed = Callable[[Ints], tuple[Ints, Shots]]
 """Function that aims the shots of cells (n,) of a table; it returns the cells that have a shot, and the shots."""
@@ -65,8 +67,8 @@ def sees(
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
     targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
-    for pair, _, ends in _ends(scene, tick, Pistol(None), shots, seen.shape[1], _gazes(shots, targets_256)):
-        seen.reshape(-1)[pair] = ends.reason == Reason.RANGE
+    for pair, _, time in _ends(scene, tick, GAZE, shots, seen.shape[1], _gazes(shots, targets_256)):
+        seen.reshape(-1)[pair] = time == NEVER
     return seen
 
 
@@ -118,10 +120,10 @@ def scan(
     shots, ray = _shots("at", at, scene, accept, blocked_by, exclude), Pistol(real("range", range, 0, REACH_MAX))
     shape, aimed = _beams(shots, angles)
     distance = np.full(shape, np.inf)
-    for beam, rays, ends in _ends(scene, tick, ray, shots, shape[1], aimed):
-        met = np.flatnonzero(ends.rank >= 0)
+    for beam, rays, time in _ends(scene, tick, ray, shots, shape[1], aimed):
+        met = np.flatnonzero(time != NEVER)
         lines = lines_of(rays, ray).take(met)
-        distance.reshape(-1)[beam[met]] = ends.time[met] / lines.scale * lines.length
+        distance.reshape(-1)[beam[met]] = time[met] / lines.scale * lines.length
     return distance
 
 
@@ -158,13 +160,13 @@ def _check_reach(offset: Ints, eye: Ints, target: Ints) -> None:
 
 def _ends(
     scene: Scene | History, tick: object, ray: Pistol, shots: Shots, each: int, aimed: Aimed
-) -> Iterator[tuple[Ints, Rays, Terminations]]:
-    """Follow so many rays of each shot, a row of a table: cells (n,) of the table, their rays, and their ends."""
+) -> Iterator[tuple[Ints, Rays, Ints]]:
+    """Follow so many rays of each shot, a row of a table: cells (n,) of the table, their rays, and when these end."""
     view = view_of(False, shots)
     for moment, rows in moments_of(scene, tick, len(shots)):
         cells = (rows[:, None] * each + np.arange(each)).reshape(-1)
-        ends_of = first_ends(moment, ray, view, len(cells))
+        times_of = end_times(moment, ray, view, len(cells))
         for begin in range(0, len(cells), RAYS_AT_ONCE):
             cell, aimed_shots = aimed(cells[begin : begin + RAYS_AT_ONCE])
             if len(cell):
-                yield cell, *ends_of(aimed_shots)
+                yield cell, *times_of(aimed_shots)
