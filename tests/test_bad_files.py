@@ -149,7 +149,7 @@ SCENES: dict[str, tuple[Any, str]] = {
     "category unknown": (changed(f"{DUCK}.categories", ["targe"]), r"hittable\[0\]: .*'targe' .did you mean 'target'"),
     "flip true": (changed(f"{DUCK}.flip", True), r"hittable\[0\]: flip: expected one of .*got True"),
     "mask of 40,000": (object_of(mask=["#" * 40_000]), r"hittable\[0\]: mask: expected a mask of sides .*40000 x 1"),
-    "mask of an empty row": (object_of(mask=[""]), r"hittable\[0\]: mask: expected .*not empty, got 0 x 1"),
+    "mask of an empty row": (object_of(mask=[""]), r"hittable\[0\]: mask: expected .*1 to 32768 px, got 0 x 1"),
     "mask of words": (object_of(mask=["##", "#x"]), r"hittable\[0\]: mask\[1\]: expected 2 of '#' and '\.', got '#x'"),
     "mask of true and 0": (object_of(mask=[[True, 0]]), r"hittable\[0\]: mask\[0\]\[0\]: .*like the others, got True"),
     "polygon with true": (object_of(polygon=[[0, 0], [True, 0], [0, 5]]), r"polygon\[1\]\[0\]: .*got True"),
