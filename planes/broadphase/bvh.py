@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
-from ..grid.spans import meets, pieces, ragged, sorted_once
+from ..grid.spans import begins, meets, pieces, ragged, sorted_once
 from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
 
 
@@ -52,7 +52,7 @@ class Tree:
         """Update the nodes above changed outer boxes; return the number of rows read and written."""
         leaf = sorted_once(np.searchsorted(self.starts, places, side="right") - 1)
         group, place = ragged(self.starts[leaf + 1] - self.starts[leaf])
-        first = np.flatnonzero(np.diff(group, prepend=-1))
+        first = np.flatnonzero(begins(group))
         hulls = _hulls(self.outer[self.starts[leaf][group] + place], first)
         self.levels[-1][leaf] = hulls
         written = len(group) + len(leaf)

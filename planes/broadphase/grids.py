@@ -12,7 +12,7 @@ import numpy as np
 
 from ..common.checks import Floats, InputError, Ints, integer, integers, real
 from ..common.limits import CHUNK_SAMPLES, GRID_FRESH, OVERSIZED_CELLS
-from ..grid.spans import pieces, ragged
+from ..grid.spans import begins, pieces, ragged
 from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work
 
 FIRST_BITS = 3
@@ -39,7 +39,7 @@ class Listing:
         """Sort entries by cell."""
         order = np.argsort(key, kind="stable")
         key = key[order]
-        start = np.flatnonzero(np.diff(key, prepend=-1))
+        start = np.flatnonzero(begins(key))
         return cls(key[start], np.append(start, len(key)), entry[order])
 
     def entries(self) -> Pairs:

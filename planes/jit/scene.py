@@ -560,9 +560,11 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
 def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
     """See `kinds.placements.disc_offsets`."""
     seed, reach = np.asarray(seed, np.uint64), radius_256 // SUB
-    shape = np.broadcast_shapes(*(word.shape for word in (seed, shot, round_, pellet)))
-    wide = shape if len(shape) > 1 else (*shape, 1)
-    *turns, pellets = (np.broadcast_to(word, shape).reshape(wide) for word in (seed, shot, round_, pellet))
+    words: Any = seed, shot, round_, pellet
+    if len({word.shape for word in words}) > 1:  # of one shape, this would take as long as the draws
+        words = np.broadcast_arrays(*words)
+    shape = words[0].shape
+    *turns, pellets = (word.reshape(shape if len(shape) > 1 else (*shape, 1)) for word in words)
     offsets = np.empty((*pellets.shape, 2), np.int64)
     bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
     _disc_offsets(reach, radius_256**2, bits, *(word[:, 0] for word in turns), pellets, offsets.reshape(-1, 2))

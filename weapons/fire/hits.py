@@ -17,7 +17,7 @@ from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Bools, InputError, Ints, integer
 from hitplanes.planes.common.limits import WEIGHT_FULL
-from hitplanes.planes.grid.spans import Spans, merged_runs, sorted_once
+from hitplanes.planes.grid.spans import Spans, begins, merged_runs, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -503,14 +503,15 @@ def rows_of_span_hits(met: SpanHits, placements: Placements, ids: Ints, first_sh
     distance2 = (x - origin[:, 0]) ** 2 + (met.y - origin[:, 1]) ** 2
     order = row_order(group, distance2, met.y, x)
     group, distance2 = group[order], distance2[order]
-    first = np.flatnonzero(np.diff(group, prepend=-1))
+    new = begins(group)
+    first = np.flatnonzero(new)
     best = order[first]
     lengths = (met.x_last - met.x_first + 1)[order]
     samples = np.add.reduceat(lengths, first) if len(first) else lengths
     weight = np.add.reduceat(met.weight[order], first) if len(first) else lengths
     pellets, pixels = np.ones_like(samples), samples
     if int(placements.pellet.max(initial=0)):
-        pellets, pixels = _distinct(met, np.cumsum(np.diff(group, prepend=-1) != 0) - 1, order, len(first))
+        pellets, pixels = _distinct(met, np.cumsum(new) - 1, order, len(first))
     sort = row_order(shot[best], round_[best], distance2[first], met.y[best], x[best], met.rank[best])
     best = best[sort]
     return Rows(

@@ -445,7 +445,7 @@ def end_at_occluders(ends: Terminations, met: Contacts, stack: Stack) -> None:
 def _earliest(met: Contacts, pairs: Ints, cell: Ints) -> tuple[Ints, Ints]:
     """Earliest pair of each ray in the order of the walk, and its cell, given one cell of each pair."""
     order = np.lexsort((met.rank[pairs], met.x[cell], met.y[cell], met.entry[cell], met.ray[pairs]))
-    first = order[np.flatnonzero(np.diff(met.ray[pairs][order], prepend=-1))]
+    first = order[begins(met.ray[pairs][order])]
     return pairs[first], cell[first]
 
 
@@ -482,15 +482,15 @@ def _end_at_budget(ends: Terminations, met: Contacts, lines: Lines, cost: Ints, 
     ray, time, slope = _rates(met, cost)
     if not len(ray):
         return
-    begins = np.flatnonzero(np.diff(ray, prepend=-1))
-    group = np.cumsum(np.diff(ray, prepend=-1) != 0) - 1
-    fulls = [_full(lines, r, budget_256) for r in ray[begins].tolist()]
+    new = begins(ray)
+    first, group = np.flatnonzero(new), np.cumsum(new) - 1
+    fulls = [_full(lines, r, budget_256) for r in ray[first].tolist()]
     full, even = np.array([most for most, _ in fulls], object), np.array([exact for _, exact in fulls], np.bool_)
-    spent = _spent(ray, time, slope, lines.scale[ray[begins]])
-    spent = spent - spent[begins][group]
+    spent = _spent(ray, time, slope, lines.scale[ray[first]])
+    spent = spent - spent[first][group]
     enough = full if spent.dtype == object else np.minimum(full, NEVER).astype(np.int64)
     over = np.flatnonzero(spent >= enough[group])
-    over = over[np.flatnonzero(np.diff(ray[over], prepend=-1))] - 1  # before the first of each ray
+    over = over[begins(ray[over])] - 1  # before the first of each ray
     left = full[group[over]] - spent[over]
     whole = np.asarray(time[over] - (-left // slope[over]), np.int64)
     even = even[group[over]] & np.asarray(left % slope[over] == 0, np.bool_)
@@ -537,6 +537,6 @@ def _end_inside(ends: Terminations, met: Contacts, rays: Ints, times: Ints) -> N
     within = np.flatnonzero((met.entry <= last[ray]) & (met.leave > last[ray]))
     ray, rank = ray[within], met.rank[met.pair[within]]
     order = np.lexsort((met.x[within], met.y[within], rank, ray))
-    order = order[np.flatnonzero(np.diff(ray[order], prepend=-1))]
+    order = order[begins(ray[order])]
     ends.rank[ray[order]] = rank[order]
     ends.y[ray[order]], ends.x[ray[order]] = met.y[within[order]], met.x[within[order]]

@@ -14,7 +14,7 @@ from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Box, Spans, pieces, sorted_once
+from hitplanes.planes.grid.spans import Box, Spans, begins, pieces, sorted_once
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
@@ -535,10 +535,10 @@ def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Ro
         )  # fmt: skip
     group = groups_of(passes, rounds)
     order = row_order(group, passes.entry_px, passes.pellet, passes.order)
-    begins = np.flatnonzero(np.diff(group[order], prepend=-1))
-    best = order[begins]
+    first = begins(group[order])
+    best = order[first]
     number = np.zeros(len(group), np.int64)
-    number[order] = np.cumsum(np.diff(group[order], prepend=-1) != 0) - 1
+    number[order] = np.cumsum(first) - 1
     samples = np.bincount(number, passes.samples, len(best)).astype(np.int64)
     weight = np.bincount(number, passes.weight, len(best)).astype(np.int64)
     pellets = np.bincount(number, minlength=len(best))
