@@ -168,8 +168,8 @@ shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
-class Walk:
-    """Compiled form of `position_cache.Walk`: the items as columns of kernels."""
+class GroundCache:
+    """Compiled form of `position_cache.GroundCache`: the items as columns of kernels."""
 
     def __init__(self, scene: Scene, pierce: bool) -> None:
         self.pierce = pierce
@@ -190,10 +190,10 @@ class Walk:
 class PositionCache:
     """Compiled form of `position_cache.PositionCache`, without squares: a kernel walks the stack or the visible set."""
 
-    def __init__(self, scene: Scene, walk: Walk, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int) -> None:
         self.quick = None  # each shot is looked up
         self.tiles: Any  # a ShotTiles
-        self._scene, self._walk, self._view = scene, walk, kept.view(walk.pierce)
+        self._scene, self._ground, self._view = scene, ground, kept.view(ground.pierce)
         self._filter = np.array([kept.meets]), np.array([self._view.exclude], np.int64).reshape(1, -1)
         self._reach = np.array([-reach, -reach, reach, reach])
         self._is_visible = False
@@ -210,7 +210,7 @@ class PositionCache:
             bounds = self._scene.bounds or EVERYWHERE
             kept = self._filter if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(
-                *self._walk.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
+                *self._ground.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
             )
             self._is_visible = False
 

@@ -105,7 +105,7 @@ class Column(dict[int, Square]):
         return self.made.make(self.i, j)
 
 
-class Walk:
+class GroundCache:
     """The items as shots walk them, front to back; made for the first shot of each state of a scene."""
 
     def __init__(self, scene: Scene, pierce: bool) -> None:
@@ -171,16 +171,16 @@ class PositionCache:
 
     Parameters
     ----------
-    walk : the items as shots walk them
+    ground : the items as shots walk them
     reach : greatest distance of a pixel of a round from the round's own, px
     made : visible tiles near each square; `prepare` reads it as `quick`, as a shot in an empty square needs no look-up
     """
 
-    def __init__(self, scene: Scene, walk: Walk, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int) -> None:
         self.made = Made(self._asked)
         self.quick: Any = self.made
         self.nbytes = 0
-        self._scene, self._walk, self._reach, self._view = scene, walk, reach, kept.view(walk.pierce)
+        self._scene, self._ground, self._reach, self._view = scene, ground, reach, kept.view(ground.pierce)
         self._shots = kept.shot_at_origin(None, 0)
         self._stack: Stack | None = None
         self._visible: VisibleSet | None = None
@@ -218,7 +218,7 @@ class PositionCache:
             If there are so many tiles, and the round is so large, that `fire` is faster.
         """
         assert self._stack is not None  # `follow` is called first
-        ground, left, top = self._walk.read(self._stack), x + pattern.x, y + pattern.y
+        ground, left, top = self._ground.read(self._stack), x + pattern.x, y + pattern.y
         box = np.array([left, top, left + pattern.wide - 1, top + pattern.high - 1])
         tile = meets(box, ground.boxes_xyxy).nonzero()[0]
         self._lose(integers_ns(len(tile), pattern.wide, pattern.high))

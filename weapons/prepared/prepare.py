@@ -109,7 +109,7 @@ class AimCache:
 
     def __init__(self, scene: Scene, weapon: Weapon, kernels: Any) -> None:
         _, spread, plain = parts_of(weapon)
-        self.walk = kernels.Walk(scene, plain.pierce)
+        self.ground = kernels.GroundCache(scene, plain.pierce)
         self._weapon, self._look = weapon, kernels.look
         self._directed, self._drawn = plain.directed, spread is not None
         self._looks: dict[object, Looks] = {}
@@ -252,7 +252,7 @@ class ReadyPattern(Ready[Hits]):
                 if kernels not in self._aims_by:
                     self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
                 self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
-                self._near = kernels.PositionCache(self.scene, self._aims.walk, self._filter, self._reach)
+                self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach)
             stack = self._items.stack()
             self._near.follow(stack)
             self._present = self._snapshot(version, stack, self._near)
