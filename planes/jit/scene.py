@@ -560,10 +560,10 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
 def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
     """See `kinds.placements.disc_offsets`."""
     seed, reach = np.asarray(seed, np.uint64), radius_256 // SUB
-    words: Any = seed, shot, round_, pellet
-    if len({word.shape for word in words}) > 1:  # of one shape, this would take as long as the draws
-        words = np.broadcast_arrays(*words)
-    shape = words[0].shape
+    words, shapes = [seed, shot, round_, pellet], {word.shape for word in (seed, shot, round_, pellet)}
+    shape = np.broadcast_shapes(*shapes)
+    if len(shapes) > 1:  # of one shape, this would take as long as the draws
+        words = [np.broadcast_to(word, shape) for word in words]
     *turns, pellets = (word.reshape(shape if len(shape) > 1 else (*shape, 1)) for word in words)
     offsets = np.empty((*pellets.shape, 2), np.int64)
     bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
