@@ -21,7 +21,9 @@ from hitplanes import (
     Disc,
     History,
     InputError,
+    Laser,
     Pistol,
+    Rifle,
     Scene,
     Spread,
     Weapon,
@@ -127,6 +129,36 @@ def test_each_draw_of_a_spread_is_asked_for_again(jit: bool) -> None:
 )  # fmt: skip
 def test_what_asks_for_more_is_answered_by_the_scene(how: dict[str, Any]) -> None:
     assert readiness(crowd(1), Disc(3), 3, **how) == [False] * 3
+
+
+@pytest.mark.parametrize("weapon", [Pistol(150), Laser(150, width=3), Rifle(99, max_hits=2)], ids=lambda w: w.kind)
+def test_one_ray_at_the_past_is_ready_at_once(weapon: Weapon, jit: bool) -> None:
+    """Of a recorded tick, and of one between two; each kind of filter, and errors, are those of a batch."""
+    scene, rng = crowd(5), random.Random(2)
+    history = History(scene, interpolate=True)
+    for _ in range(4):
+        history.record()
+        changed(scene, rng)
+    hit = 0
+    for k in range(24):
+        how: dict[str, Any] = [{}, {"accept": "glass"}, {"exclude": [k, 1]}, {"aim": 20.0 * k}, {"toward": (90, 80)}][
+            k % 5
+        ]
+        at, tick = (rng.uniform(0, 200), rng.uniform(0, 150)), rng.choice([0, 2, 1.5, 0.25, np.float64(2.75)])
+        hits = fire(history, weapon, at, tick=tick, **how)
+        same(hits, fire(history, weapon, at, tick=tick, strategy="direct", **how))
+        assert [stage.name for stage in hits.plan.ran][:2] == ["past", "prepared"]
+        assert hits.scene_of(0).tick == tick
+        hit += len(hits)
+    assert hit > 9
+    for bad in ({"tick": 9}, {"tick": True}, {"tick": 1, "exclude": 999}, {"tick": 1, "aim": "east"}):
+        with pytest.raises(InputError) as told:
+            fire(history, weapon, AT, **bad)
+        with pytest.raises(InputError) as truth:
+            fire(history, weapon, AT, strategy="direct", **bad)
+        assert str(told.value) == str(truth.value)
+    with pytest.raises(InputError, match=r"^scene: expected a Scene or a History, got list"):
+        fire([], weapon, AT, tick=1)  # type: ignore[arg-type]
 
 
 def test_batches_and_the_past_are_answered_by_the_scene() -> None:

@@ -114,8 +114,14 @@ def recorded(*ticks: int, interpolate: bool = False) -> History:
         (lambda: recorded(*range(100)).at(100), "tick: expected one of 36 to 99, got 100"),
         (lambda: recorded(0, 1, 2, 5, 7, 8).at(6), "tick: expected one of 0 to 2, 5, 7 to 8, got 6"),
         (lambda: recorded(*range(0, 80, 4)).at(6), "tick: expected one of the 20 recorded from 0 to 76, got 6"),
-        (lambda: recorded(0, 1).at(0.5), "tick: expected one of 0 to 1, got 0.5"),
-        (lambda: recorded(0, 1).at(1e-9), "tick: expected one of 0 to 1, got 1e-09"),
+        (
+            lambda: recorded(0, 1).at(0.5),
+            "tick: expected one of 0 to 1, got 0.5; to read between them, make the History with interpolate=True",
+        ),
+        (
+            lambda: recorded(0, 1).at(1e-9),
+            "tick: expected one of 0 to 1, got 1e-09; to read between them, make the History with interpolate=True",
+        ),
         (lambda: recorded(4).at(6), "tick: expected one of 4, got 6"),
         (lambda: recorded().at(0), "tick: expected one that is recorded, got 0: none is yet"),
         (lambda: recorded(0).at(True), "tick: expected numbers, got True"),

@@ -280,7 +280,8 @@ class History:
         if not ticks:
             raise InputError(f"tick: expected one that is recorded, got {shown(tick)}: none is yet")
         if not self._interpolate:
-            raise InputError(f"tick: expected one of {_runs(ticks)}, got {shown(tick)}")
+            between = "" if at.is_integer() else "; to read between them, make the History with interpolate=True"
+            raise InputError(f"tick: expected one of {_runs(ticks)}, got {shown(tick)}{between}")
         if not ticks[0] < at < ticks[-1]:
             raise InputError(f"tick: expected a number from {ticks[0]} to {ticks[-1]}, got {shown(tick)}")
         return at

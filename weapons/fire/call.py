@@ -128,8 +128,12 @@ def fire(
     """
     _check_words(prefilter, broadphase, strategy)
     how = prefilter, broadphase, strategy
-    if how == AUTO and tick is None and type(scene) is Scene and _is_one(at):
-        ready = _ready(scene, weapon, accept, blocked_by, exclude, seed, shot)
+    if how == AUTO and _is_one(at):
+        filters = accept, blocked_by, exclude, seed
+        if isinstance(tick, int | float):
+            ready = _ready_then(scene, weapon, tick, filters)
+        else:
+            ready = _ready(scene, weapon, filters, shot) if tick is None and type(scene) is Scene else None
         if ready is not None:
             return ready.fire(at, aim, toward, shot)
     return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
@@ -177,13 +181,16 @@ def _is_one(at: object) -> bool:
     return isinstance(at, tuple | list) and len(at) == 2 and isinstance(at[0], int | float)
 
 
-def _ready(
-    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: Any, seed: Any, shot: Any
-) -> Ready[Hits] | None:
+Filtering = tuple[Any, Any, Any, Any]
+"""(accept, blocked_by, exclude, seed) of a call."""
+
+
+def _ready(scene: Scene, weapon: Weapon, filters: Filtering, shot: Any) -> Ready[Hits] | None:
     """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call.
 
     A spread must have been fired with the same draws, because pellets that are new cost more if they are looked up.
     """
+    accept, blocked_by, exclude, seed = filters
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owner = int(exclude) if isinstance(exclude, np.integer) else exclude
@@ -200,6 +207,16 @@ def _ready(
 
     ready = scene.derived.when_asked_again((weapon.text, seed, shot) if drawn else weapon.text, make)
     return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owner, seed)
+
+
+def _ready_then(scene: Scene | History, weapon: Weapon, tick: float, filters: Filtering) -> Ready[Hits] | None:
+    """A weapon of one ray, ready for the scene of a tick; it pays for a single shot, for which nothing is kept."""
+    parts = ray_parts_of(weapon) if isinstance(weapon, Weapon) else None
+    if parts is None or parts[:2] != (None, None) or present_of(scene) is scene:
+        return None
+    ((past, _),) = moments_of(scene, tick, 1)
+    accept, blocked_by, exclude, seed = filters
+    return late.prepare.prepare(past, weapon, accept=accept, blocked_by=blocked_by, exclude=exclude, seed=seed)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:

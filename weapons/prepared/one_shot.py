@@ -191,6 +191,8 @@ class Answer(Hits):
     def plan(self) -> Plan:
         """Plan of the shot."""
         plan = Plan()
+        if type(self.scene) is not Scene:
+            plan.run("past", "1 scenes of it")
         plan.run("prepared", "the weapon is ready for the scene; the stages after it ran when they were asked for")
         if self._arguments[:2] == (None, None):
             plan.leave_out_all(unaimed, self.weapon)
