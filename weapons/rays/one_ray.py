@@ -108,7 +108,7 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
 class Ray:
     """A thin ray, relative to the pixel on which it begins, in 1/256 px."""
 
-    reach = HALF
+    reach = HALF  # how far from its axis it may touch a pixel's centre, along x and along y
 
     def __init__(self, start: Pair, step: Pair) -> None:
         self.start, self.step = start, step
@@ -200,11 +200,11 @@ class Ray:
 
 
 class WideRay:
-    """A ray of half a width of `reach`, relative to the pixel on which it begins, in 1/256 px."""
+    """A ray with a radius, half of its width, relative to the pixel on which it begins, in 1/256 px."""
 
-    def __init__(self, start: Pair, step: Pair, reach: int) -> None:
-        self.start, self.step, self.reach = start, step, max(reach, HALF)
-        self.lines = Lines(np.array([start]), np.array([step]), reach)
+    def __init__(self, start: Pair, step: Pair, radius: int) -> None:
+        self.start, self.step, self.reach = start, step, max(radius, HALF)
+        self.lines = Lines(np.array([start]), np.array([step]), radius)
 
     def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Bounds of the times at which the ray enters cells of boxes (n, 4); leave < entry if it touches none."""
