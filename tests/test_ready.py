@@ -21,6 +21,7 @@ from some_of import in_turn
 from test_fire import Placements, expected, some_battle, some_place, some_pose, told
 
 from hitplanes import (
+    ALL,
     Beam,
     Box,
     Disc,
@@ -47,6 +48,7 @@ from hitplanes.planes.grid.spans import Spans
 from hitplanes.weapons.prepared import position_cache
 from hitplanes.weapons.prepared.one_shot import OneShot
 from hitplanes.weapons.prepared.position_cache import ODD, PIXEL
+from hitplanes.weapons.prepared.prepare import filtered
 
 WORLD = (220, 160)
 MASK = np.array([[1, 0, 1], [0, 1, 0]], bool)
@@ -283,17 +285,17 @@ def test_a_scene_that_forgot_what_changed(monkeypatch: pytest.MonkeyPatch) -> No
         scene.move(scene.ids()[:6], rng.uniform((0, 0), WORLD, (6, 2)))
 
 
-@pytest.mark.parametrize(
-    "limit", ["hitplanes.weapons.prepared.position_cache.KEPT_BYTES", "hitplanes.weapons.prepared.prepare.AIMS_BYTES"]
-)
+@pytest.mark.parametrize("limit", ["KEPT_BYTES", "FILTER_BYTES", "AIMS_BYTES"])
 def test_memory_is_bounded(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limit, 20_000)
+    monkeypatch.setattr(f"hitplanes.weapons.prepared.prepare.{limit}", 20_000)
     scene = crowd(3)
     ready: Any = prepare(scene, Beam(120, 20))
+    if limit == "FILTER_BYTES":
+        ready = filtered(ready, ALL, ALL, None, 0)
     for k in range(300):
         at, aim = (float(7 * k % 220), float(11 * k % 160)), float(k % 97)
         assert ready.fire(at, aim=aim) == fire(scene, Beam(120, 20), at, aim=aim)
-        kept = ready._near.nbytes if "position_cache" in limit else ready._aims.nbytes
+        kept = ready._aims.nbytes if "AIMS" in limit else ready._near.nbytes
         assert kept < 60_000
         assert sum(map(len, ready._near.made.values())) * position_cache.CELL_BYTES < 60_000 or "AIMS" in limit
         assert len(ready._aims._looks_of) <= 100

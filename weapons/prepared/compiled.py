@@ -190,7 +190,7 @@ class GroundCache:
 class PositionCache:
     """Compiled form of `position_cache.PositionCache`, without squares: a kernel walks the stack or the visible set."""
 
-    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int, _: int) -> None:
         self.quick = None  # each shot is looked up
         self.tiles: Any  # a ShotTiles
         self._scene, self._ground, self._view = scene, ground, kept.view(ground.pierce)

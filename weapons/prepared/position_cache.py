@@ -31,8 +31,11 @@ CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
 """Side of a square, px. A larger square has more objects near it; smaller squares are made more often."""
 
-KEPT_BYTES = 16 * 2**20
-"""Most memory of the squares of one prepared weapon and filter, bytes; beyond it all are discarded."""
+KEPT_BYTES = 64 * 2**20
+"""Most memory of the squares of one prepared weapon, bytes; beyond it all are discarded."""
+
+FILTER_BYTES = 4 * 2**20
+"""The same of each filter of a weapon that `fire` made ready, of which many are kept."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
 """Squares beyond this index are not made, so that a shot that finds a square needs no check of its range."""
@@ -173,13 +176,14 @@ class PositionCache:
     ----------
     ground : the items as shots walk them
     reach : greatest distance of a pixel of a round from the round's own, px
+    room : most memory of the squares, bytes
     made : visible tiles near each square; `prepare` reads it as `quick`, as a shot in an empty square needs no look-up
     """
 
-    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int) -> None:
+    def __init__(self, scene: Scene, ground: GroundCache, kept: Filter, reach: int, room: int) -> None:
         self.made = Made(self._asked)
         self.quick: Any = self.made
-        self.nbytes = 0
+        self.nbytes, self._room = 0, room
         self._scene, self._ground, self._reach, self._view = scene, ground, reach, kept.view(ground.pierce)
         self._shots = kept.shot_at_origin(None, 0)
         self._stack: Stack | None = None
@@ -243,7 +247,7 @@ class PositionCache:
             return UNMADE
         with self._lock:
             self._visible = visible
-            if self.nbytes > KEPT_BYTES:
+            if self.nbytes > self._room:
                 self._clear()
             column = self.made[i]
             if j not in column:

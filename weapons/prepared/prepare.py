@@ -26,7 +26,7 @@ from ..kinds.rays import not_cast
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Answer, Arguments, Filter, Present, answer_of, reach_of, rounds_of
-from .position_cache import CELL_SHIFT, FARTHEST, ODD, PIXEL, Look
+from .position_cache import CELL_SHIFT, FARTHEST, FILTER_BYTES, KEPT_BYTES, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
     from ..fire.call import Angles, Filtered, Places, Wholes
@@ -181,6 +181,7 @@ class ReadyPattern(Ready[Hits]):
         self._lock = threading.Lock()
         self._kernels: ModuleType | None = None
         self._aims_by: dict[ModuleType, AimCache] = {} if aims is None else aims
+        self._room = KEPT_BYTES if aims is None else FILTER_BYTES
         self._aims: AimCache
         self._near: Any
         self._present: Present
@@ -252,7 +253,7 @@ class ReadyPattern(Ready[Hits]):
                 if kernels not in self._aims_by:
                     self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
                 self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
-                self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach)
+                self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach, self._room)
             stack = self._items.stack()
             self._near.follow(stack)
             self._present = self._snapshot(version, stack, self._near)
