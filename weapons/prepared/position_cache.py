@@ -140,17 +140,19 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
     def look(x: int, y: int, hits: Answer) -> None:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
         shared: list[Shared] = []
-        near = hits._present.near
+        near: PositionCache = hits._present.near
         square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
         if square is UNMADE:
             for distance2, py, px, item, n, weight in near.walked(pattern, x, y):
                 tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (px, py), distance2)))
             return
         left, top, last = x + first_x, y + first_y, -1
-        right, bottom = left + wide, top + high
+        right, bottom, tiles = left + wide, top + high, near.tiles(stride)
         for x_min, y_min, x_max, y_max, begin, item in square:
             if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
-                bits = near.tile(stride, begin)
+                bits = tiles.get(begin)
+                if bits is None:
+                    bits = near.read(tiles, begin)
                 shift = (y_min - top) * stride + x_min - left
                 hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
                 if hit:
@@ -203,15 +205,16 @@ class PositionCache:
             tiles.clear()
         self.nbytes = 0
 
-    def tile(self, stride: int, begin: int) -> int:
-        """A visible tile as an integer of a stride."""
-        tiles = self._bigs.get(stride) or self._bigs.setdefault(stride, BigTiles(stride))
-        bits = tiles.get(begin)
-        if bits is None:
-            visible = self._visible
-            assert visible is not None  # squares list its tiles
-            bits = tiles.read(visible.seen.words, begin)
-        return bits
+    def tiles(self, stride: int) -> BigTiles:
+        """The visible tiles that shots have met, as integers of a stride."""
+        tiles = self._bigs.get(stride)
+        return self._bigs.setdefault(stride, BigTiles(stride)) if tiles is None else tiles
+
+    def read(self, tiles: BigTiles, begin: int) -> int:
+        """Make a visible tile as an integer."""
+        visible = self._visible
+        assert visible is not None  # squares list its tiles
+        return tiles.read(visible.seen.words, begin)
 
     def walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
         """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and weight of what it hits.
