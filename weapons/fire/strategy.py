@@ -263,11 +263,9 @@ def chosen_ray_way(
 
 def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, prepared: bool, why: str) -> RayChoice:
     """Of rays that can be cast, whether they march; `why` tells what was passed over."""
-    now, pairs = costs(), rays * len(scene.items.stack())
-    cast = now.cast_call + rays * now.cast_ray + pairs * now.cast_pair
-    march = now.march_call + rays * now.march_ray
-    if prepared:
-        cast, march = now.prepared_cast + pairs * now.prepared_cast_item, now.prepared_march
+    now, items = costs(), len(scene.items.stack())
+    cast = _alone_ns(rays, items) if prepared else _cast_ns(rays, items)
+    march = now.prepared_march if prepared else now.march_call + rays * now.march_ray
     why += f"about {cast / 1e3:.0f} us cast at items"
     field = scene.derived.distance_field(view) if is_thin_first(ray) and view is not None else None
     if field is None:
@@ -277,10 +275,20 @@ def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, p
 
 
 def are_faster_alone(rays: int, items: int) -> bool:
-    """Whether so many rays take less time followed one after another than together."""
+    """Whether so many rays take less time cast one after another than together."""
+    return _alone_ns(rays, items) < _cast_ns(rays, items)
+
+
+def _cast_ns(rays: int, items: int) -> float:
+    """Time to cast rays together, ns."""
     now = costs()
-    alone, together = now.prepared_cast + items * now.prepared_cast_item, now.cast_ray + items * now.cast_pair
-    return rays * alone < now.cast_call + rays * together
+    return now.cast_call + rays * (now.cast_ray + items * now.cast_pair)
+
+
+def _alone_ns(rays: int, items: int) -> float:
+    """Time to cast rays one after another, ns."""
+    now = costs()
+    return rays * (now.prepared_cast + items * now.prepared_cast_item)
 
 
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:

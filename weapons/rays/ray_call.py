@@ -119,6 +119,7 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     planned = cache(lambda: _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan()))
 
     def ended(shots: Shots) -> tuple[Rays, Ints]:
+        """Rays of shots, and when they end."""
         rays = rays_of((None, None, ray), shots)
         if follow is not None:
             lines = zip(rays.start_256.tolist(), rays.step_256.tolist(), strict=True)
