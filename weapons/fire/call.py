@@ -130,10 +130,7 @@ def fire(
     how = prefilter, broadphase, strategy
     if how == AUTO and _is_one(at):
         filters = accept, blocked_by, exclude, seed
-        if isinstance(tick, int | float):
-            ready = _ready_then(scene, weapon, tick, filters)
-        else:
-            ready = _ready(scene, weapon, filters, shot) if tick is None and type(scene) is Scene else None
+        ready = _ready(scene, weapon, filters, shot) if tick is None else _ready_then(scene, weapon, filters, tick)
         if ready is not None:
             return ready.fire(at, aim, toward, shot)
     return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
@@ -185,21 +182,24 @@ Filtering = tuple[Any, Any, Any, Any]
 """(accept, blocked_by, exclude, seed) of a call."""
 
 
-def _ready(scene: Scene, weapon: Weapon, filters: Filtering, shot: Any) -> Ready[Hits] | None:
+def _ready(scene: Scene | History, weapon: Weapon, filters: Filtering, shot: Any) -> Ready[Hits] | None:
     """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call.
 
     A spread must have been fired with the same draws, because pellets that are new cost more if they are looked up.
     """
     accept, blocked_by, exclude, seed = filters
+    if type(scene) is not Scene or not isinstance(weapon, Weapon):
+        return None
+    of_rays = ray_parts_of(weapon) is not None
+    if of_rays and not _is_one_ray(weapon):
+        return None  # `prepare` leaves several rays to `fire`
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owner = int(exclude) if isinstance(exclude, np.integer) else exclude
     plain = type(accepts) is type(blocks) is type(seed) is int and (owner is None or type(owner) is int)
-    if not plain or not isinstance(weapon, Weapon):
+    drawn = not of_rays and parts_of(weapon)[1] is not None
+    if not plain or (drawn and not (shot is None or type(shot) is int)):
         return None  # also of True, which would find what is kept for 1
-    drawn = (ray_parts_of(weapon) or parts_of(weapon))[1] is not None
-    if drawn and not (shot is None or type(shot) is int):
-        return None
 
     def make() -> Ready[Hits]:
         own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
@@ -209,14 +209,21 @@ def _ready(scene: Scene, weapon: Weapon, filters: Filtering, shot: Any) -> Ready
     return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owner, seed)
 
 
-def _ready_then(scene: Scene | History, weapon: Weapon, tick: float, filters: Filtering) -> Ready[Hits] | None:
+def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:
     """A weapon of one ray, ready for the scene of a tick; it pays for a single shot, for which nothing is kept."""
-    parts = ray_parts_of(weapon) if isinstance(weapon, Weapon) else None
-    if parts is None or parts[:2] != (None, None) or present_of(scene) is scene:
+    if not (isinstance(tick, int | float) and isinstance(weapon, Weapon) and _is_one_ray(weapon)):
+        return None
+    if present_of(scene) is scene:
         return None
     ((past, _),) = moments_of(scene, tick, 1)
     accept, blocked_by, exclude, seed = filters
     return late.prepare.prepare(past, weapon, accept=accept, blocked_by=blocked_by, exclude=exclude, seed=seed)
+
+
+def _is_one_ray(weapon: Weapon) -> bool:
+    """Whether each shot of a weapon is one ray."""
+    parts = ray_parts_of(weapon)
+    return parts is not None and parts[:2] == (None, None)
 
 
 def _check_words(prefilter: object, broadphase: object, strategy: object) -> None:
