@@ -18,7 +18,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from .checks import InputError, flag, integer
 
@@ -194,15 +194,22 @@ class LruCache(Generic[Key, Value]):
     def get_all(self, keys: Sequence[Key], make: Callable[[list[int]], Sequence[Value]]) -> list[Value]:
         """Return the values of keys; `make` makes those of the given rows, of which no two have the same key."""
         with self._lock:
-            found = [self.values.get(key) for key in keys]
-            missing = {key: row for row, key in enumerate(keys) if found[row] is None}
-            for key, value in zip(keys, found, strict=True):
-                if value is not None:
+            found = list(map(self.values.get, keys))
+            missing: dict[Key, int] = {}
+            for row, (key, value) in enumerate(zip(keys, found, strict=True)):
+                if value is None:
+                    missing.setdefault(key, row)
+                else:
                     self.values.move_to_end(key)
-            made = dict(zip(missing, make(list(missing.values())), strict=True)) if missing else {}
-            for key, value in made.items():
+            if not missing:
+                return cast(list[Value], found)
+            made = make(list(missing.values()))
+            for key, value in zip(missing, made, strict=True):
                 self._keep(key, value)
-            return [made[key] if value is None else value for key, value in zip(keys, found, strict=True)]
+            if len(missing) == len(keys):
+                return list(made)
+            fresh = dict(zip(missing, made, strict=True))
+            return [fresh[key] if value is None else value for key, value in zip(keys, found, strict=True)]
 
     def _keep(self, key: Key, made: Value) -> Value:
         self.values[key] = made

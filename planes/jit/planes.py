@@ -14,6 +14,7 @@ from ..common.limits import HALF, MAPPED_PIXELS, SUB, TRIG_BITS
 from ..grid.rasterize import DIAGONAL
 from ..grid.spans import WIDEST, RowRuns, pieces
 from ..grid.turns import Edges
+from ..scene.sprite import frozen
 from ..scene.variants import Grids, Turned
 from .bit_rows import BOXES, INTS, OUT
 from .cache import compiled
@@ -425,87 +426,85 @@ def half_chord(radius, v, length2):
 MASKS = types.Array(types.boolean, 1, "C", readonly=True)
 
 
+PLACE_BITS = 40
+"""Bits of a place on a frame beyond the pixel."""
+
+DOUBT = 1 << 18
+"""Places are too small by less: 2**16 steps of a grid, each rounded down to 2**-40 px."""
+
+
 @njit
-def _is_beside(flat, begin, wide, high, column, row, left, up):
-    """Whether any of the squares of a frame that meet at a border is set."""
-    for j in (row, row - 1) if up else (row, row):
-        for i in (column, column - 1) if left else (column, column):
+def _place(parts, unit):
+    """A number of pixels, given in parts, rounded down to 2**-40."""
+    whole = parts // unit
+    return (whole << PLACE_BITS) + np.int64(float(parts - whole * unit) / float(unit) * (1 << PLACE_BITS))
+
+
+@njit
+def _is_held(flat, frame, place, unit):
+    """Whether a set square of a frame holds a place in parts, which may lie on the border of several."""
+    (begin, wide, high), column, row = frame, place[0] // unit[0], place[1] // unit[1]
+    for j in (row, row - 1) if place[1] == row * unit[1] else (row, row):
+        for i in (column, column - 1) if place[0] == column * unit[0] else (column, column):
             if 0 <= j < high and 0 <= i < wide and flat[begin + j * wide + i]:
                 return True
     return False
 
 
 @njit
-def _within(value, step, most, near, far):
-    """The part of near .. far - 1 in which 0 <= value + k * step <= most."""
+def _within(place, step, size, near, far):
+    """The part of near .. far - 1 whose places on an axis, which are DOUBT too great, may be on a frame of a size."""
+    most = (size << PLACE_BITS) + 2 * DOUBT
     if step == 0:
-        return (near, far) if 0 <= value <= most else (near, near)
-    first, last = -(value // step), (most - value) // step
-    if step < 0:
-        first, last = -((value - most) // step), -value // step
-    near = max(near, first)
-    return near, max(min(far, last + 1), near)
+        return (near, far) if 0 <= place <= most else (near, near)
+    first, last = float(-place) / float(step), float(most - place) / float(step)
+    near = max(near, np.int64(np.ceil(min(first, last))))
+    return near, max(min(far, np.int64(np.floor(max(first, last))) + 1), near)
 
 
 @njit
 def _map(flat, frame, first, step, unit, size_wh, held):
-    """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels."""
-    (begin, wide, high), (unit_x, unit_y), width = frame, unit, size_wh[0]
-    (across_x, down_x), (across_y, down_y) = step[0], step[1]
-    along_x, over_x, along_y, over_y = across_x // unit_x, across_x % unit_x, across_y // unit_y, across_y % unit_y
-    columns, rows, first_place, at = np.uint64(wide), np.uint64(high), np.uint64(begin), 0
+    """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels.
+
+    A place that may lie on a border of squares, or be rounded across one, is looked at exactly.
+    """
+    (begin, wide, high), width, rest = frame, size_wh[0], (1 << PLACE_BITS) - 1
+    (across_x, down_x), (across_y, down_y) = step
+    first_x, first_y = _place(first[0], unit[0]) + DOUBT, _place(first[1], unit[1]) + DOUBT
+    step_x, step_y = _place(across_x, unit[0]), _place(across_y, unit[1])
+    row_x, row_y = _place(down_x, unit[0]), _place(down_y, unit[1])
     left, top, right, low, area = width, size_wh[1], 0, 0, 0
     for y in range(size_wh[1]):
-        begin_x, begin_y = first[0] + y * down_x, first[1] + y * down_y
-        near, far = _within(begin_x, across_x, wide * unit_x, 0, width)
-        near, far = _within(begin_y, across_y, high * unit_y, near, far)
-        held[at : at + width] = False
-        place_x, place_y = begin_x + near * across_x, begin_y + near * across_y
-        column, x_rest, row, y_rest = place_x // unit_x, place_x % unit_x, place_y // unit_y, place_y % unit_y
-        count = 0
-        for x in range(at + near, at + far):
-            j, i = np.uint64(row), np.uint64(column)
-            on = j < rows and i < columns and flat[first_place + j * columns + i]
-            if x_rest == 0 or y_rest == 0:
-                on = on or _is_beside(flat, begin, wide, high, column, row, x_rest == 0, y_rest == 0)
-            held[np.uint64(x)] = on
+        row, count = held[y * width : (y + 1) * width], 0
+        place_x, place_y = first_x + y * row_x, first_y + y * row_y
+        near, far = _within(place_x, step_x, wide, 0, width)
+        near, far = _within(place_y, step_y, high, near, far)
+        row[:] = False
+        place_x, place_y = place_x + near * step_x, place_y + near * step_y
+        for x in range(near, far):
+            if place_x & rest < 2 * DOUBT or place_y & rest < 2 * DOUBT:
+                place = first[0] + x * across_x + y * down_x, first[1] + x * across_y + y * down_y
+                on = _is_held(flat, frame, place, unit)
+            else:
+                on = flat[np.uint64(begin + (place_y >> PLACE_BITS) * wide + (place_x >> PLACE_BITS))]
+            row[np.uint64(x)] = on
             count += on
-            x_rest, y_rest = x_rest + over_x, y_rest + over_y
-            carried_x, carried_y = x_rest >= unit_x, y_rest >= unit_y  # without a branch
-            column, row = column + along_x + carried_x, row + along_y + carried_y
-            x_rest, y_rest = x_rest - (unit_x if carried_x else 0), y_rest - (unit_y if carried_y else 0)
+            place_x, place_y = place_x + step_x, place_y + step_y
         if count:
             area, top, low = area + count, min(top, y), y + 1
-            first_x, last_x = near, far - 1
-            while first_x < left and not held[at + first_x]:
-                first_x += 1
-            while last_x >= right and not held[at + last_x]:
+            begin_x, last_x = near, far - 1
+            while begin_x < left and not row[begin_x]:
+                begin_x += 1
+            while last_x >= right and not row[last_x]:
                 last_x -= 1
-            left, right = min(left, first_x), max(right, last_x + 1)
-        at += width
+            left, right = min(left, begin_x), max(right, last_x + 1)
     return left, top, right, low, area
 
 
-@njit
-def _crop(held, width, left, top, wide, high, quarter, out):
-    """Write a part of a grid to `out`, turned by quarter turns."""
-    begin, down, right = 0, wide, 1
-    if quarter == 1:
-        begin, down, right = high - 1, -1, high
-    elif quarter == 2:
-        begin, down, right = high * wide - 1, -wide, -1
-    elif quarter == 3:
-        begin, down, right = (wide - 1) * high, 1, -high
-    for y in range(high):
-        source, place = (top + y) * width + left, begin + y * down
-        for x in range(wide):
-            out[place + x * right] = held[source + x]
-
-
 @compiled(types.Tuple((types.int64[:, ::1], types.boolean[::1]))(
-    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS, INTS
+    MASKS, PELLETS, INTS, PELLETS, STEPS, PELLETS, PELLETS
 ))  # fmt: skip
-def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
+def _turned_masks(flat, frames, which, first, step, unit, size_wh):
     boxes, room, most, used = np.empty((len(which), 6), np.int64), 0, 0, 0
     for n in range(len(which)):
         room, most = room + size_wh[n, 0] * size_wh[n, 1], max(most, size_wh[n, 0] * size_wh[n, 1])
@@ -513,25 +512,27 @@ def _turned_masks(flat, frames, which, first, step, unit, size_wh, quarter):
     for n in range(len(which)):
         left, top, right, low, area = _map(flat, frames[which[n]], first[n], step[n], unit[n], size_wh[n], held)
         wide, high = max(right - left, 0), max(low - top, 0)
-        _crop(held, size_wh[n, 0], left, top, wide, high, quarter[n], out[used:])
-        boxes[n, 0], boxes[n, 1], boxes[n, 4], boxes[n, 5] = left, top, area, used
-        boxes[n, 2], boxes[n, 3] = (high, wide) if quarter[n] & 1 else (wide, high)
-        used += wide * high
+        boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3], boxes[n, 4], boxes[n, 5] = left, top, wide, high, area, used
+        for y in range(top, top + high):
+            begin = y * size_wh[n, 0] + left
+            out[used : used + wide] = held[begin : begin + wide]
+            used += wide
     return boxes, out
 
 
-def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
+def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids) -> Turned:
     """See `scene.variants.turned_masks`; it divides once a row, not once a pixel."""
     sizes = [mask.size for mask in masks]
     shapes = [(begin, *mask.shape[::-1]) for begin, mask in zip(accumulate(sizes, initial=0), masks, strict=False)]
     flat = np.concatenate([mask.reshape(-1) for mask in masks])
-    frames, made = np.array(shapes), []
+    frames, made, found = np.array(shapes), [], []
     for part in pieces(grids.size_wh.prod(axis=1), MAPPED_PIXELS):
         _, size_wh, *places = (column[part] for column in grids)
-        boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh, quarters[part])
-        for left, top, wide, high, area, begin in boxes.tolist():
-            made.append(Turned(out[begin : begin + wide * high].reshape(high, wide), left, top, area))
-    return made
+        boxes, out = _turned_masks(flat, frames, which[part], *places, size_wh)
+        made += [frozen(out[at : at + wide * high].reshape(high, wide)) for wide, high, _, at in boxes[:, 2:].tolist()]
+        found.append(boxes)
+    every = np.concatenate(found)
+    return Turned(made, every[:, :2], every[:, 4])
 
 
 @njit

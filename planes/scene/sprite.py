@@ -440,6 +440,6 @@ def _frame_rects(
 
 def frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A contiguous read-only copy."""
-    out = np.array(array, order="C")
-    out.flags.writeable = False
+    out = array.copy()
+    out.setflags(write=False)
     return out

@@ -24,6 +24,7 @@ from ..common.limits import (
     ATLAS_SLACK_BYTES,
     HALF,
     MAPPED_PIXELS,
+    MASK_AREA_MAX,
     SCALE_BITS,
     SCALE_MAX,
     SCALE_MIN,
@@ -36,7 +37,7 @@ from ..grid import rasterize
 from ..grid.fixed_point import over_one, quarter_turns, rounded_div, turned
 from ..grid.rasterize import ellipse
 from ..grid.spans import Spans
-from ..grid.turns import quarter_turned, rotated, turned_pivot
+from ..grid.turns import quarter_turned
 from .sprite import (
     UIDS,
     Known,
@@ -55,6 +56,7 @@ Ints32 = npt.NDArray[np.int32]
 
 FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
+QUARTERS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])  # matrices of turns
 
 FINE_BITS = TRIG_BITS - SCALE_BITS  # bits by which a turned position is finer than a scaled one
 
@@ -107,7 +109,7 @@ def whole_scale(x: float, y: float) -> tuple[int, int]:
     return round(x * ONE), round(y * ONE)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # a frozen one takes six times as long to make
 class Variant(Known):
     """The mask of a sprite in one pose, cropped and read-only, with its pivot in 1/256 px from the centre of [0, 0]."""
 
@@ -207,11 +209,13 @@ def picture_of(sprite: Sprite, form: Transform, color: tuple[int, int, int]) -> 
         return image, variant.pivot_x, variant.pivot_y
     mask, (x, y) = _flipped_frame(sprite, form)
     image = _flipped(frame.image, form.flip)
-    if not form.plain:
-        grids = _grids_of([mask], [(x, y)], [form])
-        image = _mapped(grids, [mask], np.zeros(1, np.int64), [image])[0]
+    if form.plain:
+        image, x, y = quarter_turned(image, x, y, form.quarter)
+    else:
+        only = np.zeros(1, np.int64)
+        grids = _grids_of([(*mask.shape[::-1], x, y)], only, [form])
+        image = _mapped(grids, [mask], only, [image])[0]
         x, y = grids.pivot_256[0].tolist()
-    image, x, y = quarter_turned(image, x, y, form.quarter)
     if form.frame in sprite.carvings:
         image = image.copy()
         image[~_left(sprite, form, image.shape[1::-1], (x, y), masked=False), 3] = 0
@@ -281,53 +285,47 @@ def cropped(form: Transform, mask: Bools, pivot_256: tuple[int, int]) -> Variant
 
 
 def _mapped_frames(sprites: Sequence[Sprite], forms: Sequence[Transform]) -> list[Variant]:
-    """Variants of frames that are mapped inversely."""
-    keys = [(sprite.uid, form.frame, form.flip) for sprite, form in zip(sprites, forms, strict=True)]
-    firsts = dict(zip(reversed(keys), range(len(keys) - 1, -1, -1), strict=True))
-    frames = {key: _flipped_frame(sprites[row], forms[row]) for key, row in firsts.items()}
-    masks, pivots = zip(*(frames[key] for key in keys), strict=True)
-    grids = _grids_of(masks, pivots, forms)
-    numbers = {key: number for number, key in enumerate(frames)}
-    planes, which = [mask for mask, _ in frames.values()], np.array([numbers[key] for key in keys])
-    quarters = np.array([form.quarter for form in forms])
-    found = kernels_of(sys.modules[__name__]).turned_masks(planes, which, grids, quarters)
-    made = []
-    for form, (x, y), (mask, left, top, area) in zip(forms, grids.pivot_256.tolist(), found, strict=True):
-        size_wh = mask.shape[:: 1 if form.quarter & 1 else -1]
-        pivot = turned_pivot(x - SUB * left, y - SUB * top, size_wh, form.quarter) if area else (0, 0)
-        made.append(Variant(form, frozen(mask), *pivot, area))
-    return made
+    """Variants of frames that are mapped inversely; a frame that several of them show is flipped once."""
+    numbers: dict[tuple[int, int, str], int] = {}
+    which: list[int] = []
+    frames: list[tuple[Bools, tuple[int, int]]] = []
+    for sprite, form in zip(sprites, forms, strict=True):
+        key = sprite.uid, form.frame, form.flip
+        number = numbers.setdefault(key, len(frames))
+        if number == len(frames):
+            frames.append(_flipped_frame(sprite, form))
+        which.append(number)
+    own = np.array(which)
+    grids = _grids_of([(*mask.shape[::-1], *pivot) for mask, pivot in frames], own, forms)
+    found = kernels_of(sys.modules[__name__]).turned_masks([mask for mask, _ in frames], own, grids)
+    pivots = np.where(found.area[:, None] > 0, grids.pivot_256 - SUB * found.corner_xy, 0)
+    columns = forms, found.masks, *pivots.T.tolist(), found.area.tolist()
+    return list(map(Variant, *columns))
 
 
 class Turned(NamedTuple):
-    """A turned mask, the corner of its box on the grid before the quarter turns, and the number of its pixels."""
+    """Read-only masks that were cropped out of grids, their corners on these, and the numbers of their pixels."""
 
-    mask: Bools
-    left: int
-    top: int
-    area: int
+    masks: list[Bools]
+    corner_xy: Ints  # (n, 2)
+    area: Ints  # (n,)
 
 
-def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids, quarters: Ints) -> list[Turned]:
-    """Masks of frames at the centres of grids (n,), cropped to their pixels and turned by quarter turns.
-
-    Parameters
-    ----------
-    which, quarters : (n,) number of each grid's frame, and of its quarter turns
-    """
-    made: dict[int, Turned] = {}
+def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids) -> Turned:
+    """Masks of frames at the centres of grids (n,), cropped to their pixels; `which` (n,) is each grid's frame."""
+    made, corner_xy, area = {}, np.empty((len(which), 2), np.int64), np.empty(len(which), np.int64)
     for batch in _batches(grids):
-        used, own = np.unique(which[batch], return_inverse=True)
-        planes = [masks[number] for number in used.tolist()]
+        used = sorted(set(which[batch].tolist()))
+        own, planes = np.searchsorted(used, which[batch]), [masks[number] for number in used]
         held = _mapped(Grids(*(column[batch] for column in grids)), planes, own, planes)
         rows, columns = np.asarray(held.any(axis=2)), np.asarray(held.any(axis=1))
         sides = np.stack([plane.argmax(axis=1) for plane in (columns, rows, columns[:, ::-1], rows[:, ::-1])], axis=1)
         areas, (height, width) = np.count_nonzero(held, axis=(1, 2)), held.shape[1:]
-        details = (column.tolist() for column in (sides, quarters[batch], areas))
-        for row, mask, side, quarter, area in zip(batch, held, *details, strict=True):
-            left, top, right, low = side if area else (0, 0, width, height)
-            made[row] = Turned(rotated(mask[top : height - low, left : width - right], quarter), left, top, area)
-    return [made[row] for row in range(len(which))]
+        sides[areas == 0] = 0, 0, width, height
+        corner_xy[batch], area[batch] = sides[:, :2], areas
+        for row, mask, (left, top, right, low) in zip(batch, held, sides.tolist(), strict=True):
+            made[row] = frozen(mask[top : height - low, left : width - right])
+    return Turned([made[row] for row in range(len(which))], corner_xy, area)
 
 
 def _batches(grids: Grids) -> Iterator[list[int]]:
@@ -357,34 +355,39 @@ class Grids(NamedTuple):
     unit: Ints  # (n, 2) number of parts of a column, and of a row
 
 
-def _grids_of(masks: Sequence[Bools], pivots_256: Sequence[tuple[int, int]], forms: Sequence[Transform]) -> Grids:
-    """Grids of frames.
+def _grids_of(frames: Sequence[tuple[int, int, int, int]], which: Ints, forms: Sequence[Transform]) -> Grids:
+    """Grids of frames, each given by its width, its height and its pivot (x, y); `which` (n,) is each grid's frame.
 
     The pivot keeps its offset from the pixel grid. If the frame is scaled, its edges decide the offset, to half a
     pixel: whole scales repeat pixels exactly, and a mirrored frame lies on the mirrored grid. A centre at (dx, dy) from
     the pivot lies at (dx c + dy s, dy c - dx s) from it on the frame, in 2**-38 px of the result.
     """
-    rows = [
-        (*mask.shape[::-1], *pivot, form.scale_x, form.scale_y, form.c, form.s, -form.s, form.c)
-        for mask, pivot, form in zip(masks, pivots_256, forms, strict=True)
-    ]
-    table = np.array(rows, np.int64)
-    size, pivot, scale = table[:, :2], table[:, 2:4], table[:, 4:6]
-    back = table[:, 6:].reshape(-1, 2, 2)  # the matrix of the inverse turn
-    edges = np.empty_like(back)
+    frame = np.array(frames).take(which, axis=0)
+    size, pivot = frame[:, :2], frame[:, 2:]
+    _, _, scale_x, scale_y, quarter, *rest = zip(*forms, strict=True)
+    scale, turn = np.array([scale_x, scale_y]).T, QUARTERS.take(quarter, axis=0)
+    axis = turn @ np.array(rest).T[..., None]
+    forth = np.concatenate([axis, QUARTERS[1] @ axis], axis=2)  # the matrix of the turn, [[c, -s], [s, c]]
+    back = forth.swapaxes(1, 2)
+    edges = np.empty_like(forth)
     edges[:, :, 0] = (-HALF - pivot) * scale // ONE
     edges[:, :, 1] = (SUB * size - HALF - pivot) * scale // ONE + 1
-    corners = back.transpose(0, 2, 1)[..., None] * edges[:, None]
-    low, high = over_one(corners.min(axis=3).sum(axis=2)) - 1, over_one(corners.max(axis=3).sum(axis=2)) + 1
-    halves = rounded_div((pivot + HALF) * scale - HALF * ONE, HALF * ONE)
-    held = np.where(scale == ONE, pivot, halves * HALF) % SUB
+    corners = np.sort(forth[..., None] * edges[:, None], axis=3)
+    reach = over_one(corners[:, :, 0] + corners[:, :, 1])
+    low, high = reach[..., 0] - 1, reach[..., 1] + 1
+    held = pivot
+    if (scale != ONE).any():
+        halves = rounded_div((pivot + HALF) * scale - HALF * ONE, HALF * ONE)
+        held = np.where(scale == ONE, pivot, halves * HALF)
+    held = (turn @ held[..., None])[..., 0] % SUB
     held -= SUB * ((held + low) // SUB)
     size_wh = (high + held) // SUB + 1
-    for form, (width, height) in zip(forms, size_wh.tolist(), strict=True):
-        if not fits(width, height):
+    if not fits(1, size_wh.max()) or size_wh.prod(axis=1).max() > MASK_AREA_MAX:
+        for form, (width, height) in zip(forms, size_wh.tolist(), strict=True):
             check_size("scale" if form.scaled else "angle", width, height)
     fine = scale << FINE_BITS
-    return Grids(held, size_wh, (pivot + HALF) * fine - (back * held[:, None]).sum(axis=2), SUB * back, SUB * fine)
+    first = (pivot + HALF) * fine - (back @ held[..., None])[..., 0]
+    return Grids(held, size_wh, first, SUB * back, SUB * fine)
 
 
 def _mapped(grids: Grids, masks: Sequence[Bools], which: Ints, values: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
@@ -392,7 +395,8 @@ def _mapped(grids: Grids, masks: Sequence[Bools], which: Ints, values: Sequence[
 
     Frames have masks (h, w) and values (h, w, ...); `which` (n,) is the number of the frame of each grid.
     """
-    planes, picked = _bordered(masks), _bordered(values)
+    planes = _bordered(masks)
+    picked = planes if values is masks else _bordered(values)
     cells = picked.reshape(-1, *picked.shape[3:])
     width, height = grids.size_wh.max(axis=0).tolist()
     rows, strips = max(1, MAPPED_PIXELS // (len(which) * width)), []
