@@ -782,6 +782,10 @@ def test_progress_is_one_line_on_a_terminal_and_cleared(long_log: tuple[Path, by
     words = [*COMMAND, str(GALLERY), str(long_log[0]), "-o", str(tmp_path / "hits.jsonl")]
     process = subprocess.Popen(words, cwd=ROOT, stderr=slave, stdout=subprocess.DEVNULL)
     os.close(slave)
+    until((tmp_path / "hits.jsonl.part").exists)
+    process.send_signal(signal.SIGSTOP)  # a fast machine is through before the line is drawn once
+    time.sleep(2 * stream.SECONDS)
+    process.send_signal(signal.SIGCONT)
     shown = b""
     while True:
         try:
