@@ -673,9 +673,9 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     history.record()
     before, made = history.at(0).items, []
     flat = before.atlas.flat
-    variant_of = history_module.variant_of
+    variants_of = history_module.variants_of
     monkeypatch.setattr(
-        history_module, "variant_of", lambda sprite, form: made.append(form) or variant_of(sprite, form)
+        history_module, "variants_of", lambda sprites, forms: made.extend(forms) or variants_of(sprites, forms)
     )
     monkeypatch.setattr(items_module, "variant_of", lambda *_: pytest.fail("a mask was made"))
     past = history.at(0.5).items

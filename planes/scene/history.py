@@ -20,12 +20,12 @@ import numpy as np
 
 from ..common.checks import Bools, InputError, Ints, flag, integer, real, shown, within
 from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
-from ..grid.fixed_point import quarter_turns, rounded_div
+from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
 from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items
 from .scene import Scene
-from .variants import MaskAtlas, variant_of
+from .variants import MaskAtlas, variant_of, variants_of
 
 T = TypeVar("T")
 
@@ -98,13 +98,17 @@ class PastItems(Items):
             setattr(self, name, getattr(self, name).copy())
         self.atlas = _full(self.atlas.flat)
         self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
-        for item, angle in angles.items():
-            quarter, c, s = quarter_turns(self.sprites[item].stepped(angle))
-            form = self.forms[item]._replace(quarter=quarter, c=c, s=s)
-            with within(f"object {item} at {angle:.15g} degrees"):
-                variant = variant_of(self.sprites[item], form)
+        looks = self.looks(list(angles)).changed(None, list(angles.values()), None, None, None)
+        try:
+            variants = variants_of(looks.sprites, looks.forms)
+        except InputError:
+            for item, sprite, angle, form in zip(angles, *looks, strict=True):
+                with within(f"object {item} at {angle:.15g} degrees"):
+                    variant_of(sprite, form)
+            raise
+        for item, angle, form in zip(angles, looks.angles, looks.forms, strict=True):
             self.angles[item], self.forms[item] = angle, form
-            self._enter([item], [variant])
+        self._enter(list(angles), variants)
         for name in COLUMNS:
             _sealed(getattr(self, name))
 
