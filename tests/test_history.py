@@ -620,6 +620,19 @@ def test_angles_go_the_short_way(begin: float, end: float, half: float) -> None:
     np.testing.assert_array_equal(draw_view(past.items, view), draw_view(fresh.items, view))
 
 
+def test_objects_that_turn_between_two_ticks_have_masks_of_their_own() -> None:
+    sprites = [Sprite.from_mask(np.ones((3, wide), bool)) for wide in (4, 8, 13)] + [Sprite.box(9, 4)]
+    scene, fresh = Scene(), Scene()
+    for k, sprite in enumerate(sprites):
+        scene.add(sprite, (20 * k, 0), scale=1 + k)
+        fresh.add(sprite, (20 * k, 0), scale=1 + k, angle=5 * k)
+    history = History(scene, interpolate=True)
+    history.record()
+    scene.set(range(4), angle=[10 * k for k in range(4)])
+    history.record()
+    assert masks(history.at(0.5)) == masks(fresh)
+
+
 def test_all_else_is_as_at_the_earlier_tick() -> None:
     sheet = Sprite.from_image(np.random.default_rng(0).integers(0, 256, (6, 15, 4), np.uint8), grid_wh=(5, 6))
     scene = Scene((99, 99), categories=["a"])
