@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.checks import Floats, InputError, array_of, choice, each, integers, reals, within
 from ..common.limits import POSITION_MAX, SUB
-from ..grid.fixed_point import all_quarter_turns
+from ..grid.fixed_point import all_quarter_turns, snap
 from .sprite import Sprite, as_sprite, frame_number
 from .variants import FLIPS, Transform, whole_scale
 
@@ -46,8 +46,19 @@ def one_place(xy: object) -> tuple[int, int] | None:
     return round(x * SUB), round(y * SUB)
 
 
+def place_256(field: str, xy: object, limit: float) -> tuple[int, int]:
+    """Check one position or velocity, px, and round it to 1/256 px."""
+    place = one_place(xy)
+    if place is None or max(map(abs, place)) >= SUB * limit:
+        x, y = snap(reals(field, xy, (2,), limit)).tolist()
+        return x, y
+    return place
+
+
 def scale_pair(scale: object) -> tuple[float, float]:
     """Check a scale, one number or (sx, sy), and return the pair."""
+    if type(scale) is float:
+        return scale, scale  # `whole_scale` checks it
     values = array_of("scale", scale)
     sx, sy = reals("scale", values if values.ndim else np.stack([values, values]), (2,)).tolist()
     return sx, sy

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from .. import late
 from ..common.checks import (
+    FLOAT_MAX,
     Bools,
     Floats,
     InputError,
@@ -23,7 +24,7 @@ from ..common.checks import (
     integers,
     listed,
     path_of,
-    reals,
+    real,
     rising,
 )
 from ..common.limits import ALL, CATEGORY_BITS, COST_MAX, LAYER_MAX, POSITION_MAX, REACH_MAX, SCALE_BITS, SUB
@@ -32,7 +33,7 @@ from ..grid.fixed_point import snap
 from ..grid.spans import Box
 from .derived import Derived
 from .items import ROLES, Items, Role
-from .poses import are_rows, one_place, points, scale_pair
+from .poses import are_rows, one_place, place_256, points, scale_pair
 from .sprite import Sprite, as_sprite
 from .variants import transform_of
 
@@ -160,7 +161,7 @@ class Scene:
         InputError
             Naming the field.
         """
-        made, kind, turn = as_sprite(sprite), _role(role), float(reals("angle", angle, ()))
+        made, kind, turn = as_sprite(sprite), _role(role), real("angle", angle, -FLOAT_MAX, FLOAT_MAX)
         form = transform_of(made, frame, flip, scale_pair(scale), turn)
         values = self._new_columns(kind, layer, categories, owner, cost, position_xy, velocity_xy)
         unnamed = name is None or (isinstance(name, str) and not name)
@@ -178,8 +179,8 @@ class Scene:
             "categories": self._bits(categories, _default_bits(role)),
             "owner": self.items.count if owner is None else integer("owner", owner, 0, self.items.count),
             "cost": integer("cost", cost, 0, COST_MAX),
-            "position_256": snap(reals("position_xy", position_xy, (2,), POSITION_MAX)),
-            "velocity_256": snap(reals("velocity_xy", velocity_xy, (2,), REACH_MAX)),
+            "position_256": place_256("position_xy", position_xy, POSITION_MAX),
+            "velocity_256": place_256("velocity_xy", velocity_xy, REACH_MAX),
         }
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
