@@ -503,6 +503,7 @@ FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
     "bounds' place": (lambda v: Scene((5, 5), (0, v)), "origin_xy", (0.5, FAR, -FAR)),
     "planes' place": (lambda v: Scene.from_planes(hittable=[[1]], origin_xy=(v, 0)), "origin_xy", (0.5, FAR)),
     "add position_xy": (lambda v: placed(position_xy=(1, v)), "position_xy", (FAR, -FAR)),
+    "add velocity_xy": (lambda v: placed(velocity_xy=(1, v)), "velocity_xy", (-(2**21), 2**20 + 0.001, FAR)),
     "add angle": (lambda v: placed(angle=v), "angle", ()),
     "add scale": (lambda v: placed(scale=v), "scale", (0, -1, 1 / 257, 257)),
     "add scales": (lambda v: placed(scale=(1, v)), "scale", (0, -1, 1 / 257, 257)),
