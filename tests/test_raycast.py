@@ -28,9 +28,12 @@ worlds = st.randoms(use_true_random=False)
 Bounds = tuple[int, int, int, int]
 
 
-@pytest.fixture
-def kernels(jit: bool) -> ModuleType:
-    """The kernels, and their compiled twins."""
+@pytest.fixture(params=["alone", "together"])
+def kernels(jit: bool, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The kernels, for any number of rays those of a few or of many; and their compiled twins."""
+    if jit and request.param == "alone":
+        pytest.skip("a compiled kernel follows any number of rays")
+    monkeypatch.setattr(raycast, "are_few", lambda *_: request.param == "alone")
     return kernels_of(raycast)
 
 

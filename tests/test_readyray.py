@@ -169,9 +169,11 @@ def test_few_rays_that_go_on_are_left_to_arrays(kind: Any, weapon: Weapon, monke
         scene.add(Sprite.box(side, side), (x, y), role=role)
     monkeypatch.setattr(kind, "passed", lambda *of: told.append(inner(*of)) or told[-1])
     ready = prepare(scene, weapon)
-    for at in [(20, 50), (100, 50), (150, 50), (250, 80), (50, 20)]:
-        assert ready.fire(at) == fire(scene, weapon, at, strategy="walk")
-    assert [found is None for found in told] == [False, False, True, True, True]
+    for at, left in [((20, 50), False), ((100, 50), False), ((150, 50), True), ((250, 80), True), ((50, 20), True)]:
+        told.clear()
+        hits = ready.fire(at)
+        assert [found is None for found in told] == [left]
+        assert hits == fire(scene, weapon, at, strategy="walk")
     first = Pistol(400, width=weapon.width)  # type: ignore[attr-defined]
     assert prepare(scene, first).fire((50, 20)).object.tolist() == [6] and told[-1] is not None
 
@@ -181,11 +183,13 @@ def test_a_wide_ray_among_many_items_is_left_to_arrays(monkeypatch: pytest.Monke
     scene, weapon, cast = Scene(), Pistol(900, width=4), []
     for k in range(raycast.ROUND_PAIRS + 1):
         scene.add(Sprite.box(4, 4), (20 + 6 * k, 50))
-    monkeypatch.setattr(one_ray, "hits_and_ends", lambda *of: cast.append(of) or raycast.hits_and_ends(*of))
+    monkeypatch.setattr(one_ray, "cast_together", lambda *of: cast.append(of) or raycast.cast_together(*of))
     ready = prepare(scene, weapon)
-    for x, left in ((0, 1), (30, 1)):
-        assert ready.fire((x, 50)) == fire(scene, weapon, (x, 50), strategy="walk")
+    for x, left in ((0, 1), (30, 0)):
+        cast.clear()
+        hits = ready.fire((x, 50))
         assert len(cast) == left
+        assert hits == fire(scene, weapon, (x, 50), strategy="walk")
 
 
 @pytest.fixture

@@ -279,6 +279,14 @@ def are_faster_alone(rays: int, items: int) -> bool:
     return _alone_ns(rays, items) < _cast_ns(rays, items)
 
 
+def are_few(rays: int, items: int, most: int | None) -> bool:
+    """Whether the rays of a call, which hit up to `most` objects, are so few that numpy follows them one by one.
+
+    They must take half of the time, as half of a call is the same for both; rays that go on take twice as long.
+    """
+    return 2 * _alone_ns(rays if most == 1 else 2 * rays, items) < _cast_ns(rays, items)
+
+
 def _cast_ns(rays: int, items: int) -> float:
     """Time to cast rays together, ns."""
     now = costs()

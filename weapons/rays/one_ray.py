@@ -1,4 +1,4 @@
-"""One ray a call. A thin ray is followed in whole numbers of Python, which is faster than numpy.
+"""One ray a call, or a few. A thin ray is followed in whole numbers of Python, which is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
 box is left that it enters before its end. The cells of a wide ray are found in arrays, those of all boxes at once; both
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +26,12 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack, clipped
 from hitplanes.planes.scene.scene import Scene
 
+from ..fire.prefilter import Filters, refused_by
 from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.rays import RayWeapon
-from .contacts import NEVER
+from .contacts import NEVER, Reason
 from .first_hit import marcher
-from .raycast import ROUND_PAIRS, Crossed, first_cells, hits_and_ends, times_in
+from .raycast import ROUND_PAIRS, Crossed, cast_together, first_cells, times_in
 
 ROWS_MOST = 400
 """Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
@@ -58,6 +60,12 @@ class Entered(NamedTuple):
 Followed = tuple[int, list[list[int]]]
 """When a ray ends, and what it hits, in order: rank, number of cells, first cell (x, y) in the world, and its time."""
 
+Touch = tuple[int, int, int, int, int, int]
+"""An item that a ray touches: time, y and x of its first cell, rank, cells, and when the ray leaves its box."""
+
+Passed = tuple[int, list[list[int]], Touch | None]
+"""Like `Followed`, with cells relative to the pixel on which the ray begins; and what it touches as it ends."""
+
 Follow = Callable[[int, int, int, int], Followed | None]
 """Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
 
@@ -85,7 +93,7 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
     def cast(x: int, y: int, dx: int, dy: int) -> Followed | None:
         """Follow one ray in arrays."""
         lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
-        hit, ends = hits_and_ends(stack, bounds, lines, most, filters)
+        hit, ends = cast_together(stack, bounds, lines, most, filters)
         hit[3:5] += pixel(lines.start).T
         return int(ends[1, 0]), hit[1:].T.tolist()
 
@@ -94,15 +102,58 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
 
     def follow(x: int, y: int, dx: int, dy: int) -> Followed | None:
         """Follow one ray."""
-        if not (dx or dy) or max(abs(dx), abs(dy)) > LONGEST:
+        found = _passed((x, y), (dx, dy), radius, stack, bounds, accepts, most)
+        if found is None:
             return cast(x, y, dx, dy)
-        origin = (x + HALF) // SUB, (y + HALF) // SUB
-        start, step = (x - SUB * origin[0], y - SUB * origin[1]), (dx, dy)
-        ray = WideRay(start, step, radius) if radius else Ray(start, step)
-        found = ray.passed(origin, _near(ray, origin, stack, bounds, accepts), stack, most)
-        return cast(x, y, dx, dy) if found is None else found
+        left, top = (x + HALF) // SUB, (y + HALF) // SUB
+        return found[0], [[rank, count, x + left, y + top, time] for rank, count, x, y, time in found[1]]
 
     return follow
+
+
+def follow_each(
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None
+) -> tuple[Ints, Ints]:
+    """`raycast.hits_and_ends` of a few rays, one after another."""
+    hits: list[list[int]] = []
+    ends: list[list[int]] = []
+
+    @cache
+    def accepted(meets: int, exclude: tuple[int, ...]) -> Bools:
+        own = np.array([meets]), np.array([exclude], np.int64)
+        return ~refused_by(own, stack, np.arange(len(stack)), np.zeros(len(stack), np.int64))
+
+    for number, (start, step) in enumerate(zip(lines.start.tolist(), lines.step.tolist(), strict=True)):
+        accepts = filters and accepted(int(filters[0][number]), tuple(filters[1][number].tolist()))
+        found = _passed(start, step, lines.radius, stack, bounds, accepts, most)
+        if found is None:
+            own = slice(number, number + 1)
+            among = filters and (filters[0][own], filters[1][own])
+            hit, end = cast_together(stack, bounds, lines.take(own), most, among)
+            hits += [[number, *row] for row in hit[1:].T.tolist()]
+            ends.append(end[:, 0].tolist())
+            continue
+        time, rows, last = found
+        hits += [[number, *row] for row in rows]
+        if last is None:
+            ends.append([Reason.RANGE, NEVER, 0, 0, -1, False])
+        else:
+            blocked = stack.has_occluders and bool(stack.occluder[last[3]])
+            ends.append([Reason.OCCLUDER if blocked else Reason.HITS, time, *last[1:4], blocked])
+    hit, end = (np.array(rows, np.int64).reshape(-1, 6).T for rows in (hits, ends))
+    return hit, end
+
+
+def _passed(
+    at: Pair, step: Pair, radius: int, stack: Stack, bounds: Box | None, accepts: Bools | None, most: int | None
+) -> Passed | None:
+    """What a ray of half a width hits, up to `most` of the accepted objects; None if arrays must decide it."""
+    if not any(step) or max(map(abs, step)) > LONGEST:
+        return None
+    origin = (at[0] + HALF) // SUB, (at[1] + HALF) // SUB
+    start, way = (at[0] - SUB * origin[0], at[1] - SUB * origin[1]), (step[0], step[1])
+    ray = WideRay(start, way, radius) if radius else Ray(start, way)
+    return ray.passed(origin, _near(ray, origin, stack, bounds, accepts), stack, most)
 
 
 class Ray:
@@ -169,7 +220,7 @@ class Ray:
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
 
     # house: hit rule of rays
-    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
+    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Passed | None:
         """What a ray hits, up to `most` objects; None if arrays must decide it.
 
         They do so if it looks at too many rows, if it enters another item at once with the occluder that ends it, or if
@@ -191,12 +242,12 @@ class Ray:
             if found is None:
                 continue
             touched.append((*found, rank, count, leave))
-            if stack.occluder[rank]:
+            if stack.has_occluders and stack.occluder[rank]:
                 end = min(end, found[0])
             elif most is not None:
                 times = sorted([*times, found[0]])[:most]
                 end = min(end, times[-1]) if len(times) == most else end
-        return _ended(sorted(met for met in touched if met[0] <= end), end, most, origin, stack)
+        return _ended(sorted(met for met in touched if met[0] <= end), end, most, stack)
 
 
 class WideRay:
@@ -210,7 +261,7 @@ class WideRay:
         """Bounds of the times at which the ray enters cells of boxes (n, 4); leave < entry if it touches none."""
         return times_in(self.lines, np.zeros(len(boxes_xyxy), np.int64), boxes_xyxy)
 
-    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Followed | None:
+    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Passed | None:
         """What the ray hits, up to `most` objects; None if the raycast of a batch must decide it.
 
         It does so if the ray may end long before it meets all boxes, and as it does for thin rays; see `Ray.passed`.
@@ -218,14 +269,16 @@ class WideRay:
         if most is not None and len(near.rank) > ROUND_PAIRS:
             return None
         first = first_cells(Crossed(np.zeros_like(near.rank), *near), self.lines, np.array([origin]), stack)
-        blocks = stack.occluder[first.rank]
-        end, times = int(first.entry[blocks].min(initial=NEVER)), first.entry[~blocks]
+        end, times = NEVER, first.entry
+        if stack.has_occluders:
+            blocks = stack.occluder[first.rank]
+            end, times = int(times[blocks].min(initial=NEVER)), times[~blocks]
         if most is not None and len(times) >= most:
             end = min(end, int(np.partition(times, most - 1)[most - 1]))
         reached = (first.entry <= end).nonzero()[0]
         columns = first.entry, first.y, first.x, first.rank, first.count, first.most
         touched = zip(*(column[reached].tolist() for column in columns), strict=True)
-        return _ended(sorted(touched), end, most, origin, stack)
+        return _ended(sorted(touched), end, most, stack)
 
 
 def _near(ray: Ray | WideRay, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
@@ -271,22 +324,20 @@ def _entered(ray: Ray, row: int, at: int) -> Cell:
     return ray.spell(x, y)[0], y, x
 
 
-Touch = tuple[int, int, int, int, int, int]
-"""An item that a ray touches: time, y and x of its first cell, rank, cells, and when the ray leaves its box."""
-
-
-def _ended(touched: list[Touch], end: int, most: int | None, origin: Pair, stack: Stack) -> Followed | None:
+def _ended(touched: list[Touch], end: int, most: int | None, stack: Stack) -> Passed | None:
     """What a ray hit before its end, of what it touched until then, in order."""
     at_end = [rank for time, _, _, rank, _, _ in touched if time == end]
-    blocked = bool(stack.occluder[at_end].any()) if at_end else False
+    blocked = bool(at_end) and stack.has_occluders and bool(stack.occluder[at_end].any())
     hits = touched[:-1] if blocked else touched[:most]
     passed = hits if blocked else hits[:-1]  # if one of them was entered as the ray ends, it is not left before
     if at_end and any(leave >= end for *_, leave in passed):
         return None
-    rows = [[rank, count, x + origin[0], y + origin[1], time] for time, y, x, rank, count, _ in hits]
-    if at_end and not blocked:
+    rows = [[rank, count, x, y, time] for time, y, x, rank, count, _ in hits]
+    if not at_end:
+        return end, rows, None
+    if not blocked:
         rows[-1][1] = 1
-    return end, rows
+    return end, rows, touched[-1] if blocked else hits[-1]
 
 
 def _cells(runs: Iterator[tuple[int, int, bytes]], ray: Ray, every: bool) -> tuple[int, Cell | None]:

@@ -26,7 +26,9 @@ from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
 from hitplanes.planes.scene.items import Stack, clipped
 
+from .. import late
 from ..fire.prefilter import Filters, filters_of, refused_by
+from ..fire.strategy import are_few
 from ..kinds.placements import Shots
 from ..kinds.rays import RayWeapon
 from .contacts import (
@@ -123,7 +125,6 @@ def cast_to_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tu
     return walk.ends, np.flatnonzero(starts_inside)
 
 
-# house: hit rule of rays
 def hits_and_ends(
     stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None = None
 ) -> tuple[Ints, Ints]:
@@ -140,13 +141,23 @@ def hits_and_ends(
     what rays hit, in order, as (ray, rank, count, x, y, entry) (6, P); and their ends, as (reason, time, y, x, rank,
     alone) (6, R); a compiled kernel returns None for rays that are too long or too wide for it
     """
+    if are_few(len(lines), len(stack), most):
+        return late.one_ray.follow_each(stack, bounds, lines, most, filters)
+    return cast_together(stack, bounds, lines, most, filters)
+
+
+# house: hit rule of rays
+def cast_together(
+    stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None
+) -> tuple[Ints, Ints]:
+    """`hits_and_ends` in arrays, some rays at a time."""
     step, found, size = RAYS_AT_ONCE, [], np.abs(lines.step).max(axis=0, initial=0) // SUB + 2 * lines.radius // SUB + 2
     if not len(stack) or not is_sparse(stack.sizes, size):  # all boxes are compared
         step = max(1, min(step, BRUTE_PAIRS // max(len(stack), 1)))
     for begin in range(0, max(len(lines), 1), step):
         part = slice(begin, begin + step)
         own = filters and (filters[0][part], filters[1][part])
-        found.append(_hits_and_ends(stack, bounds, lines.take(part), most, own))
+        found.append(_cast_together(stack, bounds, lines.take(part), most, own))
         found[-1][0][0] += begin
     if len(found) == 1:
         return found[0]
@@ -154,10 +165,10 @@ def hits_and_ends(
     return hit, ends
 
 
-def _hits_and_ends(
+def _cast_together(
     stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None
 ) -> tuple[Ints, Ints]:
-    """`hits_and_ends` of some rays."""
+    """`cast_together` of some rays."""
     origin = pixel(lines.start)
     own = Lines(lines.start - SUB * origin, lines.step, lines.radius)
     near = near_items(stack, bounds, lines, own, origin, filters)
