@@ -32,9 +32,9 @@ print(told().blocks > before)
 @pytest.mark.parametrize(
     ("then", "from_the_system"),
     [
-        ("fire(scene, Disc(3), (0, 0)); scene.set(mask, angle=3)", True),
+        ("fire(scene, Disc(3), (0, 0)); scene.set(mask, angle=3); scene.box(mask)", True),
         ("fire(scene, Disc(3), np.zeros((2, 2)))", False),
-        ("scene.set([mask, scene.add(np.eye(3) > 0, (0, 0))], angle=3)", False),
+        ("scene.set([mask, scene.add(np.eye(3) > 0, (0, 0))], angle=3); scene.box(mask)", False),
     ],
 )
 def test_a_batch_lets_large_blocks_be_kept(then: str, from_the_system: bool, environment: dict[str, str]) -> None:

@@ -690,7 +690,7 @@ def test_only_what_turns_gets_a_new_mask(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(
         history_module, "variants_of", lambda sprites, forms: made.extend(forms) or variants_of(sprites, forms)
     )
-    monkeypatch.setattr(items_module, "variant_of", lambda *_: pytest.fail("a mask was made"))
+    monkeypatch.setattr(items_module, "variants_of", lambda *_: pytest.fail("a mask was made"))
     past = history.at(0.5).items
     assert len(made) == 1
     assert [i for i in range(40) if past.variants[i] is not before.variants[i]] == [4]

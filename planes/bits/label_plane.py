@@ -19,9 +19,9 @@ from ..common.backend import kernels_of
 from ..common.checks import Bools, InputError, Ints, Labels
 from ..common.limits import HALF, ITEMS_UINT16, PLANE_AREA_MAX, PLANE_SIDE_MAX, SUB
 from ..grid.fixed_point import pixel
-from ..grid.spans import Box, meets
+from ..grid.spans import Box, clipped, meets
 from ..scene.derived import OF_ALL, Derivative, View
-from ..scene.items import Items, Stack, clipped
+from ..scene.items import Items, Stack
 from .cells import within
 
 

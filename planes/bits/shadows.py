@@ -26,8 +26,7 @@ import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..grid.spans import Box, Spans, begins, each_pixel, merged_runs, ragged, sorted_once
-from ..scene.items import clipped
+from ..grid.spans import Box, Spans, begins, clipped, each_pixel, merged_runs, ragged, sorted_once
 from . import cells
 from .bit_rows import WORD, Words
 from .span_walk import Runs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import re
 import reprlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,6 +15,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from .limits import BOXES_MAX
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -147,6 +150,17 @@ def choice(field: str, value: object, options: Iterable[str]) -> str:
     if len(names) > NAMES_SHOWN:
         listed += f" and {len(names) - NAMES_SHOWN} more"
     raise InputError(f"{field}: expected one of {listed}, got {shown(value)}{hint}")
+
+
+def boxes_in(field: str, name: object) -> int | None:
+    """Number of boxes in a name like "4 boxes"; None for any other name."""
+    counted = re.fullmatch(r"([0-9]{1,4}) box(?:es)?", name) if isinstance(name, str) else None
+    if counted is None:
+        return None
+    k = int(counted[1])
+    if not 1 <= k <= BOXES_MAX:
+        raise InputError(f"{field}: expected 1 to {BOXES_MAX} boxes, got {k}")
+    return k
 
 
 def suggestion(value: object, names: Iterable[str]) -> str:

@@ -140,7 +140,7 @@ class PastScene(Scene):
     def __init__(self, moment: Moment, tick: float, latest: Scene) -> None:
         super().__init__()
         self.tick, self._latest = tick, latest
-        self.name, self.categories, self._bounds, pickled, self.items = moment
+        self.name, self.categories, self._bounds, pickled, self._items = moment
         self.derived = Derived(self._bounds)
         try:
             self.weapons, self.shots = pickle.loads(pickled)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -18,15 +17,15 @@ import numpy.typing as npt
 
 from .. import late
 from ..common.backend import kernels_of
-from ..common.checks import Bools, Floats, InputError, Ints, choice
-from ..common.limits import BOXES_MAX, CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
+from ..common.checks import Bools, Floats, InputError, Ints, boxes_in, choice
+from ..common.limits import CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box, sorted_once
 from .derived import NEVER
 from .poses import Looks
 from .sprite import Sprite
-from .variants import MaskAtlas, Transform, Variant, variant_of, variants_of
+from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
 
 if TYPE_CHECKING:
     from ..bits.shadows import Covers
@@ -150,12 +149,6 @@ class Stack:
         return self.masks[self.offset[rank] : self.offset[rank] + size].reshape(y_max - y + 1, x_max - x + 1)
 
 
-def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
-    """Clip inclusive boxes (n, 4) to a box; those outside get x_max < x_min or y_max < y_min."""
-    low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
-    return np.concatenate([low, high], axis=1)
-
-
 def _is_there(boxes: Ints | Box) -> bool:
     """Whether any of some boxes (n, 4), or a single box, holds a pixel."""
     if isinstance(boxes, tuple):
@@ -189,20 +182,10 @@ NOTHING = Sprite(frames=())  # sprite of an id without an object: a removed one,
 NO_TRANSFORM = Transform()  # transform of an id without an object
 NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of an id without an object
 
+NO_EDGE = np.array([HALF, HALF, HALF - SUB, HALF - SUB])  # of an empty box
 NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
 ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
-
-
-def boxes_in(field: str, name: object) -> int | None:
-    """Number of boxes in a name like "4 boxes"; None for any other name."""
-    counted = re.fullmatch(r"([0-9]{1,4}) box(?:es)?", name) if isinstance(name, str) else None
-    if counted is None:
-        return None
-    k = int(counted[1])
-    if not 1 <= k <= BOXES_MAX:
-        raise InputError(f"{field}: expected 1 to {BOXES_MAX} boxes, got {k}")
-    return k
 
 
 @dataclass
@@ -249,6 +232,7 @@ class Items:
         self.angles: list[float] = []
         self.variants: list[Variant] = []
         self.names: list[str] = []
+        self.unmade: dict[int, None] = {}  # items that have masks of earlier looks, until `make_masks`
         self.arrangement = next(ARRANGEMENTS)
         self._journal: deque[Change] = deque()
         self._in_order = False  # whether the order of the last stack still holds
@@ -265,27 +249,22 @@ class Items:
         for name, shape in COLUMNS.items():
             setattr(self, name, np.zeros((16, *shape), np.int64))
         self._box = np.tile(np.array(NOWHERE), (16, 1))
-        self._edge = np.zeros((16, 4), np.int64)  # from the position to the first and last pixel of the box, 1/256 px
+        self._edge = np.tile(NO_EDGE, (16, 1))  # from the position to the first and last pixel of the box, 1/256 px
 
     def add(self, sprite: Sprite, form: Transform, angle: float, name: str, values: dict[str, object]) -> int:
-        """Append an item with its columns `values`, and return its id."""
+        """Append an item with its columns `values`, and return its id; its mask is made later."""
         item = self.count
         if item >= ITEMS_MAX:
             raise InputError(f"objects: expected at most {ITEMS_MAX} in the life of a scene, got one more")
-        variant = variant_of(sprite, form)
-        self._reserve(item + 1)
-        self.count += 1
-        self.sprites.append(sprite)
-        self.forms.append(form)
-        self.angles.append(angle)
-        self.variants.append(NO_MASK)
-        self.names.append(name)
+        if not surely_fits(sprite, form):
+            variants_of([sprite], [form])
+        self.skip_to(item + 1)
+        self.sprites[item], self.forms[item], self.angles[item], self.names[item] = sprite, form, angle, name
         for column, value in values.items():
             getattr(self, column)[item] = value
         self.alive[item] = 1
         self.living += 1
-        self._enter([item], [variant])
-        self.record(np.array([item]))
+        self._make_later([item])
         return item
 
     def state(self) -> dict[str, Any]:
@@ -332,6 +311,7 @@ class Items:
         self.living -= len(ids)
         for item in ids.tolist():
             self.atlas.drop(self.variants[item])
+            self.unmade.pop(item, None)
             self.sprites[item], self.forms[item], self.variants[item] = NOTHING, NO_TRANSFORM, NO_MASK
             self.angles[item] = 0.0
         self.record(ids)
@@ -345,15 +325,39 @@ class Items:
         return Looks([sprites[item] for item in ids], [angles[item] for item in ids], [forms[item] for item in ids])
 
     def reform(self, ids: Sequence[int], looks: Looks) -> None:
-        """Give items other looks; all masks are made before any item changes."""
-        variants = variants_of(looks.sprites, looks.forms)
+        """Give items other looks; their masks are made later, but if any is too large, no item changes."""
+        if not all(map(surely_fits, looks.sprites, looks.forms)):
+            variants_of(looks.sprites, looks.forms)
         for item, sprite, angle, form in zip(ids, *looks, strict=True):
-            self.atlas.drop(self.variants[item])
             self.sprites[item], self.angles[item], self.forms[item] = sprite, angle, form
-        self._enter(ids, variants)
+        self._make_later(ids)
+
+    def _make_later(self, ids: Sequence[int]) -> None:
+        """Leave masks of items to `make_masks`; what reads the version sees at once that something changed."""
+        self.version += 1
+        self.unmade.update(dict.fromkeys(ids))
+
+    def make_masks(self) -> None:
+        """Make the masks of items that changed their looks, all together."""
+        with self._lock:  # threads may read a scene at once
+            ids = list(self.unmade)
+            if not ids:
+                return
+            looks = self.looks(ids)
+            variants = variants_of(looks.sprites, looks.forms)
+            for item in ids:
+                self.atlas.drop(self.variants[item])
+            self._enter(ids, variants)
+            self._record(np.array(ids), ("mask",))
+            self.unmade.clear()
 
     def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
-        """Update the boxes, arrangement and journal after some columns of items changed."""
+        """Update the version, boxes, arrangement and journal after some columns of items changed."""
+        self.version += 1
+        self._record(ids, columns)
+
+    def _record(self, ids: Ints, columns: Iterable[str]) -> None:
+        """`record` of changes that the version counts already."""
         before, after = self._box[ids], self.deciding_boxes(ids)
         low = HALF - self.pivot_256[ids]
         self._edge[ids] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
@@ -368,6 +372,7 @@ class Items:
         """Move distinct items (n,) to new positions (n, 2); masks and order stay."""
         before, after = self._box.take(ids, axis=0), boxes_at(position_256, self._edge.take(ids, axis=0))
         self.position_256[ids], self._box[ids] = position_256, after
+        self.version += 1
         self._note(ids, before, after, len(ids))
 
     def move_risen(self, ids: Ints, xy: Floats) -> bool:
@@ -376,6 +381,7 @@ class Items:
         place = kernels_of(fixed_point).place
         if not place(ids, xy, self.count, self.alive, self._edge, self.position_256, self._box, before, after):
             return False
+        self.version += 1
         self._note(ids.copy(), before, after, len(ids))
         return True
 
@@ -389,12 +395,12 @@ class Items:
         after = (left, top, left + x_max - x, top + y_max - y)
         PLACE.pack_into(self.position_256, PLACE.size * item, x_256, y_256)  # type: ignore[arg-type]
         BOX.pack_into(self._box, BOX.size * item, *after)  # type: ignore[arg-type]
+        self.version += 1
         self._note(item, before, after, 1)
         return True
 
     def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
-        """Write n changes into the journal as a new version."""
-        self.version += 1
+        """Write n changes of the present version into the journal."""
         self._journal.append((self.version, ids, before, after))
         self._journal_rows += n
         most = min(JOURNAL_ROWS, JOURNAL_FEW + JOURNAL_EACH * self.living)
@@ -585,7 +591,7 @@ class Items:
             return
         more = max(count - size, size // 4)
         self._box = np.concatenate([self._box, np.tile(np.array(NOWHERE), (more, 1))])
-        self._edge = np.concatenate([self._edge, np.zeros((more, 4), np.int64)])
+        self._edge = np.concatenate([self._edge, np.tile(NO_EDGE, (more, 1))])
         for name in COLUMNS:
             old: npt.NDArray[np.int64] = getattr(self, name)
             grown = np.zeros((size + more, *old.shape[1:]), np.int64)

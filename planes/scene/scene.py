@@ -79,7 +79,7 @@ class Scene:
             x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
             w, h = integers("size_wh", size_wh, (2,), 1, POSITION_MAX).tolist()
             self._bounds = (x, y, x + w - 1, y + h - 1)
-        self.items = Items()
+        self._items = Items()
         self.weapons: dict[str, Any] = {}
         self.shots: list[Any] = []
         self.derived = Derived(self._bounds)
@@ -115,6 +115,13 @@ class Scene:
         return scene
 
     @property
+    def items(self) -> Items:
+        """The items as columns; masks that changed since they were last read are made first."""
+        if self._items.unmade:
+            self._items.make_masks()
+        return self._items
+
+    @property
     def bounds(self) -> Box | None:
         """Inclusive box (x_min, y_min, x_max, y_max) of the world, px; None if it has no bounds."""
         return self._bounds
@@ -130,7 +137,7 @@ class Scene:
         return self
 
     def __len__(self) -> int:
-        return int(self.items.alive[: self.items.count].sum())
+        return int(self._items.alive[: self._items.count].sum())
 
     def add(
         self, sprite: object, position_xy: Sequence[float] = (0.0, 0.0), *, role: Role | str = Role.HITTABLE,
@@ -165,8 +172,8 @@ class Scene:
         form = transform_of(made, frame, flip, scale_pair(scale), turn)
         values = self._new_columns(kind, layer, categories, owner, cost, position_xy, velocity_xy)
         unnamed = name is None or (isinstance(name, str) and not name)
-        called = f"{kind.value} {self.items.count}" if unnamed else Text().check("name", name)
-        return self.items.add(made, form, turn, called, values)
+        called = f"{kind.value} {self._items.count}" if unnamed else Text().check("name", name)
+        return self._items.add(made, form, turn, called, values)
 
     def _new_columns(
         self, role: Role, layer: object, categories: object, owner: object, cost: object, position_xy: object,
@@ -177,7 +184,7 @@ class Scene:
             "role": ROLES.index(role),
             "layer": integer("layer", layer, -LAYER_MAX, LAYER_MAX),
             "categories": self._bits(categories, _default_bits(role)),
-            "owner": self.items.count if owner is None else integer("owner", owner, 0, self.items.count),
+            "owner": self._items.count if owner is None else integer("owner", owner, 0, self._items.count),
             "cost": integer("cost", cost, 0, COST_MAX),
             "position_256": place_256("position_xy", position_xy, POSITION_MAX),
             "velocity_256": place_256("velocity_xy", velocity_xy, REACH_MAX),
@@ -185,18 +192,18 @@ class Scene:
 
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
         """Take objects out of the scene; their ids are not used again."""
-        self.items.remove(self._existing(ids))
+        self._items.remove(self._existing(ids))
 
     def move(self, ids: int | Sequence[int] | Ints, xy: object) -> None:
         """Place objects at new positions: ids (n,) and xy (n, 2), or one position for all of them, px."""
         if type(ids) is int or isinstance(ids, np.integer):
             position = one_place(xy)
-            if position is not None and self.items.move_one(int(ids), *position):
+            if position is not None and self._items.move_one(int(ids), *position):
                 return
-        elif are_rows(ids, xy) and self.items.move_risen(ids, xy):  # type: ignore[arg-type]
+        elif are_rows(ids, xy) and self._items.move_risen(ids, xy):  # type: ignore[arg-type]
             return
         rows = self._existing(ids)
-        self.items.move(rows, snap(points("xy", xy, len(rows))))
+        self._items.move(rows, snap(points("xy", xy, len(rows))))
 
     def set(
         self, ids: int | Sequence[int] | Ints, *, sprite: object = None, position_xy: object = None,
@@ -223,16 +230,16 @@ class Scene:
         if categories is not None:
             columns["categories"] = self._bits_per_row(categories, n)
         if owner is not None:
-            columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self.items.count - 1)
+            columns["owner"] = integers("owner", each("owner", owner, n), (n,), 0, self._items.count - 1)
         if role is not None:
             columns = self._of_role(rows, _role(role)) | columns
         look = sprite, angle, scale, flip, frame
         if any(part is not None for part in look):
-            self.items.reform(rows.tolist(), self.items.looks(rows.tolist()).changed(*look))
-            columns["mask"] = self.items.mask[rows]
+            self._items.reform(rows.tolist(), self._items.looks(rows.tolist()).changed(*look))
         for name, values in columns.items():
-            getattr(self.items, name)[rows] = values
-        self.items.record(rows, columns)
+            getattr(self._items, name)[rows] = values
+        if columns:
+            self._items.record(rows, columns)
 
     def carve(self, pixels: HitPixels | Mapping[int, object]) -> dict[int, int]:
         """Take pixels out of objects, as terrain that is shot away, and return how many each of them lost.
@@ -254,20 +261,19 @@ class Scene:
         sprites, lost = late.carving.carved_sprites(self.items, given)
         if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
-            self.items.record(np.array(rows), ("mask",))
         return lost
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""
-        old = np.where(self.items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
-        now = self.items.categories[rows]
+        old = np.where(self._items.role[rows] == ROLES.index(Role.OCCLUDER), ALL, 1)
+        now = self._items.categories[rows]
         return {"role": ROLES.index(role), "categories": np.where(now == old, _default_bits(role), now)}
 
     def ids(self, role: Role | str | None = None) -> Ints:
         """Ids of the objects in the scene, rising, of one role or of all."""
-        n = self.items.count
-        alive = self.items.alive[:n] == 1
-        return np.flatnonzero(alive if role is None else alive & (self.items.role[:n] == ROLES.index(_role(role))))
+        n = self._items.count
+        alive = self._items.alive[:n] == 1
+        return np.flatnonzero(alive if role is None else alive & (self._items.role[:n] == ROLES.index(_role(role))))
 
     def __iter__(self) -> Iterator[int]:
         """Ids of the objects in the scene, rising."""
@@ -277,7 +283,7 @@ class Scene:
         """Whether an id is of an object in the scene, and not of a removed one."""
         if not isinstance(item, int | np.integer):
             return False
-        return 0 <= int(item) < self.items.count and bool(self.items.alive[item])
+        return 0 <= int(item) < self._items.count and bool(self._items.alive[item])
 
     def __repr__(self) -> str:
         counts = [f"{len(ids)} {role.value}" for role in ROLES if len(ids := self.ids(role))]
@@ -299,11 +305,11 @@ class Scene:
 
     def position(self, ids: int | Sequence[int] | Ints) -> Floats:
         """Positions (n, 2) of ids, or (2,) of one, px; kept in 1/256 px."""
-        return self._read(ids, lambda rows: self.items.position_256[rows] / SUB)
+        return self._read(ids, lambda rows: self._items.position_256[rows] / SUB)
 
     def angle(self, ids: int | Sequence[int] | Ints) -> Floats:
         """Angles (n,) of ids, or the angle of one, degrees, as they were given."""
-        return self._read(ids, lambda rows: np.array(self.items.looks(rows.tolist()).angles, np.float64))
+        return self._read(ids, lambda rows: np.array(self._items.looks(rows.tolist()).angles, np.float64))
 
     def scale(self, ids: int | Sequence[int] | Ints) -> Floats:
         """Scales (n, 2) of ids in x and y, or (2,) of one; they are kept in 1/65536."""
@@ -319,27 +325,27 @@ class Scene:
 
     def layer(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Layers (n,) of ids, or that of one; greater is nearer the viewer."""
-        return self._read(ids, lambda rows: self.items.layer[rows])
+        return self._read(ids, lambda rows: self._items.layer[rows])
 
     def role(self, ids: int | Sequence[int] | Ints) -> npt.NDArray[np.str_]:
         """Roles (n,) of ids, or that of one: "background", "hittable", "mover", "occluder" or "hud"."""
-        return self._read(ids, lambda rows: np.array(ROLE_NAMES)[self.items.role[rows]])
+        return self._read(ids, lambda rows: np.array(ROLE_NAMES)[self._items.role[rows]])
 
     def categories_of(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Category bits (n,) of ids, or those of one; `category_names` tells their names."""
-        return self._read(ids, lambda rows: self.items.categories[rows])
+        return self._read(ids, lambda rows: self._items.categories[rows])
 
     def owner(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Owners (n,) of ids, or that of one: the object that it is a part of, or itself."""
-        return self._read(ids, lambda rows: self.items.owner[rows])
+        return self._read(ids, lambda rows: self._items.owner[rows])
 
     def cost(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Costs (n,) of a px of ids, or that of one."""
-        return self._read(ids, lambda rows: self.items.cost[rows])
+        return self._read(ids, lambda rows: self._items.cost[rows])
 
     def velocity(self, ids: int | Sequence[int] | Ints) -> Floats:
         """Velocities (n, 2) of ids, or (2,) of one, px a frame; they are kept in 1/256 px."""
-        return self._read(ids, lambda rows: self.items.velocity_256[rows] / SUB)
+        return self._read(ids, lambda rows: self._items.velocity_256[rows] / SUB)
 
     def box(self, ids: int | Sequence[int] | Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of ids as x_min, y_min, x_max, y_max, or (4,) of one, px.
@@ -350,21 +356,21 @@ class Scene:
 
     def sprite(self, item: int) -> Sprite:
         """Sprite of an object."""
-        return self.items.sprites[int(self._existing(integer("item", item, 0, self.items.count - 1))[0])]
+        return self._items.sprites[int(self._existing(integer("item", item, 0, self._items.count - 1))[0])]
 
     def rename(self, item: int, name: str) -> None:
         """Give an object another name."""
-        rows = self._existing(integer("item", item, 0, self.items.count - 1))
-        self.items.names[int(rows[0])] = Text().check("name", name)
-        self.items.record(rows, ("name",))
+        rows = self._existing(integer("item", item, 0, self._items.count - 1))
+        self._items.names[int(rows[0])] = Text().check("name", name)
+        self._items.record(rows, ("name",))
 
     def name_of(self, item: int) -> str:
         """Name of an object, even if it was removed."""
-        return self.items.names[integer("item", item, 0, self.items.count - 1)]
+        return self._items.names[integer("item", item, 0, self._items.count - 1)]
 
     def find(self, name: str) -> int:
         """Id of the object of a name; it must be the only one."""
-        names = {i: self.items.names[i] for i in self.ids().tolist()}
+        names = {i: self._items.names[i] for i in self.ids().tolist()}
         choice("name", name, names.values())
         named = [i for i, other in names.items() if other == name]
         if len(named) > 1:
@@ -497,10 +503,10 @@ class Scene:
 
     def _risen(self, ids: object) -> Ints | None:
         """A copy of an array of rising ids (n,) that are all in the scene; None for any other value."""
-        if type(ids) is not np.ndarray or ids.ndim != 1 or ids.dtype != np.int64 or not rising(ids, self.items.count):
+        if type(ids) is not np.ndarray or ids.ndim != 1 or ids.dtype != np.int64 or not rising(ids, self._items.count):
             return None
         rows = ids.copy()
-        return rows if self.items.alive.take(rows).all() else None
+        return rows if self._items.alive.take(rows).all() else None
 
     def _read(self, ids: object, values: Callable[[Ints], npt.NDArray[Read]]) -> npt.NDArray[Read]:
         """Values of objects, a row each; for one id without the rows. An id may be there several times."""
@@ -509,14 +515,14 @@ class Scene:
 
     def _forms(self, rows: Ints, *names: str) -> npt.NDArray[Any]:
         """Columns of the transforms of objects."""
-        forms = self.items.looks(rows.tolist()).forms
+        forms = self._items.looks(rows.tolist()).forms
         return np.array([[getattr(form, name) for name in names] for form in forms]).reshape(-1, len(names))
 
     def _living(self, ids: object) -> Ints:
         """Check that ids are in the scene."""
         given = np.atleast_1d(array_of("ids", ids))
-        rows = integers("ids", given, (None,), 0, self.items.count - 1)
-        gone = rows[self.items.alive[rows] == 0]
+        rows = integers("ids", given, (None,), 0, self._items.count - 1)
+        gone = rows[self._items.alive[rows] == 0]
         if len(gone):
             row = int(np.flatnonzero(rows == gone[0])[0])
             raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
@@ -565,5 +571,5 @@ def _restored(
     """A scene of the parts that `Scene.copy` and pickle take."""
     scene = Scene(categories=categories[1:], name=name)
     scene._bounds, scene.derived = bounds, Derived(bounds)
-    scene.weapons, scene.shots, scene.items = weapons, shots, Items.restored(state)
+    scene.weapons, scene.shots, scene._items = weapons, shots, Items.restored(state)
     return scene

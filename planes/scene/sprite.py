@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..common.backend import cached_attribute
 from ..common.checks import (
     Bools,
     Image,
@@ -275,6 +276,11 @@ class Sprite(Known):
     def frame_count(self) -> int:
         """Number of frames; a shape has one."""
         return max(len(self.frames), 1)
+
+    @cached_attribute
+    def sides(self) -> int:
+        """Greatest sum of width and height of its frames, px, or that of its shape."""
+        return max(sum(local_grid(self, number)[0]) for number in range(self.frame_count))
 
 
 def as_sprite(value: object) -> Sprite:

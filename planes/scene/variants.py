@@ -58,6 +58,8 @@ FLIPS = ("none", "x", "y", "xy")
 ONE = 1 << SCALE_BITS
 QUARTERS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])  # matrices of turns
 
+SIDES_SURE = math.isqrt(MASK_AREA_MAX) - 16  # of a sum of two sides; grids are a few pixels wider
+
 FINE_BITS = TRIG_BITS - SCALE_BITS  # bits by which a turned position is finer than a scaled one
 
 
@@ -107,6 +109,11 @@ def whole_scale(x: float, y: float) -> tuple[int, int]:
     """Check a scale and round it to 1/65536."""
     x, y = real("scale[0]", x, SCALE_MIN, SCALE_MAX), real("scale[1]", y, SCALE_MIN, SCALE_MAX)
     return round(x * ONE), round(y * ONE)
+
+
+def surely_fits(sprite: Sprite, form: Transform) -> bool:
+    """Whether a mask surely is not too large, by the sum of the sides of its sprite, which no turn makes longer."""
+    return sprite.sides * max(form.scale_x, form.scale_y) <= SIDES_SURE * ONE
 
 
 @dataclass(eq=False)  # a frozen one takes six times as long to make
@@ -175,10 +182,11 @@ class MaskAtlas:
         return [self.offsets[variant.uid] for variant in variants]
 
     def drop(self, variant: Variant) -> None:
-        """Count one user less of a mask."""
-        users = self.users[variant.uid] = self.users[variant.uid] - 1
-        if not users:
-            del self.users[variant.uid]
+        """Count one user less of a mask, if it has any."""
+        users = self.users.pop(variant.uid, 0)
+        if users > 1:
+            self.users[variant.uid] = users - 1
+        elif users:
             self.live -= variant.mask.size
 
     @property

@@ -77,6 +77,9 @@ RESULTS = {
 GIVEN = {"Hits", "RayHits", "Ready", "PastScene", "Planes", "Cells", "Work"}
 """Classes whose objects calls give: nobody makes one."""
 
+INSIDE = {"items", "sides"}
+"""What only the library reads."""
+
 PROPERTIES = property, cached_property, cached_attribute
 SPELLED = {
     "Pellet": "AreaWeapon | RayWeapon", "Repeated": "AreaWeapon | RayWeapon | Spread | Sweep", "AnyHits": "Hits",
@@ -117,7 +120,7 @@ def members(cls: type) -> tuple[list[Member], list[Member]]:
     found: dict[str, Any] = {}
     for home in homes(cls):
         for name, value in vars(home).items():
-            if not name.startswith("_"):
+            if not name.startswith("_") and name not in INSIDE:
                 found.setdefault(name, value)
     methods = {n: getattr(v, "__func__", v) for n, v in found.items()}
     return (

@@ -15,8 +15,8 @@ from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints
 from hitplanes.planes.common.limits import DETAIL_SAMPLES_MAX, NEAR_PX, SUB
 from hitplanes.planes.grid.rasterize import Lines, cells_of
-from hitplanes.planes.grid.spans import Box, Spans, meets, pieces, slabs
-from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.grid.spans import Box, Spans, clipped, meets, pieces, slabs
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.plan import Plan

@@ -22,8 +22,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
-from hitplanes.planes.grid.spans import Box, Columns, each_pixel, pieces, sorted_once
-from hitplanes.planes.scene.items import clipped
+from hitplanes.planes.grid.spans import Box, Columns, clipped, each_pixel, pieces, sorted_once
 
 from ..fire.prefilter import Filters, filters_of, refused, refused_by
 from ..kinds.placements import Shots

@@ -21,7 +21,7 @@ from hitplanes.planes import late
 from hitplanes.planes.bits import cells
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SKIP, Kinds, Pairs
 from hitplanes.planes.common.backend import LruCache, kernels_of
-from hitplanes.planes.common.checks import Bools, Ints, choice
+from hitplanes.planes.common.checks import Bools, Ints, boxes_in, choice
 from hitplanes.planes.common.limits import (
     BOUNDING_BYTES,
     BOUNDING_CACHE_BYTES,
@@ -34,7 +34,7 @@ from hitplanes.planes.common.limits import (
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import meets
 from hitplanes.planes.scene.derived import OF_ALL, View
-from hitplanes.planes.scene.items import Items, Stack, boxes_in
+from hitplanes.planes.scene.items import Items, Stack
 
 from ..kinds.placements import Placements, Shots
 from ..kinds.weapon import Pattern, Swept

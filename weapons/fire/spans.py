@@ -21,8 +21,8 @@ from hitplanes.planes.bits.span_walk import (
 )
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES
-from hitplanes.planes.grid.spans import Box, area, merged_runs, pieces
-from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.grid.spans import Box, area, clipped, merged_runs, pieces
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late

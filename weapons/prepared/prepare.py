@@ -245,7 +245,8 @@ class ReadyPattern(Ready[Hits]):
     def _follow(self) -> None:
         """Read the scene as it is now, and choose the kernels."""
         with self._lock:
-            version = self._items.version
+            items = self.scene.items
+            version = items.version
             if version == self._version:
                 return
             kernels = kernels_of(position_cache)
@@ -254,7 +255,7 @@ class ReadyPattern(Ready[Hits]):
                     self._aims_by[kernels] = AimCache(self.scene, self.weapon, kernels)
                 self._kernels, self._aims, self._quick = kernels, self._aims_by[kernels], {}
                 self._near = kernels.PositionCache(self.scene, self._aims.ground, self._filter, self._reach, self._room)
-            stack = self._items.stack()
+            stack = items.stack()
             self._near.follow(stack)
             self._present = self._snapshot(version, stack, self._near)
             self._version = version

@@ -139,10 +139,11 @@ class ReadyRay(Ready[RayHits]):
     def _follow(self) -> None:
         """Read the scene as it is now, and choose the kernels."""
         with self._lock:
-            version = self._items.version
+            items = self.scene.items
+            version = items.version
             if version == self._version:
                 return
-            stack = self._stack = self._items.stack()
+            stack = self._stack = items.stack()
             if stack.forms != self._arrangement:
                 self._arrangement = stack.forms
                 self._ids = stack.ids.data

@@ -25,8 +25,8 @@ from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
 from hitplanes.planes.grid.fixed_point import pixel, scaled, snap, turned, unit
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
-from hitplanes.planes.grid.spans import Box, Columns, begins, merged_runs, pieces, ragged
-from hitplanes.planes.scene.items import Items, Stack, clipped
+from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_runs, pieces, ragged
+from hitplanes.planes.scene.items import Items, Stack
 
 from ..fire.plan import Plan
 from ..kinds import placements

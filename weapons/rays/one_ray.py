@@ -21,9 +21,9 @@ from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import Lines
-from hitplanes.planes.grid.spans import Box, meets
+from hitplanes.planes.grid.spans import Box, clipped, meets
 from hitplanes.planes.scene.derived import View
-from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.prefilter import Filters, refused_by

@@ -23,8 +23,8 @@ from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
-from hitplanes.planes.grid.spans import Box, Columns, begins, pieces
-from hitplanes.planes.scene.items import Stack, clipped
+from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, pieces
+from hitplanes.planes.scene.items import Stack
 
 from .. import late
 from ..fire.prefilter import Filters, filters_of, refused_by
