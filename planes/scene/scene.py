@@ -236,6 +236,8 @@ class Scene:
         look = sprite, angle, scale, flip, frame
         if any(part is not None for part in look):
             self._items.reform(rows.tolist(), self._items.looks(rows.tolist()).changed(*look))
+        if (position_256 := columns.pop("position_256", None)) is not None:
+            self._items.move(rows, position_256)
         for name, values in columns.items():
             getattr(self._items, name)[rows] = values
         if columns:
@@ -520,6 +522,8 @@ class Scene:
 
     def _living(self, ids: object) -> Ints:
         """Check that ids are in the scene."""
+        if isinstance(ids, int | np.integer) and type(ids) is not bool and ids in self:
+            return np.array([ids])
         given = np.atleast_1d(array_of("ids", ids))
         rows = integers("ids", given, (None,), 0, self._items.count - 1)
         gone = rows[self._items.alive[rows] == 0]
