@@ -114,9 +114,9 @@ def bools(field: str, values: object, shape: Shape) -> Bools:
 
 def real(field: str, value: object, low: float, high: float) -> float:
     """Check one finite number in [low, high]."""
-    if type(value) is float and low <= value <= high:
-        return value
     given = float(value) if type(value) is int and value.bit_length() < FLOAT_BITS else value
+    if type(given) is float and low <= given <= high:
+        return given
     number = float(reals(field, given, ()))
     if not low <= number <= high:
         raise InputError(f"{field}: expected a number from {low:.15g} to {high:.15g}, got {shown(value)}")

@@ -137,8 +137,7 @@ class PastScene(Scene):
     tick : as given
     """
 
-    def __init__(self, moment: Moment, tick: float, latest: Scene) -> None:
-        super().__init__()
+    def __init__(self, moment: Moment, tick: float, latest: Scene) -> None:  # all that a Scene has is in the moment
         self.tick, self._latest = tick, latest
         self.name, self.categories, self._bounds, pickled, self._items = moment
         self.derived = Derived(self._bounds)

@@ -268,6 +268,8 @@ def moments_of(history: Scene | History, tick: object, n: int) -> list[tuple[Sce
         return [(history, np.arange(n))]
     if tick is None:
         raise InputError("tick: expected one, or one for each shot, as it is a History that is fired at, got none")
+    if n and isinstance(tick, int | float) and not isinstance(tick, bool):
+        return [(history.at(tick), np.arange(n))]
     ticks = reals("tick", each("tick", tick, n), (n,))
     if not n:
         return [(history.at(history.ticks[-1]) if history.ticks else history.scene, np.arange(0))]
