@@ -44,8 +44,11 @@ from hitplanes import (
     replay,
     report_of,
 )
-from hitplanes.planes.bits.shadows import rectangles
+from hitplanes.planes.bits import shadows
+from hitplanes.planes.grid.spans import rectangles
 from hitplanes.weapons.cli.command import main
+from hitplanes.weapons.fire.shelter import ways_box
+from hitplanes.weapons.kinds.placements import placements_for
 
 SIGHTS = ("occluders", "all")
 WAYS = ("spans", "tiles", "visible")
@@ -91,6 +94,55 @@ def check(seeds: range) -> None:
 @pytest.mark.parametrize("part", some_of(range(4), 2))
 def test_every_way_agrees_with_one_segment_a_pixel(part: int) -> None:
     check(range(15 * part, 15 * (part + 1)))
+
+
+@pytest.mark.usefixtures("jit")
+@pytest.mark.parametrize("part", some_of(range(4), 2))
+def test_large_masks_are_covered_near_the_shots(monkeypatch: pytest.MonkeyPatch, part: int) -> None:
+    """Masks of a few pixels are large here: each has many blocks, of which most are far from a shot."""
+    monkeypatch.setattr(shadows, "BLOCK", 3)
+    check(range(400 + 15 * part, 400 + 15 * (part + 1)))
+
+
+def test_all_ways_lie_in_their_box() -> None:
+    """Of every weapon, with pellets and recoil; and the box is not much larger."""
+    rng, slack = np.random.default_rng(7), []
+    for seed in range(150):
+        battle = seen_battle(seed)
+        plain = parts_of(battle.volley.weapon)[2]
+        far = Spread(plain, 30, 90), Rounds(plain, 6, (25, -40), 77), Rounds(Spread(plain, 20, 50), 3, (0, 30))
+        for weapon in (plain, battle.volley.weapon, *far):
+            shots = fire(battle.scene(), weapon, rng.uniform(-99, 99, (3, 2)), aim=rng.uniform(0, 360)).shots
+            x, y, x_max, y_max = ways_box(weapon, shots)
+            placed = placements_for(weapon, shots)
+            every = np.concatenate([placed.boxes, np.tile(placed.xy, 2)]) - np.array([x, y, x_max, y_max])
+            least = np.concatenate([every[:, :2], -every[:, 2:]]).min(axis=0).min()
+            assert least >= 0, (seed, weapon)
+            slack.append(least)
+    assert min(slack) <= 2
+
+
+def test_a_shot_covers_the_blocks_that_it_may_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Terrain is a new mask after each hole, so only what is near an explosion is covered anew."""
+    made: list[tuple[int, ...]] = []
+    monkeypatch.setattr(shadows, "rectangles", lambda mask: made.append(mask.shape) or rectangles(mask))
+    scene = Scene((1300, 700))
+    ground = scene.add(np.arange(400)[:, None] + np.zeros(1300) > 99, (649.5, 499.5))
+    scene.add(np.ones((9, 9), np.bool_), (320, 395))
+    bomb, counts = Disc(30, line_of_sight="all"), []
+    for at in ((300, 390), (310, 390), (340, 390)):
+        hits = fire(scene, bomb, at)
+        assert hits == fire(scene, bomb, at, strategy="spans") and ground in hits.object
+        counts.append(len(made))
+        scene.carve(hits)
+    assert max(counts) < 20 and all(max(size) <= shadows.BLOCK for size in made)
+    made.clear()
+    fire(scene, bomb, (300, 390))
+    fire(scene, bomb, (301, 391))
+    first = len(made)
+    assert 1 <= first <= 4
+    fire(scene, Disc(900, line_of_sight="all"), (600, 300))
+    assert len(made) == 11 * 3  # each block of the ground once; of the box nothing is left
 
 
 @pytest.mark.long
@@ -229,8 +281,10 @@ def test_shares_blockers_and_why_not() -> None:
 
 @pytest.mark.parametrize("strategy", WAYS)
 def test_the_plan_says_what_may_shelter(strategy: str) -> None:
-    stages = {stage.name: stage.why for stage in fire(street(), Disc(9, line_of_sight="all"), (9, 9)).plan.ran}
-    assert stages["line of sight"] == "2 items may shelter"
+    near, far = (fire(street(), Disc(9, line_of_sight="all"), at, strategy=strategy).plan for at in ((38, 15), (9, 9)))
+    assert {stage.name: stage.why for stage in near.ran}["line of sight"] == "2 items may shelter"
+    left_out = {stage.name: stage.why for stage in far.left_out}
+    assert left_out["line of sight"] == "no item near the shots may shelter" and not far.has_run("line of sight")
     assert not fire(street(), Disc(9), (9, 9), strategy=strategy).plan.has_run("line of sight")
 
 

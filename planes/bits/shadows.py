@@ -18,15 +18,16 @@ Ericson, *Real-Time Collision Detection* (2005), 5.3.3 (segment against box).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from ..common.backend import LruCache, kernels_of
 from ..common.checks import Bools, Floats, Ints
-from ..grid.spans import Box, Spans, begins, clipped, each_pixel, merged_runs, ragged, sorted_once
+from ..grid.spans import Box, begins, clipped, each_pixel, merged_runs, ragged, rectangles, sorted_once
 from . import cells
 from .bit_rows import WORD, Words
 from .span_walk import Runs
@@ -40,7 +41,12 @@ COVERS_BYTES, MASK_BYTES = 2**25, 200
 ROWS_AT_ONCE = 2**15
 """Rows of rectangles worked on at a time: 256 KB for each of their columns."""
 
-FULL = np.uint64(2**64 - 1)
+BLOCK = 128
+"""Side of the blocks in which a larger mask is covered, px; only those near the shots are."""
+
+ONE_BLOCK = 0, 0, 1, 1
+
+FULL, NO_RECTS = np.uint64(2**64 - 1), np.zeros((0, 4), np.int64)
 
 
 class Blockers(NamedTuple):
@@ -85,37 +91,62 @@ class Blockers(NamedTuple):
 
 
 class Covers:
-    """Rectangles that cover masks, by the number of the mask; the last ones asked for are kept."""
+    """Rectangles that cover masks, block by block, by the number of the mask; the last ones asked for are kept."""
 
     def __init__(self) -> None:
-        self._of_mask: LruCache[int, Ints] = LruCache(COVERS_BYTES, lambda rects: rects.nbytes + MASK_BYTES)
+        self._of_block: LruCache[tuple[int, int, int], Ints] = LruCache(
+            COVERS_BYTES, lambda rects: rects.nbytes + MASK_BYTES
+        )
         self._of_masks: LruCache[bytes, tuple[Ints, Ints]] = LruCache(
             COVERS_BYTES, lambda made: made[0].nbytes + made[1].nbytes, len
         )
 
-    def of(self, number: Ints, mask_of: Callable[[int], Bools]) -> tuple[Ints, Ints]:
-        """Begin (B + 1,) of the rectangles of each mask, and all rectangles (R, 4).
+    def of(
+        self, number: Ints, mask_of: Callable[[int], Bools], boxes_xyxy: Ints, near_xyxy: Box | None
+    ) -> tuple[Ints, Ints]:
+        """Begin (B + 1,) of the rectangles of each mask, and all rectangles (R, 4), from its corner.
 
         Parameters
         ----------
         number : (B,) numbers of masks
         mask_of : returns the mask (h, w) of a place in `number`
+        boxes_xyxy : (B, 4) boxes of the masks
+        near_xyxy : box that large masks are covered in, or a little more; None for all of them
         """
 
         def made() -> tuple[Ints, Ints]:
-            numbers = enumerate(number.tolist())
-            return joined([self._of_mask.get(mask, partial(_rectangles_of, mask_of, row)) for row, mask in numbers])
+            counts, every = [0], [NO_RECTS]
+            for row, mask in enumerate(number.tolist()):
+                x, y, x_end, y_end = blocks.get(row, ONE_BLOCK)
+                places = product(range(y, y_end), range(x, x_end))
+                rects = [self._of_block.get((mask, *at), partial(_rectangles_of, mask_of, row, at)) for at in places]
+                counts.append(sum(map(len, rects)))
+                every += rects
+            return np.cumsum(counts), np.concatenate(every)
 
-        return self._of_masks.get(number.tobytes(), made)
+        blocks = _blocks_of_large(boxes_xyxy, near_xyxy)
+        key = number.tobytes() + str(blocks).encode() if blocks else number.tobytes()
+        return self._of_masks.get(key, made)
 
 
-def joined(rects: Sequence[Ints]) -> tuple[Ints, Ints]:
-    """Begin (B + 1,) of the rectangles (k, 4) of each of B masks, and all of them (R, 4)."""
-    return np.cumsum([0, *(len(part) for part in rects)]), np.concatenate([np.zeros((0, 4), np.int64), *rects])
+def _blocks_of_large(boxes_xyxy: Ints, near_xyxy: Box | None) -> dict[int, tuple[int, ...]]:
+    """First, and last + 1, column and row of the blocks of large boxes (B, 4) that may meet a box, by their row."""
+    size = boxes_xyxy[:, 2:] - boxes_xyxy[:, :2]
+    if size.max(initial=0) < BLOCK:
+        return {}
+    large = (size.max(axis=1) >= BLOCK).nonzero()[0]
+    first, end = np.zeros((len(large), 2), np.int64), size[large] // BLOCK + 1
+    if near_xyxy is not None:
+        near = np.array(near_xyxy) - np.tile(boxes_xyxy[large, :2], 2)
+        first, end = np.maximum(near[:, :2] // BLOCK, 0), np.minimum(near[:, 2:] // BLOCK + 1, end)
+    return dict(zip(large.tolist(), map(tuple, np.concatenate([first, end], axis=1).tolist()), strict=True))
 
 
-def _rectangles_of(mask_of: Callable[[int], Bools], row: int) -> Ints:
-    return rectangles(mask_of(row))
+def _rectangles_of(mask_of: Callable[[int], Bools], row: int, block: tuple[int, int]) -> Ints:
+    """Rectangles of a block of a mask, from the corner of the mask."""
+    y, x = (BLOCK * place for place in block)
+    rects: Ints = rectangles(mask_of(row)[y : y + BLOCK, x : x + BLOCK]) + np.array([x, y, x, y])
+    return rects
 
 
 def ways_met(boxes_xyxy: Ints, origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
@@ -131,31 +162,6 @@ def begun_in(origin_xy: Ints, blockers: Blockers) -> tuple[Ints, Ints]:
     place, rects = blockers.rects_of(blocker, origin_xy[row])
     begun = sorted_once(place[_holds_origin(rects)])
     return row[begun], blocker[begun]
-
-
-def rectangles(mask: Bools) -> Ints:
-    """Rectangles (k, 4) that cover a mask (h, w): each run of a row, as far up and down as all of it goes on."""
-    runs = Spans.from_mask(mask)
-    if not len(runs):
-        return np.zeros((0, 4), np.int64)
-    y, x_end = runs.y, runs.x_last + 1
-    down = _reach(mask, y, runs.x_first, x_end)
-    up = _reach(mask[::-1], len(mask) - 1 - y, runs.x_first, x_end)
-    return np.unique(np.stack([runs.x_first, y - up, runs.x_last, y + down], axis=1), axis=0)
-
-
-def _reach(mask: Bools, y: Ints, x_first: Ints, x_end: Ints) -> Ints:
-    """How many rows below row y all pixels of a run (n,) go on."""
-    high, wide = mask.shape
-    row = np.arange(high)[:, None]
-    ends = np.where(mask, high, row)  # the first row at or below that is not set
-    ends = np.minimum.accumulate(ends[::-1], axis=0)[::-1]
-    flat = np.append(ends.reshape(-1), high)
-    cuts = np.stack([y * wide + x_first, y * wide + x_end], axis=1).reshape(-1)
-    order = np.argsort(cuts[::2], kind="stable")
-    least = np.empty(len(y), np.int64)
-    least[order] = np.minimum.reduceat(flat, np.stack([cuts[::2][order], cuts[1::2][order]], axis=1).reshape(-1))[::2]
-    return np.asarray(least - y - 1)
 
 
 # house: hit rule of areas

@@ -368,3 +368,13 @@ def in_rows(shape: Ints, y: Ints, first: Ints, last: Ints) -> RowRuns:
         here = place == number
         ends[0][at[here]], ends[1][at[here]] = first[here], last[here]
     return RowRuns(shape[begin][own], row, parts)
+
+
+def rectangles(mask: Bools) -> Ints:
+    """Rectangles (k, 4) that cover a mask (h, w): runs of equal columns in rows that follow each other, as one."""
+    runs = Spans.from_mask(mask)
+    order = np.lexsort((runs.y, runs.x_last, runs.x_first))
+    y, first, last = runs.y[order], runs.x_first[order], runs.x_last[order]
+    new = begins(first) | begins(last) | begins(y - np.arange(len(y)))
+    begin, end = new.nonzero()[0], np.append(new[1:], True)[: len(y)].nonzero()[0]
+    return np.stack([first[begin], y[begin], last[begin], y[end]], axis=1)

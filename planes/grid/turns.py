@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ..common.checks import Bools, Ints
 from ..common.limits import HALF, SUB, TRIG_BITS
 from .fixed_point import pixel
-from .spans import RowRuns, Spans, begins, each_pixel, in_rows, ragged
+from .spans import RowRuns, each_pixel, in_rows, ragged, rectangles
 
 
 def turned_pivot(x: int, y: int, size_wh: tuple[int, ...], turns: int) -> tuple[int, int]:
@@ -45,12 +45,8 @@ def edges_of(mask: Bools, pivot_256: tuple[int, int]) -> Edges:
     sides, pivots = [], []
     for turns in range(4):
         source, *pivot = quarter_turned(mask, *pivot_256, turns)
-        runs = Spans.from_mask(np.asarray(source))
-        order = np.lexsort((runs.y, runs.x_last, runs.x_first))
-        y, first, last = runs.y[order], runs.x_first[order], runs.x_last[order]
-        new = begins(first) | begins(last) | begins(y - np.arange(len(y)))
-        begin, end = np.flatnonzero(new), np.flatnonzero(np.append(new[1:], True)[: len(y)])
-        edges = np.stack([first[begin], last[begin] + 1, y[begin], y[end] + 1])
+        left, top, right, low = rectangles(np.asarray(source)).T
+        edges = np.stack([left, right + 1, top, low + 1])
         sides.append(SUB * edges - HALF - np.repeat(pivot, 2)[:, None])
         pivots.append(pivot + SUB * pixel(-np.array(pivot)))
     return Edges(np.cumsum([0, *(part.shape[1] for part in sides)]), np.concatenate(sides, axis=1), np.array(pivots))

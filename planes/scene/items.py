@@ -545,10 +545,10 @@ class Items:
         variants, ids = self.variants, stack.ids
         return atlas.tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
 
-    def covers(self, ids: Ints) -> tuple[Ints, Ints]:
-        """Rectangles that cover the masks of items (B,): begin (B + 1,) of each item's, and all of them (R, 4)."""
+    def covers(self, ids: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Ints]:
+        """Rectangles that cover the masks of items (B,); see `bits.shadows.Covers.of`."""
         covers = self.by_mask.covers = self.by_mask.covers or late.shadows.Covers()
-        return covers.of(self.mask.take(ids), lambda row: self.variants[ids[row]].mask)
+        return covers.of(self.mask.take(ids), lambda row: self.variants[ids[row]].mask, boxes_xyxy, near_xyxy)
 
     def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, px from the mask's pixel [0, 0], and the row for each item; no mask may be empty."""

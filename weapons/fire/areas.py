@@ -113,7 +113,10 @@ def request_of(scene: Scene, weapon: Weapon, shots: Shots, stack: Stack, filtere
     """What a call asks."""
     traits = traits_of(weapon)
     view, placements = view_of(traits.pierces, shots), traits.placements * len(shots)
-    blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view) if traits.sight else None
+    blockers = None
+    if traits.sight:
+        near = late.shelter.ways_box(weapon, shots)
+        blockers = late.shelter.blockers_of(scene, stack, traits.sight, traits.inside, view, near)
     choosy = may_refuse(stack, shots)
     return Request(scene, weapon, shots, stack, traits, view, choosy, filtered, placements, blockers, stack.covers)
 

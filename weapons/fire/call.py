@@ -307,6 +307,8 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
     request = request_of(scene, weapon, shots, stack, how[:2] != ("auto", "auto"))
     if request.blockers is not None:
         plan.run("line of sight", f"{len(request.blockers.rank)} items may shelter", request.blockers.nbytes)
+    elif request.traits.sight:
+        plan.leave_out("line of sight", "no item near the shots may shelter")
     way, why = chosen_way(how[2], request)
     asked = request.placements if request.filtered or way.name == "spans" else 0
     candidates = chosen_candidates(*how[:2], scene, stack, asked)

@@ -355,7 +355,7 @@ class Hits:
 
     def _pixels_of(self, scene: Scene, shots: Shots) -> Iterator[tuple[int, Spans]]:
         """Pixels of objects of a scene that shots hit, as (object, pixels), in any number of parts."""
-        return late.samples.object_spans(context_of(scene, scene.items.stack(), self.weapon), self.weapon, shots)
+        return late.samples.object_spans(context_of(scene, scene.items.stack(), self.weapon, shots), self.weapon, shots)
 
     def shares(self, shot: int | None = None) -> list[Share]:
         """Samples of each row as shares of the pattern, of the visible object and of its mask; for a shot, or all."""
@@ -402,7 +402,9 @@ class Hits:
         """One shot, sample by sample; the last one asked for is kept."""
         row = self._checked(shot)
         if self._walked is None or self._walked[0] != row:
-            self._walked = row, late.samples.detail_of(self._context(row), self.weapon, self.shots.take(row, row + 1))
+            own = self.shots.take(row, row + 1)
+            context = context_of(*self._then(row), self.weapon, own)
+            self._walked = row, late.samples.detail_of(context, self.weapon, own)
         return self._walked[1]
 
     def _one(self, shot: int) -> Shots:

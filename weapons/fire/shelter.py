@@ -8,10 +8,15 @@ import numpy as np
 
 from hitplanes.planes import late
 from hitplanes.planes.common.checks import InputError, Ints
+from hitplanes.planes.common.limits import SUB
+from hitplanes.planes.grid.fixed_point import snap
+from hitplanes.planes.grid.spans import Box, meets
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
+from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots
+from ..kinds.weapon import Weapon
 from .prefilter import refused
 
 if TYPE_CHECKING:
@@ -20,26 +25,56 @@ if TYPE_CHECKING:
     from hitplanes.planes.scene.derived import View
 
 
-def blockers_of(scene: Scene, stack: Stack, sight: str, inside: str, view: View | None) -> Blockers | None:
+SLACK_PX = 2
+"""Distance by which the pixels of a shot may lie beyond its reach, as directions and positions are rounded, px."""
+
+
+FEW_NEAR = 64
+"""Most items near the shots that are listed alone; of more, all are, as that list is kept for the next shots."""
+
+
+def ways_box(weapon: Weapon, shots: Shots) -> Box:
+    """Box around the ways to all pixels of some shots, px."""
+    burst, spread, plain = parts_of(weapon)
+    reach_256 = plain.reach_256 + (int(snap(spread.radius)) if spread else 0)
+    if burst:
+        reach_256 += burst.count * int(np.abs(snap(burst.recoil_xy)).max())
+    reach = reach_256 // SUB + SLACK_PX
+    if len(shots) < 2:
+        x, y = x_max, y_max = shots.xy[0].tolist() if len(shots) else (0, 0)
+    else:
+        (x, y), (x_max, y_max) = shots.xy.min(axis=0).tolist(), shots.xy.max(axis=0).tolist()
+    return x - reach, y - reach, x_max + reach, y_max + reach
+
+
+def blockers_of(
+    scene: Scene, stack: Stack, sight: str, inside: str, view: View | None, near_xyxy: Box | None
+) -> Blockers | None:
     """Items that may shelter pixels from shots; None if there is none.
 
     Parameters
     ----------
     sight, inside : `line_of_sight` and `inside` of the weapon of the pattern
     view : what all shots accept; None if they accept different items
+    near_xyxy : box around all ways that are looked at; None if any may be
     """
     there = stack.occluder if sight == "occluders" else np.ones(len(stack), np.bool_)
-    rank = np.flatnonzero(there if view is None else there & view.accepts(stack))
+    if view is not None:
+        there = there & view.accepts(stack)
+    rank = np.flatnonzero(there)
+    if near_xyxy is not None:
+        near = rank[meets(stack.box_xyxy[rank], np.array(near_xyxy))]
+        rank, near_xyxy = (near, near_xyxy) if len(near) <= FEW_NEAR else (rank, None)
     if not len(rank):
         return None
-    whose = (stack.categories[rank], stack.owner[rank]) if view is None else (rank[:0], rank[:0])
+    boxes_xyxy = stack.box_xyxy[rank]
     if stack.forms == scene.items.arrangement:
-        rects = scene.items.covers(stack.ids[rank])
+        rects = scene.items.covers(stack.ids[rank], boxes_xyxy, near_xyxy)
     else:  # the masks of then may be gone from the scene
-        rects = late.shadows.joined([late.shadows.rectangles(stack.mask(r)) for r in rank.tolist()])
-    return late.shadows.Blockers(
-        rank, stack.box_xyxy[rank], *rects, *whose, scene.bounds, inside == "ignore_until_exit"
-    )
+        rects = late.shadows.Covers().of(np.arange(len(rank)), lambda row: stack.mask(rank[row]), boxes_xyxy, near_xyxy)
+    whose = (stack.categories[rank], stack.owner[rank]) if view is None else (rank[:0], rank[:0])
+    leaves = inside == "ignore_until_exit"
+    return late.shadows.Blockers(rank, boxes_xyxy, *rects, *whose, scene.bounds, leaves)
 
 
 def near_blockers(placements: Placements, shots: Shots, stack: Stack, blockers: Blockers) -> tuple[Ints, Ints]:

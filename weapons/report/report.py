@@ -70,7 +70,7 @@ def _parts(fired: Sequence[Hits]) -> Iterator[tuple[Ints, Ints]]:
                 yield cells.xy[walked], cells.verdict[walked]
             continue
         step = max(1, CHUNK_SAMPLES // max(int(hits.fired.max(initial=1)), 1))
-        context = context_of(hits.scene, hits.scene.items.stack(), hits.weapon)
+        context = context_of(hits.scene, hits.scene.items.stack(), hits.weapon, hits.shots)
         for first in range(0, len(hits.shots), step):
             detail = detail_of(context, hits.weapon, hits.shots.take(first, first + step))
             yield np.stack([detail.x, detail.runs.y[detail.run]], axis=1), detail.verdict
