@@ -812,3 +812,20 @@ def test_the_path_of_the_file_will_do_for_its_folder(tmp_path: Path) -> None:
     scene = Scene((9, 9))
     scene.save(tmp_path)
     assert load_scene(tmp_path / "scene.json").content_hash() == scene.content_hash()
+
+
+@given(st.lists(st.tuples(st.sampled_from(["add", "remove", "read", "skip"]), st.integers(0, 9)), max_size=30))
+def test_the_ids_are_those_of_what_was_added_and_not_removed(steps: list[tuple[str, int]]) -> None:
+    scene, living = Scene(), []
+    for step, number in steps:
+        if step == "add":
+            living.append(scene.add(DOT, role=("hittable", "mover")[number % 2]))
+        elif step == "remove" and living:
+            scene.remove(living.pop(number % len(living)))
+        elif step == "skip":
+            scene.items.skip_to(scene.items.count + number)
+        elif step == "read":
+            scene.ids()[:] = 99  # what a caller does with them is the caller's own
+            assert scene.ids().tolist() == living and len(scene) == len(living)
+    assert list(scene) == living == sorted({*scene.ids("hittable").tolist(), *scene.ids("mover").tolist()})
+    assert scene.copy().ids().tolist() == living

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -28,8 +29,11 @@ from ..grid.spans import Box
 if TYPE_CHECKING:
     from ..bits.distance_field import DistanceField
     from ..bits.label_plane import LabelPlane
+    from ..bits.shadows import Covers
+    from ..bits.tiles import TileAtlas
     from ..bits.visible import Visible
     from ..broadphase.boxes import Index
+    from ..volumes.fit import Bounds, Kind
     from .items import Change, Items, Stack
 
 Made = TypeVar("Made")
@@ -74,6 +78,15 @@ class View(NamedTuple):
 
 OF_ALL = View(False, EVERYTHING, ()), View(True, EVERYTHING, ())
 """Views of shots that accept everything: without and with pierce."""
+
+
+@dataclass
+class ByMask:
+    """What is derived from masks alone, by their numbers; the moments of a scene share it."""
+
+    tiles: TileAtlas | None = None
+    covers: Covers | None = None
+    bounds: dict[Kind, Bounds] = field(default_factory=dict)
 
 
 class Derivative:

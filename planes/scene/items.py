@@ -6,7 +6,7 @@ import itertools
 import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from struct import Struct
@@ -22,15 +22,14 @@ from ..common.limits import CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNA
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box, sorted_once
-from .derived import NEVER
+from .derived import NEVER, ByMask
 from .poses import Looks
 from .sprite import Sprite
 from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
 
 if TYPE_CHECKING:
-    from ..bits.shadows import Covers
-    from ..bits.tiles import TileAtlas, Tiles
-    from ..volumes.fit import Bounds, Kind
+    from ..bits.tiles import Tiles
+    from ..volumes.fit import Kind
     from ..volumes.volumes import Volumes
 
 
@@ -188,15 +187,6 @@ NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
 
-@dataclass
-class ByMask:
-    """What is derived from masks alone, by their numbers; the moments of a scene share it."""
-
-    tiles: TileAtlas | None = None
-    covers: Covers | None = None
-    bounds: dict[Kind, Bounds] = field(default_factory=dict)
-
-
 COLUMNS: dict[str, tuple[int, ...]] = {
     "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
@@ -240,6 +230,7 @@ class Items:
         self._forgotten = 0
         self._decided = NEVER, 0  # version that was looked at, and `decided`
         self._stack: tuple[int, Stack] | None = None
+        self._present = NO_IDS, 0, 0  # `ids`, and the numbers of ids and of items that they are of
         self.by_mask = ByMask()
         self._imagery: tuple[int, list[Role]] | None = None
         self._lock = threading.Lock()
@@ -283,12 +274,22 @@ class Items:
             getattr(items, name)[: items.count] = state[name]
         for name in (*Looks._fields, "names"):
             setattr(items, name, state[name])
-        alive = np.flatnonzero(items.alive)
-        items.living = len(alive)
-        looks = items.looks(alive.tolist())
-        items._enter(alive.tolist(), variants_of(looks.sprites, looks.forms))
-        items.record(alive)
+        ids = items.ids
+        items.living = len(ids)
+        looks = items.looks(ids.tolist())
+        items._enter(ids.tolist(), variants_of(looks.sprites, looks.forms))
+        items.record(ids)
         return items
+
+    @property
+    def ids(self) -> Ints:
+        """Rising ids of all items, of as many as there are and not of all that ever were."""
+        ids, count, living = self._present
+        if (count, living) != (self.count, self.living):
+            ids = np.concatenate([ids, np.arange(count, self.count)])
+            ids = ids[self.alive.take(ids) == 1]
+            self._present = ids, self.count, self.living
+        return ids
 
     def skip_to(self, item: int) -> None:
         """Skip the ids below `item` as if their objects had been removed; objects of a scene file keep their ids."""
@@ -507,9 +508,8 @@ class Items:
 
     def stack_of(self, *roles: Role) -> Stack:
         """Items of some roles, front to back."""
-        n = self.count
-        wanted = np.isin(self.role[:n], [ROLES.index(role) for role in roles])
-        ids = np.flatnonzero((self.alive[:n] == 1) & wanted & (self.size_wh[:n, 0] > 0))
+        wanted = np.isin(self.role.take(self.ids), [ROLES.index(role) for role in roles])
+        ids = self.ids[wanted & (self.size_wh[self.ids, 0] > 0)]
         occluder, layer = self.role[ids] == OCCLUDER, self.layer[ids]
         layered = bool((layer[1:] != layer[:-1]).any())
         keys = [-ids]
@@ -521,17 +521,15 @@ class Items:
         ids, occluder = ids[order], occluder[order]
         return Stack(
             ids, occluder, self._filtered_by(ids, occluder), self.owner[ids], self.boxes(ids), self.offset[ids],
-            self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), n,
+            self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), self.count,
         )  # fmt: skip
 
     def imagery(self) -> list[Role]:
         """Roles in use that decide no hit."""
         known = self._imagery
         if known is None or known[0] != self.arrangement:
-            count = np.bincount(self.role[: self.count], self.alive[: self.count], len(ROLES)).tolist()
-            drawn = [
-                role for role in ROLES if count[ROLES.index(role)] and ROLES.index(role) not in (HITTABLE, OCCLUDER)
-            ]
+            used = set(self.role.take(self.ids).tolist())
+            drawn = [role for number, role in enumerate(ROLES) if number in used and role not in DECIDING]
             known = self._imagery = self.arrangement, drawn
         return known[1]
 
@@ -581,8 +579,7 @@ class Items:
     def _compact(self) -> None:
         """Rebuild the atlas with only the masks in use."""
         atlas, offset = MaskAtlas(), self.offset.copy()
-        alive = np.flatnonzero(self.alive[: self.count])
-        offset[alive] = atlas.take([self.variants[item] for item in alive.tolist()])
+        offset[self.ids] = atlas.take([self.variants[item] for item in self.ids.tolist()])
         self.atlas, self.offset = atlas, offset
 
     def _reserve(self, count: int) -> None:

@@ -78,8 +78,7 @@ def _beyond(items: Items, item: int, view_xyxy: Box) -> bool:
 
 def _back_to_front(items: Items) -> list[int]:
     """Ids in drawing order: the background, the stack from back to front with movers among its objects, the HUD."""
-    ids = np.flatnonzero(items.alive[: items.count] == 1)
-    role = items.role[ids]
+    ids, role = items.ids, items.role.take(items.ids)
     plane = np.select([role == ROLES.index(Role.BACKGROUND), role == ROLES.index(Role.HUD)], [0, 2], 1)
     order = np.lexsort((ids, role == ROLES.index(Role.OCCLUDER), items.layer[ids], plane))
     return [int(i) for i in ids[order]]

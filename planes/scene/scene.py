@@ -137,7 +137,7 @@ class Scene:
         return self
 
     def __len__(self) -> int:
-        return int(self._items.alive[: self._items.count].sum())
+        return len(self._items.ids)
 
     def add(
         self, sprite: object, position_xy: Sequence[float] = (0.0, 0.0), *, role: Role | str = Role.HITTABLE,
@@ -273,9 +273,8 @@ class Scene:
 
     def ids(self, role: Role | str | None = None) -> Ints:
         """Ids of the objects in the scene, rising, of one role or of all."""
-        n = self._items.count
-        alive = self._items.alive[:n] == 1
-        return np.flatnonzero(alive if role is None else alive & (self._items.role[:n] == ROLES.index(_role(role))))
+        ids = self._items.ids
+        return ids.copy() if role is None else ids[self._items.role.take(ids) == ROLES.index(_role(role))]
 
     def __iter__(self) -> Iterator[int]:
         """Ids of the objects in the scene, rising."""
