@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import gc
+import pickle
 import random
 import threading
 import weakref
@@ -26,6 +28,7 @@ from hitplanes import (
     History,
     InputError,
     PastScene,
+    Pistol,
     Point,
     Rounds,
     Scene,
@@ -179,7 +182,7 @@ def test_a_moment_is_what_it_was() -> None:
     for tick, truth in zip(history.ticks, told, strict=True):
         past = history.at(tick)
         assert (len(past), past.ids().tolist(), past.version, names(past), masks(past), answers(past)) == truth
-        assert {len(getattr(past.items, name)) for name in (*LISTS, *COLUMNS)} == {past.items.count}
+        assert {len(getattr(past.items, name)) for name in COLUMNS} == {past.items.count}
     assert len({str(truth[-1]) for truth in told}) == len(told)
     assert (scene.content_hash(), scene.version) == (hash_now, version_now)
 
@@ -447,6 +450,76 @@ def test_a_moment_that_did_not_change_takes_no_room() -> None:
     assert len({id(moment) for moment in history._moments.values()}) == 1
 
 
+def served(gone: int, seed: int) -> tuple[Scene, History]:
+    """A scene that changes from tick to tick, of which some objects were there before and are gone."""
+    rng, scene = np.random.default_rng(seed), Scene((200, 120))
+    for _ in range(gone):
+        scene.add(square(3), name="gone")
+    scene.remove(range(gone))
+    history = History(scene, interpolate=True)
+    for step in range(6):
+        living = scene.ids()
+        for _ in range(int(rng.integers(0, 4))):
+            scene.add(square(int(rng.integers(3, 9))), rng.uniform(0, 100, 2), name=f"of {step}")
+        if len(living) and rng.random() < 0.5:
+            scene.remove(int(living[rng.integers(len(living))]))
+        ids = scene.ids()
+        scene.move(ids, rng.uniform(0, 100, (len(ids), 2)))
+        if rng.random() < 0.6:
+            scene.set(ids[::2], angle=rng.uniform(-400, 400, len(ids[::2])))
+        if rng.random() < 0.3:
+            scene.set(ids[:2], role="occluder", layer=2)
+        history.record()
+    return scene, history
+
+
+def told_of(past: Scene, first: int) -> list[Any]:
+    """All that is read of a scene, with ids as they would be if the first had not been there."""
+    ids = past.ids()
+    at = np.random.default_rng(2).uniform(0, 100, (20, 2))
+    hits = [fire(past, weapon, at, aim=30) for weapon in (Disc(9), Pistol(60))]
+    owners = (past.owner(ids) - first).tolist()
+    return [
+        (ids - first).tolist(), owners, past.position(ids).tolist(), past.angle(ids).tolist(), past.box(ids).tolist(),
+        [mask for _, mask, _ in masks(past)], names(past), past.layer(ids).tolist(), past.role(ids).tolist(), len(past),
+        [(row.shot, row.object - first, row.samples) for own in hits for row in own],
+    ]  # fmt: skip
+
+
+@examples(40)
+@given(st.integers(1, 300), st.integers(0, 2**32))
+def test_what_was_removed_before_makes_no_difference_to_the_past(gone: int, seed: int) -> None:
+    (_, plain), (scene, history) = served(0, seed), served(gone, seed)
+    copies = [history, copy.deepcopy(history), pickle.loads(pickle.dumps(history))]
+    for tick in (0, 0.25, 1, 1.5, 2, 3.75, 5):
+        truth = told_of(plain.at(tick), 0)
+        for one in copies:
+            past = one.at(tick)
+            assert told_of(past, gone) == told_of(past.copy(), gone) == truth
+            assert past.name_of(0) == "gone" and 0 not in past
+    told = told_of(scene, gone)
+    scene.add(square(4))
+    scene.remove(scene.ids())
+    assert told_of(history.at(5), gone) == told
+
+
+def test_a_moment_has_rows_for_what_was_there_and_not_for_what_ever_was() -> None:
+    scene, ids = Scene((99, 99)), [0]
+    history = History(scene)
+    for _ in range(300):
+        ids.append(scene.add(square(3), (9, 9)))
+        if len(ids) > 2:
+            scene.remove(ids[-2])
+    for x in range(3):
+        scene.move(ids[-1], (x, 5))
+        history.record()
+    kept = [moment.items for moment in history._moments.values()]
+    assert {len(column) for items in kept for column in items.columns.values()} == {1}
+    assert {len(values) for items in kept for values in items.lists.values()} == {1}
+    assert all(items.lists is kept[0].lists and items.ids is kept[0].ids for items in kept)
+    assert [history.at(tick).position(ids[-1])[0] for tick in range(3)] == [0, 1, 2]
+
+
 def test_ids_that_are_left_out_make_a_moment_of_their_own() -> None:
     scene = yard(3)
     history = History(scene)
@@ -514,6 +587,21 @@ def test_the_stack_is_kept_with_the_moment() -> None:
     history.at(1)
     gc.collect()
     assert history.at(0).items.stack() is stack
+
+
+def test_the_order_of_a_moment_is_found_once() -> None:
+    """Also of one at which nobody fired, and between two, whose items are made anew for each reader."""
+    scene = yard(5)
+    scene.remove([1])
+    history = History(scene, interpolate=True)
+    for x in range(3):
+        scene.move([0], (x, 0))
+        history.record()
+    kept = [moment.items for moment in history._moments.values()]
+    assert [items.order for items in kept] == [None] * 3
+    history.at(0.5).items.stack()
+    history.at(2).items.stack()
+    assert [items.order is None for items in kept] == [False, True, False]
 
 
 def test_volumes_of_masks_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,8 @@ from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
-from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, UNARRANGED, Items
+from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, NO_MASK, NO_TRANSFORM, NOTHING, UNARRANGED, Items, Stack
+from .poses import Looks
 from .scene import Scene
 from .variants import MaskAtlas, variant_of, variants_of
 
@@ -33,63 +34,145 @@ RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only 
 PART_BITS = 31  # a step between two ticks has fewer than 2**31 parts: the square of their number stays inside int64
 
 
-class PastItems(Items):
-    """An immutable copy of the items of a scene at one moment.
+LISTS = (*Looks._fields, "variants", "names")
+"""What items have beside their columns."""
+
+
+class Kept:
+    """What is kept of the items of a scene at one moment: a row for each that was there, none for any that was removed.
 
     Parameters
     ----------
-    items : the present items; if too many of their masks are unused, the copy gets an atlas without those
-    earlier : the moment before, with which everything unchanged is shared
+    items : the present items; if too many of their masks are unused, an atlas without those is kept
+    earlier : what is kept of the moment before, with which everything unchanged is shared
     """
 
-    def __init__(self, items: Items, earlier: PastItems | None) -> None:
+    def __init__(self, items: Items, earlier: Kept | None) -> None:
+        (atlas, stack), self.by_mask, self.all_names = items.settled(), items.by_mask, items.names
+        self.count, self.version, self.arrangement = items.count, items.version, items.arrangement
+        self.ids, self.order = items.ids, None if stack is None else stack.placed(NO_BOXES)
+        columns: dict[str, Ints] = {} if earlier is None else earlier.columns
+        lists: dict[str, list[Any]] = {} if earlier is None else earlier.lists
+        arranged = earlier is not None and earlier.arrangement == items.arrangement
+        self.columns: dict[str, Ints] = {
+            name: columns[name] if arranged and name not in UNARRANGED else self._column(items, name, columns.get(name))
+            for name in COLUMNS
+        }
+        self.lists: dict[str, list[Any]] = lists
+        if not arranged:
+            self.lists = {name: self._list(items, name, lists.get(name)) for name in LISTS}
+        shared = earlier is not None and earlier.atlas.flat is atlas.flat
+        self.atlas: MaskAtlas = earlier.atlas if earlier is not None and shared else _full(atlas.flat)
+        self._opened: PastItems | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no item was removed before, so that rows are ids."""
+        return len(self.ids) == self.count
+
+    def _column(self, items: Items, name: str, before: Ints | None) -> Ints:
+        """The rows of a column; the earlier ones if they are equal."""
+        every: Ints = getattr(items, name)
+        now = every[: self.count] if self.is_whole else every.take(self.ids, axis=0)
+        if before is not None and now.shape == before.shape and (now == before).all():
+            return before
+        return _sealed(now.copy())
+
+    def _list(self, items: Items, name: str, before: list[Any] | None) -> list[Any]:
+        """The rows of a list; the earlier ones if they are equal."""
+        every: list[Any] = getattr(items, name)
+        now = list(every) if self.is_whole else [every[item] for item in self.ids.tolist()]
+        return before if before is not None and now == before else now
+
+    def by_id(self, name: str) -> Any:
+        """A column or list as items have it, by id; those of removed items cost nothing in a list."""
+        if name in LISTS:
+            rest = self.all_names if name == "names" else OF_REMOVED[name]
+            return self.lists[name] if self.is_whole else ById(self.ids, self.lists[name], rest)
+        rows = self.columns[name]
+        if self.is_whole:
+            return rows
+        column = np.zeros((self.count, *rows.shape[1:]), np.int64)
+        column[self.ids] = rows
+        return _sealed(column)
+
+    def opened(self) -> PastItems:
+        """The items, to be read; they are kept if that takes no room."""
+        if not self.is_whole:
+            return PastItems(self)
+        self._opened = self._opened or PastItems(self)
+        return self._opened
+
+    def between(self, after: Kept, part: int, parts: int) -> PastItems:
+        """Items at part / parts of the time to a later moment, 0 < part < parts; see `History`."""
+        if after is self:
+            return self.opened()
+        if self.order is None:
+            self.opened().stack()
+        both, row, later = self.ids, np.arange(len(self.ids)), np.arange(len(self.ids))
+        if both is not after.ids:
+            both, row, later = np.intersect1d(both, after.ids, assume_unique=True, return_indices=True)
+        own, position = copy.copy(self), self.columns["position_256"].copy()
+        step = after.columns["position_256"][later] - position[row]
+        if step.any():
+            position[row] += _part_of(step, part, parts)
+            own.columns = self.columns | {"position_256": _sealed(position)}
+        out = PastItems(own)
+        if self.lists["angles"] is not after.lists["angles"]:
+            then, to = (np.array(kept.lists["angles"])[at].tolist() for kept, at in ((self, row), (after, later)))
+            turns = {item: (a, _short_turn(a, b)) for item, a, b in zip(both.tolist(), then, to, strict=True)}
+            out.turn({item: angle + turn * (part / parts) for item, (angle, turn) in turns.items() if turn})
+        return out
+
+
+OF_REMOVED = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": NO_MASK}
+
+
+class ById(dict[int, Any]):
+    """Values of items by id; what was removed has one value for all, or its own of a list."""
+
+    def __init__(self, ids: Ints, values: list[Any], rest: Any) -> None:
+        super().__init__(zip(ids.tolist(), values, strict=True))
+        self.rest = rest
+
+    def __missing__(self, item: int) -> Any:
+        return self.rest[item] if isinstance(self.rest, list) else self.rest
+
+
+class PastItems(Items):
+    """The items of a scene at one moment, read-only, by id as present ones are; each column is made when it is read."""
+
+    def __init__(self, kept: Kept) -> None:
         super().__init__()
-        before = Items() if earlier is None else earlier
-        self.count = items.count
-        self.version = self._forgotten = items.version
-        (atlas, stack), self.by_mask, self.arrangement = items.settled(), items.by_mask, items.arrangement
-        kept = before.arrangement == items.arrangement
-        for name in COLUMNS:
-            changed = not kept or name in UNARRANGED
-            now = getattr(items, name)[: self.count] if changed else getattr(before, name)
-            setattr(self, name, _column(now, getattr(before, name)) if changed else now)
-        if stack is not None:
-            self._stack = (NEVER, stack.placed(NO_BOXES))  # only the order is kept
-        self.atlas = before.atlas if atlas.flat is before.atlas.flat else _full(atlas.flat)
-        if kept:
-            self.sprites, self.names, self.angles = before.sprites, before.names, before.angles
-            self.variants, self.forms = before.variants, before.forms
-            return
-        self.sprites = _shared(items.sprites, before.sprites)
-        self.names = _shared(items.names, before.names)
-        self.angles = _shared(items.angles, before.angles)
-        self.variants = _shared(items.variants, before.variants)
-        self.forms = before.forms if self.variants is before.variants else list(items.forms)
+        for name in LISTS:
+            del vars(self)[name]
+        self._kept, self.count, self.arrangement = kept, kept.count, kept.arrangement
+        self.version = self._forgotten = kept.version
+        self.by_mask, self.atlas, self._present = kept.by_mask, kept.atlas, (kept.ids, kept.count, 0)
+        if kept.order is not None:
+            self._stack = (NEVER, kept.order)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in LISTS and name not in COLUMNS:
+            raise AttributeError(name)
+        value = self._kept.by_id(name)
+        setattr(self, name, value)
+        return value
 
     def _allot(self) -> None:
         """Do nothing: the columns are the recorded ones."""
 
-    def between(self, after: PastItems, part: int, parts: int) -> PastItems:
-        """Items at part / parts of the time to a later moment, 0 < part < parts; see `History`."""
-        if after is self:
-            return self
-        out = PastItems(self, self)
-        both = np.flatnonzero(after.alive[: self.count])  # a removed item does not come back
-        step = after.position_256[both] - self.position_256[both]
-        if step.any():
-            position = self.position_256.copy()
-            position[both] += _part_of(step, part, parts)
-            out.position_256 = _sealed(position)
-        if self.angles is not after.angles:
-            differ = [i for i in both.tolist() if self.angles[i] != after.angles[i]]
-            turns = {i: _short_turn(self.angles[i], after.angles[i]) for i in differ}
-            out._turn({i: self.angles[i] + turn * (part / parts) for i, turn in turns.items() if turn})
-        return out
-
     def _boxes_in_order(self, ids: Ints) -> Ints:
         return self.boxes(ids)
 
-    def _turn(self, angles: Mapping[int, float]) -> None:
+    def stack(self) -> Stack:
+        """See `Items.stack`; its order is kept for those who read the moment later."""
+        stack = super().stack()
+        if self._kept.order is None:
+            self._kept.order = stack.placed(NO_BOXES)
+        return stack
+
+    def turn(self, angles: Mapping[int, float]) -> None:
         """Set the angles of items, and their masks."""
         if not angles:
             return
@@ -97,7 +180,8 @@ class PastItems(Items):
         for name in COLUMNS:
             setattr(self, name, getattr(self, name).copy())
         self.atlas = _full(self.atlas.flat)
-        self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
+        for name in ("angles", "forms", "variants"):
+            setattr(self, name, copy.copy(getattr(self, name)))
         looks = self.looks(list(angles)).changed(None, list(angles.values()), None, None, None)
         try:
             variants = variants_of(looks.sprites, looks.forms)
@@ -120,7 +204,7 @@ class Moment(NamedTuple):
     categories: tuple[str, ...]
     bounds: Box | None
     pickled: bytes
-    items: PastItems
+    items: Kept
 
 
 class PastScene(Scene):
@@ -128,7 +212,7 @@ class PastScene(Scene):
 
     Parameters
     ----------
-    moment : the recorded or interpolated moment
+    moment, items : the recorded moment, and its items or those of a time between it and the next
     tick : its tick; between two recorded ticks a multiple of 1/256
     latest : the scene that was recorded, as it is now
 
@@ -137,9 +221,10 @@ class PastScene(Scene):
     tick : as given
     """
 
-    def __init__(self, moment: Moment, tick: float, latest: Scene) -> None:  # all that a Scene has is in the moment
+    def __init__(self, moment: Moment, items: PastItems, tick: float, latest: Scene) -> None:  # no Scene has more
         self.tick, self._latest = tick, latest
-        self.name, self.categories, self._bounds, pickled, self._items = moment
+        self.name, self.categories, self._bounds, pickled, _ = moment
+        self._items = items
         self.derived = Derived(self._bounds)
         try:
             self.weapons, self.shots = pickle.loads(pickled)
@@ -196,7 +281,8 @@ class History:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle the recorded moments with the scene; equal columns of moments are stored once."""
         with self._lock:
-            states: dict[int, Any] = {id(moment.items): moment.items.state() for moment in self._moments.values()}
+            kept = {id(moment.items): moment.items for moment in self._moments.values()}
+            states: dict[int, Any] = {number: items.opened().state() for number, items in kept.items()}
             moments = {tick: moment._replace(items=states[id(moment.items)]) for tick, moment in self._moments.items()}
         return _restored_history, (self.scene, self._most, self._interpolate, moments)
 
@@ -255,7 +341,8 @@ class History:
             at = self._checked(tick)
             scene = self._views.get(at)
             if scene is None:
-                scene = self._views[at] = PastScene(self._moment(at), int(at) if at.is_integer() else at, self.scene)
+                tick = int(at) if at.is_integer() else at
+                scene = self._views[at] = PastScene(*self._moment(at), tick, self.scene)
             self._read = scene
             return scene
 
@@ -264,7 +351,7 @@ class History:
         scene, items = self.scene, self.scene.items
         before = None if last is None else last.items
         if before is None or (before.version, before.count) != (items.version, items.count):
-            before = PastItems(items, before)
+            before = Kept(items, before)
         try:
             pickled = pickle.dumps((scene.weapons, scene.shots))
         except Exception as error:  # an object that cannot be pickled may raise anything
@@ -289,27 +376,28 @@ class History:
             raise InputError(f"tick: expected a number from {ticks[0]} to {ticks[-1]}, got {shown(tick)}")
         return at
 
-    def _moment(self, at: float) -> Moment:
-        """The recorded moment of a tick, or an interpolated one."""
+    def _moment(self, at: float) -> tuple[Moment, PastItems]:
+        """The recorded moment of a tick, or the one before it, and the items of that time."""
         if at in self._moments:
-            return self._moments[int(at)]
+            moment = self._moments[int(at)]
+            return moment, moment.items.opened()
         ticks = list(self._moments)
         place = bisect(ticks, at)
         first, last = ticks[place - 1], ticks[place]
         before, after = self._moments[first], self._moments[last]
         part, parts = int(SUB * (at - first)), SUB * (last - first)
         spare = max(parts.bit_length() - PART_BITS, 0)
-        return before._replace(items=before.items.between(after.items, part >> spare, parts >> spare))
+        return before, before.items.between(after.items, part >> spare, parts >> spare)
 
 
 def _restored_history(scene: Scene, most: int, interpolate: bool, moments: dict[int, Any]) -> History:
     """A history of the parts that copies and pickles take; its moments share masks and columns again."""
-    history, atlas, made = History(scene, most, interpolate), MaskAtlas(), dict[int, PastItems]()
-    last: PastItems | None = None
+    history, atlas, made = History(scene, most, interpolate), MaskAtlas(), dict[int, Kept]()
+    last: Kept | None = None
     for tick, moment in moments.items():
         if id(moment.items) not in made:
-            last = made[id(moment.items)] = PastItems(Items.restored(moment.items, atlas), last)
-            last.version = last._forgotten = 0  # of no present scene, which has changed at least once
+            last = made[id(moment.items)] = Kept(Items.restored(moment.items, atlas), last)
+            last.version = 0  # of no present scene, which has changed at least once
         history._moments[tick] = moment._replace(items=made[id(moment.items)])
     return history
 
@@ -317,18 +405,6 @@ def _restored_history(scene: Scene, most: int, interpolate: bool, moments: dict[
 def _not_plain(error: Exception) -> InputError:
     """The error for weapons or shots that cannot be pickled."""
     return InputError(f"scene: expected weapons and shots of plain JSON, got a value that cannot be kept: {error}")
-
-
-def _column(now: Ints, before: Ints) -> Ints:
-    """The earlier column if it is equal, else a copy."""
-    if now.shape == before.shape and (now == before).all():
-        return before
-    return _sealed(now.copy())
-
-
-def _shared(now: list[T], before: list[T]) -> list[T]:
-    """The earlier list if it is equal, else a copy."""
-    return before if now == before else list(now)
 
 
 def _sealed(column: Ints) -> Ints:

@@ -262,7 +262,8 @@ class Items:
         """What a copy is made of: views of the columns, and lists of looks and names."""
         columns = {name: getattr(self, name) for name in COLUMNS}
         columns = {name: col if len(col) == self.count else col[: self.count] for name, col in columns.items()}
-        return columns | {name: list(getattr(self, name)) for name in (*Looks._fields, "names")}
+        ids = range(self.count)
+        return columns | {name: [getattr(self, name)[item] for item in ids] for name in (*Looks._fields, "names")}
 
     @classmethod
     def restored(cls, state: dict[str, Any], atlas: MaskAtlas | None = None) -> Items:
