@@ -1,7 +1,7 @@
 """The history of a scene by tick, each tick readable as a scene; and a clock with a fixed time step.
 
-A column, a list or a whole moment that did not change between two recorded ticks is stored once. A moment never
-changes, so neither does a scene made of it.
+A moment has a row for each item that was there. A column, a list or a whole moment that did not change between two
+recorded ticks is stored once. A moment never changes, so neither does a scene made of it.
 """
 
 from __future__ import annotations
