@@ -486,7 +486,7 @@ def told_of(past: Scene, first: int) -> list[Any]:
     ]  # fmt: skip
 
 
-@examples(40)
+@examples(40, deadline=None)
 @given(st.integers(1, 300), st.integers(0, 2**32))
 def test_what_was_removed_before_makes_no_difference_to_the_past(gone: int, seed: int) -> None:
     (_, plain), (scene, history) = served(0, seed), served(gone, seed)

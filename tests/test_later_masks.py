@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from examples import examples
-from hypothesis import HealthCheck, given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_label_plane import change, changed_boxes, random_scene
 from test_moves import told
@@ -156,6 +156,7 @@ def test_a_mask_that_is_too_large_changes_nothing() -> None:
 sides = st.integers(1, MASK_SIDE_MAX)
 
 
+@settings(deadline=None)
 @given(sides, sides, st.floats(SCALE_MIN, 64), st.floats(SCALE_MIN, 64), st.floats(-400, 400), st.integers(-999, 999))
 def test_what_surely_fits_does(width: int, height: int, sx: float, sy: float, angle: float, pivot: int) -> None:
     """Its grid is measured, without its mask."""

@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 import pytest
 from examples import examples
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_label_plane import changed_boxes
 
@@ -814,6 +814,7 @@ def test_the_path_of_the_file_will_do_for_its_folder(tmp_path: Path) -> None:
     assert load_scene(tmp_path / "scene.json").content_hash() == scene.content_hash()
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(["add", "remove", "read", "skip"]), st.integers(0, 9)), max_size=30))
 def test_the_ids_are_those_of_what_was_added_and_not_removed(steps: list[tuple[str, int]]) -> None:
     scene, living = Scene(), []

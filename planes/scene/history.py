@@ -165,6 +165,10 @@ class PastItems(Items):
     def _boxes_in_order(self, ids: Ints) -> Ints:
         return self.boxes(ids)
 
+    def _by_id(self, name: str) -> list[Any]:
+        values = getattr(self, name)
+        return [values[item] for item in range(self.count)]
+
     def stack(self) -> Stack:
         """See `Items.stack`; its order is kept for those who read the moment later."""
         stack = super().stack()

@@ -262,8 +262,11 @@ class Items:
         """What a copy is made of: views of the columns, and lists of looks and names."""
         columns = {name: getattr(self, name) for name in COLUMNS}
         columns = {name: col if len(col) == self.count else col[: self.count] for name, col in columns.items()}
-        ids = range(self.count)
-        return columns | {name: [getattr(self, name)[item] for item in ids] for name in (*Looks._fields, "names")}
+        return columns | {name: self._by_id(name) for name in (*Looks._fields, "names")}
+
+    def _by_id(self, name: str) -> list[Any]:
+        """A list of its own of looks or names, by id."""
+        return list(getattr(self, name))
 
     @classmethod
     def restored(cls, state: dict[str, Any], atlas: MaskAtlas | None = None) -> Items:
