@@ -513,7 +513,7 @@ def test_a_moment_has_rows_for_what_was_there_and_not_for_what_ever_was() -> Non
     for x in range(3):
         scene.move(ids[-1], (x, 5))
         history.record()
-    kept = [moment.items for moment in history._moments.values()]
+    kept = [moment.snapshot for moment in history._moments.values()]
     assert {len(column) for items in kept for column in items.columns.values()} == {1}
     assert {len(values) for items in kept for values in items.lists.values()} == {1}
     assert all(items.lists is kept[0].lists and items.ids is kept[0].ids for items in kept)
@@ -597,7 +597,7 @@ def test_the_order_of_a_moment_is_found_once() -> None:
     for x in range(3):
         scene.move([0], (x, 0))
         history.record()
-    kept = [moment.items for moment in history._moments.values()]
+    kept = [moment.snapshot for moment in history._moments.values()]
     assert [items.order for items in kept] == [None] * 3
     history.at(0.5).items.stack()
     history.at(2).items.stack()

@@ -216,8 +216,10 @@ def test_a_history_is_copied_and_goes_on(way: str) -> None:
         made.scene.move(0, (2, 2))
         made.record(40)
         assert made.at(40).position(0).tolist() == [2, 2] and history.scene.position(0).tolist() != [2, 2]
-    items = [made._moments[tick].items for tick in (24, 30, 31)]
-    assert items[1] is items[2] or items[1].layer is items[2].layer  # equal columns are stored once
+    items = [made._moments[tick].snapshot for tick in (24, 30, 31)]
+    assert (
+        items[1] is items[2] or items[1].columns["layer"] is items[2].columns["layer"]
+    )  # equal columns are stored once
 
 
 def test_moments_of_a_pickled_history_share_what_did_not_change() -> None:
@@ -230,7 +232,7 @@ def test_moments_of_a_pickled_history_share_what_did_not_change() -> None:
     text = pickle.dumps(history)
     assert len(text) < 2 * 300 * 300 + 64 * 3000
     made = pickle.loads(text)
-    assert len({id(moment.items.atlas.flat) for moment in made._moments.values()}) == 1
+    assert len({id(moment.snapshot.atlas.flat) for moment in made._moments.values()}) == 1
 
 
 @pytest.mark.parametrize("way", ["copy.deepcopy", "pickle"])

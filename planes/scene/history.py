@@ -38,16 +38,16 @@ LISTS = (*Looks._fields, "variants", "names")
 """What items have beside their columns."""
 
 
-class Kept:
-    """What is kept of the items of a scene at one moment: a row for each that was there, none for any that was removed.
+class Snapshot:
+    """The items of a scene at one moment as rows, one for each that was there: none for any that was removed before.
 
     Parameters
     ----------
-    items : the present items; if too many of their masks are unused, an atlas without those is kept
-    earlier : what is kept of the moment before, with which everything unchanged is shared
+    items : the present items; if too many of their masks are unused, the snapshot gets an atlas without those
+    earlier : the snapshot of the moment before, with which everything unchanged is shared
     """
 
-    def __init__(self, items: Items, earlier: Kept | None) -> None:
+    def __init__(self, items: Items, earlier: Snapshot | None) -> None:
         (atlas, stack), self.by_mask, self.all_names = items.settled(), items.by_mask, items.names
         self.count, self.version, self.arrangement = items.count, items.version, items.arrangement
         self.ids, self.order = items.ids, None if stack is None else stack.placed(NO_BOXES)
@@ -63,7 +63,7 @@ class Kept:
             self.lists = {name: self._list(items, name, lists.get(name)) for name in LISTS}
         shared = earlier is not None and earlier.atlas.flat is atlas.flat
         self.atlas: MaskAtlas = earlier.atlas if earlier is not None and shared else _full(atlas.flat)
-        self._opened: PastItems | None = None
+        self._items: PastItems | None = None
 
     @property
     def is_whole(self) -> bool:
@@ -96,19 +96,19 @@ class Kept:
         column[self.ids] = rows
         return _sealed(column)
 
-    def opened(self) -> PastItems:
+    def items(self) -> PastItems:
         """The items, to be read; they are kept if that takes no room."""
         if not self.is_whole:
             return PastItems(self)
-        self._opened = self._opened or PastItems(self)
-        return self._opened
+        self._items = self._items or PastItems(self)
+        return self._items
 
-    def between(self, after: Kept, part: int, parts: int) -> PastItems:
+    def between(self, after: Snapshot, part: int, parts: int) -> PastItems:
         """Items at part / parts of the time to a later moment, 0 < part < parts; see `History`."""
         if after is self:
-            return self.opened()
+            return self.items()
         if self.order is None:
-            self.opened().stack()
+            self.items().stack()
         both, row, later = self.ids, np.arange(len(self.ids)), np.arange(len(self.ids))
         if both is not after.ids:
             both, row, later = np.intersect1d(both, after.ids, assume_unique=True, return_indices=True)
@@ -119,7 +119,9 @@ class Kept:
             own.columns = self.columns | {"position_256": _sealed(position)}
         out = PastItems(own)
         if self.lists["angles"] is not after.lists["angles"]:
-            then, to = (np.array(kept.lists["angles"])[at].tolist() for kept, at in ((self, row), (after, later)))
+            then, to = (
+                np.array(snapshot.lists["angles"])[at].tolist() for snapshot, at in ((self, row), (after, later))
+            )
             turns = {item: (a, _short_turn(a, b)) for item, a, b in zip(both.tolist(), then, to, strict=True)}
             out.turn({item: angle + turn * (part / parts) for item, (angle, turn) in turns.items() if turn})
         return out
@@ -142,20 +144,20 @@ class ById(dict[int, Any]):
 class PastItems(Items):
     """The items of a scene at one moment, read-only, by id as present ones are; each column is made when it is read."""
 
-    def __init__(self, kept: Kept) -> None:
+    def __init__(self, snapshot: Snapshot) -> None:
         super().__init__()
         for name in LISTS:
             del vars(self)[name]
-        self._kept, self.count, self.arrangement = kept, kept.count, kept.arrangement
-        self.version = self._forgotten = kept.version
-        self.by_mask, self.atlas, self._present = kept.by_mask, kept.atlas, (kept.ids, kept.count, 0)
-        if kept.order is not None:
-            self._stack = (NEVER, kept.order)
+        self._snapshot, self.count, self.arrangement = snapshot, snapshot.count, snapshot.arrangement
+        self.version = self._forgotten = snapshot.version
+        self.by_mask, self.atlas, self._present = snapshot.by_mask, snapshot.atlas, (snapshot.ids, snapshot.count, 0)
+        if snapshot.order is not None:
+            self._stack = (NEVER, snapshot.order)
 
     def __getattr__(self, name: str) -> Any:
         if name not in LISTS and name not in COLUMNS:
             raise AttributeError(name)
-        value = self._kept.by_id(name)
+        value = self._snapshot.by_id(name)
         setattr(self, name, value)
         return value
 
@@ -172,8 +174,8 @@ class PastItems(Items):
     def stack(self) -> Stack:
         """See `Items.stack`; its order is kept for those who read the moment later."""
         stack = super().stack()
-        if self._kept.order is None:
-            self._kept.order = stack.placed(NO_BOXES)
+        if self._snapshot.order is None:
+            self._snapshot.order = stack.placed(NO_BOXES)
         return stack
 
     def turn(self, angles: Mapping[int, float]) -> None:
@@ -208,7 +210,7 @@ class Moment(NamedTuple):
     categories: tuple[str, ...]
     bounds: Box | None
     pickled: bytes
-    items: Kept
+    snapshot: Snapshot
 
 
 class PastScene(Scene):
@@ -285,9 +287,11 @@ class History:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle the recorded moments with the scene; equal columns of moments are stored once."""
         with self._lock:
-            kept = {id(moment.items): moment.items for moment in self._moments.values()}
-            states: dict[int, Any] = {number: items.opened().state() for number, items in kept.items()}
-            moments = {tick: moment._replace(items=states[id(moment.items)]) for tick, moment in self._moments.items()}
+            snapshots = {id(moment.snapshot): moment.snapshot for moment in self._moments.values()}
+            states: dict[int, Any] = {number: snapshot.items().state() for number, snapshot in snapshots.items()}
+            moments = {
+                tick: moment._replace(snapshot=states[id(moment.snapshot)]) for tick, moment in self._moments.items()
+            }
         return _restored_history, (self.scene, self._most, self._interpolate, moments)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> History:
@@ -353,9 +357,9 @@ class History:
     def _now(self, last: Moment | None) -> Moment:
         """The moment of the present scene; it shares everything unchanged with the last one."""
         scene, items = self.scene, self.scene.items
-        before = None if last is None else last.items
+        before = None if last is None else last.snapshot
         if before is None or (before.version, before.count) != (items.version, items.count):
-            before = Kept(items, before)
+            before = Snapshot(items, before)
         try:
             pickled = pickle.dumps((scene.weapons, scene.shots))
         except Exception as error:  # an object that cannot be pickled may raise anything
@@ -384,25 +388,25 @@ class History:
         """The recorded moment of a tick, or the one before it, and the items of that time."""
         if at in self._moments:
             moment = self._moments[int(at)]
-            return moment, moment.items.opened()
+            return moment, moment.snapshot.items()
         ticks = list(self._moments)
         place = bisect(ticks, at)
         first, last = ticks[place - 1], ticks[place]
         before, after = self._moments[first], self._moments[last]
         part, parts = int(SUB * (at - first)), SUB * (last - first)
         spare = max(parts.bit_length() - PART_BITS, 0)
-        return before, before.items.between(after.items, part >> spare, parts >> spare)
+        return before, before.snapshot.between(after.snapshot, part >> spare, parts >> spare)
 
 
 def _restored_history(scene: Scene, most: int, interpolate: bool, moments: dict[int, Any]) -> History:
     """A history of the parts that copies and pickles take; its moments share masks and columns again."""
-    history, atlas, made = History(scene, most, interpolate), MaskAtlas(), dict[int, Kept]()
-    last: Kept | None = None
+    history, atlas, made = History(scene, most, interpolate), MaskAtlas(), dict[int, Snapshot]()
+    last: Snapshot | None = None
     for tick, moment in moments.items():
-        if id(moment.items) not in made:
-            last = made[id(moment.items)] = Kept(Items.restored(moment.items, atlas), last)
+        if id(moment.snapshot) not in made:
+            last = made[id(moment.snapshot)] = Snapshot(Items.restored(moment.snapshot, atlas), last)
             last.version = 0  # of no present scene, which has changed at least once
-        history._moments[tick] = moment._replace(items=made[id(moment.items)])
+        history._moments[tick] = moment._replace(snapshot=made[id(moment.snapshot)])
     return history
 
 
