@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hitplanes import Disc, History, Scene, Sprite, fire
-from hitplanes.planes.scene import sprite
+from hitplanes.planes.scene import variants
 from hitplanes.planes.scene.items import COLUMNS
 
 WORLD = (1920, 1080)
@@ -37,8 +37,9 @@ def moved(scene: Scene, part: float, rng: np.random.Generator) -> None:
 
 
 def turned(scene: Scene, rng: np.random.Generator) -> None:
-    """Turn all objects, each by an angle of its own."""
+    """Turn all objects, each by an angle of its own, and make their masks, which are no part of a record."""
     scene.set(scene.ids(), angle=rng.uniform(0, 360, len(scene)))
+    scene.box(scene.ids())
 
 
 CHANGES: dict[str, Callable[[Scene, np.random.Generator], None]] = {
@@ -64,8 +65,8 @@ def bytes_freed(scene: Scene, change: Callable[[Scene, np.random.Generator], Non
         change(scene, rng)
         history.record()
     change(scene, rng)
-    sprite._kept.values.clear()  # masks kept for the next who asks are no tick's own
-    sprite._kept.bytes = 0
+    variants._kept.values.clear()  # masks kept for the next who asks are no tick's own
+    variants._kept.bytes = 0
     before = tracemalloc.get_traced_memory()[0]
     del history
     return before - tracemalloc.get_traced_memory()[0]
