@@ -89,6 +89,7 @@ def test_what_reads_no_mask_makes_none_and_what_is_gone_keeps_none(made: list[An
     assert scene.items.atlas.live == 15 and len(made) == 2
     scene.set(item, angle=270)
     scene.remove([item, scene.add(np.ones((3, 5), np.bool_), (9, 9))])
+    assert list(scene._items.unmade) == [item]  # what came and went unseen leaves no trace
     assert len(scene.items.stack()) == 0 and scene.items.atlas.live == 0 and len(made) == 2
 
 

@@ -222,7 +222,7 @@ class Items:
         self.angles: list[float] = []
         self.variants: list[Variant] = []
         self.names: list[str] = []
-        self.unmade: dict[int, None] = {}  # items that have masks of earlier looks, until `make_masks`
+        self.unmade: dict[int, None] = {}  # items that have masks of earlier looks or none, until `make_masks`
         self.arrangement = next(ARRANGEMENTS)
         self._journal: deque[Change] = deque()
         self._in_order = False  # whether the order of the last stack still holds
@@ -314,12 +314,13 @@ class Items:
         """Remove items; their ids are not used again, and their columns and names stay."""
         self.alive[ids] = 0
         self.living -= len(ids)
+        self._make_later(ids.tolist())
         for item in ids.tolist():
+            if self.variants[item] is NO_MASK:  # it came and went unseen
+                del self.unmade[item]
             self.atlas.drop(self.variants[item])
-            self.unmade.pop(item, None)
-            self.sprites[item], self.forms[item], self.variants[item] = NOTHING, NO_TRANSFORM, NO_MASK
-            self.angles[item] = 0.0
-        self.record(ids)
+            self.sprites[item], self.angles[item] = NOTHING, 0.0
+            self.forms[item], self.variants[item] = NO_TRANSFORM, NO_MASK
         self._stack = None  # it would hold the masks until the next shot
         if self.atlas.wasteful:
             self._compact()
@@ -343,18 +344,17 @@ class Items:
         self.unmade.update(dict.fromkeys(ids))
 
     def make_masks(self) -> None:
-        """Make the masks of items that changed their looks, all together."""
+        """Make the masks of items that changed their looks, all together, and record these items and removed ones."""
         with self._lock:  # threads may read a scene at once
-            ids = list(self.unmade)
-            if not ids:
-                return
-            looks = self.looks(ids)
-            variants = variants_of(looks.sprites, looks.forms)
-            for item in ids:
-                self.atlas.drop(self.variants[item])
-            self._enter(ids, variants)
-            self._record(np.array(ids), ("mask",))
-            self.unmade.clear()
+            if ids := [item for item in self.unmade if self.sprites[item] is not NOTHING]:
+                looks = self.looks(ids)
+                variants = variants_of(looks.sprites, looks.forms)
+                for item in ids:
+                    self.atlas.drop(self.variants[item])
+                self._enter(ids, variants)
+            if self.unmade:
+                self._record(np.array(list(self.unmade)), ("mask",))
+                self.unmade.clear()
 
     def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
         """Update the version, boxes, arrangement and journal after some columns of items changed."""
