@@ -183,6 +183,7 @@ def test_a_moment_is_what_it_was() -> None:
         past = history.at(tick)
         assert (len(past), past.ids().tolist(), past.version, names(past), masks(past), answers(past)) == truth
         assert {len(getattr(past.items, name)) for name in COLUMNS} == {past.items.count}
+        assert all(len(past.items._by_id(name)) == past.items.count for name in LISTS)
     assert len({str(truth[-1]) for truth in told}) == len(told)
     assert (scene.content_hash(), scene.version) == (hash_now, version_now)
 

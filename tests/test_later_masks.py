@@ -28,9 +28,9 @@ def said(scene: Scene) -> list[Any]:
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[list[float]]:
-    """How many quarter turns and what rest the masks have that items make, call by call."""
-    calls: list[list[float]] = []
+def made(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
+    """Quarter turns of the masks that items make, call by call."""
+    calls: list[list[int]] = []
     inner = items_module.variants_of
 
     def variants_of(sprites: Any, forms: Any) -> Any:

@@ -128,6 +128,7 @@ class Snapshot:
 
 
 OF_REMOVED = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": NO_MASK}
+"""What the lists have for items that were removed; names stay."""
 
 
 class ById(dict[int, Any]):

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 SLACK_PX = 2
 """Distance by which the pixels of a shot may lie beyond its reach, as directions and positions are rounded, px."""
 
-
 FEW_NEAR = 64
 """Most items near the shots that are listed alone; of more, all are, as that list is kept for the next shots."""
 

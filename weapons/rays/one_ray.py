@@ -26,7 +26,7 @@ from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.prefilter import Filters, refused_by
+from ..fire.prefilter import Filters
 from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.rays import RayWeapon
 from .contacts import NEVER, Reason
@@ -120,8 +120,7 @@ def follow_each(
 
     @cache
     def accepted(meets: int, exclude: tuple[int, ...]) -> Bools:
-        own = np.array([meets]), np.array([exclude], np.int64)
-        return ~refused_by(own, stack, np.arange(len(stack)), np.zeros(len(stack), np.int64))
+        return View(False, meets, exclude).accepts(stack)
 
     for number, (start, step) in enumerate(zip(lines.start.tolist(), lines.step.tolist(), strict=True)):
         accepts = filters and accepted(int(filters[0][number]), tuple(filters[1][number].tolist()))
