@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import random
 from typing import Any
@@ -173,17 +174,19 @@ def test_passes_are_read_after_items_have_moved_and_gained_speed(jit: bool) -> N
 def test_roots_and_shares_of_the_kernel_are_exact() -> None:
     """Also where products of 64 bits wrap around."""
     jit, rng = pytest.importorskip("hitplanes.planes.jit.raycast"), random.Random(4)
+    njit = importlib.import_module("numba").njit  # with an entry for Python
+    half_chord, share = (njit(helper.py_func) for helper in (jit.half_chord, jit.share))
     for bits in (3, 20, 30, 40, 56):
         for _ in range(300):
             length2, radius = rng.randint(1, 2**bits), rng.randint(1, 2 ** min(17, (89 - bits) // 2 + 1))
             v = rng.choice([0, 1, rng.randint(0, math.isqrt(radius**2 * length2)), math.isqrt(radius**2 * length2)])
-            assert jit.half_chord(radius, v, length2) == math.isqrt(radius**2 * length2 - v * v)
+            assert half_chord(radius, v, length2) == math.isqrt(radius**2 * length2 - v * v)
     for _ in range(1000):
         length2 = rng.randint(1, 2 ** rng.randint(1, 50))
         scale = rng.randint(1, max(length2 // 2, 1))
         time = rng.choice([0, scale, rng.randint(0, scale), scale // 2])
-        parts, share = rng.randint(3, 99), rng.randint(1, 2**40)
-        whole = rng.randint(0, parts), parts * share, parts * rng.randint(share, 2**43)  # quotients are whole numbers
-        for time_, scale_, length2_ in ((time, scale, length2), (whole[0] * share, whole[1], whole[2])):
+        parts, part = rng.randint(3, 99), rng.randint(1, 2**40)
+        whole = rng.randint(0, parts), parts * part, parts * rng.randint(part, 2**43)  # quotients are whole numbers
+        for time_, scale_, length2_ in ((time, scale, length2), (whole[0] * part, whole[1], whole[2])):
             for sign in (1, -1):
-                assert jit.share(sign * time_, length2_, scale_) == sign * time_ * length2_ // scale_
+                assert share(sign * time_, length2_, scale_) == sign * time_ * length2_ // scale_

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from ..bits import front_to_back as front_to_back_module
 from ..bits.bit_rows import WORD, PatternBits, Placed
@@ -42,7 +42,7 @@ from .bit_rows import (
     rows_by,
     shared,
 )
-from .cache import compiled
+from .cache import compiled, helper
 
 FEW = 4  # most placements that compare all tiles; for more, tiles are listed in cells of the world first
 CELL_BITS = 6  # least side of those cells, 2**CELL_BITS = 64 px; no tile is wider
@@ -81,7 +81,7 @@ def _binned(box):
     return begin, listed, np.array([x, y, bits, wide, high])
 
 
-@njit
+@helper()
 def near_of(box, begin, listed, cells, left, top, right, bottom, near):
     """Write the tiles whose boxes meet a box to `near`, front to back; return how many."""
     count = 0
@@ -107,7 +107,7 @@ def near_of(box, begin, listed, cells, left, top, right, bottom, near):
     return count
 
 
-@njit
+@helper()
 def _crossing(strips, pattern, x, y, box, near, count):
     """Keep the tiles that meet the strip of a pattern; return how many."""
     kept = 0
@@ -118,7 +118,7 @@ def _crossing(strips, pattern, x, y, box, near, count):
     return kept
 
 
-@njit
+@helper()
 def _sort(numbers, count):
     """Sort the first `count` numbers: Shell (1959)."""
     step = 1
@@ -134,7 +134,7 @@ def _sort(numbers, count):
         step //= 3
 
 
-@njit
+@helper()
 def take(tiles, tile, rest, word, step, shift, low, high):
     """Clear the pixels of a tile in the rest of a pattern, in rows `low` to `high`; return how many were cleared."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
@@ -149,7 +149,7 @@ def take(tiles, tile, rest, word, step, shift, low, high):
     return taken
 
 
-@njit
+@helper()
 def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
     """Count the pixels that a tile shares with the rest of a pattern, and clear them: `shared`, `take` in one pass."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
@@ -169,7 +169,7 @@ def struck(tiles, tile, rest, word, step, shift, low, high, own, level):
     return samples, *pixel_of(nearest, own, low - level)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def refuses(tile, categories, owner, meets, exclude, shot):
     """Whether a shot refuses the item of a tile; `meets` and `exclude` have one row for all shots, or one for each."""
     if categories[tile] & meets[shot if len(meets) > 1 else 0] == 0:
@@ -180,7 +180,7 @@ def refuses(tile, categories, owner, meets, exclude, shot):
     return False
 
 
-@njit
+@helper()
 def _accepted(near, count, occluder, categories, owner, meets, exclude, shot):
     """Keep the tiles that a shot accepts, up to the last object's; return how many."""
     kept = objects = 0
@@ -201,7 +201,7 @@ TURN, RANK, SAMPLES, WEIGHT, PIXELS, PELLETS, KEY, X, Y = range(9)
 TOGETHER = WORD + 8  # words of the pixels of a tile that pellets of a round have hit
 
 
-@njit
+@helper()
 def lay(windows, first, step, hull, rest):
     """Copy the words of a pattern that tiles may read to `rest`; return their pixels.
 
@@ -220,7 +220,7 @@ def lay(windows, first, step, hull, rest):
     return pixels
 
 
-@njit
+@helper()
 def clip(rest, step, hull, left, top, bounds):
     """Clear the words of a pattern in `rest` beyond the bounds; return the pixels that are left."""
     pixels = 0
@@ -237,7 +237,7 @@ def clip(rest, step, hull, left, top, bounds):
     return pixels
 
 
-@njit(inline="always")
+@helper(inline="always")
 def hull_of(box, near, count, left, top, bottom):
     """Words of a pattern that tiles may read: first and last column, first and last row."""
     first, last, low, high = 2**62, 0, bottom, top
@@ -249,7 +249,7 @@ def hull_of(box, near, count, left, top, bottom):
     return first, last, low - top, high - top
 
 
-@njit
+@helper()
 def weighed(tiles, tile, windows, word, step, shift, low, high, sums, begin, wide):
     """Sum of the weights of the pixels that a tile shares with a window, run by run.
 
@@ -271,7 +271,7 @@ def weighed(tiles, tile, windows, word, step, shift, low, high, sums, begin, wid
     return total
 
 
-@njit
+@helper()
 def anew(together, tiles, tile, windows, word, step, shift, low, high):
     """Add the pixels that a tile shares with a window to `together`, row by row; return the number of new ones."""
     tile, word, following = np.uint64(tile + low), np.uint64(word + low), np.uint64(word + step + low)
@@ -285,7 +285,7 @@ def anew(together, tiles, tile, windows, word, step, shift, low, high):
 
 
 # house: row order
-@njit(inline="always")
+@helper(inline="always")
 def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
     """Sort rows `first` .. `last` - 1 of a round by (key, rank), and replace the keys by squared distance and y.
 
@@ -301,7 +301,7 @@ def in_row_order(first, last, origin_x, origin_y, out, rank, key, x, y):
 
 
 # house: hit rule of areas
-@njit
+@helper()
 def match(
     turn, end, count, out, pattern, x, y, origin_x, origin_y,
     pattern_box, first, following, pattern_words, strips, sums, first_sum,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
 from ..bits import bit_rows, cells, shadows
@@ -15,7 +15,7 @@ from ..bits.bit_rows import NO_STRIPS, NO_SUMS, WORD, PatternBits, Placed, Words
 from ..common.backend import in_parts
 from ..common.checks import Ints
 from ..grid.spans import WIDEST, Box, RowRuns
-from .cache import compiled
+from .cache import compiled, helper
 
 INTS = types.Array(types.int64, 1, "A", readonly=True)
 BOXES = types.Array(types.int64, 2, "C", readonly=True)
@@ -64,20 +64,20 @@ def _above(_: Any, word: Any) -> Any:
     return types.int64(types.uint64), made
 
 
-@njit(inline="always")
+@helper(inline="always")
 def key_of(distance2, x, y):
     """A number that sorts as (distance2, y, x); two equally far pixels of a row lie on both sides of the origin."""
     return (distance2 << SIDE_BITS) | ((y + SIDE) << 1) | (x > 0)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def is_far(origin_x, origin_y, left, top, right, bottom):
     """Whether a box reaches too far from an origin for `key_of`."""
     across = max(abs(left - origin_x), abs(right - origin_x))
     return max(across, abs(top - origin_y), abs(bottom - origin_y)) >= SIDE
 
 
-@njit(inline="always")
+@helper(inline="always")
 def is_beyond(strips, pattern, x, y, left, top, right, bottom):
     """Whether a box lies beyond the strip of a pattern that is placed on a pixel."""
     a, b = strips[pattern, 0], strips[pattern, 1]
@@ -86,7 +86,7 @@ def is_beyond(strips, pattern, x, y, left, top, right, bottom):
     return (low > strips[pattern, 3]) | (high < strips[pattern, 2])
 
 
-@njit(inline="always")
+@helper(inline="always")
 def pixels_of(first, last, origin_x, origin_y, distance2, x, y):
     """Replace keys and relative columns of rows `first` .. `last` - 1 by squared distances and pixels."""
     for i in range(first, last):
@@ -131,14 +131,14 @@ def _filled(kernel: Kernel, columns: int, first: int, last: int, given: tuple[An
         out = more
 
 
-@njit(inline="always")
+@helper(inline="always")
 def columns_about(own):
     """Shifts that keep the pixels from a column on, and up to it; and the column's distance from the tile."""
     column = min(max(own, 0), 63)
     return np.uint64(column), np.uint64(63 - column), abs(own - column)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def row_key(met, row, down, ahead, behind, beyond):
     """A number that sorts the nearest pixels of rows by (squared distance, row); the last bit is set if it is after."""
     after, before = lowest(met >> ahead), _above(met << behind)
@@ -147,7 +147,7 @@ def row_key(met, row, down, ahead, behind, beyond):
     return key if met else FAR
 
 
-@njit(inline="always")
+@helper(inline="always")
 def pixel_of(key, own, top):
     """Squared distance, x and y of the pixel of a `row_key`, from an origin in column `own`, `top` px above row 0."""
     distance2, down = key >> ROW_BITS, top + ((key & WORD_ROWS) >> 1)
@@ -156,7 +156,7 @@ def pixel_of(key, own, top):
     return distance2, column - own + (along if key & 1 else -along), down
 
 
-@njit
+@helper()
 def shared(tiles, tile, windows, word, step, shift, low, high, own, level):
     """Count the pixels that a tile shares with a window, in rows `low` to `high` of the world.
 
@@ -197,14 +197,14 @@ def take_away(rows: Words, words: Words, of: Ints, front: Ints, right: Ints) -> 
 BEYOND = 2**40  # farther than any column
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _columns(first, last, left):
     """Word whose bits are the columns first .. last; bit 0 is column `left`."""
     low, high = max(first - left, 0), min(last - left, 63)
     return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high)) if low <= high else np.uint64(0)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _shadow(x_min, y_min, x_max, y_max, y, left):
     """Word of the columns of a row that a rectangle hides; see `bits.shadows.shadow`."""
     away, near, far = abs(y), y_min if y >= 0 else -y_max, y_max if y >= 0 else -y_min
@@ -269,7 +269,7 @@ def hide_behind(
     return None
 
 
-@njit
+@helper()
 def _bounds_of(parts, y, at, end, box):
     """Write the box around the runs `at` .. `end` - 1 of a pattern; it has x_max < x_min if all are empty."""
     left, right, top, low = WIDEST, -WIDEST, WIDEST, -WIDEST
@@ -288,7 +288,7 @@ def _bounds_of(parts, y, at, end, box):
     box[0], box[1], box[2], box[3] = left, top, right, low
 
 
-@njit
+@helper()
 def _strip_of(parts, y, at, end, strip):
     """Write the least and the greatest distance of the runs `at` .. `end` - 1 along a normal, the strip's a and b."""
     a, b, low, high = strip[0], strip[1], FAR, -FAR
@@ -303,7 +303,7 @@ def _strip_of(parts, y, at, end, strip):
     strip[2], strip[3] = low, high
 
 
-@njit
+@helper()
 def _lay(first, last, left, words):
     """Add the pixels of runs, row by row, to words whose bit 0 is column `left`; without a branch in the loop."""
     for i in range(len(words)):
@@ -385,7 +385,7 @@ def pixels_within(placed: Placed, windows: PatternBits, count: Ints, bounds: Box
 BRUTE_PAIRS = 2**21  # most pairs of boxes that are compared one by one; with more, numpy lists them in cells
 
 
-@njit(inline="always")
+@helper(inline="always")
 def cell_at(at_x, at_y, x, y, bits, wide, high):
     """The cell of a pixel; -1 if it lies in none."""
     column, row = np.uint64((at_x - x) >> bits), np.uint64((at_y - y) >> bits)  # negative numbers become very large
@@ -393,7 +393,7 @@ def cell_at(at_x, at_y, x, y, bits, wide, high):
     return np.int64(row * np.uint64(wide) + column) if inside else -1
 
 
-@njit
+@helper()
 def meets_any(box, at, taken, count):
     """Whether the box of an item meets those of others."""
     for k in range(count):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import accumulate
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from ..bits.distance_field import EXACT, FAR, LONGEST, NOTHING, PAD, UNDECIDED, Clearance
 from ..common.checks import Bools, Ints
@@ -17,7 +17,7 @@ from ..grid.turns import Edges
 from ..scene.sprite import frozen
 from ..scene.variants import Grids, Turned
 from .bit_rows import BOXES, INTS, OUT
-from .cache import compiled
+from .cache import compiled, helper
 from .scene import PARTS, PELLETS, STEPS, add_run, at_least, at_most, empty_parts, layout, root_of
 
 BLOCK = 128
@@ -210,7 +210,7 @@ LATE = 2**62
 """A time after all others."""
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _spell(low, high, sign, across, entry, leave):
     """Part of the time from `entry` to `leave` in which a ray is between two sides, given relative to its start."""
     if sign == 0:
@@ -219,7 +219,7 @@ def _spell(low, high, sign, across, entry, leave):
     return max(entry, near * across), min(leave, far * across)
 
 
-@njit
+@helper()
 def times_in(left, top, right, low, ray):
     """Times at which a ray enters and leaves a box of pixels; leave < entry if it does not touch the box."""
     x, y, dx, dy, across_x, across_y = ray
@@ -227,7 +227,7 @@ def times_in(left, top, right, low, ray):
     return _spell(SUB * top - HALF - y, SUB * low + HALF - y, dy, across_y, entry, leave)
 
 
-@njit
+@helper()
 def run_of(row, begin, step, u, along):
     """First and last cell of a row that a ray touches, along its longer axis; (1, 0) if it touches none."""
     first = max(min(begin, begin + step), SUB * row - HALF) - begin
@@ -242,7 +242,7 @@ def run_of(row, begin, step, u, along):
     return -over(HALF * per - low, SUB * per), over(high + HALF * per, SUB * per)
 
 
-@njit
+@helper()
 def _border(start, step):
     """Way to the first border of pixels along an axis, the pixel before it, and the direction."""
     ahead = 1 if step > 0 else -1
@@ -251,7 +251,7 @@ def _border(start, step):
     return np.int64(2 if step == 0 and first > 0 else first), np.int64(base), np.int64(ahead)
 
 
-@njit
+@helper()
 def borders_of(ray):
     """Borders of pixels that a thin ray crosses; see `weapons.explain.ray_verdicts.Borders`."""
     x, y, dx, dy, high, wide = ray
@@ -272,12 +272,12 @@ def borders_of(ray):
     return first_x, first_y, high, wide, base_x, base_y, sign_x, sign_y, still, phase, common * p * q * SUB
 
 
-@njit
+@helper()
 def _crossed(first, across, time):
     return max((time // across - first) // SUB + 1, 0)
 
 
-@njit
+@helper()
 def cells_by(borders, time):
     """Number of cells that a thin ray has entered by a time."""
     first_x, first_y, across_x, across_y, _, _, _, _, still, phase, period = borders
@@ -287,7 +287,7 @@ def cells_by(borders, time):
     return (1 + x) * (1 + y) if still else 1 + x + y + max((time - phase) // period + 1, 0)
 
 
-@njit
+@helper()
 def _cells_up_to(borders, x, y, time):
     """Number of cells entered by a time, after at most `x` borders along x, and `y` along y."""
     first_x, first_y, across_x, across_y, _, _, _, _, still, phase, period = borders
@@ -305,14 +305,14 @@ def _cells_up_to(borders, x, y, time):
     return cells_by(borders, out - 1) + (out_x != out_y and out >= phase and (out - phase) % period == 0)
 
 
-@njit
+@helper()
 def _sides(low, high, base, sign, most):
     """Borders before the near side of a box along an axis, and up to its far side."""
     near, far = (low - base, high - base) if sign > 0 else (base - high, base - low)
     return min(max(near, 0), most + 1) - 1, min(max(far, -1), most)
 
 
-@njit
+@helper()
 def cells_within(borders, box, time):
     """Number of cells of a box that a thin ray has entered by a time."""
     first_x, first_y, across_x, across_y, base_x, base_y, sign_x, sign_y, _, _, _ = borders
@@ -323,7 +323,7 @@ def cells_within(borders, box, time):
     return count - _cells_up_to(borders, x, y_before, time) + _cells_up_to(borders, x_before, y_before, time)
 
 
-@njit
+@helper()
 def wide_run_of(row, u, along, v, step, wide, per):
     """First and last cell of a row that a wide ray may touch, along its longer axis; `per` is 1 / step, or 0."""
     reach = max(wide[0], DIAGONAL)
@@ -335,7 +335,7 @@ def wide_run_of(row, u, along, v, step, wide, per):
     return np.int64(np.ceil((low - 1) / SUB)), np.int64(np.floor((high + 1) / SUB))
 
 
-@njit
+@helper()
 def rows_between(least, most, u, along, v, step, wide):
     """First and last row that a ray may touch between two columns, along its longer axis; floats have room."""
     reach = max(wide[0], DIAGONAL) if wide[0] > 0 else HALF
@@ -349,7 +349,7 @@ def rows_between(least, most, u, along, v, step, wide):
     return np.int64(np.floor((min(one, other) - half) / SUB)), np.int64(np.ceil((max(one, other) + half) / SUB))
 
 
-@njit
+@helper()
 def bounds_of_times(left, top, right, low, ray, wide):
     """Bounds of the times at which a ray enters pixels of a box; the second is less if it touches none."""
     if wide[0] == 0:
@@ -370,7 +370,7 @@ def bounds_of_times(left, top, right, low, ray, wide):
     return max(u_least - reach - 2, 0), u_most + reach + 2
 
 
-@njit
+@helper()
 def between(u, along, cells, low, high):
     """First and last of some cells, from a product `u` on with a step, whose product is `low` .. `high`."""
     far = u + along * (cells - 1)
@@ -382,7 +382,7 @@ def between(u, along, cells, low, high):
     return max(-over(high - u, ahead), 0), min(over(u - low, ahead), cells - 1)
 
 
-@njit
+@helper()
 def near_of(box, origin_x, origin_y, ray, bounds, near, reach):
     """Write the items with pixels whose centres may lie within `reach` of a ray to `near`; return how many."""
     x, y, dx, dy, around = ray[0] + reach, ray[1] + reach, ray[2], ray[3], 2 * reach - SUB + 1
@@ -397,21 +397,21 @@ def near_of(box, origin_x, origin_y, ray, bounds, near, reach):
     return count
 
 
-@njit
+@helper()
 def part_of(box, at, origin_x, origin_y, bounds):
     """The part of an item's box within the bounds, relative to a pixel."""
     left, top = max(box[at, 0], bounds[0]) - origin_x, max(box[at, 1], bounds[1]) - origin_y
     return left, top, min(box[at, 2], bounds[2]) - origin_x, min(box[at, 3], bounds[3]) - origin_y
 
 
-@njit
+@helper()
 def share(time, length2, scale):
     """The part time / scale of a squared length below 2**50, rounded down; products wrap, their difference fits."""
     whole = np.int64(np.floor(float(time) / float(scale) * float(length2)))
     return whole + (time * length2 - whole * scale) // scale
 
 
-@njit
+@helper()
 def half_chord(radius, v, length2):
     """Root of radius^2 length^2 - v^2, rounded down; see `grid.fixed_point.far_roots`."""
     side = radius * np.sqrt(float(length2))
@@ -433,14 +433,14 @@ DOUBT = 1 << 18
 """Places are too small by less: 2**16 steps of a grid, each rounded down to 2**-40 px."""
 
 
-@njit
+@helper()
 def _place(parts, unit):
     """A number of pixels, given in parts, rounded down to 2**-40."""
     whole = parts // unit
     return (whole << PLACE_BITS) + np.int64(float(parts - whole * unit) / float(unit) * (1 << PLACE_BITS))
 
 
-@njit
+@helper()
 def _is_held(flat, frame, place, unit):
     """Whether a set square of a frame holds a place in parts, which may lie on the border of several."""
     (begin, wide, high), column, row = frame, place[0] // unit[0], place[1] // unit[1]
@@ -451,7 +451,7 @@ def _is_held(flat, frame, place, unit):
     return False
 
 
-@njit
+@helper()
 def _within(place, step, size, near, far):
     """The part of near .. far - 1 whose places on an axis, which are DOUBT too great, may be on a frame of a size."""
     most = (size << PLACE_BITS) + 2 * DOUBT
@@ -462,7 +462,7 @@ def _within(place, step, size, near, far):
     return near, max(min(far, np.int64(np.floor(max(first, last))) + 1), near)
 
 
-@njit
+@helper()
 def _map(flat, frame, first, step, unit, size_wh, held):
     """Map a frame to a grid `held`; return the sides of what is set, right and low exclusive, and its pixels.
 
@@ -515,7 +515,8 @@ def _turned_masks(flat, frames, which, first, step, unit, size_wh):
         boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3], boxes[n, 4], boxes[n, 5] = left, top, wide, high, area, used
         for y in range(top, top + high):
             begin = y * size_wh[n, 0] + left
-            out[used : used + wide] = held[begin : begin + wide]
+            for k in range(wide):
+                out[used + k] = held[begin + k]
             used += wide
     return boxes, out
 
@@ -535,7 +536,7 @@ def turned_masks(masks: Sequence[Bools], which: Ints, grids: Grids) -> Turned:
     return Turned(made, every[:, :2], every[:, 4])
 
 
-@njit
+@helper()
 def _rows_of(sides, pivot_y, c, s):
     """First and last row of pixels that a turned rectangle may hold; see `turned_runs`."""
     left, right, top, low = sides
@@ -543,7 +544,7 @@ def _rows_of(sides, pivot_y, c, s):
     return first >> 8, (max(left * s, right * s) + low * c >> TRIG_BITS) + pivot_y + 1 >> 8
 
 
-@njit
+@helper()
 def _turned_rows(sides, pivot, c, s, row, first, last):
     """Fill the first and last pixel that a turned rectangle holds in each row from `row` on; see `turned_runs`."""
     (left, right, top, low), (x, y) = sides, pivot

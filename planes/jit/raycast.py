@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from ..bits.cells import BRUTE_PAIRS, cells_of, is_sparse
 from ..bits.span_walk import Verdict
@@ -16,7 +16,7 @@ from ..grid.spans import Box
 from ..scene.items import Stack
 from .areas import NOBODY, NONE, OWNERS, refuses
 from .bit_rows import BOXES, EVERYWHERE, FLAGS, INTS, ROWS_OUT, cell_at, meets_any, rows_by
-from .cache import compiled
+from .cache import compiled, helper
 from .planes import (
     LATE,
     between,
@@ -58,7 +58,7 @@ PART_PAIRS, RAY_PAIRS = 135_000, 2000
 """Least number of pairs of a ray and an item that is worth a thread; each ray counts as so many more."""
 
 
-@njit
+@helper()
 def _entry_of(at_x, at_y, u, v, ray, wide):
     """Time at which a ray enters a pixel, see `grid.rasterize.Lines.times`; LATE if it does not touch it.
 
@@ -84,7 +84,7 @@ def _entry_of(at_x, at_y, u, v, ray, wide):
     return best
 
 
-@njit
+@helper()
 def _walked(at_x, at_y, u, v, ray, wide, stop):
     """Whether a ray enters a pixel before its stop, and when."""
     time, stop_x, stop_y, alone, takes = stop
@@ -98,7 +98,7 @@ def _walked(at_x, at_y, u, v, ray, wide, stop):
     return entry == time and (here or before), entry
 
 
-@njit
+@helper()
 def _touches(part, mask, ray, wide, stop, first_alone):
     """Number of pixels of an item that a ray enters before a stop, and time and cell of the first of them.
 
@@ -140,7 +140,7 @@ def _touches(part, mask, ray, wide, stop, first_alone):
     return first_of
 
 
-@njit
+@helper()
 def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, first_of):
     """What `_touches` found so far, with the pixels of one run of cells."""
     x, y, dx, dy, _, _ = ray
@@ -165,7 +165,7 @@ def _in_run(left, top, length, masks, pixel, stride, steep, ray, wide, stop, fir
     return count, best, best_x, best_y
 
 
-@njit
+@helper()
 def _comes_before(found, one, other):
     """Whether a ray enters an item before another: by (time, y, x, rank)."""
     for column in (ENTRY, Y, X):
@@ -174,7 +174,7 @@ def _comes_before(found, one, other):
     return found[RANK, one] < found[RANK, other]
 
 
-@njit
+@helper()
 def _listed(grid, begin, listed, ray, origin, reach, near):
     """Copy the items that are listed in the cell of the corner of a ray's box; return how many."""
     x, y, dx, dy, _, _ = ray
@@ -187,7 +187,7 @@ def _listed(grid, begin, listed, ray, origin, reach, near):
     return begin[cell + 1] - begin[cell]
 
 
-@njit
+@helper()
 def _entered_by(items, cells, meets, exclude, row, origin, ray, wide, bounds, near, found):
     """Write rank and bounds of the times of the accepted items whose boxes a ray enters; return how many."""
     (box, _, _, _, categories, owner), (grid, begin, listed), reach = items, cells, max(wide[0], HALF)
@@ -209,7 +209,7 @@ def _entered_by(items, cells, meets, exclude, row, origin, ray, wide, bounds, ne
     return count
 
 
-@njit
+@helper()
 def _of_item(items, at, origin, ray, wide, bounds, stop, first_alone):
     """`_touches` of an item within the bounds."""
     box, offset, masks, _, _, _ = items
@@ -217,7 +217,7 @@ def _of_item(items, at, origin, ray, wide, bounds, stop, first_alone):
     return _touches(part_of(box, at, origin[0], origin[1], bounds), mask, ray, wide, stop, first_alone)
 
 
-@njit
+@helper()
 def _earliest_first(found, k, count):
     """Swap the item of the earliest time of entry, of those from place k on, to that place."""
     least = k
@@ -227,7 +227,7 @@ def _earliest_first(found, k, count):
         found[column, k], found[column, least] = found[column, least], found[column, k]
 
 
-@njit
+@helper()
 def _meet(items, origin, ray, wide, bounds, most, found, count):
     """Move the items that a ray touches before its end to the front, with times, cells and counts; return how many."""
     endless = np.int64(LATE), np.int64(0), np.int64(0), np.bool_(True), np.bool_(True)  # of no literal types
@@ -235,7 +235,9 @@ def _meet(items, origin, ray, wide, bounds, most, found, count):
     if count > SORTED:
         order = np.argsort(found[ENTER, :count])
         for column in (RANK, ENTER, LAST):
-            found[column, :count] = found[column, :count][order]
+            held = found[column, :count].copy()
+            for k in range(count):
+                found[column, k] = held[order[k]]
     for k in range(count):
         if count <= SORTED:
             _earliest_first(found, k, count)
@@ -263,7 +265,7 @@ def _meet(items, origin, ray, wide, bounds, most, found, count):
     return met
 
 
-@njit
+@helper()
 def _covers(items, at, x, y, bounds):
     """Whether an item has a pixel, within the bounds."""
     box, offset, masks, _, _, _ = items
@@ -274,7 +276,7 @@ def _covers(items, at, x, y, bounds):
     return masks[offset[at] + (y - box[at, 1]) * (box[at, 2] - box[at, 0] + 1) + x - box[at, 0]]
 
 
-@njit
+@helper()
 def _blocked(items, origin, bounds, found, count):
     """Drop what a ray touches at or behind the first occluder; return how many objects are left, and the occluder."""
     occluder, wall = items[3], -1
@@ -299,7 +301,7 @@ def _blocked(items, origin, bounds, found, count):
     return kept, rank, time, y, x
 
 
-@njit
+@helper()
 def _sort(found, order, count):
     """Order the items by the walk of the ray; each is near its place."""
     for i in range(count):
@@ -317,7 +319,7 @@ RAYCAST = types.Tuple((types.int64, types.int64, types.int64))(
 
 
 # house: hit rule of rays
-@njit
+@helper()
 def follow(row, x, y, dx, dy, wide, items, cells, bounds, most, meets, exclude, near, found, ends):
     """Write the order of the objects that a ray hits to `near`, and its end; return how many there are."""
     origin = (x + HALF) >> 8, (y + HALF) >> 8
@@ -367,7 +369,7 @@ def _each(begin, end, row, out, start, step, radius, sides, most, items, cells, 
     return end, row, 0
 
 
-@njit
+@helper()
 def _row_cells(row, first, last, ray, wide, stop):
     """Number of cells of a row that a wide ray enters before a stop.
 
@@ -396,7 +398,7 @@ def _row_cells(row, first, last, ray, wide, stop):
     return count
 
 
-@njit
+@helper()
 def _wide_cells(ray, wide, bounds, stop):
     """Cells that a wide ray reaches, those after its stop, and those beyond the bounds."""
     x, y, dx, dy, _, _ = ray
@@ -419,7 +421,7 @@ def _wide_cells(ray, wide, bounds, stop):
     return reached, inside - reached, total - inside
 
 
-@njit
+@helper()
 def _thin_cells(ray, bounds, stop):
     """Cells that a thin ray reaches, those after its stop, and those beyond the bounds."""
     borders = borders_of(ray)
@@ -442,7 +444,7 @@ def _thin_cells(ray, bounds, stop):
     return reached, inside - reached, total - inside
 
 
-@njit
+@helper()
 def _new_cells(items, at, taken, count, hits, last_rank, origin, ray, wide, bounds, stop):
     """Number of pixels of an item that a ray enters before a stop, and that none of the items before it has.
 
@@ -469,7 +471,7 @@ def _new_cells(items, at, taken, count, hits, last_rank, origin, ray, wide, boun
     return new
 
 
-@njit
+@helper()
 def _is_taken(items, x, y, taken, count, hits, last_rank, origin, bounds, stop):
     """Whether any of some items has a pixel that a ray enters."""
     ends = x == stop[1] and y == stop[2]
@@ -480,7 +482,7 @@ def _is_taken(items, x, y, taken, count, hits, last_rank, origin, bounds, stop):
     return False
 
 
-@njit
+@helper()
 def _decided(items, hits, near, taken, origin, ray, wide, bounds, stop, end, refuse):
     """Number of cells of a ray that are hit, that an occluder ends, and that items have which are refused.
 

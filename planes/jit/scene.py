@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from ..common.checks import Floats, Ints
 from ..common.limits import GOLDEN, HALF, POSITION_MAX, SUB, TRIG_BITS
@@ -14,7 +14,7 @@ from ..grid.fixed_point import DOUBT, UNIT
 from ..grid.rasterize import DIAGONAL, ROOM, sides_of
 from ..grid.spans import WIDEST, RowRuns
 from .bit_rows import INTS, OUT
-from .cache import compiled
+from .cache import compiled, helper
 
 TERMS = 8  # terms of each series; up to 45 degrees the rest is below 2**-53
 
@@ -97,7 +97,7 @@ PARTS = types.int64[:, :, ::1]
 WHOLE = types.int64
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _over_one(value):
     """See `fixed_point.over_one`."""
     return (value + (UNIT // 2 - 1) + ((value >> TRIG_BITS) & 1)) >> TRIG_BITS
@@ -115,7 +115,7 @@ def turned_to(points_256, direction):
     return out
 
 
-@njit
+@helper()
 def _lower(quotient, rest, more, over, per, out):
     """Lower out[k] to the whole part of a quotient, which grows by more + over / per from each to the next.
 
@@ -129,7 +129,7 @@ def _lower(quotient, rest, more, over, per, out):
         rest -= per if carried else 0
 
 
-@njit
+@helper()
 def _raise(quotient, rest, more, over, per, out):
     """Raise out[k] to the negative of such a quotient."""
     for k in range(len(out)):
@@ -140,24 +140,24 @@ def _raise(quotient, rest, more, over, per, out):
         rest -= per if carried else 0
 
 
-@njit
+@helper()
 def at_most(value, step, per, last):
     """Lower last[k] to the floor of (value + k * step) / per."""
     _lower(value // per, value % per, step // per, step % per, per, last)
 
 
-@njit
+@helper()
 def at_least(value, step, per, first):
     """Raise first[k] to the ceiling of (value + k * step) / per."""
     _raise(-value // per, -value % per, -step // per, -step % per, per, first)
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _ceil(value, per):
     return -(-value // per)
 
 
-@njit
+@helper()
 def root_of(value):
     """Square root of a whole number, rounded down."""
     root = np.int64(np.sqrt(np.float64(value)))
@@ -168,7 +168,7 @@ def root_of(value):
     return root
 
 
-@njit
+@helper()
 def layout(top, low):
     """Shape and row of all rows top .. low of shapes, and where those of each begin (n + 1,)."""
     begin = np.zeros(len(top) + 1, np.int64)
@@ -181,7 +181,7 @@ def layout(top, low):
     return shape, y, begin
 
 
-@njit
+@helper()
 def empty_parts(count, rows):
     """Parts (count, 2, rows) of `RowRuns`, all of them empty."""
     parts = np.empty((count, 2, rows), np.int64)
@@ -189,7 +189,7 @@ def empty_parts(count, rows):
     return parts
 
 
-@njit
+@helper()
 def add_run(parts, used, row, first, last):
     """Add a run, if it is not empty, to a row: to the run that was added last, if it touches that one.
 
@@ -203,14 +203,15 @@ def add_run(parts, used, row, first, last):
         return parts
     if part + 1 == len(parts):
         more = empty_parts(2 * len(parts), parts.shape[2])
-        more[: len(parts)] = parts
+        for k in range(parts.size):
+            more.flat[k] = parts.flat[k]
         parts = more
     parts[part + 1, 0, row], parts[part + 1, 1, row] = first, last
     used[row] += 1
     return parts
 
 
-@njit
+@helper()
 def _winding(ring):
     """1 or -1 for a convex ring (m, 2) that turns right or left; 0 for any other: see `rasterize.convex_polygons`."""
     count, changes, right, left, level = len(ring), 0, 0, 0, True
@@ -268,7 +269,7 @@ def convex_polygons(points: Ints) -> RowRuns | None:
     return RowRuns(shape, y, parts) if convex else None
 
 
-@njit
+@helper()
 def _even_odd_row(corner, following, row, parts, used, at):
     """Add to a row of a polygon what its edges touch, and what lies between every two of its crossings."""
     level, count, crossing = SUB * row, 0, np.empty(len(corner), np.int64)
@@ -315,7 +316,7 @@ def polygons(points: Ints, starts: Ints) -> RowRuns:
     return RowRuns(*_even_odd(points, starts)) if convex is None else convex
 
 
-@njit
+@helper()
 def _axis_rows(x0, y0, dx, dy, top, first, last):
     """Runs of the supercover of a segment in rows from `top` on; empty in rows that it does not meet."""
     first[:], last[:] = WIDEST, -WIDEST
@@ -339,7 +340,7 @@ def _axis_rows(x0, y0, dx, dy, top, first, last):
         last[0], first[-1] = (enter + half) // cell, _ceil(leave - half, cell)
 
 
-@njit
+@helper()
 def _side(value, step, slope, first, last):
     """Keep of runs the centres with slope * x >= value + k * step in row k, x in 1/256 px."""
     if slope > 0:
@@ -352,7 +353,7 @@ def _side(value, step, slope, first, last):
                 first[k], last[k] = WIDEST, -WIDEST
 
 
-@njit
+@helper()
 def _between(x, y, dx, dy, reach, side, top, first, last):
     """Keep of runs in rows from `top` on the centres beside a segment, see `rasterize._between`.
 
@@ -371,7 +372,7 @@ def _between(x, y, dx, dy, reach, side, top, first, last):
             first[k], last[k] = WIDEST, -WIDEST
 
 
-@njit
+@helper()
 def _add_disc(x, y, radius, top, first, last):
     """Extend runs in rows from `top` on to the centres at most `radius` from a point."""
     for row in range(_ceil(y - radius, SUB), (y + radius) // SUB + 1):
@@ -418,7 +419,7 @@ def beams(a: Ints, b: Ints, radius: int) -> RowRuns:
     return RowRuns(shape, y, parts)
 
 
-@njit
+@helper()
 def _half_plane(slope, limit, top, first, last):
     """Keep of runs in rows from `top` on the centres with slope * x <= limit * y; both are below 2**62.
 
@@ -519,7 +520,7 @@ SEEDS = types.Array(types.uint64, 1, "A", readonly=True)
 AT_ONCE = 256  # least number of pellets that are drawn at a time; those of a round are drawn together
 
 
-@njit(inline="always")
+@helper(inline="always")
 def _mixed(z):
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
