@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_rayhits import fired, many
+from test_ray_hits import fired, many
 
 from hitplanes import (
     Disc,

@@ -36,7 +36,6 @@ from hitplanes import (  # fmt: skip
     Sprite,
     Stencil,
     Sweep,
-    arsenal_of,
     fire,
     load_scene,
     picture_of_report,
@@ -45,6 +44,7 @@ from hitplanes import (  # fmt: skip
     report_of,
     use_jit,
     weapon_from_json,
+    weapons_of,
     write_png,
 )
 from hitplanes.weapons.cli.report_file import read_report
@@ -52,7 +52,7 @@ from hitplanes.weapons.cli.starter import write_starter
 from hitplanes.weapons.lab.demo import moments, write_demo, write_frames, write_gif
 from hitplanes.weapons.lab.stability.stability import load_study, run_stability
 from hitplanes.weapons.lab.study.study import Effort, write_study
-from hitplanes.weapons.replay.shot_log import orders_of
+from hitplanes.weapons.replay.shot_log import requests_of
 from hitplanes.weapons.replay.stream import Progress, fire_log
 
 GALLERY = Path(__file__).parents[1] / "fixtures" / "gallery"
@@ -421,7 +421,7 @@ NOT_YET = [
     pytest.param(lambda: weapon_from_json(DIGITS), "weapon: ", id="weapon, 5000 digits"),
     pytest.param(lambda: weapon_from_json(DEEP), "weapon: ", id="weapon, 10^5 deep"),
     pytest.param(lambda: weapon_from_json(deep_rounds(10**4)), "weapon: ", id="rounds 10^4 deep"),
-    pytest.param(lambda: arsenal_of(5), "scene: expected a Scene, got", id="arsenal of a number"),
+    pytest.param(lambda: weapons_of(5), "scene: expected a Scene, got", id="weapons of a number"),
     pytest.param(lambda: Scene(name=DIGITS), "name: ", id="name, 5000 digits"),  # type: ignore[arg-type]
     pytest.param(lambda: world().add(Sprite.circle(1), name=DEEP), "name: ", id="name, 10^5 deep"),  # type: ignore[arg-type]
     pytest.param(lambda: load_scene(DEEP), "folder: ", id="folder, 10^5 deep"),  # type: ignore[arg-type]
@@ -486,7 +486,7 @@ def in_file(**entry: Any) -> object:
 def ordered(**given: Any) -> object:
     scene = world()
     scene.shots = [{"weapon": "gun", "at": [1, 2], **given}]
-    return orders_of(scene, {"gun": Disc(3)})
+    return requests_of(scene, {"gun": Disc(3)})
 
 
 FIELDS: dict[str, tuple[Callable[[Any], object], str, tuple[Any, ...]]] = {
@@ -818,7 +818,7 @@ def test_other_calls_with_what_they_do_not_take() -> None:
     check(lambda: picture_of_report(report, scene, text=np.zeros(3)), "^text: ")  # type: ignore[arg-type]
     check(lambda: use_jit(np.zeros(3)), "^on: expected true or false, got ")  # type: ignore[arg-type]
     scene.weapons = [5]  # type: ignore[assignment]
-    check(lambda: arsenal_of(scene), "^weapons: expected an object, got ")
+    check(lambda: weapons_of(scene), "^weapons: expected an object, got ")
 
 
 @examples(30, deadline=None)

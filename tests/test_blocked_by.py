@@ -19,15 +19,15 @@ from hitplanes import (
     Scene,
     ShotRecord,
     Weapon,
-    arsenal_of,
     fire,
     load_scene,
     prepare,
     replay,
+    weapons_of,
 )
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.golden.file import golden_of, read_golden
-from hitplanes.weapons.replay.shot_log import ShotReader, fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import ShotReader, fire_request, requests_of
 from hitplanes.weapons.report.cards import shot_card
 from hitplanes.weapons.report.report import report_of
 
@@ -72,8 +72,8 @@ def ways(scene: Scene, weapon: str, how: dict[str, Any], folder: Path) -> Iterat
     yield "in the past", fire(history.at(0), fired, AT, **how)
     save(scene, folder, [{"weapon": weapon, "at": list(AT), **how}])
     loaded = load_scene(folder)
-    (order,) = orders_of(loaded, arsenal_of(loaded))
-    yield "from a file", fire_order(loaded, order)
+    (request,) = requests_of(loaded, weapons_of(loaded))
+    yield "from a file", fire_request(loaded, request)
 
 
 @pytest.mark.parametrize("weapon", WEAPONS)
@@ -103,7 +103,7 @@ def test_a_line_that_is_none_takes_nothing_from_those_before(tmp_path: Path) -> 
     scene = load_scene(tmp_path / "gate")
     shots = [{"weapon": "pistol", "at": list(AT), "accept": [], "blocked_by": ["wall"]} for _ in range(99)]
     lines = [json.dumps(shot).encode() for shot in shots]
-    salvo, error = ShotReader(scene, arsenal_of(scene), "shots.jsonl").read([*lines, b"{}"], 0)
+    salvo, error = ShotReader(scene, weapons_of(scene), "shots.jsonl").read([*lines, b"{}"], 0)
     assert error is not None and salvo.blocked_by.tolist() == [4] * 99 and salvo.accept.tolist() == [0] * 99
 
 
@@ -149,8 +149,8 @@ def test_what_was_written_with_one_filter_means_what_it_meant(tmp_path: Path) ->
     file = tmp_path / "gate" / "scene.json"
     file.write_text(file.read_text().replace("hitplanes-scene/2", "hitplanes-scene/1"))
     loaded = load_scene(tmp_path / "gate")
-    (order,) = orders_of(loaded, arsenal_of(loaded))
-    assert len(fire_order(loaded, order)) == 1
+    (request,) = requests_of(loaded, weapons_of(loaded))
+    assert len(fire_request(loaded, request)) == 1
     loaded.save(tmp_path / "again")
     assert json.loads((tmp_path / "again" / "scene.json").read_text())["shots"][0]["blocked_by"] == ["target"]
 

@@ -27,11 +27,11 @@ from hitplanes import (
     Spread,
     Sprite,
     Weapon,
-    arsenal_of,
     fire,
     load_scene,
+    weapons_of,
 )
-from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 from hitplanes.weapons.report.differences import decisive, differences
 from hitplanes.weapons.report.phrases import same
 from hitplanes.weapons.report.report import report_of
@@ -64,12 +64,14 @@ def told(scene: Scene, weapon: Weapon | None = None, at: object = (210, 110), **
 def reports() -> tuple[dict[str, Any], ...]:
     """Of every kind: the gallery's shots, rounds, a batch, a scene without bounds, one without shots."""
     gallery = load_scene(GALLERY)
-    orders = orders_of(gallery, arsenal_of(gallery))[:3]
+    requests = requests_of(gallery, weapons_of(gallery))[:3]
     rays = [fire(game(), Rounds(Spread(Laser(90), count=3, radius=20), count=2), (190, 110), toward=(240, 115))]
     free = Scene()
     free.add(Sprite.circle(4), (3, 3), name="ball")
     return (
-        report_of(gallery, [fire_order(gallery, order) for order in orders], [order.name for order in orders]),
+        report_of(
+            gallery, [fire_request(gallery, request) for request in requests], [request.name for request in requests]
+        ),
         told(game(), Rounds(Spread(Disc(3), count=6, radius=20), count=3), seed=5, exclude=[1]),
         told(game(), Disc(3), [(x, 110) for x in range(190, 220)]),
         told(free, Point(), (9, 3)),

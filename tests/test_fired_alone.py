@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ray_battles import some_battle as some_ray_battle
 from test_fire import Placements, expected, some_battle, told
-from test_ready import WEAPONS, changed, crowd, same
+from test_prepare import WEAPONS, changed, crowd, same
 
 from hitplanes import (
     ALL,

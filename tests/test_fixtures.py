@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Hits, Role, Scene, arsenal_of, fire, load_scene
+from hitplanes import Hits, Role, Scene, fire, load_scene, weapons_of
 from hitplanes.planes.bits.span_walk import Verdict
 from hitplanes.planes.files.png import read_png
 from hitplanes.planes.volumes.overlap import contains_point
@@ -20,7 +20,7 @@ from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.kinds.areas import KINDS, ray_parts_of
 from hitplanes.weapons.rays.contacts import Reason
 from hitplanes.weapons.rays.ray_hits import RayHits
-from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 
 ROOT = Path(__file__).parents[1]
 FIXTURES = ROOT / "fixtures"
@@ -35,7 +35,7 @@ def files_of(folder: Path) -> set[str]:
 
 def fired_at(scene: Scene) -> list[Hits]:
     """What the shots of a scene's file hit, shot by shot."""
-    return [fire_order(scene, order) for order in orders_of(scene, arsenal_of(scene))]
+    return [fire_request(scene, request) for request in requests_of(scene, weapons_of(scene))]
 
 
 def names_hit(hits: Hits, scene: Scene) -> list[str]:
@@ -195,8 +195,8 @@ def test_filters_refuse_whom_they_should(name: str, shot: int, reason: str, refu
 def test_gallery_has_what_a_first_scene_should_show() -> None:
     scene = load_scene(GALLERY)
     assert all(len(scene.ids(role)) for role in Role)
-    found = arsenal_of(scene), arsenal_of(load_scene(FIXTURES / "corridor"))
-    assert {weapon.kind for arsenal in found for weapon in arsenal.values()} == set(KINDS), "patterns, and rays"
+    found = weapons_of(scene), weapons_of(load_scene(FIXTURES / "corridor"))
+    assert {weapon.kind for weapons in found for weapon in weapons.values()} == set(KINDS), "patterns, and rays"
     assert 1 in scene.mask(scene.find("robot"))[0].sum(axis=1), "a mast of one pixel"
     hoop, _ = scene.mask(scene.find("hoop"))
     assert not hoop[hoop.shape[0] // 2, hoop.shape[1] // 2], "a ring with a hole"
@@ -217,10 +217,10 @@ def test_gallery_shots_show_every_outcome() -> None:
 
 def test_corridor_has_every_weapon_of_rays_and_what_they_are_for() -> None:
     scene = load_scene(FIXTURES / "corridor")
-    arsenal = arsenal_of(scene)
+    weapons = weapons_of(scene)
     assert all(len(scene.ids(role)) for role in Role)
-    assert {"pistol", "rifle", "laser", "projectile", "sweep", "spread", "rounds"} == {w.kind for w in arsenal.values()}
-    assert all(ray_parts_of(weapon) is not None for weapon in arsenal.values())
+    assert {"pistol", "rifle", "laser", "projectile", "sweep", "spread", "rounds"} == {w.kind for w in weapons.values()}
+    assert all(ray_parts_of(weapon) is not None for weapon in weapons.values())
     items = scene.items
     assert [items.cost[scene.find(name)] for name in ("guard 1", "partition", "armoured guard")] == [1, 4, 3]
     assert scene.mask(scene.find("drone"))[0].sum(axis=1).max() == 2, "thinner than an arrow flies in a frame"
@@ -236,11 +236,11 @@ def test_corridor_shots_end_for_every_reason() -> None:
         {Reason.BUDGET}, {Reason.HITS}, {Reason.HITS}, {Reason.OCCLUDER, Reason.RANGE},
         {Reason.HITS}, {Reason.RANGE}, {Reason.OCCLUDER}, {Reason.OCCLUDER},
     ]  # fmt: skip
-    (order,) = (o for o in orders_of(scene, arsenal_of(scene)) if o.name == "laser")
-    assert not order.blocked_by & scene.category_bits("glass")
-    through = fire(scene, order.weapon, order.at)
+    (request,) = (o for o in requests_of(scene, weapons_of(scene)) if o.name == "laser")
+    assert not request.blocked_by & scene.category_bits("glass")
+    through = fire(scene, request.weapon, request.at)
     assert scene.name_of(int(through.stop.item[0])) == "glass", "by itself a laser ends at the pane"
-    again = fire(scene, arsenal_of(scene)["arrow"], scene.shots[5]["at"])
+    again = fire(scene, weapons_of(scene)["arrow"], scene.shots[5]["at"])
     assert names_hit(again, scene) == ["drone"], "what the arrow that is tested once a frame flies through"
 
 
@@ -259,7 +259,7 @@ def test_targets_are_all_there_is() -> None:
 def test_empty_has_bounds_and_no_object() -> None:
     scene = load_scene(FIXTURES / "empty")
     assert len(scene) == 0 and scene.bounds is not None
-    assert {"point", "disc", "polygon", "beam", "spread", "rounds"} == {w.kind for w in arsenal_of(scene).values()}
+    assert {"point", "disc", "polygon", "beam", "spread", "rounds"} == {w.kind for w in weapons_of(scene).values()}
 
 
 def test_crowd_is_three_hundred_who_overlap() -> None:

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from oracle_png import CHANNELS, GREY, KINDS, PALETTE, RGB, SIGNATURE, chunk, chunks_of, joined, png, rgba
 
-from hitplanes import InputError, arsenal_of, load_scene, read_png
-from hitplanes.weapons.replay.shot_log import orders_of
+from hitplanes import InputError, load_scene, read_png, weapons_of
+from hitplanes.weapons.replay.shot_log import requests_of
 
 ROOT = Path(__file__).parents[1]
 GALLERY = ROOT / "fixtures" / "gallery"
@@ -116,7 +116,7 @@ def read_scene(folder: Path) -> bool:
     """Load a scene with its weapons and shots; False if that is refused."""
     try:
         scene = load_scene(folder)
-        orders_of(scene, arsenal_of(scene))
+        requests_of(scene, weapons_of(scene))
     except InputError as error:
         assert len(str(error)) < 20_000
         return False

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from hitplanes import Scene, arsenal_of, load_scene
+from hitplanes import Scene, load_scene, weapons_of
 from hitplanes.weapons.golden.__init__ import HitsGolden
 from hitplanes.weapons.rays.contacts import Reason
 from hitplanes.weapons.replay.record import ShotRecord, replay
-from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 
 FIXTURES = Path(__file__).parents[1] / "fixtures"
 SCENES = sorted(path.parent.name for path in FIXTURES.glob("*/scene.json"))
@@ -24,7 +24,7 @@ SCENES = sorted(path.parent.name for path in FIXTURES.glob("*/scene.json"))
 @pytest.mark.parametrize("name", SCENES)
 def test_fired_at(name: str, row: int, hits_golden: HitsGolden) -> None:
     scene = load_scene(FIXTURES / name)
-    hits_golden(fire_order(scene, orders_of(scene, arsenal_of(scene))[row]))
+    hits_golden(fire_request(scene, requests_of(scene, weapons_of(scene))[row]))
 
 
 RECORD = Path(__file__).parent / "goldens" / "corridor.jsonl"
@@ -38,7 +38,7 @@ NOT_GLASS = ["target", "friend", "wood"]
 def record_all(scene: Scene, path: Path) -> None:
     """Fire every weapon along every way."""
     with ShotRecord(path) as record:
-        for weapon in arsenal_of(scene).values():
+        for weapon in weapons_of(scene).values():
             for at, toward in WAYS:
                 record.fire(scene, weapon, at, toward=toward, accept=NOT_GLASS, blocked_by=NOT_GLASS, seed=5)
 
@@ -54,7 +54,7 @@ def test_weapons_of_rays_do_what_they_did(request: pytest.FixtureRequest) -> Non
 def test_the_record_has_every_weapon_way_and_end() -> None:
     scene = load_scene(FIXTURES / "corridor")
     lines = [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()[1:-1]]
-    fired = [(weapon.to_json(), list(at)) for weapon in arsenal_of(scene).values() for at, _ in WAYS]
+    fired = [(weapon.to_json(), list(at)) for weapon in weapons_of(scene).values() for at, _ in WAYS]
     assert [(line["weapon"], line["at"]) for line in lines] == fired
     reasons = {stop["reason"] for line in lines for stop in line["result"]["stops"]}
     assert reasons == {int(reason) for reason in Reason}

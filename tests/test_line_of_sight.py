@@ -35,7 +35,6 @@ from hitplanes import (
     Sprite,
     Verdict,
     Weapon,
-    arsenal_of,
     fire,
     fire_shots,
     load_scene,
@@ -43,6 +42,7 @@ from hitplanes import (
     prepare,
     replay,
     report_of,
+    weapons_of,
 )
 from hitplanes.planes.bits import shadows
 from hitplanes.planes.grid.spans import rectangles
@@ -436,7 +436,7 @@ def test_cover_in_files_logs_records_and_the_past(tmp_path: Path) -> None:
     loaded = load_scene(tmp_path / "street")
     (again,) = fire_shots(loaded)
     truth = fire(scene, weapon, (20, 15), seed=4)
-    assert again == truth and truth.verdict_counts()["occluded"] > 50 and arsenal_of(loaded)["bomb"] == weapon
+    assert again == truth and truth.verdict_counts()["occluded"] > 50 and weapons_of(loaded)["bomb"] == weapon
 
     with ShotRecord(tmp_path / "match.jsonl") as record:
         record.fire(scene, weapon, (20, 15), seed=4)

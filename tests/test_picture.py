@@ -24,12 +24,12 @@ from hitplanes import (
     Sprite,
     Sweep,
     Weapon,
-    arsenal_of,
     fire,
     load_scene,
+    weapons_of,
 )
 from hitplanes.planes.scene.render import blend, draw_view
-from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 from hitplanes.weapons.report.canvas import World, legend_of
 from hitplanes.weapons.report.picture import picture_of_report
 from hitplanes.weapons.report.report import report_of
@@ -43,8 +43,8 @@ def told(scene: Scene, *shots: tuple[Weapon, tuple[float, float]]) -> dict[str, 
 
 
 def gallery_report(scene: Scene, prefilter: str | None = None, broadphase: str | None = None) -> dict[str, Any]:
-    orders = orders_of(scene, arsenal_of(scene))
-    fired, names = [fire_order(scene, order) for order in orders], [order.name for order in orders]
+    requests = requests_of(scene, weapons_of(scene))
+    fired, names = [fire_request(scene, request) for request in requests], [request.name for request in requests]
     return report_of(scene, fired, names, prefilter=prefilter, broadphase=broadphase)
 
 
@@ -81,11 +81,11 @@ def small_scene() -> tuple[Scene, int]:
 
 def test_facts_agree_with_the_hits() -> None:
     scene = load_scene(GALLERY)
-    orders = orders_of(scene, arsenal_of(scene))
-    fired = [fire_order(scene, order) for order in orders]
-    report = report_of(scene, fired, [order.name for order in orders])
+    requests = requests_of(scene, weapons_of(scene))
+    fired = [fire_request(scene, request) for request in requests]
+    report = report_of(scene, fired, [request.name for request in requests])
     assert json.loads(json.dumps(report)) == report
-    for told, given, hits in zip(report["shots"], orders, fired, strict=True):
+    for told, given, hits in zip(report["shots"], requests, fired, strict=True):
         assert (told["weapon"], tuple(told["at"]), told["seed"]) == (given.name, given.at, given.seed)
         assert [row["object"] for row in told["rows"]] == hits.object.tolist()
         assert told["verdicts"] == hits.verdict_counts(0)
@@ -158,7 +158,7 @@ def test_text_is_a_layer_of_its_own() -> None:
 )
 def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
     scene = load_scene(GALLERY)
-    weapons = arsenal_of(scene)
+    weapons = weapons_of(scene)
     reports = {
         "shots": lambda: gallery_report(scene),
         "circles": lambda: gallery_report(scene, "circle", "quadtree"),

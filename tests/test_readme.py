@@ -33,13 +33,13 @@ from guides import (
 )
 from some_of import some_of
 
-from hitplanes import arsenal_of, load_scene
+from hitplanes import load_scene, weapons_of
 from hitplanes.planes.files.png import read_png
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.fire.prefilter import PREFILTERS
 from hitplanes.weapons.fire.strategy import BROADPHASES
 from hitplanes.weapons.kinds.areas import KINDS
-from hitplanes.weapons.replay.shot_log import fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import fire_request, requests_of
 
 README_LINES, GUIDE_LINES = 250, 299
 
@@ -238,8 +238,8 @@ def test_every_fixture_is_named() -> None:
 def test_scene_example_loads_and_hits(tmp_path: Path) -> None:
     (tmp_path / "scene.json").write_text(blocks(section(WORLD, "The scene folder"), "json")[0])
     scene = load_scene(tmp_path)
-    (order,) = orders_of(scene, arsenal_of(scene))
-    assert [scene.name_of(row.object) for row in fire_order(scene, order)] == ["duck"]
+    (request,) = requests_of(scene, weapons_of(scene))
+    assert [scene.name_of(row.object) for row in fire_request(scene, request)] == ["duck"]
 
 
 def test_every_weapon_and_its_fields_are_told() -> None:

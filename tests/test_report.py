@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Beam, Disc, InputError, Laser, Point, Scene, Spread, Sprite, arsenal_of, fire, load_scene
+from hitplanes import Beam, Disc, InputError, Laser, Point, Scene, Spread, Sprite, fire, load_scene, weapons_of
 from hitplanes import Box as WeaponBox
 from hitplanes.weapons.report.canvas import World, heat_step, plain
 from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
@@ -85,7 +85,7 @@ def test_up_to_so_many_shots_are_told_one_by_one() -> None:
 def test_a_batch_tells_every_row_and_each_object() -> None:
     scene = load_scene(GALLERY)
     rng = np.random.default_rng(5)
-    weapons = arsenal_of(scene)
+    weapons = weapons_of(scene)
     fired = [fire(scene, weapons[n], rng.uniform(0, 300, (40, 2)), seed=3) for n in ("shotgun", "burst")]
     report = report_of(scene, fired, ["shotgun", "burst"])
     assert json.loads(json.dumps(report)) == report
@@ -218,7 +218,7 @@ def test_labels_cover_no_sample_no_target_and_no_label(factor: int) -> None:
 
 def test_labels_of_the_gallery_cover_nothing() -> None:
     scene = load_scene(GALLERY)
-    weapons = arsenal_of(scene)
+    weapons = weapons_of(scene)
     fired = [fire(scene, weapons[n], (390, 110)) for n in ("blast", "shotgun")]
     fired.append(fire(scene, weapons["flame"], (356, 232), aim=-24))
     texts = [text.text for text in overlaid(scene, report_of(scene, fired), 3).texts]

@@ -17,7 +17,7 @@ from examples import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from hitplanes import Disc, InputError, Rounds, Spread, arsenal_of, fire, load_scene, report_of, weapon_from_json
+from hitplanes import Disc, InputError, Rounds, Spread, fire, load_scene, report_of, weapon_from_json, weapons_of
 from hitplanes.planes.common.tables import (
     Const,
     Either,
@@ -41,7 +41,7 @@ from hitplanes.planes.common.tables import (
 from hitplanes.planes.files.scene_folder import SCENE
 from hitplanes.weapons.cli.report_file import REPORT, read_report
 from hitplanes.weapons.kinds.areas import KINDS
-from hitplanes.weapons.replay.shot_log import SHOT, fire_order, orders_of
+from hitplanes.weapons.replay.shot_log import SHOT, fire_request, requests_of
 
 ROOT = Path(__file__).parents[1]
 SCENES = sorted(path.parent.name for path in (ROOT / "fixtures").glob("*/scene.json"))
@@ -175,11 +175,11 @@ def test_every_fixture_is_valid(name: str) -> None:
     data = json.loads((ROOT / "fixtures" / name / "scene.json").read_text())
     VALIDATORS["scene"].validate(data)
     scene = load_scene(ROOT / "fixtures" / name)
-    orders = orders_of(scene, arsenal_of(scene))
+    requests = requests_of(scene, weapons_of(scene))
     for shot in data["shots"]:
         VALIDATORS["shot"].validate(shot)
-    fired = [fire_order(scene, order) for order in orders]
-    report = report_of(scene, fired, [order.name for order in orders])
+    fired = [fire_request(scene, request) for request in requests]
+    report = report_of(scene, fired, [request.name for request in requests])
     VALIDATORS["report"].validate(report)
     REPORT.check("report", json.loads(json.dumps(report)))
 
@@ -187,7 +187,7 @@ def test_every_fixture_is_valid(name: str) -> None:
 def test_a_batch_report_is_valid() -> None:
     scene = load_scene(ROOT / "fixtures" / "gallery")
     at = np.random.default_rng(3).uniform(-20, 500, (60, 2))
-    report = report_of(scene, [fire(scene, arsenal_of(scene)["shotgun"], at)])
+    report = report_of(scene, [fire(scene, weapons_of(scene)["shotgun"], at)])
     VALIDATORS["report"].validate(report)
     REPORT.check("report", json.loads(json.dumps(report)))
 
@@ -263,7 +263,7 @@ def test_what_the_schema_of_a_shot_refuses_is_refused() -> None:
 
 def test_what_the_schema_of_a_report_refuses_is_refused() -> None:
     scene = load_scene(ROOT / "fixtures" / "gallery")
-    weapons = arsenal_of(scene)
+    weapons = weapons_of(scene)
     fired = [
         fire(scene, weapons["blast"], (390, 110), accept=["target"]),
         fire(scene, weapons["point"], [(62, 86)] * 30),
@@ -284,7 +284,7 @@ def test_what_the_schema_of_a_scene_refuses_is_refused(count: int, tmp_path: Pat
     def load(value: Any) -> None:
         (tmp_path / "scene.json").write_text(json.dumps(value))
         loaded = load_scene(tmp_path)
-        orders_of(loaded, arsenal_of(loaded))
+        requests_of(loaded, weapons_of(loaded))
 
     for _ in range(count):
         agree(SCHEMAS["scene"], changed(scene, rng), load)
@@ -293,7 +293,7 @@ def test_what_the_schema_of_a_scene_refuses_is_refused(count: int, tmp_path: Pat
 
 def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
     scene = load_scene(ROOT / "fixtures" / "gallery")
-    report = report_of(scene, [fire(scene, arsenal_of(scene)["point"], (62, 86))])
+    report = report_of(scene, [fire(scene, weapons_of(scene)["point"], (62, 86))])
     path = tmp_path / "r.json"
     path.write_text(json.dumps(report))
     assert read_report(path) == report
@@ -306,7 +306,7 @@ def test_a_report_is_read_and_named_when_it_is_bad(tmp_path: Path) -> None:
         path.write_text(json.dumps({**report, key: value}))
         with pytest.raises(InputError, match=message):
             read_report(path)
-    batch = report_of(scene, [fire(scene, arsenal_of(scene)["point"], [(62, 86)] * 30)])
+    batch = report_of(scene, [fire(scene, weapons_of(scene)["point"], [(62, 86)] * 30)])
     batch["batch"]["heat"]["counts"]["hit"][0][3] = 0
     path.write_text(json.dumps(batch))
     with pytest.raises(InputError, match="batch: heat: counts: hit: expected counts from 1, got 0"):

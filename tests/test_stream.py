@@ -26,10 +26,10 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from some_of import in_turn, some_of
 
-from hitplanes import InputError, RayHits, Reason, Scene, arsenal_of, load_scene
+from hitplanes import InputError, RayHits, Reason, Scene, load_scene, weapons_of
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.replay import shot_log, stream
-from hitplanes.weapons.replay.shot_log import LINE_MAX, fire_order, order_from_json
+from hitplanes.weapons.replay.shot_log import LINE_MAX, fire_request, request_from_json
 from hitplanes.weapons.replay.stream import Progress
 
 ROOT = Path(__file__).parents[1]
@@ -37,7 +37,7 @@ GALLERY = ROOT / "fixtures" / "gallery"
 COMMAND = [sys.executable, "-W", "error", "-m", "hitplanes", "fire"]
 
 scene = load_scene(GALLERY)
-arsenal = arsenal_of(scene)
+weapons = weapons_of(scene)
 
 
 def line_of(shot: Any) -> bytes:
@@ -62,12 +62,12 @@ def answers_of(lines: bytes, folder: Path) -> list[dict[str, Any]]:
 
 def alone(data: Any, number: int, scene: Scene = scene) -> dict[str, Any]:
     """What one shot answers, fired by itself."""
-    order = order_from_json(data, scene, arsenal, number=number)
-    hits = fire_order(scene, order)
+    request = request_from_json(data, scene, weapons, number=number)
+    hits = fire_request(scene, request)
     rows = [
         [r.object, r.round, r.samples, r.pixels, r.weight, r.pellets, *r.first_xy, r.distance2] for r in hits
     ]  # fmt: skip
-    return {"shot": order.shot, "rows": rows, "verdicts": list(hits.verdict_counts().values())}
+    return {"shot": request.shot, "rows": rows, "verdicts": list(hits.verdict_counts().values())}
 
 
 # The same answers as shot by shot
@@ -75,7 +75,7 @@ def alone(data: Any, number: int, scene: Scene = scene) -> dict[str, Any]:
 coordinate = st.one_of(st.integers(-20, 500), st.floats(-20, 500).map(lambda v: round(v, 3)))
 point = st.lists(coordinate, min_size=2, max_size=2)
 usual = st.fixed_dictionaries(
-    {"weapon": st.sampled_from(sorted(arsenal)), "at": point},
+    {"weapon": st.sampled_from(sorted(weapons)), "at": point},
     optional={
         "accept": st.lists(st.sampled_from(scene.categories), unique=True),
         "blocked_by": st.lists(st.sampled_from(scene.categories), unique=True),
@@ -137,7 +137,7 @@ def test_usual_lines_are_read_together_and_an_unusual_one_only_with_its_neighbou
 
     monkeypatch.setattr(shot_log.ShotReader, "_one_by_one", counted)
     shots: list[Any] = [{"weapon": "point", "at": [i, i], "accept": ["target"], "exclude": [3]} for i in range(256)]
-    reader = shot_log.ShotReader(scene, arsenal, "log")
+    reader = shot_log.ShotReader(scene, weapons, "log")
     bodies = [json.dumps(shot).encode() for shot in shots]
     assert reader.read(bodies, 0)[0].number.tolist() == list(range(256)) and not read
     bodies[77] += b" "
@@ -242,7 +242,7 @@ def table_of(columns: Any, names: list[str]) -> list[list[float]]:
 @pytest.mark.parametrize("chunk", [1, 7, 1024])
 def test_lines_of_rays_answer_what_their_shots_answer_alone(chunk: int, armed: Path, tmp_path: Path) -> None:
     world = load_scene(armed)
-    weapons = arsenal_of(world)
+    weapons = weapons_of(world)
     shots = mixed(60)
     log, output = tmp_path / "shots.jsonl", tmp_path / "hits.jsonl"
     log.write_bytes(b"".join(map(line_of, shots)))
@@ -253,10 +253,10 @@ def test_lines_of_rays_answer_what_their_shots_answer_alone(chunk: int, armed: P
     assert header["reasons"] == [reason.name.lower() for reason in Reason]
     kinds = {"rays": 0, "patterns": 0, "passes": 0}
     for number, (shot, answer) in enumerate(zip(shots, answers, strict=True)):
-        order = order_from_json(shot, world, weapons, number=number)
-        hits = fire_order(world, order)
+        request = request_from_json(shot, world, weapons, number=number)
+        hits = fire_request(world, request)
         rows = [[r.object, r.round, r.samples, r.pixels, r.weight, r.pellets, *r.first_xy, r.distance2] for r in hits]
-        expected: dict[str, Any] = {"shot": order.shot, "of": f"{zlib.crc32(json.dumps(shot).encode()):08x}"}
+        expected: dict[str, Any] = {"shot": request.shot, "of": f"{zlib.crc32(json.dumps(shot).encode()):08x}"}
         expected["rows"] = rows
         if isinstance(hits, RayHits):
             expected["passes"] = table_of(hits.passes, header["passes"])
@@ -438,7 +438,7 @@ def test_a_line_may_be_as_long_as_the_limit(tmp_path: Path) -> None:
     assert len(answers_of(body + b"\r\n" + body, tmp_path)) == 2
 
 
-# Another log, scene or arsenal
+# Another log, scene or weapons
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_bounding import holds
+from test_bounding_volumes import holds
 
 from hitplanes import Scene, Sprite
 from hitplanes.planes.common.checks import InputError

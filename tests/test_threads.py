@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from test_bitfire import some_scene, some_shots
+from test_areas import some_scene, some_shots
 
 from hitplanes import Disc, InputError, Point, Rounds, Spread, Stencil, Weapon, fire, use_jit, use_threads
 from hitplanes.planes.common import backend

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from bench.schemas import schemas
 from some_of import some_of
-from test_arsenal import EVERY
+from test_weapons import EVERY
 
 from hitplanes import (
     ALL,
@@ -34,16 +34,16 @@ from hitplanes import (
     Sprite,
     Sweep,
     Weapon,
-    arsenal_of,
     fire,
     fire_shots,
     load_scene,
     prepare,
     report_of,
+    weapons_of,
 )
 from hitplanes.planes.grid.fixed_point import unit_of
 from hitplanes.weapons.cli.command import main
-from hitplanes.weapons.replay.shot_log import orders_of
+from hitplanes.weapons.replay.shot_log import requests_of
 from hitplanes.weapons.replay.stream import Progress, fire_log
 
 ROOT = Path(__file__).parents[1]
@@ -198,7 +198,7 @@ def test_shots_of_the_past_are_saved_with_their_scene(tmp_path: Path) -> None:
 def test_the_command_reports_what_was_found_in_python(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = load_scene(ROOT / "fixtures" / "gallery")
     scene.shots.clear()
-    weapons = [Disc(21), Disc(8), arsenal_of(scene)["beam"], Disc(21), Laser(200)]
+    weapons = [Disc(21), Disc(8), weapons_of(scene)["beam"], Disc(21), Laser(200)]
     for weapon in weapons:
         scene.shots.append(fire(scene, weapon, (170, 150), aim=12).to_shot())
     scene.weapons["disc"] = Disc(5).to_json()  # the name of its kind is taken
@@ -264,7 +264,7 @@ def test_bad_weapons_of_a_shot_are_named(weapon: object, told: str) -> None:
     with pytest.raises(InputError, match=told):
         fire_shots(scene)
     with pytest.raises(InputError, match=told):
-        orders_of(scene, arsenal_of(scene))
+        requests_of(scene, weapons_of(scene))
 
 
 @pytest.mark.parametrize("categories", [[], ["a"], CATEGORIES, ["bit 4", "bit 4'", "bit 3"]])

@@ -18,7 +18,7 @@ import json
 from pathlib import Path
 import numpy as np
 from hitplanes import (
-    Disc, History, Laser, Pistol, Projectile, Rifle, Scene, ShotRecord, Spread, Sprite, arsenal_of, fire, load_scene,
+    Disc, History, Laser, Pistol, Projectile, Rifle, Scene, ShotRecord, Spread, Sprite, weapons_of, fire, load_scene,
     prepare, replay, report_of,
 )
 
@@ -55,7 +55,7 @@ weapons = {"a": {"kind": "disc", "radius": 5}}
 told = {"format": "hitplanes-scene/2", "objects": objects, "weapons": weapons}
 Path("plain").mkdir()
 Path("plain/scene.json").write_text(json.dumps(told))
-assert len(fire(load_scene("plain"), arsenal_of(load_scene("plain"))["a"], (30, 30))) == 1
+assert len(fire(load_scene("plain"), weapons_of(load_scene("plain"))["a"], (30, 30))) == 1
 """
 
 

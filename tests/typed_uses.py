@@ -25,17 +25,17 @@ from hitplanes import (
     Spread,
     Sweep,
     Weapon,
-    arsenal_of,
     fire,
     fire_shots,
     prepare,
     scan,
     sees,
+    weapons_of,
 )
 
 scene = Scene((90, 60), categories=["tank"])
 tank = scene.add(np.ones((4, 4), np.bool_), (9, 9))
-ONE: Weapon = arsenal_of(scene)["gun"]
+ONE: Weapon = weapons_of(scene)["gun"]
 
 # The answer of rays has what rays have.
 assert_type(fire(scene, Disc(3), (5, 5)), Hits)

@@ -56,7 +56,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "Weapons of patterns": ("Point", "Disc", "Ring", "Box", "Polygon", "Cone", "Beam", "Stencil"),
     "Weapons of rays": ("Pistol", "Rifle", "Laser", "Projectile", "Sweep"),
-    "Weapons of other weapons, and their JSON": ("Spread", "Rounds", "Weapon", "arsenal_of", "weapon_from_json"),
+    "Weapons of other weapons, and their JSON": ("Spread", "Rounds", "Weapon", "weapons_of", "weapon_from_json"),
     "The past, and records": ("History", "PastScene", "FixedStep", "ShotRecord", "replay"),
     "Reports": ("report_of", "picture_of_report"),
     "The process": ("use_jit", "warm_up", "use_threads", "__version__"),

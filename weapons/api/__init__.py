@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from hitplanes.weapons.kinds.areas import Rounds as Rounds
     from hitplanes.weapons.kinds.areas import Spread as Spread
     from hitplanes.weapons.kinds.areas import Stencil as Stencil
-    from hitplanes.weapons.kinds.areas import arsenal_of as arsenal_of
     from hitplanes.weapons.kinds.areas import weapon_from_json as weapon_from_json
+    from hitplanes.weapons.kinds.areas import weapons_of as weapons_of
     from hitplanes.weapons.kinds.rays import Laser as Laser
     from hitplanes.weapons.kinds.rays import Pistol as Pistol
     from hitplanes.weapons.kinds.rays import Projectile as Projectile
@@ -79,7 +79,7 @@ _HOME = {
         "weapons.kinds.weapon": "Weapon",
         "weapons.kinds.rays": "Laser Pistol Projectile Rifle Sweep",
         "weapons.kinds.areas": (
-            "Beam Box Cone Disc Point Polygon Ring Rounds Spread Stencil arsenal_of weapon_from_json"
+            "Beam Box Cone Disc Point Polygon Ring Rounds Spread Stencil weapons_of weapon_from_json"
         ),
         "weapons.fire.call": "fire",
         "weapons.fire.hits": "Hits",

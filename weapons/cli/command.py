@@ -22,8 +22,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Hits
 from ..fire.plan import PlanSum, plan_lines
-from ..kinds.areas import arsenal_of
-from ..replay.shot_log import ShotRequest, fire_order, order_from_json, orders_of
+from ..kinds.areas import weapons_of
+from ..replay.shot_log import ShotRequest, fire_request, request_from_json, requests_of
 from ..replay.stream import Progress, fire_log
 from ..report.cards import place_text
 from ..report.differences import differences
@@ -357,11 +357,11 @@ def report(arguments: argparse.Namespace) -> None:
     _check_outputs(arguments.output, file)
     scene = load_scene(arguments.scene)
     _check_not_of_scene(scene, arguments.scene, arguments.output, file)
-    orders = _orders(arguments, scene)
+    requests = _requests(arguments, scene)
     how = {"prefilter": arguments.prefilter, "broadphase": arguments.broadphase}
     asked = {name: value for name, value in how.items() if value is not None}
-    fired = [fire_order(scene, order, **asked) for order in orders]
-    facts = report_of(scene, fired, [order.name for order in orders], **asked)
+    fired = [fire_request(scene, request, **asked) for request in requests]
+    facts = report_of(scene, fired, [request.name for request in requests], **asked)
     write_png(arguments.output, picture_of_report(facts, scene))
     text = json.dumps(facts, indent=1) + "\n"
     if file is not None:
@@ -374,16 +374,16 @@ def report(arguments: argparse.Namespace) -> None:
         _print_hits(facts, fired if arguments.plan else [])
 
 
-def _orders(arguments: argparse.Namespace, scene: Scene) -> list[ShotRequest]:
+def _requests(arguments: argparse.Namespace, scene: Scene) -> list[ShotRequest]:
     """Return the shots of the scene's file, or the one of the command line."""
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
-        arsenal = arsenal_of(scene)
+        weapons = weapons_of(scene)
         if all(getattr(arguments, name) is None for name in ("weapon", "at", "aim", "toward", "seed")):
-            return orders_of(scene, arsenal)
+            return requests_of(scene, weapons)
     if arguments.weapon is None:
         given = next(name for name in ("at", "aim", "toward", "seed") if getattr(arguments, name) is not None)
         raise InputError(f"--{given}: expected only together with --weapon, got no weapon")
-    return [order_from_json(_shot(arguments), scene, arsenal, "command line")]
+    return [request_from_json(_shot(arguments), scene, weapons, "command line")]
 
 
 def _print_hits(facts: Mapping[str, Any], planned: Sequence[Hits]) -> None:
@@ -412,7 +412,7 @@ def fire(arguments: argparse.Namespace) -> None:
     check_output(arguments.output)
     scene = load_scene(arguments.scene)
     with within(str(scene_folder(arguments.scene) / FILE_NAME)):
-        arsenal_of(scene)
+        weapons_of(scene)
     done = fire_log(scene, arguments.shots, arguments.output, Progress(sys.stderr))
     _say(f"{done.shots} shots, {done.hit} hit something, in {arguments.output}")
     if arguments.plan:

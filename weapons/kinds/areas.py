@@ -520,7 +520,7 @@ def weapon_from_json(data: object, name: str = "weapon", kinds: tuple[type, ...]
         return kind(**values)
 
 
-def arsenal_of(scene: Scene) -> dict[str, Weapon]:
+def weapons_of(scene: Scene) -> dict[str, Weapon]:
     """Weapons of a scene's file, by name."""
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")

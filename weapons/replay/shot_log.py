@@ -33,7 +33,7 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire
 from ..fire.hits import Hits
-from ..kinds.areas import arsenal_of, has_no_range, weapon_from_json
+from ..kinds.areas import has_no_range, weapon_from_json, weapons_of
 from ..kinds.placements import Shots, Words
 from ..kinds.weapon import Weapon
 
@@ -76,13 +76,13 @@ class ShotRequest:
     shot: int = 0
 
 
-def orders_of(scene: Scene, arsenal: Mapping[str, Weapon]) -> list[ShotRequest]:
+def requests_of(scene: Scene, weapons: Mapping[str, Weapon]) -> list[ShotRequest]:
     """Return the shots of a scene's file; a shot without a number gets its index."""
-    return [order_from_json(data, scene, arsenal, f"shots[{row}]", row) for row, data in enumerate(scene.shots)]
+    return [request_from_json(data, scene, weapons, f"shots[{row}]", row) for row, data in enumerate(scene.shots)]
 
 
-def order_from_json(
-    data: object, scene: Scene, arsenal: Mapping[str, Weapon], place: str = "shot", number: int = 0
+def request_from_json(
+    data: object, scene: Scene, weapons: Mapping[str, Weapon], place: str = "shot", number: int = 0
 ) -> ShotRequest:
     """Check one shot, given as JSON; an InputError names its place and the field.
 
@@ -90,8 +90,8 @@ def order_from_json(
     """
     with within(place):
         shot = SHOT.check("shot", data)
-        name = None if isinstance(shot["weapon"], Weapon) else choice("weapon", shot["weapon"], arsenal)
-        weapon: Weapon = shot["weapon"] if name is None else arsenal[name]
+        name = None if isinstance(shot["weapon"], Weapon) else choice("weapon", shot["weapon"], weapons)
+        weapon: Weapon = shot["weapon"] if name is None else weapons[name]
         _check_aim(weapon, shot)
         accept, blocked_by = (
             scene.category_bits(*shot[key], field=key) if key in shot else ALL for key in ("accept", "blocked_by")
@@ -112,16 +112,16 @@ def _check_aim(weapon: Weapon, shot: Mapping[str, Any]) -> None:
         raise InputError("toward: expected a point, as the weapon has no range, got none")
 
 
-def fire_order(scene: Scene, order: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
+def fire_request(scene: Scene, request: ShotRequest, prefilter: str = "auto", broadphase: str = "auto") -> Hits:
     """Fire one shot; the pre-filter and the broad phase are those of `fire`."""
-    alike = {name: getattr(order, name) for name in ("at", "aim", "toward", "accept", "blocked_by", "seed")}
+    alike = {name: getattr(request, name) for name in ("at", "aim", "toward", "accept", "blocked_by", "seed")}
     how: dict[str, Any] = {
-        "exclude": order.exclude or None,
-        "shot": [order.shot],
+        "exclude": request.exclude or None,
+        "shot": [request.shot],
         "prefilter": prefilter,
         "broadphase": broadphase,
     }
-    return fire(scene, order.weapon, **alike, **how)
+    return fire(scene, request.weapon, **alike, **how)
 
 
 def fire_shots(scene: Scene) -> list[Hits]:
@@ -132,16 +132,16 @@ def fire_shots(scene: Scene) -> list[Hits]:
     InputError
         If a weapon or a shot is invalid; the text names its place and the field.
     """
-    return [fire_order(scene, order) for order in orders_of(scene, arsenal_of(scene))]
+    return [fire_request(scene, request) for request in requests_of(scene, weapons_of(scene))]
 
 
 def shot_json(weapon: Weapon, shot: Shots, scene: Scene, stack: Stack) -> dict[str, Any]:
-    """One shot, a batch of one, as a scene file has it: the inverse of `order_from_json`.
+    """One shot, a batch of one, as a scene file has it: the inverse of `request_from_json`.
 
     Defaults are left out, but for the number, and so are excluded owners that own nothing of the stack that was fired
     at, as a file need not have their ids. The scene is asked for its weapons and names.
     """
-    name = next((name for name, other in arsenal_of(scene).items() if other == weapon), None)
+    name = next((name for name, other in weapons_of(scene).items() if other == weapon), None)
     aimed: dict[str, Any] = {}
     if shot.aim is not None:
         (aim,) = shot.aim.tolist()
@@ -226,18 +226,18 @@ class Salvo:
         return cls(*whole)
 
     @classmethod
-    def of_orders(cls, orders: Sequence[ShotRequest]) -> Salvo:
+    def of_requests(cls, requests: Sequence[ShotRequest]) -> Salvo:
         """Return the columns of checked shots."""
         return cls(
-            [order.weapon for order in orders],
-            np.array([order.at for order in orders], np.float64).reshape(-1, 2),
-            np.array([order.aim or 0.0 for order in orders], np.float64),
-            np.array([order.toward or NOWHERE for order in orders], np.float64).reshape(-1, 2),
-            np.array([order.accept for order in orders], np.int64),
-            np.array([order.blocked_by for order in orders], np.int64),
-            [order.exclude for order in orders],
-            np.array([order.seed for order in orders], np.uint64),
-            np.array([order.shot for order in orders], np.int64),
+            [request.weapon for request in requests],
+            np.array([request.at for request in requests], np.float64).reshape(-1, 2),
+            np.array([request.aim or 0.0 for request in requests], np.float64),
+            np.array([request.toward or NOWHERE for request in requests], np.float64).reshape(-1, 2),
+            np.array([request.accept for request in requests], np.int64),
+            np.array([request.blocked_by for request in requests], np.int64),
+            [request.exclude for request in requests],
+            np.array([request.seed for request in requests], np.uint64),
+            np.array([request.shot for request in requests], np.int64),
         )
 
 
@@ -260,10 +260,10 @@ def body_of(line: bytes) -> bytes:
 
 
 class ShotReader:
-    """Reader of the lines of a log for one scene and its arsenal; `name` is that of the log in errors."""
+    """Reader of the lines of a log for one scene and its weapons; `name` is that of the log in errors."""
 
-    def __init__(self, scene: Scene, arsenal: Mapping[str, Weapon], name: str) -> None:
-        self.scene, self.arsenal, self._name = scene, arsenal, name
+    def __init__(self, scene: Scene, weapons: Mapping[str, Weapon], name: str) -> None:
+        self.scene, self.weapons, self._name = scene, weapons, name
         self._bits = {category: 1 << bit for bit, category in enumerate(scene.categories)}
         self._owners: dict[int | str, int] = {item: item for item in range(scene.items.count)}
         names = Counter(scene.items.names[item] for item in scene.ids().tolist())
@@ -294,15 +294,15 @@ class ShotReader:
 
     def _one_by_one(self, bodies: list[bytes], first: int) -> tuple[Salvo, InputError | None]:
         """Check each line by the rules for a scene's shots, which name the error."""
-        orders: list[ShotRequest] = []
+        requests: list[ShotRequest] = []
         for number, body in enumerate(bodies, first):
             try:
                 with within(self.place(number)):
                     data = _parsed(body)
-                orders.append(order_from_json(data, self.scene, self.arsenal, self.place(number), number))
+                requests.append(request_from_json(data, self.scene, self.weapons, self.place(number), number))
             except InputError as error:
-                return Salvo.of_orders(orders), error
-        return Salvo.of_orders(orders), None
+                return Salvo.of_requests(requests), error
+        return Salvo.of_requests(requests), None
 
     def _together(self, bodies: list[bytes], first: int) -> Salvo:
         """Check the types and ranges of whole columns at once; raise any error if a line is unusual."""
@@ -313,7 +313,7 @@ class ShotReader:
         points = np.full((len(shots), 2), np.nan)
         points[aimed] = _points([point for point in toward if point is not None])
         return Salvo(
-            [self.arsenal[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots],
+            [self.weapons[gun] if type(gun := shot["weapon"]) is str else weapon_from_json(gun) for shot in shots],
             _points([shot["at"] for shot in shots]),
             _numbers([0.0 if angle is None else angle for angle in aim], AIM_MAX),
             points,

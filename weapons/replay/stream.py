@@ -34,7 +34,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.call import fire
 from ..fire.hits import Hits
 from ..fire.plan import PlanSum
-from ..kinds.areas import arsenal_of
+from ..kinds.areas import weapons_of
 from ..kinds.placements import ShotColumns
 from ..rays.contacts import Reason
 from ..rays.ray_hits import RayHits
@@ -326,7 +326,7 @@ def fire_log(scene: Scene, log: Path, output: Path, progress: Progress) -> Strea
         With a message that the part is kept.
     """
     log, output = path_of("log", log), path_of("output", output)
-    reader = ShotReader(scene, arsenal_of(scene), str(log))
+    reader = ShotReader(scene, weapons_of(scene), str(log))
     with _opened(log) as lines:
         _check_places(lines, output)
         with Part(output, _header(scene, reader)) as part:
@@ -376,7 +376,7 @@ def _header(scene: Scene, reader: ShotReader) -> bytes:
         "scene": scene.content_hash(),
         "name": scene.name,
         "names": _hash([scene.categories, words]),
-        "weapons": _hash({name: weapon.to_json() for name, weapon in reader.arsenal.items()}),
+        "weapons": _hash({name: weapon.to_json() for name, weapon in reader.weapons.items()}),
         "columns": COLUMNS,
         "verdicts": [verdict.name.lower() for verdict in OF_PATTERNS],
         "passes": PASSES,

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hitplanes import Disc, Laser, Point, Scene, Spread, Sprite, arsenal_of, fire, load_scene, read_png, report_of
+from hitplanes import Disc, Laser, Point, Scene, Spread, Sprite, fire, load_scene, read_png, report_of, weapons_of
 from hitplanes.weapons.cli.command import main
 from hitplanes.weapons.cli.report_file import read_report
 from hitplanes.weapons.report.canvas import factor_of
@@ -119,7 +119,7 @@ def test_odd_reports_have_a_picture(far: int) -> None:
 
 def test_compare_tells_by_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = load_scene(GALLERY)
-    weapons = arsenal_of(scene)
+    weapons = weapons_of(scene)
     paths = [tmp_path / name for name in ("a.json", "b.json")]
     paths[0].write_text(json.dumps(report_of(scene, [fire(scene, weapons["blast"], (390, 110))])))
     scene.move(scene.find("bandit"), (369.5, 111.5))

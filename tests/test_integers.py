@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_bitfire import some_scene, some_shots
+from test_areas import some_scene, some_shots
 
 from hitplanes import Box, Disc, Rounds, Scene, Sprite, Stencil, Weapon, fire, prepare, use_jit
 from hitplanes.planes.bits.tiles import BigTiles, big_pattern

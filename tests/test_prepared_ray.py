@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from ray_battles import some_battle
 from some_of import some_of
 from test_march import single
-from test_ready import changed, crowd, same
+from test_prepare import changed, crowd, same
 
 from hitplanes import (
     Hits,
