@@ -1,4 +1,4 @@
-"""What can be seen is composed, and listed by cells, when shots have lost as much without it; the rows are the same."""
+"""What can be seen is made, and listed by cells, when shots have lost as much without it; the rows are the same."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hitplanes import Beam, Disc, Scene, fire
+from hitplanes import Beam, Disc, Scene, Sprite, fire
 from hitplanes.planes.bits import visible
+from hitplanes.planes.bits.tiles import tiles_in
 from hitplanes.planes.bits.visible import WITHOUT_MOST, View, VisibleSet
 from hitplanes.planes.common.limits import EVERYTHING
 from hitplanes.planes.scene.derived import VIEWS_MOST
@@ -27,8 +28,8 @@ def crowd(count: int = 60, corner: tuple[int, int] = (0, 0)) -> Scene:
 
 
 @pytest.fixture
-def composed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
-    """The views of what is composed during a test."""
+def made_sets(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
+    """Views of the visible sets that are made during a test."""
     made: list[View] = []
     begin = VisibleSet.__init__
 
@@ -41,7 +42,7 @@ def composed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[View]]:
 
 
 @pytest.mark.parametrize("more", [0, 1])
-def test_each_of_the_kept_views_is_composed_once_and_one_more_never_in_vain(composed: list[View], more: int) -> None:
+def test_each_of_the_kept_views_is_made_once_and_one_more_never_in_vain(made_sets: list[View], more: int) -> None:
     scene = crowd(300)
     views = [View(False, 1 << k, ()) for k in range(VIEWS_MOST + more)]
     lost, cost, rounds = 1.0, 10.0, 200
@@ -50,10 +51,10 @@ def test_each_of_the_kept_views_is_composed_once_and_one_more_never_in_vain(comp
             known = scene.derived.visible(view)
             if known.made(scene.items) is None and known.worth_building(lost, cost):
                 known.read(scene.items)
-    assert len(composed) == (0 if more else len(views))
+    assert len(made_sets) == (0 if more else len(views))
 
 
-def test_only_what_decides_hits_makes_a_visible_set_stale(composed: list[View]) -> None:
+def test_only_what_decides_hits_makes_a_visible_set_stale(made_sets: list[View]) -> None:
     scene = crowd()
     mover, hud = scene.add([[True]], role="mover"), scene.add([[True]], role="hud")
     objects = scene.ids("hittable")
@@ -81,7 +82,7 @@ def test_only_what_decides_hits_makes_a_visible_set_stale(composed: list[View]) 
             scene, Disc(9), [(50, 50), (200, 300)], strategy="direct"
         )
         first = again
-    assert set(composed) == {view}
+    assert set(made_sets) == {view}
 
 
 @pytest.mark.parametrize("corner", CORNERS)
@@ -143,3 +144,15 @@ def test_a_few_shots_find_all_that_is_visible(jit: bool, size: tuple[int, int], 
     for place in at:
         hits = fire(scene, Disc(400), place, strategy="visible")
         assert hits == fire(scene, Disc(400), place, strategy="spans") and hits
+
+
+def test_a_large_mask_counts_as_the_tiles_that_cover_it(jit: bool, made_sets: list[View]) -> None:
+    """Among few objects and one wall of 375 tiles, shots lose so much that what can be seen is made for them."""
+    scene = Scene((1600, 960))
+    scene.add(np.ones((960, 1600), np.bool_), (799.5, 479.5), role="occluder")
+    for x in range(50):
+        scene.add(Sprite.box(9, 9), (30 * x, 9), layer=1)
+    assert tiles_in(scene.items.stack()) == 375
+    shots = [(30 * x, 9) for x in range(50)]
+    hits = [fire(scene, Disc(40), shots) for _ in range(200)]
+    assert made_sets and hits[0] == hits[-1] == fire(scene, Disc(40), shots, strategy="spans")

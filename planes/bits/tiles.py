@@ -444,6 +444,16 @@ class Ground(NamedTuple):
     covers: Bools
 
 
+def tiles_in(stack: Stack) -> int:
+    """About how many tiles the masks of a stack have: one each, or as many as cover them, if masks are large."""
+    return max(len(stack), int(stack.numbers[-1]) // WORD**2)
+
+
+def visible_ns(stack: Stack, now: costs.Costs) -> float:
+    """Time to make the visible set of a stack, ns."""
+    return now.visible_made + tiles_in(stack) * now.visible_item
+
+
 def integers_ns(pairs: float, wide: int, high: int) -> float:
     """Time to count pairs of a tile and a pattern of `wide` columns and `high` rows, ns."""
     return pairs * (costs.NUMPY.integers_pair + costs.NUMPY.integers_bit * stride_of(wide) * high)

@@ -17,11 +17,11 @@ class Costs(NamedTuple):
 
     tiles_call: float  # by the tiles of the stack, front to back
     tiles_placement: float
-    tiles_pair: float  # a placement and an item
+    tiles_pair: float  # a placement and a tile
     visible_call: float  # by the visible set
     visible_placement: float
     visible_made: float
-    visible_item: float  # made: each item
+    visible_item: float  # made: each tile
     labels_call: float  # by the label plane
     labels_item: float  # made: each item
     labels_pixel: float  # made: each pixel

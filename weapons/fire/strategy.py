@@ -11,7 +11,8 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
-from hitplanes.planes.bits.tiles import integers_ns
+from hitplanes.planes.bits.bit_rows import WORD
+from hitplanes.planes.bits.tiles import integers_ns, tiles_in, visible_ns
 from hitplanes.planes.common.backend import jit_is_on
 from hitplanes.planes.common.checks import InputError, choice
 from hitplanes.planes.common.costs import costs
@@ -55,12 +56,12 @@ class Way(NamedTuple):
 
 
 def expected_near(stack: Stack, reach: int) -> float:
-    """Expected number of items near a placement, if they are spread evenly over the box around all."""
+    """Expected number of tiles near a placement, if they are spread evenly over the box around all."""
     if not len(stack):
         return 0.0
-    near = float(len(stack))
+    near = float(tiles_in(stack))
     for side, world in zip(*(sizes.tolist() for sizes in stack.sizes), strict=True):
-        near *= min((side + 2 * reach + 1) / world, 1.0)
+        near *= min((min(side, WORD) + 2 * reach + 1) / world, 1.0)
     return near
 
 
@@ -70,7 +71,7 @@ def _tiles_refuse(request: Request) -> str:
 
 def _tiles_cost(request: Request) -> tuple[float, float]:
     now = costs()
-    each = now.tiles_placement + len(request.stack) * now.tiles_pair
+    each = now.tiles_placement + tiles_in(request.stack) * now.tiles_pair
     return now.tiles_call + request.placements * each, 0.0
 
 
@@ -83,7 +84,7 @@ def _visible_refuse(request: Request) -> str:
 def _visible_cost(request: Request) -> tuple[float, float]:
     now, scene = costs(), request.scene
     known = request.view is not None and scene.derived.visible(request.view).made(scene.items) is not None
-    made = 0.0 if known else now.visible_made + len(request.stack) * now.visible_item
+    made = 0.0 if known else visible_ns(request.stack, now)
     return now.visible_call + request.placements * now.visible_placement, made
 
 

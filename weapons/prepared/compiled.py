@@ -18,6 +18,7 @@ from numba import types
 from numba.experimental import structref
 
 from hitplanes.planes.bits.front_to_back import NO_NUMBERS
+from hitplanes.planes.bits.tiles import visible_ns
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
@@ -206,7 +207,7 @@ class PositionCache:
             if visible_set is not None:
                 self._use_visible(visible_set, stack)
                 return
-            worth = max(int(COMPILED.visible_made + COMPILED.visible_item * len(stack)), 1)
+            worth = max(int(visible_ns(stack, COMPILED)), 1)
             bounds = self._scene.bounds or EVERYWHERE
             kept = self._filter if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, hit_by_one, integers_ns
+from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, hit_by_one, integers_ns, visible_ns
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
 from hitplanes.planes.common.limits import POSITION_MAX
@@ -237,7 +237,7 @@ class PositionCache:
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""
         items, visible, now = self._scene.items, self._scene.derived.visible(self._view), costs.NUMPY
-        made = now.visible_made + len(items.stack()) * now.visible_item
+        made = visible_ns(items.stack(), now)
         if visible.made(items) or visible.worth_building(now.integers_placement + ns, made):
             self._visible = visible.read(items)
         if ns > now.tiles_call:
