@@ -237,11 +237,13 @@ class Ray:
             left -= len(rows)
             if left < 0:
                 return None
-            count, found = _cells(_runs(self, origin, box, rows, stack, rank), self, most != 1)
+            blocks = stack.has_occluders and bool(stack.occluder[rank])
+            every = most != 1 and not blocks  # of an occluder only the first cell matters
+            count, found = _cells(_runs(self, origin, box, rows, stack, rank), self, every)
             if found is None:
                 continue
             touched.append((*found, rank, count, leave))
-            if stack.has_occluders and stack.occluder[rank]:
+            if blocks:
                 end = min(end, found[0])
             elif most is not None:
                 times = sorted([*times, found[0]])[:most]
