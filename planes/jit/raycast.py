@@ -244,7 +244,7 @@ def _meet(items, origin, ray, wide, bounds, most, found, count):
         if found[ENTER, k] > limit:
             break
         at = found[RANK, k]
-        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, endless, most == 1)
+        pixels, entry, x, y = _of_item(items, at, origin, ray, wide, bounds, endless, most == 1 or occluder[at])
         if pixels == 0:
             continue
         found[RANK, met], found[COUNT, met], found[LAST, met] = at, pixels, found[LAST, k]
