@@ -175,9 +175,10 @@ def compiled(*signatures: Any, **options: Any) -> Callable[[Callable[..., Any]],
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function that kernels alone call: without an entry for Python, which takes a fifth of all the time.
+    """Compile a function that kernels alone call. It has no entry for Python: a call from there crashes.
 
-    It must not assign arrays to slices, for whose error message numba compiles its formatting of text.
+    Entries took a fifth of the time to compile all kernels. Kernels copy arrays by loops, because numba compiles
+    its formatting of text for the error message of `a[i:j] = b`, which takes two seconds.
 
     Parameters
     ----------
