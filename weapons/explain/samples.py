@@ -211,7 +211,7 @@ def _behind(detail: Detail, rank: int, samples: Ints) -> Behind:
 def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequence[Any]) -> list[Share]:
     """Share of each row; the visible pixels of an object are counted once for each filter."""
     stack = context.stack
-    visible: dict[tuple[object, ...], Runs] = {}
+    visible: dict[tuple[object, ...], tuple[Bools, int, int]] = {}
     shares = []
     placed: dict[int, Placements] = {}
     for row in rows:
@@ -219,28 +219,28 @@ def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequenc
         rank = int(stack.rank_of[row.object])
         key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
-            visible[key] = _visible(context, rank, shot)
+            mask = _visible(context, rank, shot)
+            visible[key] = mask, int(np.count_nonzero(mask)), int(np.count_nonzero(stack.mask(rank)))
         if row.shot not in placed:
             placed[row.shot] = placements_for(weapon, shot)
-        placements, seen = placed[row.shot], int(visible[key].lengths.sum())
+        placements, (mask, seen, area) = placed[row.shot], visible[key]
         own, exposed = placements.round == row.round, None
         if parts_of(weapon)[2].line_of_sight:
-            exposed = _exposed(visible[key], rank, placements.xy[own], shot, context) / seen
-        fired, area = int(placements.count[own].sum()), int(np.count_nonzero(stack.mask(rank)))
+            exposed = _exposed(mask, rank, placements.xy[own], shot, context) / seen
+        fired = int(placements.count[own].sum())
         shares.append(Share(row.samples / fired, row.pixels / seen, row.pixels / area, exposed))
     return shares
 
 
-def _exposed(visible: Runs, rank: int, origin_xy: Ints, shot: Shots, context: QueryContext) -> int:
+def _exposed(visible: Bools, rank: int, origin_xy: Ints, shot: Shots, context: QueryContext) -> int:
     """Number of visible pixels of an object that lie in the line of sight of any pellet (P, 2) of one shot."""
-    blockers = context.blockers
+    blockers, box, pellets = context.blockers, context.stack.box_xyxy[rank], len(origin_xy)
     if blockers is None:
-        return int(visible.lengths.sum())
-    pellets, n = len(origin_xy), len(visible)
-    each = visible.take(np.tile(np.arange(n), pellets))
-    runs = Runs(np.arange(pellets).repeat(n), each.y, each.x_first, each.x_last, each.ordinal)
-    box = visible.x_first.min(), visible.y.min(), visible.x_last.max(), visible.y.max()
-    pellet, blocker = late.shadows.ways_met(np.tile(np.array(box), (pellets, 1)), origin_xy, blockers)
+        return int(np.count_nonzero(visible))
+    spans = Spans.from_mask(visible, (int(box[0]), int(box[1])))
+    y, x_first, x_last = (np.tile(side, pellets) for side in (spans.y, spans.x_first, spans.x_last))
+    runs = Runs(np.arange(pellets).repeat(len(spans)), y, x_first, x_last, np.zeros_like(y))
+    pellet, blocker = late.shadows.ways_met(np.tile(box, (pellets, 1)), origin_xy, blockers)
     met = ~refused(context.stack, blockers.rank[blocker], shot, np.zeros(len(blocker), np.int64))
     shelter = late.shadows.shelter_of(runs, origin_xy, blockers, pellet[met], blocker[met])
     hidden = shelter.hides(np.arange(len(shelter.items)), np.array(rank)).reshape(pellets, -1)
@@ -353,17 +353,25 @@ def _distance2(runs: Runs, stack: Stack, rank: int) -> int:
     return least
 
 
-def _visible(context: QueryContext, rank: int, shot: Shots) -> Runs:
-    """Pixels of an object that a pattern covering everything would hit, without a line of sight."""
-    stack = context.stack
-    spans = spans_of(stack, rank)
-    zero = np.zeros(len(spans), np.int64)
-    runs = Runs(zero, spans.y, spans.x_first, spans.x_last, zero)
-    pairs = pairs_of(stack.box_xyxy[rank][None], zero[:1], shot, stack)
-    events, _ = walk(runs, pairs, stack, context.pierce, HIT)
-    own = _inside(events.take(np.flatnonzero(events.rank == rank)), runs, context.bounds)
-    zero = np.zeros(len(own), np.int64)
-    return Runs(zero, runs.y[own.run], own.x_first, own.x_last, zero)
+def _visible(context: QueryContext, rank: int, shot: Shots) -> Bools:
+    """Mask of an object with the pixels that a pattern covering everything would hit, without a line of sight."""
+    stack, box, seen = context.stack, context.stack.box_xyxy[rank], context.stack.mask(rank).copy()
+    near = pairs_of(box[None], np.zeros(1, np.int64), shot, stack)
+    hides = (near.rank < rank) & ((near.kind == BLOCK) | ((near.kind == HIT) & (not context.pierce)))
+    for front in near.rank[hides].tolist():
+        own, other = (_overlap(box, stack.box_xyxy[front], corner[:2]) for corner in (box, stack.box_xyxy[front]))
+        seen[own] &= ~stack.mask(front)[other]
+    if context.bounds is not None:
+        inside = np.zeros_like(seen)
+        inside[_overlap(box, np.array(context.bounds), box[:2])] = True
+        seen &= inside
+    return seen
+
+
+def _overlap(a_xyxy: Ints, b_xyxy: Ints, corner_xy: Ints) -> tuple[slice, slice]:
+    """Rows and columns, from a corner on, of the pixels that two boxes share."""
+    (x, y), (x_end, y_end) = np.maximum(a_xyxy, b_xyxy)[:2] - corner_xy, np.minimum(a_xyxy, b_xyxy)[2:] + 1 - corner_xy
+    return slice(y, max(y, y_end)), slice(x, max(x, x_end))
 
 
 def spans_of(stack: Stack, rank: int) -> Spans:
