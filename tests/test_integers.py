@@ -162,7 +162,7 @@ def test_squares_are_made_once_the_visible_set_pays(monkeypatch: pytest.MonkeyPa
         scene.move(ids, rng.uniform(0, 400, (60, 2)))
         shots(9)
     assert not made
-    cost = costs.NUMPY.visible_made + 60 * costs.NUMPY.visible_item
+    cost = costs.NUMPY.visible_made + 60 * costs.NUMPY.visible_tile
     shots(int(cost / costs.NUMPY.integers_placement) + 1)
     assert made and any(ready._near.made.values())
     scene.move(ids[0], (5, 5))

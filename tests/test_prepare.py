@@ -94,10 +94,10 @@ def test_random_scenes_against_the_oracle(compiled: bool) -> None:
     def check(seed: int) -> None:
         with ExitStack() as patches:
             patches.enter_context(mock.patch.object(tiles, "OFTEN", 2))
-            now = costs.NUMPY._replace(visible_made=10_000 * (seed % 3), visible_item=0)
+            now = costs.NUMPY._replace(visible_made=10_000 * (seed % 3), visible_tile=0)
             patches.enter_context(mock.patch.object(costs, "NUMPY", now))
             if compiled and seed % 2:
-                now = squares.COMPILED._replace(visible_made=seed % 1000, visible_item=0)
+                now = squares.COMPILED._replace(visible_made=seed % 1000, visible_tile=0)
                 patches.enter_context(mock.patch.object(squares, "COMPILED", now))
             check_random_scene(seed)
 
@@ -183,7 +183,7 @@ WEAPONS: dict[str, tuple[Weapon, dict[str, Any]]] = {
 
 def visible_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let compiled kernels make the visible set soon."""
-    now = costs.COMPILED._replace(visible_made=400, visible_item=0)
+    now = costs.COMPILED._replace(visible_made=400, visible_tile=0)
     monkeypatch.setattr("hitplanes.weapons.prepared.compiled.COMPILED", now)
 
 
@@ -197,7 +197,7 @@ def test_every_weapon_in_a_crowd(name: str, bounded: bool, jit: bool, monkeypatc
 
 def check_weapon(name: str, bounded: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tiles, "OFTEN", 1 if bounded else 3)
-    now = costs.NUMPY._replace(tiles_call=10**9 if bounded else 10**5, visible_made=10_000, visible_item=0)
+    now = costs.NUMPY._replace(tiles_call=10**9 if bounded else 10**5, visible_made=10_000, visible_tile=0)
     monkeypatch.setattr(costs, "NUMPY", now)
     weapon, options = WEAPONS[name]
     scene, rng = crowd(7, WORLD if bounded else None), np.random.default_rng(3)

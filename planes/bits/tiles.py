@@ -451,7 +451,7 @@ def tiles_in(stack: Stack) -> int:
 
 def visible_ns(stack: Stack, now: costs.Costs) -> float:
     """Time to make the visible set of a stack, ns."""
-    return now.visible_made + tiles_in(stack) * now.visible_item
+    return now.visible_made + tiles_in(stack) * now.visible_tile
 
 
 def integers_ns(pairs: float, wide: int, high: int) -> float:

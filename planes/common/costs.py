@@ -21,7 +21,7 @@ class Costs(NamedTuple):
     visible_call: float  # by the visible set
     visible_placement: float
     visible_made: float
-    visible_item: float  # made: each tile
+    visible_tile: float  # made: each tile
     labels_call: float  # by the label plane
     labels_item: float  # made: each item
     labels_pixel: float  # made: each pixel
@@ -51,7 +51,7 @@ class Costs(NamedTuple):
 
 NUMPY = Costs(
     tiles_call=210000, tiles_placement=103, tiles_pair=3.79,
-    visible_call=218000, visible_placement=148, visible_made=172000, visible_item=2200,
+    visible_call=218000, visible_placement=148, visible_made=172000, visible_tile=2200,
     labels_call=82500, labels_item=8820, labels_pixel=0.0799, labels_box=18400,
     integers_call=118000, integers_placement=323, integers_pair=2490, integers_bit=0.113,
     box_pair=0.765, bvh_call=91300, bvh_placement=564, bvh_moved=1480, bvh_item=766,
@@ -62,7 +62,7 @@ NUMPY = Costs(
 )  # fmt: skip
 COMPILED = Costs(
     tiles_call=120000, tiles_placement=121, tiles_pair=0.376,
-    visible_call=78800, visible_placement=46.8, visible_made=126000, visible_item=1160,
+    visible_call=78800, visible_placement=46.8, visible_made=126000, visible_tile=1160,
     labels_call=33900, labels_item=532, labels_pixel=0.0741, labels_box=1480,
     integers_call=inf, integers_placement=inf, integers_pair=inf, integers_bit=inf,
     box_pair=0.354, bvh_call=87200, bvh_placement=548, bvh_moved=1320, bvh_item=767,

@@ -55,7 +55,7 @@ def begins(group: Ints) -> Bools:
     return new
 
 
-def clipped(boxes_xyxy: Ints, box_xyxy: Box) -> Ints:
+def clipped(boxes_xyxy: Ints, box_xyxy: Box | Ints) -> Ints:
     """Clip inclusive boxes (n, 4) to a box; those outside get x_max < x_min or y_max < y_min."""
     low, high = np.maximum(boxes_xyxy[:, :2], box_xyxy[:2]), np.minimum(boxes_xyxy[:, 2:], box_xyxy[2:])
     return np.concatenate([low, high], axis=1)

@@ -104,7 +104,7 @@ def of_areas(rounds: int) -> dict[str, float]:
     found |= fitted("tiles_call tiles_placement tiles_pair", tiles)
     visible = [(1, n, ns) for n, _, ns in timed(disc, "visible", rounds)]
     found |= fitted("visible_call visible_placement", visible)
-    found |= fitted("visible_made visible_item", [(*row[:2], row[3]) for row in made(disc, "visible", rounds, "tiles")])
+    found |= fitted("visible_made visible_tile", [(*row[:2], row[3]) for row in made(disc, "visible", rounds, "tiles")])
     found |= fitted("labels_call", [(1, ns) for *_, ns in timed(Point(), "labels", rounds, (1,))])
     drawn = [row[1:] for size_wh in (SIZE_WH, (480, 270)) for row in made(Point(), "labels", rounds, "tiles", size_wh)]
     return found | fitted("labels_item labels_pixel", drawn) | {"labels_box": redrawn(rounds)}

@@ -15,7 +15,7 @@ from hitplanes.planes import late
 from hitplanes.planes.bits.span_walk import BLOCK, HIT, SHELTERED, SKIP, VERDICT_OF, Events, Runs, Verdict, walk
 from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
-from hitplanes.planes.grid.spans import Box, Spans, each_pixel, pieces
+from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
 
 from ..fire.prefilter import pairs_of, refused
@@ -358,19 +358,19 @@ def _visible(context: QueryContext, rank: int, shot: Shots) -> Bools:
     stack, box, seen = context.stack, context.stack.box_xyxy[rank], context.stack.mask(rank).copy()
     near = pairs_of(box[None], np.zeros(1, np.int64), shot, stack)
     hides = (near.rank < rank) & ((near.kind == BLOCK) | ((near.kind == HIT) & (not context.pierce)))
-    for front in near.rank[hides].tolist():
-        own, other = (_overlap(box, stack.box_xyxy[front], corner[:2]) for corner in (box, stack.box_xyxy[front]))
-        seen[own] &= ~stack.mask(front)[other]
+    front = near.rank[hides]
+    for other, shared in zip(front.tolist(), clipped(stack.box_xyxy[front], box), strict=True):
+        seen[_part(shared, box)] &= ~stack.mask(other)[_part(shared, stack.box_xyxy[other])]
     if context.bounds is not None:
-        inside = np.zeros_like(seen)
-        inside[_overlap(box, np.array(context.bounds), box[:2])] = True
-        seen &= inside
+        outside = np.ones_like(seen)
+        outside[_part(clipped(box[None], context.bounds)[0], box)] = False
+        seen[outside] = False
     return seen
 
 
-def _overlap(a_xyxy: Ints, b_xyxy: Ints, corner_xy: Ints) -> tuple[slice, slice]:
-    """Rows and columns, from a corner on, of the pixels that two boxes share."""
-    (x, y), (x_end, y_end) = np.maximum(a_xyxy, b_xyxy)[:2] - corner_xy, np.minimum(a_xyxy, b_xyxy)[2:] + 1 - corner_xy
+def _part(part_xyxy: Ints, box_xyxy: Ints) -> tuple[slice, slice]:
+    """Rows and columns of a part of a box, in its mask; none if the part is empty."""
+    (x, y), (x_end, y_end) = part_xyxy[:2] - box_xyxy[:2], part_xyxy[2:] + 1 - box_xyxy[:2]
     return slice(y, max(y, y_end)), slice(x, max(x, x_end))
 
 
