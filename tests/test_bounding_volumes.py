@@ -285,7 +285,7 @@ def test_masks_asked_for_one_after_another(kind: Kind) -> None:
         for angle in (0.0, 25.0, 0.0):
             scene.add(sprite, rng.uniform(0, 99, 2), angle=angle)
     items, rows = scene.items, {}
-    there = np.sort(items.stack().ids)  # a mask without a pixel has no volume
+    there = np.sort(items.stack().rows)  # a mask without a pixel has no volume
     for ids in (there[[41]], there[[3, 40, 3]], there[[0]], there[[50, 1, 2]], there[::-1], there):
         volumes, row = items.bounding(kind, ids)
         for item, at in zip(ids.tolist(), row.tolist(), strict=True):

@@ -64,8 +64,8 @@ def items_of(scene: Scene) -> list[oracle_stack.Item]:
     for item in sorted(roles):
         mask, (x, y) = scene.mask(item)
         pixels = frozenset((x + i, y + j) for j, i in np.argwhere(mask).tolist())
-        columns = (scene.items.layer, scene.items.categories, scene.items.owner)
-        found.append(oracle_stack.Item(item, roles[item], *(int(column[item]) for column in columns), pixels))
+        columns = scene.layer(item), scene.categories_of(item), scene.owner(item)
+        found.append(oracle_stack.Item(item, roles[item], *map(int, columns), pixels))
     return found
 
 

@@ -232,7 +232,10 @@ class ChangingScene(RuleBasedStateMachine):
             if plane is None:
                 return
             met = [item for item in items if item.categories & (blocked_by if item.occluder else accept)]
-            np.testing.assert_array_equal(plane.read(self.scene.items), codes_of(met))
+            labels, stack = plane.read(self.scene.items), self.scene.items.stack()
+            ids = np.zeros(len(stack.rank_by_label), np.int64)
+            ids[stack.rows + 1] = stack.ids + 1
+            np.testing.assert_array_equal(2 * ids[labels >> 1] + (labels & 1), codes_of(met))
         whole = self.scene.planes()
         np.testing.assert_array_equal(whole.hittable, codes_of([i for i in items if not i.occluder]) >> 1)
         np.testing.assert_array_equal(whole.occluders, codes_of([i for i in items if i.occluder]) >> 1)

@@ -200,8 +200,8 @@ def test_gallery_has_what_a_first_scene_should_show() -> None:
     assert 1 in scene.mask(scene.find("robot"))[0].sum(axis=1), "a mast of one pixel"
     hoop, _ = scene.mask(scene.find("hoop"))
     assert not hoop[hoop.shape[0] // 2, hoop.shape[1] // 2], "a ring with a hole"
-    layers = scene.items.layer
-    assert layers[scene.find("back waves")] < layers[scene.find("duck 1")] < layers[scene.find("front waves")]
+    back, duck, front = (int(scene.layer(scene.find(name))) for name in ("back waves", "duck 1", "front waves"))
+    assert back < duck < front
 
 
 def test_gallery_shots_show_every_outcome() -> None:
@@ -221,10 +221,9 @@ def test_corridor_has_every_weapon_of_rays_and_what_they_are_for() -> None:
     assert all(len(scene.ids(role)) for role in Role)
     assert {"pistol", "rifle", "laser", "projectile", "sweep", "spread", "rounds"} == {w.kind for w in weapons.values()}
     assert all(ray_parts_of(weapon) is not None for weapon in weapons.values())
-    items = scene.items
-    assert [items.cost[scene.find(name)] for name in ("guard 1", "partition", "armoured guard")] == [1, 4, 3]
+    assert [scene.cost(scene.find(name)) for name in ("guard 1", "partition", "armoured guard")] == [1, 4, 3]
     assert scene.mask(scene.find("drone"))[0].sum(axis=1).max() == 2, "thinner than an arrow flies in a frame"
-    assert items.velocity_256[[scene.find("drone"), scene.find("runner")]].any(axis=1).all()
+    assert scene.velocity([scene.find("drone"), scene.find("runner")]).any(axis=1).all()
 
 
 def test_corridor_shots_end_for_every_reason() -> None:
@@ -280,10 +279,10 @@ def test_crowd_differs_in_every_part_of_a_pose() -> None:
     assert {entry["flip"] for entry in data if "flip" in entry} == {"none", "x"}
     for key, least in (("frame", 30), ("scale", 20), ("angle", 20), ("layer", 9)):
         assert len({str(entry[key]) for entry in data}) >= least, key
-    owner = scene.items.owner
+    owner = dict(zip(scene, scene.owner(scene.ids()).tolist(), strict=True))
     held = [item for item in scene.ids(Role.HITTABLE).tolist() if owner[item] != item]
     assert len(held) == 48
-    assert all(scene.name_of(item) == f"thing of {scene.name_of(int(owner[item]))}" for item in held)
+    assert all(scene.name_of(item) == f"thing of {scene.name_of(owner[item])}" for item in held)
 
 
 @pytest.mark.parametrize("role", [Role.HITTABLE, Role.OCCLUDER, Role.MOVER, Role.HUD])
@@ -316,7 +315,7 @@ def test_far_scene_has_no_bounds_and_lies_between_pixels() -> None:
     assert scene.bounds is None
     for item in scene.ids().tolist():
         assert np.abs(mask_points(scene, item)).min() > 9e8, scene.name_of(item)
-    parts = scene.items.position_256[scene.ids()] % 256
+    parts = np.rint(256 * scene.position(scene.ids())).astype(np.int64) % 256
     assert len(np.unique(parts)) >= 8 and {127, 128, 255} <= set(parts.ravel().tolist())
     assert sum(hits.verdict_counts()["outside"] for hits in fired_at(scene)) == 0
 

@@ -43,13 +43,13 @@ def test_what_lies_in_front_at_a_pixel(kernels: ModuleType, seed: int, kind: typ
     y = top + rng.integers(-beyond, height + beyond, count)
     cells = occupied(labels) if coarse else None
     at_256 = np.stack([x, y], axis=1) * 256 + rng.integers(-128, 128, (count, 2))
-    place, item, xy = kernels.front_at(labels, cells, (left, top, left + width - 1, top + height - 1), at_256, objects)
+    place, label, xy = kernels.front_at(labels, cells, (left, top, left + width - 1, top + height - 1), at_256, objects)
     told = []
     for i, (column, row) in enumerate(zip((x - left).tolist(), (y - top).tolist(), strict=True)):
         code = int(labels[row, column]) if 0 <= column < width and 0 <= row < height else 0
         if objects[code // 2]:
-            told.append((i, code // 2 - 1))
-    assert list(zip(place.tolist(), item.tolist(), strict=True)) == told
+            told.append((i, code // 2))
+    assert list(zip(place.tolist(), label.tolist(), strict=True)) == told
     assert xy.tolist() == np.stack([x, y], axis=1)[place].tolist()
 
 

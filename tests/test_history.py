@@ -182,8 +182,8 @@ def test_a_moment_is_what_it_was() -> None:
     for tick, truth in zip(history.ticks, told, strict=True):
         past = history.at(tick)
         assert (len(past), past.ids().tolist(), past.version, names(past), masks(past), answers(past)) == truth
-        assert {len(getattr(past.items, name)) for name in COLUMNS} == {past.items.count}
-        assert all(len(past.items._by_id(name)) == past.items.count for name in LISTS)
+        lists = [getattr(past.items, name) for name in (*COLUMNS, *LISTS)]
+        assert {len(values) for values in lists} == {past.items.table.height}
     assert len({str(truth[-1]) for truth in told}) == len(told)
     assert (scene.content_hash(), scene.version) == (hash_now, version_now)
 
@@ -289,7 +289,7 @@ def test_an_answer_of_the_past_is_never_stale() -> None:
     history.record()
     assert history.ticks == [1]
     assert hits.shares() == shares and len(shares) > 1
-    assert hits.scene.items.changed_ids(hits.version - 1) is None  # it does not know what was before
+    assert hits.scene.items.changed_rows(hits.version - 1) is None  # it does not know what was before
 
 
 def test_a_scene_that_is_kept_outlives_its_tick() -> None:
@@ -504,7 +504,7 @@ def test_what_was_removed_before_makes_no_difference_to_the_past(gone: int, seed
     assert told_of(history.at(5), gone) == told
 
 
-def test_a_moment_has_rows_for_what_was_there_and_not_for_what_ever_was() -> None:
+def test_a_moment_has_as_many_rows_as_there_were_objects_at_once() -> None:
     scene, ids = Scene((99, 99)), [0]
     history = History(scene)
     for _ in range(300):
@@ -515,9 +515,9 @@ def test_a_moment_has_rows_for_what_was_there_and_not_for_what_ever_was() -> Non
         scene.move(ids[-1], (x, 5))
         history.record()
     kept = [moment.snapshot for moment in history._moments.values()]
-    assert {len(column) for items in kept for column in items.columns.values()} == {1}
-    assert {len(values) for items in kept for values in items.lists.values()} == {1}
-    assert all(items.lists is kept[0].lists and items.ids is kept[0].ids for items in kept)
+    assert {len(column) for items in kept for column in items.columns.values()} == {2}
+    assert {len(values) for items in kept for values in items.lists.values()} == {2}
+    assert all(items.lists is kept[0].lists and items.table.known[0] is kept[0].table.known[0] for items in kept)
     assert [history.at(tick).position(ids[-1])[0] for tick in range(3)] == [0, 1, 2]
 
 
@@ -525,7 +525,7 @@ def test_ids_that_are_left_out_make_a_moment_of_their_own() -> None:
     scene = yard(3)
     history = History(scene)
     history.record()
-    scene.items.skip_to(7)
+    scene.items.table.skip_to(7)
     history.record()
     assert [history.at(tick).items.count for tick in (0, 1)] == [3, 7]
 
@@ -870,9 +870,9 @@ class Record(NamedTuple):
         """A scene that never changed."""
         scene = Scene(SIZE_WH if bounded else None, ORIGIN_XY)
         for number, model in sorted(self.models.items()):
-            scene.items.skip_to(number)
+            scene.items.table.skip_to(number)
             scene.add(model.sprite, model.position, **{k: v for k, v in model.pose.items() if k != "owner"})
-        scene.items.skip_to(self.count)
+        scene.items.table.skip_to(self.count)
         for number, model in self.models.items():
             scene.set(number, owner=model.pose["owner"])
         return scene

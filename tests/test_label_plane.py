@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from hitplanes.planes.bits import label_plane as module
-from hitplanes.planes.bits.label_plane import LabelPlane, label_plane, plane_fits
+from hitplanes.planes.bits.label_plane import LabelPlane, id_plane, plane_fits
 from hitplanes.planes.common.checks import InputError
-from hitplanes.planes.scene.items import HITTABLE, OCCLUDER, ROLES, Role
+from hitplanes.planes.scene.objects import ROLES, Role
 from hitplanes.planes.scene.scene import Scene
 
 BOUNDS = (-6, 2, 17, 16)
@@ -38,9 +38,8 @@ NAMES = ["hitplanes.planes.bits.label_plane", "hitplanes.planes.jit.areas"]
 
 def front_to_back(scene: Scene) -> list[int]:
     """Greater layer, then occluders before objects, then the later added."""
-    items = scene.items
-    deciding = [i for i in scene.ids().tolist() if items.role[i] in (HITTABLE, OCCLUDER)]
-    return sorted(deciding, key=lambda i: (-items.layer[i], items.role[i] != OCCLUDER, -i))
+    deciding = [i for i in scene if scene.role(i) in ("hittable", "occluder")]
+    return sorted(deciding, key=lambda i: (-scene.layer(i), scene.role(i) != "occluder", -i))
 
 
 def brute_labels(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.ndarray:
@@ -55,7 +54,7 @@ def brute_labels(scene: Scene, box: tuple[int, int, int, int] = BOUNDS) -> np.nd
     for row, column in np.ndindex(labels.shape):
         here = [item for item in order if (column + x, row + y) in covered[item]]
         if here:
-            labels[row, column] = 2 * (here[0] + 1) + (len(here) > 1)
+            labels[row, column] = 2 * (scene.items.table.row(here[0]) + 1) + (len(here) > 1)
     return labels
 
 
@@ -282,7 +281,7 @@ def test_planes_follow_many_moves(jit: bool) -> None:
             one = len(some) == 1
             scene.move(int(some[0]) if one else some, (now + step)[0] if one else now + step)
         assert np.array_equal(plane.read(scene.items), brute_labels(scene))
-    labels = label_plane(scene.items.stack(), BOX)
+    labels = id_plane(scene.items.stack(), BOX)
     assert np.array_equal(labels, brute_labels(scene, BOX) >> 1)
 
 
@@ -334,12 +333,11 @@ def test_labels_grow_when_ids_do(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("count", [32_767, 32_768])
-def test_the_last_id_of_sixteen_bits(count: int) -> None:
-    """The ids before it were left out by a scene file."""
+def test_the_last_row_of_sixteen_bits(count: int) -> None:
     scene = Scene((4, 1))
-    scene.items.skip_to(count - 1)
+    scene.items.table.height = count - 1  # as if so many objects were there
     last = scene.add([[1, 1]], (0.5, 0))
-    assert last == count - 1
+    assert scene.items.table.row(last) == count - 1
     scene.set(last, layer=1)
     plane = LabelPlane((0, 0, 3, 0))
     labels = plane.read(scene.items)
@@ -347,9 +345,9 @@ def test_the_last_id_of_sixteen_bits(count: int) -> None:
     assert labels.tolist() == [[2 * count, 2 * count, 0, 0]]
 
 
-def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
+def test_more_behind_fits_beside_the_last_row_of_sixteen_bits() -> None:
     scene = Scene((2, 1))
-    scene.items.skip_to(32_765)
+    scene.items.table.height = 32_765
     for _ in range(2):
         scene.add([[1]], (0, 0))
     labels = LabelPlane((0, 0, 1, 0)).read(scene.items)
@@ -364,7 +362,7 @@ def test_more_behind_fits_beside_the_last_id_of_sixteen_bits() -> None:
 def test_the_label_plane_of_any_box(seed: int, corner: tuple[int, int], size: tuple[int, int]) -> None:
     scene = random_scene(np.random.default_rng(seed), 8)
     box = (*corner, corner[0] + size[0] - 1, corner[1] + size[1] - 1)
-    labels = label_plane(scene.items.stack(), box)
+    labels = id_plane(scene.items.stack(), box)
     assert labels.dtype == np.int32
     assert np.array_equal(labels, brute_labels(scene, box) >> 1)
 
@@ -374,7 +372,7 @@ def test_the_label_plane_of_one_role() -> None:
     scene.add([[1, 1]], (0.5, 0), layer=3)
     scene.add([[1, 1]], (1.5, 0), role="occluder")
     scene.add([[1]], (1, 0), role="mover", layer=9)
-    labels = {role: label_plane(scene.items.stack_of(role), (0, 0, 2, 0)).tolist() for role in Role}
+    labels = {role: id_plane(scene.items.stack_of(role), (0, 0, 2, 0)).tolist() for role in Role}
     assert labels[Role.HITTABLE] == [[1, 1, 0]]
     assert labels[Role.OCCLUDER] == [[0, 2, 2]]
     assert labels[Role.MOVER] == [[0, 3, 0]]
@@ -400,7 +398,7 @@ def test_plane_limits(size: tuple[int, int], fits: bool) -> None:
         return
     assert scene.derived.label_plane() is None
     message = f"bounds: expected a plane of sides up to 65535 px .*got {size[0]} x {size[1]}"
-    for make in (lambda: LabelPlane(box), lambda: label_plane(scene.items.stack(), box), scene.planes):
+    for make in (lambda: LabelPlane(box), lambda: id_plane(scene.items.stack(), box), scene.planes):
         with pytest.raises(InputError, match=message):
             make()
 

@@ -11,7 +11,8 @@ from test_label_plane import MASKS, add_one, change, changed_boxes, front_to_bac
 
 from hitplanes import History, InputError, Scene, Sprite
 from hitplanes.planes.bits.tiles import Tiles
-from hitplanes.planes.scene.items import Role, Stack
+from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.objects import Role
 
 BLINKING = Sprite.from_image(np.array([[[0] * 4] * 3 + [[255] * 4] * 3] * 4, np.uint8), grid_wh=(3, 4))
 """Two frames: nothing, and a block."""
@@ -22,8 +23,8 @@ COLUMNS = ("ids", "occluder", "categories", "owner", "box_xyxy", "layered")
 def told(stack: Stack) -> list[Any]:
     """All that a stack says, with its masks."""
     columns = [np.array(getattr(stack, name)).tolist() for name in COLUMNS]
-    ranks = stack.rank_of.tolist()
-    return [*columns, [stack.mask(rank).tolist() for rank in range(len(stack))], ranks, stack.count]
+    ranks = stack.ranks(np.arange(40)).tolist()
+    return [*columns, [stack.mask(rank).tolist() for rank in range(len(stack))], ranks]
 
 
 def worked_out(stack: Stack) -> list[Any]:
@@ -34,19 +35,18 @@ def worked_out(stack: Stack) -> list[Any]:
 
 def said_of(scene: Scene) -> list[Any]:
     """The same of a scene, one item at a time."""
-    items = scene.items
     ids = [i for i in front_to_back(scene) if scene.mask(i)[0].size]
     masks = {i: scene.mask(i) for i in ids}
     boxes = [[x, y, x + mask.shape[1] - 1, y + mask.shape[0] - 1] for mask, (x, y) in masks.values()]
     occluder = [i in scene.ids("occluder") for i in ids]
     categories = [
-        int(items.categories[i].astype(np.uint64) << np.uint64(32 * block))
+        int(scene.categories_of(i).astype(np.uint64) << np.uint64(32 * block))
         for i, block in zip(ids, occluder, strict=True)
     ]
-    categories, owner = [c - (c >> 63 << 64) for c in categories], [int(items.owner[i]) for i in ids]
-    ranks = [ids.index(i) if i in ids else -1 for i in range(items.count)]
-    layered = len({int(items.layer[i]) for i in ids}) > 1
-    return [ids, occluder, categories, owner, boxes, layered, [masks[i][0].tolist() for i in ids], ranks, items.count]
+    categories, owner = [c - (c >> 63 << 64) for c in categories], [int(scene.owner(i)) for i in ids]
+    ranks = [ids.index(i) if i in ids else -1 for i in range(40)]
+    layered = len({int(scene.layer(i)) for i in ids}) > 1
+    return [ids, occluder, categories, owner, boxes, layered, [masks[i][0].tolist() for i in ids], ranks]
 
 
 def moved(scene: Scene, rng: np.random.Generator) -> None:
@@ -127,7 +127,7 @@ def sides(stack: Stack) -> tuple[list[int], list[int]]:
 def test_moves_keep_the_number_of_the_forms_and_share_all_but_the_boxes() -> None:
     scene = random_scene(np.random.default_rng(1), 20)
     first = scene.items.stack()
-    assert first.rank_of is first.rank_of and not first.rank_of.flags.writeable
+    assert first.rank_by_label is first.rank_by_label and not first.rank_by_label.flags.writeable
     ids = scene.ids()
     for act in (
         lambda: scene.move(int(ids[3]), (5, 5)),
@@ -139,7 +139,7 @@ def test_moves_keep_the_number_of_the_forms_and_share_all_but_the_boxes() -> Non
         act()
         stack = scene.items.stack()
         assert stack is not first and stack.forms == first.forms
-        for name in ("ids", "occluder", "categories", "owner", "offset", "masks", "rank_of"):
+        for name in ("ids", "occluder", "categories", "owner", "offset", "masks", "rows", "rank_by_label"):
             assert getattr(stack, name) is getattr(first, name), name
     seen = {first.forms}
     for values in ({"layer": 1}, {"angle": 40}, {"categories": 5}, {"owner": 0}, {"role": "mover"}, {"scale": 2}):
@@ -249,7 +249,7 @@ def test_the_arrays_of_a_caller_are_not_kept(jit: bool) -> None:
     scene.move(ids, xy)
     before = said_of(scene)
     ids[:], xy[:] = 0, 9
-    assert scene.items.changed_ids(start).tolist() == list(range(9))  # type: ignore[union-attr]
+    assert scene.items.changed_rows(start).tolist() == list(range(9))  # type: ignore[union-attr]
     assert said_of(scene) == before == told(scene.items.stack())
 
 
@@ -269,10 +269,11 @@ def test_what_decides_nothing_is_moved_without_a_box() -> None:
 def test_ids_that_are_left_out_are_in_no_stack() -> None:
     scene = Scene()
     scene.add(MASKS[5])
-    assert scene.items.stack().rank_of.tolist() == [0]
-    scene.items.skip_to(3)
-    scene.items.version += 1
-    assert scene.items.stack().rank_of.tolist() == [0, -1, -1]
+    scene.items.table.skip_to(3)
+    last = scene.add(MASKS[5])
+    assert (last, scene.items.stack().ids.tolist()) == (3, [3, 0])
+    assert scene.items.stack().ranks(np.arange(5)).tolist() == [1, -1, -1, 0, -1]
+    assert Scene().items.stack().ranks(np.arange(2)).tolist() == [-1, -1]
 
 
 def test_a_stack_of_other_roles_has_forms_of_its_own() -> None:

@@ -318,7 +318,7 @@ def test_threads_may_fire_at_a_scene_that_none_of_them_changes() -> None:
 def expected(scene: Scene, boxes: np.ndarray) -> list[tuple[int, int]]:
     stack = scene.items.stack()
     row, rank = np.nonzero(meets(boxes[:, None], stack.box_xyxy[None]))
-    return sorted(zip(row.tolist(), stack.ids[rank].tolist(), strict=True))
+    return sorted(zip(row.tolist(), stack.rows[rank].tolist(), strict=True))
 
 
 def change(scene: Scene, rng: np.random.Generator) -> None:

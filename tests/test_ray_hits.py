@@ -366,11 +366,11 @@ def test_the_nearest_miss_is_the_nearest_of_all(rng: random.Random) -> None:
             end = tuple(p + Fraction(part) * (Fraction(q, 256) - p) for p, q in zip(start, b, strict=True))
             segments.append((start, end))
         distances = {}
-        cells, owner = hits.samples_at(which), hits.scene.items.owner
+        cells, owner = hits.samples_at(which), hits.scene.owner
         walked = {tuple(xy) for xy in cells.xy[cells.verdict < Verdict.OUTSIDE].tolist()}
-        bodies_hit = {int(owner[item]) for item in hit}
+        bodies_hit = {int(owner(item)) for item in hit}
         for item in battle.accepted(shot):
-            if item.occluder or int(owner[item.id]) in bodies_hit or item.pixels & walked:
+            if item.occluder or int(owner(item.id)) in bodies_hit or item.pixels & walked:
                 continue
             if can_be_hit := inside(item.pixels, bounds):
                 least = min(squared(a, b, cell) for a, b in segments for cell in can_be_hit)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.files.scene_folder import load_scene
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import Planes
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
@@ -56,7 +56,9 @@ def state(scene: Scene) -> list[Any]:
     """All that a change could reach."""
     items = scene.items
     masks = [pixels(scene, i) for i in scene.ids().tolist()]
-    columns = [getattr(items, c)[: items.count].tolist() for c in ("alive", "role", "layer", "categories", "owner")]
+    columns = [
+        getattr(items, c)[: items.table.height].tolist() for c in ("alive", "role", "layer", "categories", "owner")
+    ]
     lists = [len(v) for v in (items.sprites, items.forms, items.angles, items.variants, items.names)]
     return [items.count, len(scene), items.version, masks, columns, list(items.angles), list(items.forms), lists]
 
@@ -824,7 +826,7 @@ def test_the_ids_are_those_of_what_was_added_and_not_removed(steps: list[tuple[s
         elif step == "remove" and living:
             scene.remove(living.pop(number % len(living)))
         elif step == "skip":
-            scene.items.skip_to(scene.items.count + number)
+            scene.items.table.skip_to(scene.items.count + number)
         elif step == "read":
             scene.ids()[:] = 99  # what a caller does with them is the caller's own
             assert scene.ids().tolist() == living and len(scene) == len(living)

@@ -16,7 +16,8 @@ from hitplanes.planes.common.tables import Mask
 from hitplanes.planes.files import scene_folder
 from hitplanes.planes.files.png import read_png, write_png
 from hitplanes.planes.files.scene_folder import load_scene, read_scene
-from hitplanes.planes.scene.items import Items, Role
+from hitplanes.planes.scene.items import Items
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
@@ -95,8 +96,8 @@ def with_object(**values: Any) -> dict[str, Any]:
 def poses(scene: Scene) -> list[Any]:
     items = scene.items
     return [
-        (i, items.names[i], items.forms[i], items.angles[i], *(getattr(items, c)[i].tolist() for c in COLUMNS))
-        for i in scene.ids().tolist()
+        (items.names[i], items.forms[i], items.angles[i], *(getattr(items, c)[i].tolist() for c in COLUMNS))
+        for i in items.rows.tolist()
     ]
 
 

@@ -2,7 +2,7 @@
 
 One read finds the first item that a sample meets:
 
-    label = 2 * (id + 1) + more     the front item (0: none), and a bit for "something lies behind it"
+    label = 2 * (row + 1) + more     the front item (0: none), and a bit for "something lies behind it"
 
 A coarse map of occupied cells spares most reads. `jit.areas` has the compiled kernels.
 """
@@ -29,7 +29,7 @@ def places_of(stack: Stack) -> Ints:
     """Places (M, 6) of the items of a stack, from which they are drawn: box, offset of the mask, and label in front."""
     places = np.empty((len(stack), 6), np.int64)
     places[:, :4], places[:, 4] = stack.box_xyxy, stack.offset
-    np.multiply(stack.ids + 1, 2, out=places[:, 5])
+    np.multiply(stack.rows + 1, 2, out=places[:, 5])
     return places
 
 
@@ -79,10 +79,10 @@ def occupied(labels: Labels) -> Bools:
 
 
 class Front(NamedTuple):
-    """Objects in front at positions: place (n,) of the position, id of the object, and pixel (n, 2)."""
+    """Objects in front at positions: place (n,) of the position, label of the object, and pixel (n, 2)."""
 
     place: Ints
-    object: Ints
+    label: Ints
     xy: Ints
 
 
@@ -94,7 +94,7 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
     ----------
     labels, plane_xyxy : the label plane (h, w), and its box in the world
     cells : its coarse map, or None to read the plane alone
-    objects : whether item id + 1 is an object; False at 0
+    objects : whether a label is of an object; False at 0
     """
     x, y = (at_256[:, axis] + (HALF - SUB * plane_xyxy[axis]) for axis in (0, 1))  # from the corner of its first pixel
     high, wide = labels.shape
@@ -104,7 +104,7 @@ def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints,
     front = _read(labels, x, y, kept, SUB_BITS) >> 1
     hit = objects.take(front).nonzero()[0]
     place = _narrowed(kept, hit)
-    return Front(place, front.take(hit).astype(np.int64) - 1, pixel(at_256.take(place, axis=0)))
+    return Front(place, front.take(hit).astype(np.int64), pixel(at_256.take(place, axis=0)))
 
 
 def _narrowed(kept: Ints | None, rows: Ints) -> Ints:
@@ -128,13 +128,15 @@ def plane_fits(box_xyxy: Box) -> bool:
     return max(width, height) <= PLANE_SIDE_MAX and width * height <= PLANE_AREA_MAX
 
 
-def label_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
+def id_plane(stack: Stack, box_xyxy: Box) -> npt.NDArray[np.int32]:
     """Front item of each pixel of a box, as id + 1; 0 if there is none."""
     _check_plane(box_xyxy)
     labels = np.empty((box_xyxy[3] - box_xyxy[1] + 1, box_xyxy[2] - box_xyxy[0] + 1), np.uint32)
     kernels = kernels_of(sys.modules[__name__])
     kernels.paint(labels, *box_xyxy[:2], np.array([box_xyxy]), places_of(stack), stack.masks)
-    return (labels >> 1).astype(np.int32)
+    ids = np.zeros(len(stack.rank_by_label), np.int32)
+    ids[stack.rows + 1] = stack.ids + 1
+    return ids.take(labels >> 1)
 
 
 class LabelPlane(Derivative):
@@ -220,7 +222,7 @@ class LabelPlane(Derivative):
 
 def _kind(items: Items) -> type[np.uint16 | np.uint32]:
     """Type of the labels."""
-    return np.uint16 if items.count <= ITEMS_UINT16 else np.uint32
+    return np.uint16 if items.table.height <= ITEMS_UINT16 else np.uint32
 
 
 def _dirt(before: Ints, after: Ints, plane: Box) -> tuple[Ints, int]:

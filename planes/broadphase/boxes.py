@@ -303,7 +303,7 @@ class Index(Derivative):
         """Number of boxes that must be updated before the next query; each change is read once."""
         with self._lock:
             if self.boxes is not None and self._seen != items.version:
-                changed = items.changed_ids(self._seen)
+                changed = items.changed_rows(self._seen)
                 if changed is None:
                     self.boxes = None
                 else:
@@ -324,24 +324,24 @@ class Index(Derivative):
                 from .. import broadphase
 
                 self.regret = 0.0
-                ids = np.sort(items.stack().ids)
-                self.boxes = getattr(broadphase, STRUCTURES[self.structure])(items.boxes(ids))
-                self._item_of, self._place_of = ids, np.full(items.count, -1)
-                self._place_of[ids] = np.arange(len(ids))
-                self._made_of = len(ids)
+                rows = np.sort(items.stack().rows)
+                self.boxes = getattr(broadphase, STRUCTURES[self.structure])(items.boxes(rows))
+                self._item_of, self._place_of = rows, np.full(items.table.height, -1)
+                self._place_of[rows] = np.arange(len(rows))
+                self._made_of = len(rows)
             elif self.followed:
                 self._follow(self.boxes, items, self._pending)
             self._pending = self._pending[:0]
             return self.boxes
 
     def query(self, items: Items, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-        """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (row, item id)."""
+        """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (place, row of the item)."""
         row, place = self.read(items).query(boxes_xyxy.astype(np.float64))
         return row, self._item_of[place]
 
     def _follow(self, boxes: BroadPhase, items: Items, changed: Ints) -> None:
         """Insert, remove or move the boxes of items that changed."""
-        self._place_of = np.concatenate([self._place_of, np.full(items.count - len(self._place_of), -1)])
+        self._place_of = np.concatenate([self._place_of, np.full(items.table.height - len(self._place_of), -1)])
         now = items.deciding_boxes(changed)
         there, place = now[:, 0] <= now[:, 2], self._place_of[changed]
         known = place >= 0

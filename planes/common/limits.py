@@ -25,11 +25,9 @@ TEXT_BYTES_MAX = 2**28  # longest JSON file, bytes: in memory it takes about ten
 PLANE_SIDE_MAX = 65_535  # longest side of a plane, px
 PLANE_AREA_MAX = 2**28  # largest area of a whole plane, px (1 GiB of labels); larger worlds are answered without planes
 
-ITEMS_MAX = 2**22
-"""Most objects over the life of a scene: ids are never used again, and each keeps about 300 bytes of columns and name.
-The sprite and mask of a removed object are freed."""
-
-ITEMS_UINT16 = 32_767  # most item numbers that fit a uint16 label plane, whose lowest bit says "more behind"
+ITEMS_MAX = 2**22  # most objects of a scene at a time: each takes about 300 bytes of columns and name
+IDS_MAX = 2**28  # most ids in the life of a scene, which are never used again: their rows take 1 GiB
+ITEMS_UINT16 = 32_767  # most rows of items that fit a uint16 label plane, whose lowest bit says "more behind"
 COST_MAX = 255  # largest cost of a px of an object to a bullet: multiplied by the length of a ray it stays inside int64
 LAYER_MAX = 2**31 - 1  # largest layer, positive or negative: it fits 32 bits
 CATEGORY_BITS = 32  # categories are bits of one unsigned 32-bit number

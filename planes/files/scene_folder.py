@@ -16,7 +16,7 @@ from ..common.limits import (
     ALPHA_THRESHOLD,
     ANGLE_STEPS_MAX,
     COST_MAX,
-    ITEMS_MAX,
+    IDS_MAX,
     LAYER_MAX,
     MASK_AREA_MAX,
     MASK_SIDE_MAX,
@@ -50,7 +50,7 @@ from ..common.tables import (
     json_of,
     typed,
 )
-from ..scene.items import Role
+from ..scene.objects import Role
 from ..scene.scene import Scene
 from ..scene.sprite import Carving, Sprite, frame_pivot, frozen, local_grid, rows_of
 from ..scene.variants import FLIPS
@@ -71,7 +71,7 @@ POINT = Numbers((2,), POSITION_MAX)
 PIVOT = Numbers((2,), MASK_SIDE_MAX)
 COLOR = Wholes((3,), 0, 255)
 RING = Numbers((None, 2), MASK_SIDE_MAX, least=3)
-ID = Whole(0, ITEMS_MAX - 1)
+ID = Whole(0, IDS_MAX - 1)
 CELLS_MOST = 512  # most cells along a pixel of a carved sprite: what the largest scale needs, turned
 
 CARVED = Keys({"image": Text(), "frame": Whole(0, 2**31 - 1), "cells_per_px": Whole(1, CELLS_MOST)}, ("image",))
@@ -448,7 +448,7 @@ def _add_entry(scene: Scene, entry: FileObject) -> None:
         if entry.id is not None:
             if entry.id < scene.items.count:
                 raise InputError(f"id: expected each id once, got {entry.id} again")
-            scene.items.skip_to(entry.id)
+            scene.items.table.skip_to(entry.id)
         options = {"role": entry.role, "name": entry.name, "categories": entry.categories, **entry.pose}
         scene.add(entry.sprite, entry.position_xy, **options)
 
@@ -459,7 +459,7 @@ def _set_owners(scene: Scene, entries: Sequence[FileObject]) -> None:
             with within(f"{entry.place}: owner"):
                 owner = scene.find(entry.owner) if isinstance(entry.owner, str) else entry.owner
                 if entry.id is not None and owner >= scene.items.count:
-                    scene.items.skip_to(owner + 1)  # the owner was removed before the scene was saved
+                    scene.items.table.skip_to(owner + 1)  # the owner was removed before the scene was saved
                 scene.set(item, owner=owner)
 
 

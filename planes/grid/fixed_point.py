@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, all_within, rising
@@ -262,22 +263,25 @@ def pixels(at_256: Ints) -> Ints:
 
 
 def place(
-    ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
-) -> bool:
+    ids: Ints, xy: Floats, count: int, row_of: npt.NDArray[np.int32], edge: Ints, position_256: Ints, box: Ints,
+    rows: Ints, before: Ints, after: Ints,
+) -> bool:  # fmt: skip
     """Move items of ids (n,) to new positions (n, 2), px; neither array is kept. Return whether that was done.
 
     Nothing is changed unless the ids, of which a scene has `count`, are rising and all in the scene, and all positions
-    finite and in range. Of the columns of `Items` the last two are changed; `before` and `after` (n, 4) are filled with
-    the boxes of the items.
+    finite and in range. Of the columns of `Items` the last two are changed; `rows` (n,) is filled with the rows of the
+    items in them, and `before` and `after` (n, 4) with their boxes.
     """
-    if not (rising(ids, count) and all_within(xy, -POSITION_MAX, POSITION_MAX) and alive.take(ids).all()):
+    if not (rising(ids, count) and all_within(xy, -POSITION_MAX, POSITION_MAX)):
         return False
-    n, first = len(ids), int(ids[0]) if len(ids) else 0
-    rows = slice(first, first + n) if n and ids[-1] - first == n - 1 else ids
-    now = snap(xy)
-    before[:] = box[rows]
-    after[:] = boxes_at(now, edge[rows])
-    position_256[rows], box[rows] = now, after
+    rows[:] = row_of.take(ids)
+    if rows.min(initial=0) < 0:
+        return False
+    n, first, now = len(rows), int(rows[0]) if len(rows) else 0, snap(xy)
+    at = slice(first, first + n) if n and rows[-1] - first == n - 1 and rising(rows, first + n) else rows
+    before[:] = box[at]
+    after[:] = boxes_at(now, edge[at])
+    position_256[at], box[at] = now, after
     return True
 
 

@@ -535,7 +535,7 @@ BITS = np.uint64(COARSE_BITS)
         for kind in (types.uint16, types.uint32)
     )
 )  # fmt: skip
-def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
+def _front_at(labels, cells, left, top, at_256, objects, place, label, xy):
     count = 0
     high, wide, coarse = np.uint64(labels.shape[0]), np.uint64(labels.shape[1]), cells.size > 0
     for i in range(len(at_256)):
@@ -546,7 +546,7 @@ def _front_at(labels, cells, left, top, at_256, objects, place, item, xy):
         if coarse and not cells[row >> BITS, column >> BITS]:
             continue
         front = np.int64(labels[row, column] >> 1)  # always written; the next one overwrites it if it is no hit
-        place[count], item[count], xy[count, 0], xy[count, 1] = i, front - 1, x, y
+        place[count], label[count], xy[count, 0], xy[count, 1] = i, front, x, y
         count += objects[front]
     return count
 
@@ -556,7 +556,7 @@ NO_CELLS: Bools = np.zeros((0, 0), np.bool_)
 
 def front_at(labels: Labels, cells: Bools | None, plane_xyxy: Box, at_256: Ints, objects: Bools) -> Front:
     """See `bits.label_plane.front_at`."""
-    place, item = np.empty((2, len(at_256)), np.int64)
+    place, label = np.empty((2, len(at_256)), np.int64)
     xy, coarse = np.empty(at_256.shape, np.int64), NO_CELLS if cells is None else cells
-    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, item, xy)
-    return Front(place[:count], item[:count], xy[:count])
+    count = _front_at(labels, coarse, plane_xyxy[0], plane_xyxy[1], at_256, objects, place, label, xy)
+    return Front(place[:count], label[:count], xy[:count])

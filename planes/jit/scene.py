@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numba import types
 
 from ..common.checks import Floats, Ints
@@ -491,26 +492,27 @@ def cones(reach: int, direction: Ints, c_half: int, s_half: int) -> RowRuns:
 
 @compiled()
 def place(
-    ids: Ints, xy: Floats, count: int, alive: Ints, edge: Ints, position_256: Ints, box: Ints, before: Ints, after: Ints
-) -> bool:
+    ids: Ints, xy: Floats, count: int, row_of: npt.NDArray[np.int32], edge: Ints, position_256: Ints, box: Ints,
+    rows: Ints, before: Ints, after: Ints,
+) -> bool:  # fmt: skip
     """Place items at new positions; return whether that was done; see `grid.fixed_point.place`."""
     last = -1
     for i in range(len(ids)):
         item = ids[i]
         if item <= last or item >= count:
             return False
-        if not (abs(xy[i, 0]) <= POSITION_MAX and abs(xy[i, 1]) <= POSITION_MAX and alive[item] != 0):
+        if not (abs(xy[i, 0]) <= POSITION_MAX and abs(xy[i, 1]) <= POSITION_MAX and row_of[item] >= 0):
             return False
-        last = item
+        last, rows[i] = item, row_of[item]
     for i in range(len(ids)):
-        item = ids[i]
+        row = rows[i]
         for axis in range(2):
             now = np.int64(np.rint(xy[i, axis] * SUB))
-            position_256[item, axis] = now
+            position_256[row, axis] = now
             for side in (axis, axis + 2):
-                before[i, side] = box[item, side]
-                after[i, side] = (now + edge[item, side]) >> 8
-                box[item, side] = after[i, side]
+                before[i, side] = box[row, side]
+                after[i, side] = (now + edge[row, side]) >> 8
+                box[row, side] = after[i, side]
     return True
 
 

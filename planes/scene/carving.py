@@ -49,11 +49,11 @@ def pixels_to_carve(scene: Scene, pixels: HitPixels | Mapping[int, object]) -> M
 
 
 def carved_sprites(items: Items, pixels: Mapping[int, object]) -> tuple[list[Sprite], dict[int, int]]:
-    """New sprites of the items of which pixels go, and how many pixels each of them loses, by its id."""
+    """New sprites of the items of which pixels go, and how many pixels each of them loses; all by their rows."""
     sprites, lost = [], {}
     for row, xy in pixels.items():
         variant = replace(items.variants[row], form=items.forms[row])  # a circle's is kept unturned
-        place = f"pixels[{row}]"
+        place = f"pixels[{items.id[row]}]"
         hole = hole_of(place, xy, variant.mask, items.corner(row))
         if count := int(np.count_nonzero(hole.hit)):
             with within(place):

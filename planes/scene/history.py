@@ -1,6 +1,6 @@
 """The history of a scene by tick, each tick readable as a scene; and a clock with a fixed time step.
 
-A moment has a row for each item that was there. A column, a list or a whole moment that did not change between two
+A column, a list or a whole moment that did not change between two
 recorded ticks is stored once. A moment never changes, so neither does a scene made of it.
 """
 
@@ -23,8 +23,8 @@ from ..common.limits import HISTORY_TICKS_MAX, SUB, TICK_MAX
 from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
-from .items import ARRANGEMENTS, COLUMNS, NO_BOXES, NO_MASK, NO_TRANSFORM, NOTHING, UNARRANGED, Items, Stack
-from .poses import Looks
+from .items import ARRANGEMENTS, COLUMNS, EMPTY, NO_BOXES, UNARRANGED, Items, Stack
+from .objects import RowTable
 from .scene import Scene
 from .variants import MaskAtlas, variant_of, variants_of
 
@@ -34,12 +34,12 @@ RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only 
 PART_BITS = 31  # a step between two ticks has fewer than 2**31 parts: the square of their number stays inside int64
 
 
-LISTS = (*Looks._fields, "variants", "names")
+LISTS = tuple(EMPTY)
 """What items have beside their columns."""
 
 
 class Snapshot:
-    """The items of a scene at one moment as rows, one for each that was there: none for any that was removed before.
+    """The columns and lists of the items of a scene at one moment, which never change.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ class Snapshot:
     """
 
     def __init__(self, items: Items, earlier: Snapshot | None) -> None:
-        (atlas, stack), self.by_mask, self.all_names = items.settled(), items.by_mask, items.names
-        self.count, self.version, self.arrangement = items.count, items.version, items.arrangement
-        self.ids, self.order = items.ids, None if stack is None else stack.placed(NO_BOXES)
+        (atlas, stack), self.by_mask = items.settled(), items.by_mask
+        self.version, self.arrangement = items.version, items.arrangement
+        self.table, self.order = PastTable(items), None if stack is None else stack.placed(NO_BOXES)
         columns: dict[str, Ints] = {} if earlier is None else earlier.columns
         lists: dict[str, list[Any]] = {} if earlier is None else earlier.lists
         arranged = earlier is not None and earlier.arrangement == items.arrangement
@@ -65,41 +65,20 @@ class Snapshot:
         self.atlas: MaskAtlas = earlier.atlas if earlier is not None and shared else _full(atlas.flat)
         self._items: PastItems | None = None
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether no item was removed before, so that rows are ids."""
-        return len(self.ids) == self.count
-
     def _column(self, items: Items, name: str, before: Ints | None) -> Ints:
-        """The rows of a column; the earlier ones if they are equal."""
-        every: Ints = getattr(items, name)
-        now = every[: self.count] if self.is_whole else every.take(self.ids, axis=0)
+        """A copy of a column; the earlier one if they are equal."""
+        now: Ints = getattr(items, name)[: items.table.height]
         if before is not None and now.shape == before.shape and (now == before).all():
             return before
         return _sealed(now.copy())
 
     def _list(self, items: Items, name: str, before: list[Any] | None) -> list[Any]:
-        """The rows of a list; the earlier ones if they are equal."""
-        every: list[Any] = getattr(items, name)
-        now = list(every) if self.is_whole else [every[item] for item in self.ids.tolist()]
-        return before if before is not None and now == before else now
-
-    def by_id(self, name: str) -> Any:
-        """A column or list as items have it, by id; those of removed items cost nothing in a list."""
-        if name in LISTS:
-            rest = self.all_names if name == "names" else OF_REMOVED[name]
-            return self.lists[name] if self.is_whole else ById(self.ids, self.lists[name], rest)
-        rows = self.columns[name]
-        if self.is_whole:
-            return rows
-        column = np.zeros((self.count, *rows.shape[1:]), np.int64)
-        column[self.ids] = rows
-        return _sealed(column)
+        """A copy of a list; the earlier one if they are equal."""
+        now: list[Any] = getattr(items, name)
+        return before if before is not None and now == before else list(now)
 
     def items(self) -> PastItems:
-        """The items, to be read; they are kept if that takes no room."""
-        if not self.is_whole:
-            return PastItems(self)
+        """The items, to be read."""
         self._items = self._items or PastItems(self)
         return self._items
 
@@ -109,68 +88,78 @@ class Snapshot:
             return self.items()
         if self.order is None:
             self.items().stack()
-        both, row, later = self.ids, np.arange(len(self.ids)), np.arange(len(self.ids))
-        if both is not after.ids:
-            both, row, later = np.intersect1d(both, after.ids, assume_unique=True, return_indices=True)
+        rows, later = self._in_both(after)
         own, position = copy.copy(self), self.columns["position_256"].copy()
-        step = after.columns["position_256"][later] - position[row]
+        step = after.columns["position_256"][later] - position[rows]
         if step.any():
-            position[row] += _part_of(step, part, parts)
+            position[rows] += _part_of(step, part, parts)
             own.columns = self.columns | {"position_256": _sealed(position)}
         out = PastItems(own)
         if self.lists["angles"] is not after.lists["angles"]:
-            then, to = (
-                np.array(snapshot.lists["angles"])[at].tolist() for snapshot, at in ((self, row), (after, later))
-            )
-            turns = {item: (a, _short_turn(a, b)) for item, a, b in zip(both.tolist(), then, to, strict=True)}
-            out.turn({item: angle + turn * (part / parts) for item, (angle, turn) in turns.items() if turn})
+            then, to = self.lists["angles"], after.lists["angles"]
+            pairs = zip(rows.tolist(), later.tolist(), strict=True)
+            turns = {row: (then[row], _short_turn(then[row], to[other])) for row, other in pairs}
+            out.turn({row: angle + turn * (part / parts) for row, (angle, turn) in turns.items() if turn})
         return out
 
+    def _in_both(self, after: Snapshot) -> tuple[Ints, Ints]:
+        """Rows of the items that are there at both moments, in this one and in the other."""
+        (ids, rows), (others, later) = self.table.known, after.table.known
+        if ids is others:
+            return rows, later
+        _, own, other = np.intersect1d(ids, others, assume_unique=True, return_indices=True)
+        return rows[own], later[other]
 
-OF_REMOVED = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": NO_MASK}
-"""What the lists have for items that were removed; names stay."""
 
+class PastTable(RowTable):
+    """The rows that objects had at one moment, by their ids."""
 
-class ById(dict[int, Any]):
-    """Values of items by id; what was removed has one value for all, or its own of a list."""
+    def __init__(self, items: Items) -> None:
+        self.count, self.height = items.table.count, items.table.height
+        self.known, self._latest = (items.ids, items.rows), items.table
 
-    def __init__(self, ids: Ints, values: list[Any], rest: Any) -> None:
-        super().__init__(zip(ids.tolist(), values, strict=True))
-        self.rest = rest
+    def rows(self, ids: Ints) -> Ints:
+        """See `RowTable.rows`."""
+        known, rows = self.known
+        if not len(known):
+            return np.full(len(ids), -1)
+        place = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+        return np.asarray(np.where(known[place] == ids, rows[place], -1))
 
-    def __missing__(self, item: int) -> Any:
-        return self.rest[item] if isinstance(self.rest, list) else self.rest
+    def row(self, item: int) -> int:
+        """See `RowTable.row`."""
+        return int(self.rows(np.array([item]))[0])
+
+    def name_of_gone(self, item: int) -> str:
+        """Name of an object that was removed before that moment: its id never came back."""
+        return self._latest.name_of_gone(item)
+
+    def copied(self, ids: Ints, count: int) -> RowTable:
+        """See `RowTable.copied`."""
+        return self._latest.copied(ids, count)
 
 
 class PastItems(Items):
-    """The items of a scene at one moment, read-only, by id as present ones are; each column is made when it is read."""
+    """The items of a scene at one moment, read-only."""
 
     def __init__(self, snapshot: Snapshot) -> None:
         super().__init__()
-        for name in LISTS:
-            del vars(self)[name]
-        self._snapshot, self.count, self.arrangement = snapshot, snapshot.count, snapshot.arrangement
+        vars(self).update(snapshot.columns)
+        vars(self).update(snapshot.lists)
+        self._snapshot, self.table, self.arrangement = snapshot, snapshot.table, snapshot.arrangement
         self.version = self._forgotten = snapshot.version
-        self.by_mask, self.atlas, self._present = snapshot.by_mask, snapshot.atlas, (snapshot.ids, snapshot.count, 0)
+        self.by_mask, self.atlas = snapshot.by_mask, snapshot.atlas
         if snapshot.order is not None:
             self._stack = (NEVER, snapshot.order)
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in LISTS and name not in COLUMNS:
-            raise AttributeError(name)
-        value = self._snapshot.by_id(name)
-        setattr(self, name, value)
-        return value
 
     def _allot(self) -> None:
         """Do nothing: the columns are the recorded ones."""
 
-    def _boxes_in_order(self, ids: Ints) -> Ints:
-        return self.boxes(ids)
+    def _known(self) -> tuple[Ints, Ints]:
+        return self._snapshot.table.known
 
-    def _by_id(self, name: str) -> list[Any]:
-        values = getattr(self, name)
-        return [values[item] for item in range(self.count)]
+    def _boxes_in_order(self, rows: Ints) -> Ints:
+        return self.boxes(rows)
 
     def stack(self) -> Stack:
         """See `Items.stack`; its order is kept for those who read the moment later."""
@@ -180,25 +169,24 @@ class PastItems(Items):
         return stack
 
     def turn(self, angles: Mapping[int, float]) -> None:
-        """Set the angles of items, and their masks."""
+        """Set the angles of items by their rows, and their masks."""
         if not angles:
             return
         self.arrangement = next(ARRANGEMENTS)
         for name in COLUMNS:
             setattr(self, name, getattr(self, name).copy())
         self.atlas = _full(self.atlas.flat)
-        for name in ("angles", "forms", "variants"):
-            setattr(self, name, copy.copy(getattr(self, name)))
+        self.angles, self.forms, self.variants = list(self.angles), list(self.forms), list(self.variants)
         looks = self.looks(list(angles)).changed(None, list(angles.values()), None, None, None)
         try:
             variants = variants_of(looks.sprites, looks.forms)
         except InputError:
-            for item, sprite, angle, form in zip(angles, *looks, strict=True):
-                with within(f"object {item} at {angle:.15g} degrees"):
+            for row, sprite, angle, form in zip(angles, *looks, strict=True):
+                with within(f"object {self.id[row]} at {angle:.15g} degrees"):
                     variant_of(sprite, form)
             raise
-        for item, angle, form in zip(angles, looks.angles, looks.forms, strict=True):
-            self.angles[item], self.forms[item] = angle, form
+        for row, angle, form in zip(angles, looks.angles, looks.forms, strict=True):
+            self.angles[row], self.forms[row] = angle, form
         self._enter(list(angles), variants)
         for name in COLUMNS:
             _sealed(getattr(self, name))
@@ -359,7 +347,7 @@ class History:
         """The moment of the present scene; it shares everything unchanged with the last one."""
         scene, items = self.scene, self.scene.items
         before = None if last is None else last.snapshot
-        if before is None or (before.version, before.count) != (items.version, items.count):
+        if before is None or (before.version, before.table.count) != (items.version, items.count):
             before = Snapshot(items, before)
         try:
             pickled = pickle.dumps((scene.weapons, scene.shots))

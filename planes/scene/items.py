@@ -7,7 +7,6 @@ import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any
@@ -18,11 +17,12 @@ import numpy.typing as npt
 from .. import late
 from ..common.backend import kernels_of
 from ..common.checks import Bools, Floats, InputError, Ints, boxes_in, choice
-from ..common.limits import CATEGORY_BITS, HALF, ITEMS_MAX, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
+from ..common.limits import CATEGORY_BITS, HALF, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box, sorted_once
 from .derived import NEVER, ByMask
+from .objects import DECIDING, HITTABLE, OCCLUDER, ROLES, Role, RowTable
 from .poses import Looks
 from .sprite import Sprite
 from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
@@ -42,6 +42,7 @@ class Stack:
     """The items of one version of a scene that decide hits, front to back, as columns."""
 
     ids: Ints  # (M,)
+    rows: Ints  # (M,) rows of the items in the columns of `Items`
     occluder: Bools  # (M,)
     categories: Ints  # (M,) bits; those of an occluder are CATEGORY_BITS higher, so that shots filter it apart
     owner: Ints  # (M,) ids
@@ -50,7 +51,6 @@ class Stack:
     masks: Bools  # flat booleans of all masks in use
     layered: bool  # whether the items lie on more than one layer
     forms: int  # number of the arrangement: stacks of the same number differ only in boxes
-    count: int  # number of ids of the scene, including those that are not in the stack
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy is an arrangement of its own: numbers of another process mean nothing here."""
@@ -85,26 +85,30 @@ class Stack:
         return STACK_ROW_BYTES * len(self.ids)
 
     @cached_property
-    def rank_of(self) -> Ints:
-        """Rank in the stack of each id of the scene (count,), 0 in front; -1 for ids that are not in it."""
-        ranks = np.full(self.count, -1)
-        ranks[self.ids] = np.arange(len(self.ids))
-        ranks.flags.writeable = False
-        return ranks
+    def _by_id(self) -> tuple[Ints, Ints]:
+        """Rising ids, and the rank of each."""
+        order = np.argsort(self.ids)
+        return self.ids[order], order
+
+    def ranks(self, ids: Ints) -> Ints:
+        """Ranks (n,) of items in the stack by their ids, 0 in front; -1 for ids that are not in it."""
+        rising, rank = self._by_id
+        place = np.minimum(np.searchsorted(rising, ids), len(rising) - 1)
+        return np.where(rising[place] == ids, rank[place], -1) if len(rising) else np.full(np.shape(ids), -1)
 
     @cached_property
-    def rank_by_code(self) -> Ints:
-        """Rank in the stack of each label, which is an id + 1; 0 for labels of no item."""
-        ranks = np.zeros(int(self.ids.max(initial=-1)) + 2, np.int64)
-        ranks[self.ids + 1] = np.arange(len(self.ids))
+    def rank_by_label(self) -> Ints:
+        """Rank in the stack of each label, which is a row of `Items` + 1; 0 for labels of no item."""
+        ranks = np.zeros(int(self.rows.max(initial=-1)) + 2, np.int64)
+        ranks[self.rows + 1] = np.arange(len(self.rows))
         ranks.flags.writeable = False
         return ranks
 
     @cached_property
     def is_object(self) -> Bools:
-        """Whether each label (count + 1,), which is an id + 1, is of an item that can be hit; label 0 is of no item."""
-        objects = np.zeros(self.count + 1, np.bool_)
-        objects[self.ids[~self.occluder] + 1] = True
+        """Whether each label, which is a row of `Items` + 1, is of an item that can be hit; label 0 is of no item."""
+        objects = np.zeros(len(self.rank_by_label), np.bool_)
+        objects[self.rows[~self.occluder] + 1] = True
         objects.flags.writeable = False
         return objects
 
@@ -157,38 +161,27 @@ def _is_there(boxes: Ints | Box) -> bool:
     return bool(boxes[0, 0] <= boxes[0, 2] or (boxes[:, 0] <= boxes[:, 2]).any())  # the first tells most often
 
 
-class Role(Enum):
-    """Role of an object; only HITTABLE and OCCLUDER decide hits, the others are only drawn."""
-
-    BACKGROUND = "background"
-    HITTABLE = "hittable"
-    MOVER = "mover"
-    OCCLUDER = "occluder"
-    HUD = "hud"
-
-
-ROLES = tuple(Role)
-DECIDING = Role.HITTABLE, Role.OCCLUDER
-HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
 NOWHERE = (0, 0, -1, -1)
 Change = tuple[int, Ints | int, Ints | Box, Ints | Box]
-"""A version, the items that it changed, and their deciding boxes before and after; plain numbers for a single item."""
+"""A version, the rows that it changed, and their deciding boxes before and after; plain numbers for a single item."""
 
 PLACE, BOX = Struct("=2q"), Struct("=4q")
 """Layouts of a row of positions and of a row of boxes, to read and write a single item without an array."""
 
-NOTHING = Sprite(frames=())  # sprite of an id without an object: a removed one, or one that never was
-NO_TRANSFORM = Transform()  # transform of an id without an object
-NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of an id without an object
+NOTHING = Sprite(frames=())  # sprite of a row without an object
+NO_TRANSFORM = Transform()  # transform of a row without an object
+NO_MASK = Variant(NO_TRANSFORM, np.zeros((0, 0), np.bool_), 0, 0, 0)  # mask of a row without an object
+
+EMPTY = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": NO_MASK, "names": ""}
+"""The lists of items, and what they have in a row without an object."""
 
 NO_EDGE = np.array([HALF, HALF, HALF - SUB, HALF - SUB])  # of an empty box
-NO_IDS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
+NO_ROWS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
 ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
-
 COLUMNS: dict[str, tuple[int, ...]] = {
-    "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
+    "id": (), "alive": (), "role": (), "layer": (), "categories": (), "owner": (), "cost": (),
     "position_256": (2,), "velocity_256": (2,), "pivot_256": (2,), "size_wh": (2,), "offset": (), "mask": (),
 }  # fmt: skip
 
@@ -197,8 +190,9 @@ ORDERING = frozenset(("alive", "role", "layer"))  # columns whose change may reo
 
 
 class Items:
-    """The items of a scene as columns by id; ids count up from 0 and are never used again."""
+    """The items of a scene as columns and lists, which have a row for each item; `table` has the row of each id."""
 
+    id: Ints
     alive: Ints
     role: Ints
     layer: Ints
@@ -213,8 +207,7 @@ class Items:
     mask: Ints
 
     def __init__(self) -> None:
-        self.count = 0
-        self.living = 0
+        self.table = RowTable()
         self.version = 0
         self.atlas = MaskAtlas()
         self.sprites: list[Sprite] = []
@@ -222,7 +215,7 @@ class Items:
         self.angles: list[float] = []
         self.variants: list[Variant] = []
         self.names: list[str] = []
-        self.unmade: dict[int, None] = {}  # items that have masks of earlier looks or none, until `make_masks`
+        self.unmade: dict[int, None] = {}  # rows that have masks of earlier looks or none, until `make_masks`
         self.arrangement = next(ARRANGEMENTS)
         self._journal: deque[Change] = deque()
         self._in_order = False  # whether the order of the last stack still holds
@@ -230,7 +223,7 @@ class Items:
         self._forgotten = 0
         self._decided = NEVER, 0  # version that was looked at, and `decided`
         self._stack: tuple[int, Stack] | None = None
-        self._present = NO_IDS, 0, 0  # `ids`, and the numbers of ids and of items that they are of
+        self._present = NO_ROWS, NO_ROWS, 0, 0  # ids and rows of items, and the numbers of ids and of items they are of
         self.by_mask = ByMask()
         self._imagery: tuple[int, list[Role]] | None = None
         self._lock = threading.Lock()
@@ -243,172 +236,172 @@ class Items:
         self._edge = np.tile(NO_EDGE, (16, 1))  # from the position to the first and last pixel of the box, 1/256 px
 
     def add(self, sprite: Sprite, form: Transform, angle: float, name: str, values: dict[str, object]) -> int:
-        """Append an item with its columns `values`, and return its id; its mask is made later."""
-        item = self.count
-        if item >= ITEMS_MAX:
-            raise InputError(f"objects: expected at most {ITEMS_MAX} in the life of a scene, got one more")
+        """Add an item with its columns `values`, and return its id; its mask is made later."""
         if not surely_fits(sprite, form):
             variants_of([sprite], [form])
-        self.skip_to(item + 1)
-        self.sprites[item], self.forms[item], self.angles[item], self.names[item] = sprite, form, angle, name
+        item, row = self.table.add()
+        self._reserve(self.table.height)
+        self.sprites[row], self.forms[row], self.angles[row], self.names[row] = sprite, form, angle, name
         for column, value in values.items():
-            getattr(self, column)[item] = value
-        self.alive[item] = 1
-        self.living += 1
-        self._make_later([item])
+            getattr(self, column)[row] = value
+        self.id[row], self.alive[row] = item, 1
+        self.arrangement, self._in_order = next(ARRANGEMENTS), False  # the row may be one of an item of the last stack
+        self._make_later([row])
         return item
 
     def state(self) -> dict[str, Any]:
-        """What a copy is made of: views of the columns, and lists of looks and names."""
-        columns = {name: getattr(self, name) for name in COLUMNS}
-        columns = {name: col if len(col) == self.count else col[: self.count] for name, col in columns.items()}
-        return columns | {name: self._by_id(name) for name in (*Looks._fields, "names")}
-
-    def _by_id(self, name: str) -> list[Any]:
-        """A list of its own of looks or names, by id."""
-        return list(getattr(self, name))
+        """What a copy is made of: columns and lists with a row for each item by rising id, and the table of them."""
+        ids, rows = self._known()
+        columns: dict[str, Any] = {name: getattr(self, name).take(rows, axis=0) for name in COLUMNS}
+        lists = {name: [getattr(self, name)[row] for row in rows.tolist()] for name in (*Looks._fields, "names")}
+        return columns | lists | {"table": self.table.copied(ids, self.count)}
 
     @classmethod
     def restored(cls, state: dict[str, Any], atlas: MaskAtlas | None = None) -> Items:
         """Items with the same ids as those of a state; their masks are made anew, and entered into an atlas."""
         items = cls()
-        items.atlas = atlas or items.atlas
-        items.skip_to(len(state["names"]))
+        items.atlas, items.table = atlas or items.atlas, state["table"]
+        count = items.table.height
+        items._reserve(count)
         for name in COLUMNS:
-            getattr(items, name)[: items.count] = state[name]
+            getattr(items, name)[:count] = state[name]
         for name in (*Looks._fields, "names"):
             setattr(items, name, state[name])
-        ids = items.ids
-        items.living = len(ids)
-        looks = items.looks(ids.tolist())
-        items._enter(ids.tolist(), variants_of(looks.sprites, looks.forms))
-        items.record(ids)
+        looks = items.looks(range(count))
+        items._enter(range(count), variants_of(looks.sprites, looks.forms))
+        items.record(np.arange(count))
         return items
 
     @property
+    def count(self) -> int:
+        """Number of ids that the scene gave out."""
+        return self.table.count
+
+    @property
     def ids(self) -> Ints:
-        """Rising ids of all items, of as many as there are and not of all that ever were."""
-        ids, count, living = self._present
-        if (count, living) != (self.count, self.living):
-            ids = np.concatenate([ids, np.arange(count, self.count)])
-            ids = ids[self.alive.take(ids) == 1]
-            self._present = ids, self.count, self.living
-        return ids
+        """Rising ids of all items."""
+        return self._known()[0]
 
-    def skip_to(self, item: int) -> None:
-        """Skip the ids below `item` as if their objects had been removed; objects of a scene file keep their ids."""
-        missing = item - self.count
-        if missing <= 0:
-            return
-        self._reserve(item)
-        self.sprites += [NOTHING] * missing
-        self.forms += [NO_TRANSFORM] * missing
-        self.angles += [0.0] * missing
-        self.variants += [NO_MASK] * missing
-        self.names += [""] * missing
-        self.count = item
-        self.arrangement = next(ARRANGEMENTS)
-        self._in_order = False
+    @property
+    def rows(self) -> Ints:
+        """Rows of all items, by rising id."""
+        return self._known()[1]
 
-    def remove(self, ids: Ints) -> None:
-        """Remove items; their ids are not used again, and their columns and names stay."""
-        self.alive[ids] = 0
-        self.living -= len(ids)
-        self._make_later(ids.tolist())
-        for item in ids.tolist():
-            if self.variants[item] is NO_MASK:  # it came and went unseen
-                del self.unmade[item]
-            self.atlas.drop(self.variants[item])
-            self.sprites[item], self.angles[item] = NOTHING, 0.0
-            self.forms[item], self.variants[item] = NO_TRANSFORM, NO_MASK
+    def _known(self) -> tuple[Ints, Ints]:
+        """`ids` and `rows`, of as many as there are and not of all that ever were."""
+        table, (ids, rows, count, living) = self.table, self._present
+        if (count, living) != (table.count, table.living):
+            ids = np.concatenate([ids, count + np.flatnonzero(table.row_of[count : table.count] >= 0)])
+            rows = table.rows(ids)
+            ids, rows = ids[rows >= 0], rows[rows >= 0]
+            self._present = ids, rows, table.count, table.living
+        return ids, rows
+
+    def name_of(self, item: int) -> str:
+        """Name of the item of an id, even if it was removed."""
+        row = self.table.row(item)
+        return self.names[row] if row >= 0 else self.table.name_of_gone(item)
+
+    def remove(self, rows: Ints) -> None:
+        """Remove items; their ids are not used again, but their rows are."""
+        self.alive[rows] = 0
+        self._make_later(rows.tolist())
+        for row, item in zip(rows.tolist(), self.id[rows].tolist(), strict=True):
+            if self.variants[row] is NO_MASK and not _is_there(tuple(self._box[row].tolist())):  # it was never seen
+                del self.unmade[row]
+            self.atlas.drop(self.variants[row])
+            self.table.drop(item, self.names[row])
+            for name, empty in EMPTY.items():
+                getattr(self, name)[row] = empty
         self._stack = None  # it would hold the masks until the next shot
         if self.atlas.wasteful:
             self._compact()
 
-    def looks(self, ids: Sequence[int]) -> Looks:
+    def looks(self, rows: Sequence[int]) -> Looks:
         """What the masks of items are made of."""
         sprites, angles, forms = self.sprites, self.angles, self.forms
-        return Looks([sprites[item] for item in ids], [angles[item] for item in ids], [forms[item] for item in ids])
+        return Looks([sprites[row] for row in rows], [angles[row] for row in rows], [forms[row] for row in rows])
 
-    def reform(self, ids: Sequence[int], looks: Looks) -> None:
+    def reform(self, rows: Sequence[int], looks: Looks) -> None:
         """Give items other looks; their masks are made later, but if any is too large, no item changes."""
         if not all(map(surely_fits, looks.sprites, looks.forms)):
             variants_of(looks.sprites, looks.forms)
-        for item, sprite, angle, form in zip(ids, *looks, strict=True):
-            self.sprites[item], self.angles[item], self.forms[item] = sprite, angle, form
-        self._make_later(ids)
+        for row, sprite, angle, form in zip(rows, *looks, strict=True):
+            self.sprites[row], self.angles[row], self.forms[row] = sprite, angle, form
+        self._make_later(rows)
 
-    def _make_later(self, ids: Sequence[int]) -> None:
+    def _make_later(self, rows: Sequence[int]) -> None:
         """Leave masks of items to `make_masks`; what reads the version sees at once that something changed."""
         self.version += 1
-        self.unmade.update(dict.fromkeys(ids))
+        self.unmade.update(dict.fromkeys(rows))
 
     def make_masks(self) -> None:
         """Make the masks of items that changed their looks, all together, and record these items and removed ones."""
         with self._lock:  # threads may read a scene at once
-            if ids := [item for item in self.unmade if self.sprites[item] is not NOTHING]:
-                looks = self.looks(ids)
+            if rows := [row for row in self.unmade if self.sprites[row] is not NOTHING]:
+                looks = self.looks(rows)
                 variants = variants_of(looks.sprites, looks.forms)
-                for item in ids:
-                    self.atlas.drop(self.variants[item])
-                self._enter(ids, variants)
+                for row in rows:
+                    self.atlas.drop(self.variants[row])
+                self._enter(rows, variants)
             if self.unmade:
                 self._record(np.array(list(self.unmade)), ("mask",))
                 self.unmade.clear()
 
-    def record(self, ids: Ints, columns: Iterable[str] = COLUMNS) -> None:
+    def record(self, rows: Ints, columns: Iterable[str] = COLUMNS) -> None:
         """Update the version, boxes, arrangement and journal after some columns of items changed."""
         self.version += 1
-        self._record(ids, columns)
+        self._record(rows, columns)
 
-    def _record(self, ids: Ints, columns: Iterable[str]) -> None:
+    def _record(self, rows: Ints, columns: Iterable[str]) -> None:
         """`record` of changes that the version counts already."""
-        before, after = self._box[ids], self.deciding_boxes(ids)
-        low = HALF - self.pivot_256[ids]
-        self._edge[ids] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
-        self._box[ids] = after
+        before, after = self._box[rows], self.deciding_boxes(rows)
+        low = HALF - self.pivot_256[rows]
+        self._edge[rows] = np.concatenate([low, low + SUB * (after[:, 2:] - after[:, :2])], axis=1)
+        self._box[rows] = after
         if not UNARRANGED.issuperset(columns):
             self.arrangement = next(ARRANGEMENTS)
             same = (before[:, 0] <= before[:, 2]) == (after[:, 0] <= after[:, 2])
             self._in_order &= ORDERING.isdisjoint(columns) and bool(same.all())
-        self._note(ids, before, after, len(ids))
+        self._note(rows, before, after, len(rows))
 
-    def move(self, ids: Ints, position_256: Ints) -> None:
+    def move(self, rows: Ints, position_256: Ints) -> None:
         """Move distinct items (n,) to new positions (n, 2); masks and order stay."""
-        before, after = self._box.take(ids, axis=0), boxes_at(position_256, self._edge.take(ids, axis=0))
-        self.position_256[ids], self._box[ids] = position_256, after
+        before, after = self._box.take(rows, axis=0), boxes_at(position_256, self._edge.take(rows, axis=0))
+        self.position_256[rows], self._box[rows] = position_256, after
         self.version += 1
-        self._note(ids, before, after, len(ids))
+        self._note(rows, before, after, len(rows))
 
     def move_risen(self, ids: Ints, xy: Floats) -> bool:
         """Move items of rising ids (n,) to positions (n, 2), px; if any is invalid do nothing and return False."""
-        before, after = np.empty((2, len(ids), 4), np.int64)
-        place = kernels_of(fixed_point).place
-        if not place(ids, xy, self.count, self.alive, self._edge, self.position_256, self._box, before, after):
+        rows, (before, after) = np.empty(len(ids), np.int64), np.empty((2, len(ids), 4), np.int64)
+        place, table = kernels_of(fixed_point).place, self.table
+        if not place(ids, xy, table.count, table.row_of, self._edge, self.position_256, self._box, rows, before, after):
             return False
         self.version += 1
-        self._note(ids.copy(), before, after, len(ids))
+        self._note(rows, before, after, len(rows))
         return True
 
     def move_one(self, item: int, x_256: int, y_256: int) -> bool:
-        """Move one item as `move` does; if it is not in the scene do nothing and return False."""
-        if not (0 <= item < self.count and self.alive.item(item)):
+        """Move the item of an id as `move` does; if it is not in the scene do nothing and return False."""
+        row = self.table.row(item) if 0 <= item < self.table.count else -1
+        if row < 0:
             return False
-        before = x, y, x_max, y_max = BOX.unpack_from(self._box, BOX.size * item)  # type: ignore[arg-type]
-        variant = self.variants[item]
+        before = x, y, x_max, y_max = BOX.unpack_from(self._box, BOX.size * row)  # type: ignore[arg-type]
+        variant = self.variants[row]
         left, top = (x_256 - variant.pivot_x + HALF) >> 8, (y_256 - variant.pivot_y + HALF) >> 8
         after = (left, top, left + x_max - x, top + y_max - y)
-        PLACE.pack_into(self.position_256, PLACE.size * item, x_256, y_256)  # type: ignore[arg-type]
-        BOX.pack_into(self._box, BOX.size * item, *after)  # type: ignore[arg-type]
+        PLACE.pack_into(self.position_256, PLACE.size * row, x_256, y_256)  # type: ignore[arg-type]
+        BOX.pack_into(self._box, BOX.size * row, *after)  # type: ignore[arg-type]
         self.version += 1
-        self._note(item, before, after, 1)
+        self._note(row, before, after, 1)
         return True
 
-    def _note(self, ids: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
+    def _note(self, rows: Ints | int, before: Ints | Box, after: Ints | Box, n: int) -> None:
         """Write n changes of the present version into the journal."""
-        self._journal.append((self.version, ids, before, after))
+        self._journal.append((self.version, rows, before, after))
         self._journal_rows += n
-        most = min(JOURNAL_ROWS, JOURNAL_FEW + JOURNAL_EACH * self.living)
+        most = min(JOURNAL_ROWS, JOURNAL_FEW + JOURNAL_EACH * self.table.living)
         while self._journal_rows > most:
             version, old, _, _ = self._journal.popleft()
             self._journal_rows -= np.size(old)
@@ -428,10 +421,10 @@ class Items:
             self._decided = self.version, last
         return self._decided[1]
 
-    def changed_ids(self, version: int) -> Ints | None:
-        """Sorted ids of the items that changed after a version; None if that is forgotten."""
+    def changed_rows(self, version: int) -> Ints | None:
+        """Sorted rows of the items that changed after a version; None if that is forgotten."""
         changes = self.changes(version)
-        return None if changes is None else sorted_once(np.concatenate([NO_IDS, *(np.ravel(c[1]) for c in changes)]))
+        return None if changes is None else sorted_once(np.concatenate([NO_ROWS, *(np.ravel(c[1]) for c in changes)]))
 
     def changes(self, version: int) -> list[Change] | None:
         """Changes after a version, the last first; None if that is forgotten."""
@@ -444,23 +437,23 @@ class Items:
             found.append(change)
         return found
 
-    def boxes(self, ids: Ints) -> Ints:
+    def boxes(self, rows: Ints) -> Ints:
         """Inclusive boxes (n, 4) of the masks of items; x_max < x_min for an empty mask."""
-        corner = pixel(self.position_256.take(ids, axis=0) - self.pivot_256.take(ids, axis=0))
-        size = self.size_wh.take(ids, axis=0)
+        corner = pixel(self.position_256.take(rows, axis=0) - self.pivot_256.take(rows, axis=0))
+        size = self.size_wh.take(rows, axis=0)
         boxes = np.concatenate([corner, corner + size - 1], axis=1)
-        boxes[(self.alive[ids] == 0) | (size[:, 0] == 0)] = NOWHERE
+        boxes[(self.alive[rows] == 0) | (size[:, 0] == 0)] = NOWHERE
         return boxes
 
-    def corner(self, item: int) -> tuple[int, int]:
+    def corner(self, row: int) -> tuple[int, int]:
         """Top left pixel (x, y) of an item's mask."""
-        x, y = pixel(self.position_256[item] - self.pivot_256[item]).tolist()
+        x, y = pixel(self.position_256[row] - self.pivot_256[row]).tolist()
         return x, y
 
-    def deciding_boxes(self, ids: Ints) -> Ints:
+    def deciding_boxes(self, rows: Ints) -> Ints:
         """`boxes`, but empty for items that decide no hit: planes need not follow their changes."""
-        boxes = self.boxes(ids)
-        role = self.role[ids]
+        boxes = self.boxes(rows)
+        role = self.role[rows]
         boxes[(role != HITTABLE) & (role != OCCLUDER)] = NOWHERE
         return boxes
 
@@ -492,29 +485,29 @@ class Items:
     def _stack_after(self, last: Stack | None) -> Stack:
         """The stack of the present version; it shares unchanged columns with the last one."""
         if last is not None and last.forms == self.arrangement:
-            return last.placed(self._boxes_in_order(last.ids))
+            return last.placed(self._boxes_in_order(last.rows))
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
-        ids = last.ids
-        columns = self._filtered_by(ids, last.occluder), self.owner.take(ids)
+        rows = last.rows
+        columns = self._filtered_by(rows, last.occluder), self.owner.take(rows)
         return last.reformed(
-            self.arrangement, self._boxes_in_order(ids), self.offset.take(ids), self.atlas.flat, *columns
+            self.arrangement, self._boxes_in_order(rows), self.offset.take(rows), self.atlas.flat, *columns
         )
 
-    def _filtered_by(self, ids: Ints, occluder: Bools) -> Ints:
+    def _filtered_by(self, rows: Ints, occluder: Bools) -> Ints:
         """Categories of a stack's items."""
-        bits: Ints = self.categories.take(ids) << CATEGORY_BITS * occluder
+        bits: Ints = self.categories.take(rows) << CATEGORY_BITS * occluder
         return bits
 
-    def _boxes_in_order(self, ids: Ints) -> Ints:
+    def _boxes_in_order(self, rows: Ints) -> Ints:
         """Boxes of all items that decide hits."""
-        return self._box.take(ids, axis=0)
+        return self._box.take(rows, axis=0)
 
     def stack_of(self, *roles: Role) -> Stack:
         """Items of some roles, front to back."""
-        wanted = np.isin(self.role.take(self.ids), [ROLES.index(role) for role in roles])
-        ids = self.ids[wanted & (self.size_wh[self.ids, 0] > 0)]
-        occluder, layer = self.role[ids] == OCCLUDER, self.layer[ids]
+        wanted = np.isin(self.role.take(self.rows), [ROLES.index(role) for role in roles])
+        rows = self.rows[wanted & (self.size_wh[self.rows, 0] > 0)]
+        ids, occluder, layer = self.id[rows], self.role[rows] == OCCLUDER, self.layer[rows]
         layered = bool((layer[1:] != layer[:-1]).any())
         keys = [-ids]
         if occluder.any():
@@ -522,17 +515,18 @@ class Items:
         if layered:
             keys.append(-layer)
         order = np.lexsort(keys)
-        ids, occluder = ids[order], occluder[order]
+        ids, rows, occluder = ids[order], rows[order], occluder[order]
         return Stack(
-            ids, occluder, self._filtered_by(ids, occluder), self.owner[ids], self.boxes(ids), self.offset[ids],
-            self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS), self.count,
+            ids, rows, occluder, self._filtered_by(rows, occluder), self.owner[rows], self.boxes(rows),
+            self.offset[rows], self.atlas.flat, layered,
+            self.arrangement if roles == DECIDING else next(ARRANGEMENTS),
         )  # fmt: skip
 
     def imagery(self) -> list[Role]:
         """Roles in use that decide no hit."""
         known = self._imagery
         if known is None or known[0] != self.arrangement:
-            used = set(self.role.take(self.ids).tolist())
+            used = set(self.role.take(self.rows).tolist())
             drawn = [role for number, role in enumerate(ROLES) if number in used and role not in DECIDING]
             known = self._imagery = self.arrangement, drawn
         return known[1]
@@ -544,49 +538,55 @@ class Items:
         known = atlas.known(stack.forms)
         if known is not None:
             return known
-        variants, ids = self.variants, stack.ids
-        return atlas.tiles(lambda rank: variants[ids[rank]].mask, self.mask.take(ids), stack.forms)
+        variants, rows = self.variants, stack.rows
+        return atlas.tiles(lambda rank: variants[rows[rank]].mask, self.mask.take(rows), stack.forms)
 
-    def covers(self, ids: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Ints]:
+    def covers(self, rows: Ints, boxes_xyxy: Ints, near_xyxy: Box | None) -> tuple[Ints, Ints]:
         """Rectangles that cover the masks of items (B,); see `bits.shadows.Covers.of`."""
         covers = self.by_mask.covers = self.by_mask.covers or late.shadows.Covers()
-        return covers.of(self.mask.take(ids), lambda row: self.variants[ids[row]].mask, boxes_xyxy, near_xyxy)
+        return covers.of(self.mask.take(rows), lambda k: self.variants[rows[k]].mask, boxes_xyxy, near_xyxy)
 
-    def bounding(self, kind: Kind, ids: Ints) -> tuple[Volumes, Ints]:
-        """Volumes of masks, px from the mask's pixel [0, 0], and the row for each item; no mask may be empty."""
+    def bounding(self, kind: Kind, rows: Ints) -> tuple[Volumes, Ints]:
+        """Volumes of masks, px from the mask's pixel [0, 0], and which of them each item has; no mask may be empty."""
         bounds = self.by_mask.bounds.setdefault(kind, late.fit.Bounds(kind))
-        return bounds.rows(self.mask[ids], self.sprites, self.variants, ids, len(self.stack()))
+        return bounds.rows(self.mask[rows], self.sprites, self.variants, rows, len(self.stack()))
 
-    def volumes(self, name: str, ids: Ints) -> Volumes:
+    def volumes(self, name: str, rows: Ints) -> Volumes:
         """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
         k = boxes_in("kind", name)
         choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
-        for item in ids[self.size_wh[ids, 0] == 0].tolist():
+        for item in self.id[rows[self.size_wh[rows, 0] == 0]].tolist():
             raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
         if name == "box":
-            low, high = np.split(self.boxes(ids).astype(np.float64), 2, axis=1)
+            low, high = np.split(self.boxes(rows).astype(np.float64), 2, axis=1)
             return late.volumes.Aabbs(low - 0.5, high + 0.5)
-        if not len(ids):
+        if not len(rows):
             return late.volumes.Circles(np.zeros((0, 2)), 0.0)
-        volumes, row = self.bounding(late.fit.Kind(name) if k is None else late.fit.Kind(late.fit.KINDS[2], k), ids)
-        return late.fit.shifted(volumes.take(row), pixel(self.position_256[ids] - self.pivot_256[ids]))
+        volumes, of = self.bounding(late.fit.Kind(name) if k is None else late.fit.Kind(late.fit.KINDS[2], k), rows)
+        return late.fit.shifted(volumes.take(of), pixel(self.position_256[rows] - self.pivot_256[rows]))
 
-    def _enter(self, ids: Sequence[int], variants: Sequence[Variant]) -> None:
+    def _enter(self, rows: Sequence[int], variants: Sequence[Variant]) -> None:
         """Enter the masks of items into the atlas and the columns."""
-        for item, variant in zip(ids, variants, strict=True):
-            self.variants[item] = variant
-        self.offset[ids] = self.atlas.take(variants)
-        rows = [(mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
-        columns = np.array(rows, np.int64).reshape(-1, 5)
-        self.mask[ids], self.pivot_256[ids], self.size_wh[ids] = columns[:, 0], columns[:, 1:3], columns[:, 3:]
+        for row, variant in zip(rows, variants, strict=True):
+            self.variants[row] = variant
+        self.offset[rows] = self.atlas.take(variants)
+        found = [(mask.uid, mask.pivot_x, mask.pivot_y, *mask.mask.shape[::-1]) for mask in variants]
+        columns = np.array(found, np.int64).reshape(-1, 5)
+        self.mask[rows], self.pivot_256[rows], self.size_wh[rows] = columns[:, 0], columns[:, 1:3], columns[:, 3:]
 
     def _compact(self) -> None:
         """Rebuild the atlas with only the masks in use."""
         atlas, offset = MaskAtlas(), self.offset.copy()
-        offset[self.ids] = atlas.take([self.variants[item] for item in self.ids.tolist()])
+        offset[self.rows] = atlas.take([self.variants[row] for row in self.rows.tolist()])
         self.atlas, self.offset = atlas, offset
 
     def _reserve(self, count: int) -> None:
+        """Make room for `count` rows."""
+        more = count - len(self.sprites)
+        if more <= 0:
+            return
+        for name, empty in EMPTY.items():
+            getattr(self, name).extend([empty] * more)
         size = len(self.alive)
         if count <= size:
             return

@@ -12,7 +12,8 @@ from ..common.checks import Bools, Image, InputError, bools, integers, within
 from ..common.limits import ITEMS_MAX, PLANE_AREA_MAX, PLANE_SIDE_MAX, SCALE_BITS, SUB
 from ..grid.fixed_point import pixel
 from ..grid.spans import Box
-from .items import ROLES, Items, Role
+from .items import Items
+from .objects import ROLES, Role
 from .sprite import Sprite, frame_pivot
 from .variants import picture_of
 
@@ -37,12 +38,12 @@ def draw_view(items: Items, view_xyxy: Box, screen_xy: tuple[int, int] | None = 
     screen_x, screen_y = (x, y) if screen_xy is None else screen_xy
     picture = np.empty((y_max - y + 1, x_max - x + 1, 3), np.uint8)
     picture[:] = GROUND
-    for item in _back_to_front(items):
-        if _beyond(items, item, view_xyxy):
+    for row in _back_to_front(items):
+        if _beyond(items, row, view_xyxy):
             continue
-        role = ROLES[int(items.role[item])]
-        image, pivot_x, pivot_y = picture_of(items.sprites[item], items.forms[item], BARE[role])
-        left, top = pixel(items.position_256[item] - (pivot_x, pivot_y)).tolist()
+        role = ROLES[int(items.role[row])]
+        image, pivot_x, pivot_y = picture_of(items.sprites[row], items.forms[row], BARE[role])
+        left, top = pixel(items.position_256[row] - (pivot_x, pivot_y)).tolist()
         if role is Role.HUD:
             left, top = left + screen_x, top + screen_y
         blend(picture, image[:, :, :3], image[:, :, 3], left - x, top - y)
@@ -64,24 +65,24 @@ def blend(
     under[:] = (under * (255 - a) + over * a + 127) // 255
 
 
-def _beyond(items: Items, item: int, view_xyxy: Box) -> bool:
+def _beyond(items: Items, row: int, view_xyxy: Box) -> bool:
     """Whether an image surely lies out of view: its pivot is farther away than its sides and scale can reach."""
-    sprite, form = items.sprites[item], items.forms[item]
-    if not sprite.frames or ROLES[int(items.role[item])] is Role.HUD:
+    sprite, form = items.sprites[row], items.forms[row]
+    if not sprite.frames or ROLES[int(items.role[row])] is Role.HUD:
         return False
     height, width = sprite.frames[form.frame].mask.shape
     pivot = max(map(abs, frame_pivot(sprite, sprite.frames[form.frame]))) // SUB
     reach = (height + width + 2 * pivot + 2) * (max(form.scale_x, form.scale_y, 1 << SCALE_BITS) >> SCALE_BITS) * 2
-    x, y = pixel(items.position_256[item]).tolist()
+    x, y = pixel(items.position_256[row]).tolist()
     return not (view_xyxy[0] - reach <= x <= view_xyxy[2] + reach and view_xyxy[1] - reach <= y <= view_xyxy[3] + reach)
 
 
 def _back_to_front(items: Items) -> list[int]:
-    """Ids in drawing order: the background, the stack from back to front with movers among its objects, the HUD."""
-    ids, role = items.ids, items.role.take(items.ids)
+    """Rows in drawing order: the background, the stack from back to front with movers among its objects, the HUD."""
+    rows, role = items.rows, items.role.take(items.rows)
     plane = np.select([role == ROLES.index(Role.BACKGROUND), role == ROLES.index(Role.HUD)], [0, 2], 1)
-    order = np.lexsort((ids, role == ROLES.index(Role.OCCLUDER), items.layer[ids], plane))
-    return [int(i) for i in ids[order]]
+    order = np.lexsort((items.ids, role == ROLES.index(Role.OCCLUDER), items.layer[rows], plane))
+    return [int(row) for row in rows[order]]
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ from ..common.tables import Text, typed
 from ..grid.fixed_point import snap
 from ..grid.spans import Box
 from .derived import Derived
-from .items import ROLES, Items, Role
+from .items import Items
+from .objects import ROLE_NAMES, ROLES, Role
 from .poses import are_rows, one_place, place_256, points, scale_pair
 from .sprite import Sprite, as_sprite
 from .variants import transform_of
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 
 Read = TypeVar("Read", bound=np.generic)
 
-ROLE_NAMES = tuple(role.value for role in ROLES)
 FIELDS = ("background", "hittable", "movers", "occluders", "hud")  # names of the planes of ROLES, in order
 DEFAULT_CATEGORY = "default"  # name of the first category bit, which objects have by default
 
@@ -193,8 +193,7 @@ class Scene:
     def remove(self, ids: int | Sequence[int] | Ints) -> None:
         """Take objects out of the scene; their ids are not used again, as hits and histories name objects by them.
 
-        A scene gives out 4,194,304 ids in its life, and keeps about 300 bytes for each. A game that spawns without end
-        moves an object that is gone out of the bounds, and uses it again by `move` and `set`.
+        What is left of a removed object is four bytes for its id, and its name if it was given one.
         """
         self._items.remove(self._existing(ids))
 
@@ -267,7 +266,7 @@ class Scene:
         sprites, lost = late.carving.carved_sprites(self.items, given)
         if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
-        return lost
+        return {int(self._items.id[row]): count for row, count in lost.items()}
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""
@@ -277,8 +276,8 @@ class Scene:
 
     def ids(self, role: Role | str | None = None) -> Ints:
         """Ids of the objects in the scene, rising, of one role or of all."""
-        ids = self._items.ids
-        return ids.copy() if role is None else ids[self._items.role.take(ids) == ROLES.index(_role(role))]
+        ids, rows = self._items.ids, self._items.rows
+        return ids.copy() if role is None else ids[self._items.role.take(rows) == ROLES.index(_role(role))]
 
     def __iter__(self) -> Iterator[int]:
         """Ids of the objects in the scene, rising."""
@@ -288,7 +287,7 @@ class Scene:
         """Whether an id is of an object in the scene, and not of a removed one."""
         if not isinstance(item, int | np.integer):
             return False
-        return 0 <= int(item) < self._items.count and bool(self._items.alive[item])
+        return 0 <= int(item) < self._items.count and self._items.table.row(int(item)) >= 0
 
     def __repr__(self) -> str:
         counts = [f"{len(ids)} {role.value}" for role in ROLES if len(ids := self.ids(role))]
@@ -371,11 +370,11 @@ class Scene:
 
     def name_of(self, item: int) -> str:
         """Name of an object, even if it was removed."""
-        return self._items.names[integer("item", item, 0, self._items.count - 1)]
+        return self._items.name_of(integer("item", item, 0, self._items.count - 1))
 
     def find(self, name: str) -> int:
         """Id of the object of a name; it must be the only one."""
-        names = {i: self._items.names[i] for i in self.ids().tolist()}
+        names = {i: self._items.name_of(i) for i in self.ids().tolist()}
         choice("name", name, names.values())
         named = [i for i, other in names.items() if other == name]
         if len(named) > 1:
@@ -417,7 +416,8 @@ class Scene:
         """Inclusive box (x_min, y_min, x_max, y_max) of the bounds, or of all objects if there are no bounds."""
         if self.bounds is not None:
             return self.bounds
-        boxes = self.items.boxes(np.setdiff1d(self.ids(), self.ids(Role.HUD)))
+        rows = self.items.rows
+        boxes = self.items.boxes(rows[self.items.role[rows] != ROLES.index(Role.HUD)])
         boxes = boxes[boxes[:, 0] <= boxes[:, 2]]
         if not len(boxes):
             return (0, 0, 0, 0)
@@ -432,7 +432,7 @@ class Scene:
         out: dict[str, npt.NDArray[np.int32]] = {}
         for field, role in zip(FIELDS, ROLES, strict=True):
             at = (0, 0, x_max - x, y_max - y) if role is Role.HUD else box
-            out[field] = late.label_plane.label_plane(self.items.stack_of(role), at)
+            out[field] = late.label_plane.id_plane(self.items.stack_of(role), at)
             out[field].flags.writeable = False
         return late.render.Planes((x, y), **out)
 
@@ -442,11 +442,11 @@ class Scene:
 
         stack = self.items.stack()
         digest = hashlib.sha256(repr(self.bounds).encode())
-        for column in (stack.ids, stack.occluder, self.items.categories[stack.ids], stack.owner, stack.box_xyxy):
+        for column in (stack.ids, stack.occluder, self.items.categories[stack.rows], stack.owner, stack.box_xyxy):
             digest.update(np.ascontiguousarray(column).tobytes())
         for rank in range(len(stack)):
             digest.update(np.packbits(stack.mask(rank)).tobytes())
-        cost, velocity = self.items.cost[stack.ids], self.items.velocity_256[stack.ids]
+        cost, velocity = self.items.cost[stack.rows], self.items.velocity_256[stack.rows]
         if (cost != 1).any() or velocity.any():
             digest.update(np.concatenate([cost[:, None], velocity], axis=1).tobytes())
         return digest.hexdigest()[:16]
@@ -456,7 +456,7 @@ class Scene:
         Text().check("name", self.name)
         typed("weapons", self.weapons, dict)
         typed("shots", self.shots, list)
-        objects = [self._file_object(item) for item in self.ids().tolist()]
+        objects = [self._file_object(row) for row in self.items.rows.tolist()]
         x, y, x_max, y_max = self.bounds or (0, 0, 0, 0)
         size = None if self.bounds is None else (x_max - x + 1, y_max - y + 1)
         names = self._bit_names()
@@ -477,44 +477,44 @@ class Scene:
             names.append(name)
         return names
 
-    def _file_object(self, item: int) -> FileObject:
-        items, form = self.items, self.items.forms[item]
+    def _file_object(self, row: int) -> FileObject:
+        items, form = self.items, self.items.forms[row]
         one = 1 << SCALE_BITS
         pose: dict[str, Any] = {}
-        if items.angles[item]:
-            pose["angle"] = items.angles[item]
+        if items.angles[row]:
+            pose["angle"] = items.angles[row]
         if (form.scale_x, form.scale_y) != (one, one):
             pose["scale"] = [form.scale_x / one, form.scale_y / one]
         if form.flip != "none":
             pose["flip"] = form.flip
         if form.frame:
             pose["frame"] = form.frame
-        if items.layer[item]:
-            pose["layer"] = int(items.layer[item])
-        if items.cost[item] != 1:
-            pose["cost"] = int(items.cost[item])
-        if items.velocity_256[item].any():
-            pose["velocity_xy"] = (items.velocity_256[item] / SUB).tolist()
-        role = ROLES[int(items.role[item])]
-        bits, owner = int(items.categories[item]), int(items.owner[item])
-        x, y = (items.position_256[item] / SUB).tolist()
+        if items.layer[row]:
+            pose["layer"] = int(items.layer[row])
+        if items.cost[row] != 1:
+            pose["cost"] = int(items.cost[row])
+        if items.velocity_256[row].any():
+            pose["velocity_xy"] = (items.velocity_256[row] / SUB).tolist()
+        role = ROLES[int(items.role[row])]
+        bits, owner = int(items.categories[row]), int(items.owner[row])
+        x, y = (items.position_256[row] / SUB).tolist()
         categories = None
         if bits != _default_bits(role):
             categories = self.category_names(bits)
-        part_of = None if owner == item else owner
+        part_of = None if owner == items.id[row] else owner
         return late.scene_folder.FileObject(
-            role, items.sprites[item], (x, y), pose, items.names[item], categories, part_of, item
+            role, items.sprites[row], (x, y), pose, items.names[row], categories, part_of, int(items.id[row])
         )
 
     def _risen(self, ids: object) -> Ints | None:
-        """A copy of an array of rising ids (n,) that are all in the scene; None for any other value."""
+        """Rows of an array of rising ids (n,) that are all in the scene; None for any other value."""
         if type(ids) is not np.ndarray or ids.ndim != 1 or ids.dtype != np.int64 or not rising(ids, self._items.count):
             return None
-        rows = ids.copy()
-        return rows if self._items.alive.take(rows).all() else None
+        rows = self._items.table.rows(ids)
+        return rows if not len(rows) or rows.min() >= 0 else None
 
     def _read(self, ids: object, values: Callable[[Ints], npt.NDArray[Read]]) -> npt.NDArray[Read]:
-        """Values of objects, a row each; for one id without the rows. An id may be there several times."""
+        """Values of objects by their rows, one each; for one id without an axis. An id may be there several times."""
         read = values(self._living(ids))
         return read if np.ndim(ids) else read[0]  # type: ignore[arg-type]
 
@@ -524,19 +524,20 @@ class Scene:
         return np.array([[getattr(form, name) for name in names] for form in forms]).reshape(-1, len(names))
 
     def _living(self, ids: object) -> Ints:
-        """Check that ids are in the scene."""
+        """Rows of ids, which are checked to be in the scene."""
+        table = self._items.table
         if isinstance(ids, int | np.integer) and type(ids) is not bool and ids in self:
-            return np.array([ids])
-        given = np.atleast_1d(array_of("ids", ids))
-        rows = integers("ids", given, (None,), 0, self._items.count - 1)
-        gone = rows[self._items.alive[rows] == 0]
+            return np.array([table.row(int(ids))])
+        given = integers("ids", np.atleast_1d(array_of("ids", ids)), (None,), 0, table.count - 1)
+        rows = table.rows(given)
+        gone = np.flatnonzero(rows < 0)
         if len(gone):
-            row = int(np.flatnonzero(rows == gone[0])[0])
-            raise InputError(f"ids[{row}]: expected an object in the scene, got {gone[0]}, which was removed")
+            item = given[gone[0]]
+            raise InputError(f"ids[{gone[0]}]: expected an object in the scene, got {item}, which was removed")
         return rows
 
     def _existing(self, ids: object) -> Ints:
-        """Check that ids are in the scene, each once."""
+        """Rows of ids, which are checked to be in the scene, each once."""
         risen = self._risen(ids)
         if risen is not None:
             return risen
@@ -544,7 +545,8 @@ class Scene:
         if len(rows) > 1:
             again = np.setdiff1d(np.arange(len(rows)), np.unique(rows, return_index=True)[1])
             if len(again):
-                raise InputError(f"ids[{again[0]}]: expected each object once, got {rows[again[0]]} again")
+                item = self._items.id[rows[again[0]]]
+                raise InputError(f"ids[{again[0]}]: expected each object once, got {item} again")
         return rows
 
     def _bits(self, categories: object, default: int) -> int:

@@ -117,7 +117,7 @@ def redrawn(rounds: int) -> float:
     assert plane is not None  # the scene has bounds
 
     def follow() -> float:
-        scene.move(moved, scene.items.position_256[moved] / 256 + 1)
+        scene.move(moved, scene.position(moved) + 1)
         scene.items.stack()
         return time_of(partial(plane.read, scene.items))
 
@@ -149,7 +149,7 @@ def of_boxes(rounds: int) -> dict[str, float]:
     moved = scene.ids()[: len(boxes) // 10]
 
     def follow() -> float:
-        scene.move(moved, scene.items.position_256[moved] / 256 + 1)
+        scene.move(moved, scene.position(moved) + 1)
         return time_of(partial(index.read, scene.items))
 
     return found | {"bvh_moved": min(follow() for _ in range(rounds)) / len(moved)}

@@ -57,7 +57,7 @@ def shots_at(scene: Scene, weapon: Weapon) -> Hits:
     rng = np.random.default_rng(6)
     ids = rng.choice(scene.ids(), SHOTS)
     aim = rng.integers(0, 360, SHOTS).astype(np.float64)
-    box = scene.items.boxes(ids).astype(np.float64)
+    box = scene.box(ids).astype(np.float64)
     beside = 100 * np.stack([np.cos(np.radians(aim)), np.sin(np.radians(aim))], axis=1)
     return fire(scene, weapon, (box[:, :2] + box[:, 2:]) / 2 - np.rint(beside), aim=aim)
 

@@ -33,7 +33,7 @@ def rewind(settings: Settings) -> Iterator[Cell]:
         scene = scene_of(objects)
         history, masks = History(scene, TICKS), Masks(items_of(scene))
         ids, rng = scene.ids("hittable"), np.random.default_rng(4)
-        xy = scene.items.position_256[ids] / 256
+        xy = scene.position(ids)
         past, recording = [], []
         for _ in range(TICKS):
             xy = np.clip(xy + rng.integers(-STEP, STEP + 1, xy.shape), 0, np.array(WORLD) - 1)
@@ -41,7 +41,7 @@ def rewind(settings: Settings) -> Iterator[Cell]:
             begin = time.perf_counter_ns()
             history.record()
             recording.append(time.perf_counter_ns() - begin)
-            boxes = scene.items.boxes(ids[::-1])
+            boxes = scene.box(ids[::-1])
             past.append([pygame.Rect(x, y, x1 - x + 1, y1 - y + 1) for x, y, x1, y1 in boxes.tolist()])
         works = [[work] for work in islice(_at_ticks(settings.rewound, objects), settings.rounds + 1)]
         sides = [
@@ -95,7 +95,7 @@ def huge(settings: Settings) -> Iterator[Cell]:
     scene = scene_of(objects, None, occluders=0, over_wh=(HUGE, HUGE))
     items = items_of(scene)
     masks, space, tree = Masks(items, None), Space(items), Tree(items)
-    middles = scene.items.position_256[scene.ids("hittable")] / 256
+    middles = scene.position(scene.ids("hittable"))
     for name in ("point", "disc r=40", "ray 1000"):
         weapon: Any = PATTERNS[name]
         works = [[work] for work in islice(_half_near(name, settings.shots, middles), settings.rounds + 1)]

@@ -76,7 +76,7 @@ def frames_of(scene: Scene, count: int, shots: int, turning: float, seed: int) -
 def _as_peers_like(scene: Scene, some: Ints, made: dict[Any, Any], sized: bool) -> tuple[list[Any], Any]:
     """Rects of all objects, later ones first, and the masks of some."""
     ids = scene.ids("hittable")[::-1]
-    boxes = scene.items.boxes(ids)
+    boxes = scene.box(ids)
     sizes = boxes[:, 2:] - boxes[:, :2] + 1
     rects = np.concatenate([boxes[:, :2], sizes], axis=1) if sized else boxes[:, :2]
     masks = []
@@ -283,7 +283,7 @@ def redrawn(settings: Settings) -> Iterator[Cell]:
 def _steps(scene: Scene, moved: int, count: int, rng: Any) -> list[tuple[Any, Floats]]:
     """Who moves where, frame by frame."""
     ids = scene.ids("hittable")
-    xy = scene.items.position_256[ids] / 256
+    xy = scene.position(ids)
     steps = []
     for _ in range(count):
         some = np.sort(rng.permutation(len(ids))[:moved])

@@ -170,7 +170,7 @@ def static(settings: Settings) -> Iterator[Cell]:
 def aimed_at_objects(settings: Settings, scene: Scene, objects: int, peers: Peers) -> Cell:
     """Discs r = 40 at the middles of objects: what a row costs, of few objects and of many."""
     ids = scene.ids("hittable")
-    middles = scene.items.boxes(ids).reshape(-1, 2, 2).mean(axis=1)
+    middles = scene.box(ids).reshape(-1, 2, 2).mean(axis=1)
     rng = np.random.default_rng(7)
     works = [
         [

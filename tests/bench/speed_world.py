@@ -101,13 +101,13 @@ class Item:
 
 def items_of(scene: Scene) -> list[Item]:
     """All that decides, front to back."""
-    items, occluders = scene.items, set(scene.ids("occluder").tolist())
+    occluders = set(scene.ids("occluder").tolist())
     ids = [*scene.ids("hittable").tolist(), *occluders]
-    ids.sort(key=lambda i: (-int(items.layer[i]), i not in occluders, -i))
+    ids.sort(key=lambda i: (-int(scene.layer(i)), i not in occluders, -i))
     found = []
     for i in ids:
         mask, (left, top) = scene.mask(i)
-        found.append(Item(i, mask, left, top, i in occluders, int(items.categories[i])))
+        found.append(Item(i, mask, left, top, i in occluders, int(scene.categories_of(i))))
     return found
 
 

@@ -52,7 +52,7 @@ def masks() -> dict[str, Bools]:
     found = {}
     for name in OBJECTS:
         item = scene.find(name)
-        found[name] = scene.items.sprites[item].frames[scene.items.forms[item].frame].mask
+        found[name] = scene.sprite(item).frames[scene.frame(item)].mask
     return found
 
 

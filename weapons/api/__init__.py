@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hitplanes.planes.scene.history import FixedStep as FixedStep
     from hitplanes.planes.scene.history import History as History
     from hitplanes.planes.scene.history import PastScene as PastScene
-    from hitplanes.planes.scene.items import Role as Role
+    from hitplanes.planes.scene.objects import Role as Role
     from hitplanes.planes.scene.render import Planes as Planes
     from hitplanes.planes.scene.scene import Scene as Scene
     from hitplanes.planes.scene.sprite import Sprite as Sprite
@@ -69,7 +69,7 @@ _HOME = {
         "planes.common.backend": "use_jit use_threads",
         "planes.grid.spans": "Spans",
         "planes.scene.sprite": "Sprite",
-        "planes.scene.items": "Role",
+        "planes.scene.objects": "Role",
         "planes.scene.scene": "Scene",
         "planes.scene.history": "FixedStep History PastScene",
         "planes.scene.render": "Planes",

@@ -17,7 +17,7 @@ from hitplanes.planes.common.checks import InputError, integer, printable, real,
 from hitplanes.planes.common.limits import SEED_MAX
 from hitplanes.planes.files.png import check_output, write_png, write_text
 from hitplanes.planes.files.scene_folder import FILE_NAME, images_of, load_scene, scene_folder
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import Hits

@@ -8,7 +8,7 @@ from typing import Any
 from hitplanes.planes.bits.span_walk import OF_PATTERNS, Verdict
 from hitplanes.planes.common.checks import InputError, path_of, within
 from hitplanes.planes.common.limits import (
-    ITEMS_MAX,
+    IDS_MAX,
     MARGIN_PX,
     POSITION_MAX,
     REACH_MAX,
@@ -49,7 +49,7 @@ PIXEL = Wholes((2,), -FARTHEST, FARTHEST)
 BOX = Wholes((4,), -FARTHEST, FARTHEST)
 RUNS = Wholes((None, 3), -FARTHEST, FARTHEST)
 SHARE = Number(0, 1)
-ITEM: dict[str, Value] = {"object": Whole(0, ITEMS_MAX - 1), "name": Text()}
+ITEM: dict[str, Value] = {"object": Whole(0, IDS_MAX - 1), "name": Text()}
 VERDICTS = {verdict.name.lower(): COUNT for verdict in Verdict}
 COUNTS = Within(Keys(dict(VERDICTS), tuple(verdict.name.lower() for verdict in OF_PATTERNS)))
 STAGE: dict[str, Value] = {"stage": Text(), "why": Text()}
@@ -90,7 +90,7 @@ RAYS: dict[str, Value] = {"radius": Number(0, REACH_MAX), "rays": Rows(RAY), "ne
 """Further keys of a shot of rays."""
 
 TESTED = _all({
-    "objects": Wholes((None,), 0, ITEMS_MAX - 1), "of": COUNT, "opened": COUNT,
+    "objects": Wholes((None,), 0, IDS_MAX - 1), "of": COUNT, "opened": COUNT,
     "patterns": Rows(_all({"points": Numbers((None, 2), FARTHEST)})),
 })  # fmt: skip
 BLOCKED = _all({**ITEM, "samples": COUNT, "at_xy": PIXEL})

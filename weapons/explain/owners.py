@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import NamedTuple
 
 from hitplanes.planes.scene.items import Stack
@@ -48,9 +49,12 @@ def owner_rows(
         the weapon has one pellet. It is asked only about shots of which a round hit several objects of a body
     """
 
+    @cache
+    def owners(stack: Stack) -> dict[int, int]:
+        return dict(zip(stack.ids.tolist(), stack.owner.tolist(), strict=True))
+
     def owner_of(shot: int, item: int) -> int:
-        stack = stack_of(shot)
-        return stack.owner.item(stack.rank_of.item(item))
+        return owners(stack_of(shot))[item]
 
     bodies: dict[tuple[int, int], list[HitRow]] = {}
     for row in rows:

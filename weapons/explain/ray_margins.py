@@ -131,7 +131,7 @@ def ray_margins(detail: RayDetail, scene: Scene, ray: RayWeapon, shot: int, hit:
         accepted[detail.every.rank[detail.entered == 0]] = False
     open_ends = terminations_of(detail.met, detail.lines, stack, none, Laser(None), Plan())
     touched = _touched(detail)
-    velocity = scene.items.velocity_256[stack.ids] * isinstance(ray, Projectile)
+    velocity = scene.items.velocity_256[stack.rows] * isinstance(ray, Projectile)
     found = []
     for rank, rows in _passed(detail, np.flatnonzero(accepted), velocity).items():
         item = int(stack.ids[rank])

@@ -216,7 +216,7 @@ def shares_of(context: QueryContext, weapon: Weapon, shots: Shots, rows: Sequenc
     placed: dict[int, Placements] = {}
     for row in rows:
         shot = shots.take(row.shot, row.shot + 1)
-        rank = int(stack.rank_of[row.object])
+        rank = int(stack.ranks(np.array(row.object)))
         key = (rank, int(shots.meets[row.shot]), *shots.exclude[row.shot].tolist())
         if key not in visible:
             mask = _visible(context, rank, shot)

@@ -287,7 +287,8 @@ def by_labels(request: Request, context: QueryContext) -> list[Rows]:
     for begin in range(0, len(request.shots), PLACEMENTS_AT_ONCE):
         at_256 = request.shots.at_256[begin : begin + PLACEMENTS_AT_ONCE]
         front = plane.front(labels, at_256, objects)
-        rows = Rows.of({"shot": front.place, "object": front.object, "first_xy": front.xy})
+        ids = request.stack.ids.take(request.stack.rank_by_label.take(front.label))
+        rows = Rows.of({"shot": front.place, "object": ids, "first_xy": front.xy})
         plan.run("samples", "one label for each", rows.nbytes)
         parts.append(rows.later(begin))
     plan.leave_out("patterns", "each shot is one pixel")

@@ -340,8 +340,8 @@ def check_owners(scene: Scene, shots: Shots) -> None:
     if shots.last_owner < items.count:
         return
     row, column = np.argwhere(shots.exclude >= items.count)[0].tolist()
-    owners = [owner for owner in np.unique(items.owner[: items.count]).tolist() if items.names[owner]]
-    near = ", ".join(f"{owner} {items.names[owner]!r}" for owner in owners[-OWNERS_NAMED:])
-    known = f"the nearest are {near}" if near else "it never had any"
+    owners = [owner for owner in np.unique(items.owner[items.rows]).tolist() if items.name_of(owner)]
+    near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in owners[-OWNERS_NAMED:])
+    known = f"the nearest are {near}" if near else "it has none"
     got = shots.exclude[row, column]
     raise InputError(f"exclude[{row}][{column}]: expected an owner that the scene has or had, got {got}; {known}")

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter_ns
 from typing import Any
 
-from hitplanes.planes.scene.items import Role, Stack
+from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from ..kinds.areas import is_directed

@@ -192,7 +192,7 @@ class Candidates:
         m = len(self.stack)
         rows = np.flatnonzero((boxes_xyxy[:, :2] <= boxes_xyxy[:, 2:]).all(axis=1))
         row, item = self.index.query(self.items, boxes_xyxy[rows])
-        row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_of[item]), m)
+        row, rank = np.divmod(np.sort(rows[row] * m + self.stack.rank_by_label[item + 1]), m)
         return row, rank
 
     def near(self, placements: Placements, placement: Ints, rank: Ints) -> Bools:
@@ -224,29 +224,29 @@ def near(name: str, kind: Kind, items: Items, stack: Stack, placed: Placements, 
     fired, of_pattern = np.unique(placed.pattern[placement], return_inverse=True)
     patterns = pattern_volumes(name, [placed.table.patterns[i] for i in fired.tolist()])
     shift = stack.box_xyxy[rank, :2] - placed.xy[placement]
-    return _meet(kind, items, stack.ids[rank], shift, patterns, of_pattern)
+    return _meet(kind, items, stack.rows[rank], shift, patterns, of_pattern)
 
 
-def near_rays(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, lines: Lines) -> Bools:
+def near_rays(kind: Kind, items: Items, rows: Ints, corner_xy: Ints, lines: Lines) -> Bools:
     """Which pairs of a ray and an item may touch: the capsule around the ray meets the item's volume.
 
     Parameters
     ----------
     corner_xy : (P, 2) corners of the items' masks, about the origin of the ray
     """
-    if not len(ids):
+    if not len(rows):
         return np.zeros(0, np.bool_)
     capsules = late.volumes.Capsules(lines.start / SUB, (lines.start + lines.step) / SUB, lines.radius / SUB)
-    return _meet(kind, items, ids, corner_xy, capsules, np.arange(len(ids)))
+    return _meet(kind, items, rows, corner_xy, capsules, np.arange(len(rows)))
 
 
-def _meet(kind: Kind, items: Items, ids: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
+def _meet(kind: Kind, items: Items, rows: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
     """Which volumes of items, placed by the corners of their masks, meet other volumes."""
-    volumes, row = items.bounding(kind, ids)
-    found = np.zeros(len(ids), np.bool_)
-    for first in range(0, len(ids), PAIRS_AT_ONCE):
+    volumes, of = items.bounding(kind, rows)
+    found = np.zeros(len(rows), np.bool_)
+    for first in range(0, len(rows), PAIRS_AT_ONCE):
         part = slice(first, first + PAIRS_AT_ONCE)
-        here = volumes.take(row[part]).translated(corner_xy[part])
+        here = volumes.take(of[part]).translated(corner_xy[part])
         found[part] = late.overlap.overlap(here, others.take(of_other[part]), conservative=True)
     return found
 

@@ -68,7 +68,7 @@ def blockers_of(
         return None
     boxes_xyxy = stack.box_xyxy[rank]
     if stack.forms == scene.items.arrangement:
-        rects = scene.items.covers(stack.ids[rank], boxes_xyxy, near_xyxy)
+        rects = scene.items.covers(stack.rows[rank], boxes_xyxy, near_xyxy)
     else:  # the masks of then may be gone from the scene
         rects = late.shadows.Covers().of(np.arange(len(rank)), lambda row: stack.mask(rank[row]), boxes_xyxy, near_xyxy)
     whose = (stack.categories[rank], stack.owner[rank]) if view is None else (rank[:0], rank[:0])

@@ -21,7 +21,7 @@ import pytest
 from hitplanes.planes.common.checks import Bools, Image, InputError, printable
 from hitplanes.planes.common.tables import DEVICE
 from hitplanes.planes.files.png import put_in_place, write_png, write_text
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import plane_objects
 from hitplanes.planes.scene.scene import Scene
 
@@ -107,7 +107,7 @@ def scene_of(golden: Golden) -> Scene | None:
     fields = zip(SCENE_PLANES, (Role.HITTABLE, Role.OCCLUDER), strict=True)
     found = [(role, *item) for name, role in fields for item in plane_objects(name, role.value, golden.planes[name])]
     for role, label, sprite, left, top in sorted(found, key=lambda item: int(item[1])):
-        scene.items.skip_to(int(label) - 1)
+        scene.items.table.skip_to(int(label) - 1)
         scene.add(sprite, (left + golden.origin_xy[0], top + golden.origin_xy[1]), role=role)
     return scene
 

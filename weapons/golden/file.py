@@ -153,9 +153,10 @@ def check_present(hits: object) -> Hits:
     scene = hits.scene
     if hits.version == scene.version:
         return hits
-    ids = scene.items.changed_ids(hits.version)
-    names = [] if ids is None else [f"{item} {json.dumps(scene.name_of(item))}" for item in ids[:CHANGED_MAX].tolist()]
-    more = f" and {len(ids) - CHANGED_MAX} more" if ids is not None and len(ids) > CHANGED_MAX else ""
+    rows = scene.items.changed_rows(hits.version)
+    ids = [] if rows is None else sorted(scene.items.id[rows].tolist())
+    names = [f"{item} {json.dumps(scene.name_of(item))}" for item in ids[:CHANGED_MAX]]
+    more = f" and {len(ids) - CHANGED_MAX} more" if len(ids) > CHANGED_MAX else ""
     changed = f": changed since: object {', '.join(names)}{more}" if names else ""
     versions = f"at version {hits.version}, as it was fired at, got {scene.version}"
     raise InputError(f"hits: expected the scene {versions}{changed}: fire again, or compare before it changes")

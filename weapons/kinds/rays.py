@@ -226,7 +226,7 @@ def is_thin_first(ray: RayWeapon) -> bool:
 
 def is_moving(ray: RayWeapon, items: Items, stack: Stack) -> bool:
     """Whether any item moves during the ray; only a projectile takes time, one frame."""
-    return isinstance(ray, Projectile) and bool(items.velocity_256[stack.ids].any())
+    return isinstance(ray, Projectile) and bool(items.velocity_256[stack.rows].any())
 
 
 def not_cast(ray: RayWeapon) -> str:

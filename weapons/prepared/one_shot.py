@@ -15,7 +15,8 @@ from hitplanes.planes.common.limits import SUB
 from hitplanes.planes.grid.fixed_point import snap, toward, unit_of
 from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.derived import View
-from hitplanes.planes.scene.items import Role, Stack
+from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import AUTO, fired

@@ -272,12 +272,12 @@ def common_scale(ray: RayWeapon, items: Items, stack: Stack) -> int:
     return steps_of(ray) or (COMMON if is_moving(ray, items, stack) else 0)
 
 
-def relative_lines(lines: Lines, ray: RayWeapon, row: Ints, ids: Ints, items: Items) -> Lines:
+def relative_lines(lines: Lines, ray: RayWeapon, row: Ints, item: Ints, items: Items) -> Lines:
     """Lines of pairs of a ray and an item, relative to the motion of the item."""
     own = lines.take(row)
     if not isinstance(ray, Projectile):
         return own
-    return Lines(own.start, own.step - items.velocity_256[ids], ray.radius_256)
+    return Lines(own.start, own.step - items.velocity_256[item], ray.radius_256)
 
 
 def in_frame(met: Contacts, own: Lines, moving: bool) -> Contacts:

@@ -128,7 +128,7 @@ class _Planes:
         """Rank of the front-most item of taken cells, and their labels."""
         x, y = self.place(cell)
         code = self.labels.reshape(-1).take((y - PAD) * self.labels.shape[1] + (x - PAD))
-        return self.stack.rank_by_code.take(code >> 1), code
+        return self.stack.rank_by_label.take(code >> 1), code
 
     def first_of(self, cells: Ints) -> Ints:
         """First of the cells (n, 4) that rays enter at the same moment."""
@@ -206,7 +206,7 @@ def marcher(scene: Scene, stack: Stack, view: View) -> Follow:
     plane = field.labels.read(scene.items)
     distances, (left, top) = field.read(scene.items, plane), field.corner_xy.tolist()
     flat, shape, labels, width = distances.reshape(-1).data, distances.shape, plane.reshape(-1).data, plane.shape[1]
-    ranks, occluder = stack.rank_by_code.data, stack.occluder.data
+    ranks, occluder = stack.rank_by_label.data, stack.occluder.data
 
     def march(x: int, y: int, dx: int, dy: int) -> Followed | None:
         """Follow one ray."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.checks import Floats, InputError, Ints
-from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, ITEMS_MAX, SUB, WEIGHT_FULL
+from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, IDS_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import Box, Spans, begins, pieces, sorted_once
@@ -489,7 +489,7 @@ class Summed(NamedTuple):
 
 def groups_of(of: Rows | Passes | Summed, rounds: int) -> Ints:
     """Number that identifies the shot, the round and the object of each row or pass."""
-    return (of.shot * rounds + of.round) * ITEMS_MAX + of.object
+    return (of.shot * rounds + of.round) * IDS_MAX + of.object
 
 
 def _rows_of(rows: Rows, passes: Passes) -> Ints:
@@ -545,7 +545,7 @@ def rows_of_passes(passes: Summed, pixels: Ints, rays: Rays, stack: Stack) -> Ro
     ray = (passes.shot * rounds + passes.round)[best] * pellets_fired + passes.pellet[best]
     distinct = samples
     if (pellets > 1).any():
-        rank = stack.rank_of[passes.object[best]]
+        rank = stack.ranks(passes.object[best])
         begin = _first_number(rays, rounds, ray, rank, stack)
         ends = begin + stack.numbers[rank + 1] - stack.numbers[rank]
         distinct = np.diff(np.searchsorted(sorted_once(pixels), [begin, ends]), axis=0)[0]

@@ -86,7 +86,7 @@ def trace(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Con
         If a ray starts inside an item and the weapon forbids it; names the shot and the item.
     """
     lines = lines_of(rays, ray)
-    cost = through.items.cost[through.stack.ids]
+    cost = through.items.cost[through.stack.rows]
     common = common_scale(ray, through.items, through.stack)
     timed = Lines(lines.start, lines.step, lines.radius, common) if common else lines
     edges = _edges(lines, ray, through)
@@ -106,7 +106,7 @@ def trace(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Con
             break
     assert ends is not None  # there is one stretch at least
     met = Contacts.joined(found)
-    return met, ends, timed, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
+    return met, ends, timed, relative_lines(lines, ray, met.ray, through.stack.rows[met.rank], through.items)
 
 
 def has_whole_walk(ray: RayWeapon, items: Items, stack: Stack) -> bool:
@@ -123,9 +123,9 @@ def touching(rays: Rays, ray: RayWeapon, through: Range) -> tuple[Contacts, Line
     """
     lines = lines_of(rays, ray)
     row, rank = _pairs(rays, ray, lines, np.arange(len(rays)), (-np.inf, np.inf), through)
-    own = relative_lines(lines, ray, row, through.stack.ids[rank], through.items)
+    own = relative_lines(lines, ray, row, through.stack.rows[rank], through.items)
     met = find_contacts(own, row, rank, through.stack, None, rays.origin_xy[row])
-    return met, relative_lines(lines, ray, met.ray, through.stack.ids[met.rank], through.items)
+    return met, relative_lines(lines, ray, met.ray, through.stack.rows[met.rank], through.items)
 
 
 def lines_of(rays: Rays, ray: RayWeapon) -> Lines:
@@ -209,7 +209,7 @@ def _entered(
         if candidates.index is not None:
             why = f"{candidates.index.structure}: {candidates.index.followed} boxes placed anew"
             through.plan.run("broad phase", why, row.nbytes + rank.nbytes)
-    relative = relative_lines(lines, ray, live[row], through.stack.ids[rank], through.items)
+    relative = relative_lines(lines, ray, live[row], through.stack.rows[rank], through.items)
     enters = _enters(rays.origin_xy[live[row]], relative, through.stack.box_xyxy[rank])
     kept = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))
     return live[row[kept]], rank[kept]
@@ -248,13 +248,13 @@ def _touched(
         accepted = ~refused(stack, rank, shots, rays.shot[row])
         row, rank = row[accepted], rank[accepted]
         plan.run("filter", "categories and owners", row.nbytes + rank.nbytes, (len(rank), len(accepted)))
-    own, origin = relative_lines(lines, ray, row, stack.ids[rank], through.items), rays.origin_xy[row]
+    own, origin = relative_lines(lines, ray, row, stack.rows[rank], through.items), rays.origin_xy[row]
     wanted = through.candidates.prefilter
     if wanted.volume:
         from ..fire.prefilter import near_rays
 
         corner = stack.box_xyxy[rank, :2] - origin
-        kept = near_rays(late.fit.Kind(wanted.volume, wanted.k), through.items, stack.ids[rank], corner, own)
+        kept = near_rays(late.fit.Kind(wanted.volume, wanted.k), through.items, stack.rows[rank], corner, own)
         row, rank, own, origin = row[kept], rank[kept], own.take(kept), origin[kept]
         plan.run("volumes", str(wanted), kept.nbytes + row.nbytes + rank.nbytes, (len(rank), len(kept)))
     if through.looked:
@@ -265,11 +265,11 @@ def _touched(
     if not isinstance(ray, Projectile):
         return _started(met, rays, ray, shots, stack)
     moving = is_moving(ray, through.items, stack)
-    own = relative_lines(lines, ray, met.ray, stack.ids[met.rank], through.items)
+    own = relative_lines(lines, ray, met.ray, stack.rows[met.rank], through.items)
     met = _started(in_frame(met, own, moving), rays, ray, shots, stack)
     if ray.steps is None:
         return met
-    return at_steps(met, relative_lines(lines, ray, met.ray, stack.ids[met.rank], through.items), ray.steps)
+    return at_steps(met, relative_lines(lines, ray, met.ray, stack.rows[met.rank], through.items), ray.steps)
 
 
 def _started(met: Contacts, rays: Rays, ray: RayWeapon, shots: Shots, stack: Stack) -> Contacts:

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
-from hitplanes.planes.common.limits import ALL, ITEMS_MAX, POSITION_MAX, SEED_MAX, SUB
+from hitplanes.planes.common.limits import ALL, IDS_MAX, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.common.tables import (
     Either,
     Keys,
@@ -51,7 +51,7 @@ class WeaponJson(Ref):
 SHOT = Keys({
     "weapon": Either(dict, WeaponJson("weapon"), Text()), "at": Numbers((2,), POSITION_MAX),
     "aim": Optional(Number(-AIM_MAX, AIM_MAX)), "toward": Optional(Numbers((2,), POSITION_MAX)), "accept": Names(),
-    "blocked_by": Names(), "exclude": Rows(Either(str, Text(), Whole(0, ITEMS_MAX - 1))), "seed": Whole(0, SEED_MAX),
+    "blocked_by": Names(), "exclude": Rows(Either(str, Text(), Whole(0, IDS_MAX - 1))), "seed": Whole(0, SEED_MAX),
     "shot": Whole(0, 2**63 - 1),
 }, ("weapon", "at"))  # fmt: skip
 """Table that validates a shot."""
@@ -165,7 +165,7 @@ def _owner(scene: Scene, value: object, row: int) -> int:
     """Return the owner of a named object, or check the id of an owner."""
     with within(f"exclude[{row}]"):
         if isinstance(value, str):
-            return int(scene.items.owner[scene.find(value)])
+            return int(scene.owner(scene.find(value)))
         return integer("owner", value, 0, scene.items.count - 1)
 
 
@@ -265,11 +265,13 @@ class ShotReader:
     def __init__(self, scene: Scene, weapons: Mapping[str, Weapon], name: str) -> None:
         self.scene, self.weapons, self._name = scene, weapons, name
         self._bits = {category: 1 << bit for bit, category in enumerate(scene.categories)}
-        self._owners: dict[int | str, int] = {item: item for item in range(scene.items.count)}
-        names = Counter(scene.items.names[item] for item in scene.ids().tolist())
-        for item in scene.ids().tolist():
-            if names[name_of := scene.items.names[item]] == 1:
-                self._owners[name_of] = int(scene.items.owner[item])
+        self._owners: dict[str, int] = {}
+        ids = scene.ids()
+        named = list(map(scene.name_of, ids.tolist()))
+        times = Counter(named)
+        for name_of, owner in zip(named, scene.owner(ids).tolist(), strict=True):
+            if times[name_of] == 1:
+                self._owners[name_of] = owner
 
     def place(self, line: int) -> str:
         """Return the place of a line for errors; `line` counts from 0, the text from 1 as editors do."""
@@ -333,7 +335,8 @@ class ShotReader:
 
     def _passed_over(self, owners: Any) -> tuple[int, ...]:
         _usual(type(owners) is list and {type(owner) for owner in owners} <= {int, str})
-        return tuple(self._owners[owner] for owner in owners)
+        _usual(all(0 <= owner < self.scene.items.count for owner in owners if type(owner) is int))
+        return tuple(self._owners[owner] if type(owner) is str else owner for owner in owners)
 
 
 def _parsed(body: bytes) -> Any:

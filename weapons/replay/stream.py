@@ -28,7 +28,7 @@ import numpy as np
 from hitplanes.planes.bits.span_walk import OF_PATTERNS
 from hitplanes.planes.common.checks import InputError, path_of, printable, within
 from hitplanes.planes.files.png import check_output, put_in_place
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import fire
@@ -369,7 +369,9 @@ def _opened(log: Path) -> Iterator[BinaryIO]:
 
 def _header(scene: Scene, reader: ShotReader) -> bytes:
     """Return the first line of the output: all that answers depend on beside the log, and how to read them."""
-    words = {item: (scene.name_of(item), int(scene.items.owner[item])) for item in scene.ids().tolist()}
+    ids = scene.ids()
+    owners = zip(ids.tolist(), scene.owner(ids).tolist(), strict=True)
+    words = {item: (scene.name_of(item), owner) for item, owner in owners}
     data = {
         "format": FORMAT,
         "version": version("hitplanes"),

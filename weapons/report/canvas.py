@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.label_plane import label_plane
+from hitplanes.planes.bits.label_plane import id_plane
 from hitplanes.planes.common.checks import Bools, Floats, Image, Ints
 from hitplanes.planes.files.png import cv2
 from hitplanes.planes.grid.spans import Box, Spans, each_pixel
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import GROUND, blend, draw_view
 from hitplanes.planes.scene.scene import Scene
 
@@ -76,7 +76,7 @@ class World:
         if bounds is not None and view != tuple(bounds):
             _frame(self.image, view, bounds, factor)
         if scene is not None and len(scene.ids(Role.OCCLUDER)):
-            occluding = np.isin(label_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1)
+            occluding = np.isin(id_plane(scene.items.stack(), view), scene.ids(Role.OCCLUDER) + 1)
             if occluding.any():
                 self.painted.add("occluder")
                 _lay(self.image, enlarged(occluding, factor) & _stripes(self.image.shape, 12, 2), HATCH, 80)
@@ -140,7 +140,7 @@ class World:
             return
         x, y = self.view[:2]
         around = (x - 1, y - 1, self.view[2] + 1, self.view[3] + 1)  # an object may go on beyond the view
-        front = label_plane(self.scene.items.stack(), around)
+        front = id_plane(self.scene.items.stack(), around)
         for item in items[:OUTLINES_MAX]:
             mask, (left, top) = self.scene.mask(item)
             box = max(left, around[0]), max(top, around[1])

@@ -14,7 +14,7 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.files.png import cv2
 from hitplanes.planes.grid.spans import Box, Spans
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from .canvas import INK, OUTLINES_MAX, Text, World, covered, enlarged

@@ -14,7 +14,7 @@ from hitplanes.planes.common.checks import Bools, Image, InputError, flag, shown
 from hitplanes.planes.common.limits import VIEW_MAX
 from hitplanes.planes.common.tables import Const
 from hitplanes.planes.grid.spans import Box
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from .canvas import (

@@ -229,7 +229,7 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
     ids = stack.ids[seen]
     if not wanted.volume:
         return {item: [rectangle(box)] for item, box in zip(ids.tolist(), stack.box_xyxy[seen], strict=True)}
-    volumes, row = scene.items.bounding(Kind(wanted.volume, wanted.k), ids)
+    volumes, row = scene.items.bounding(Kind(wanted.volume, wanted.k), stack.rows[seen])
     corner = stack.box_xyxy[seen, :2]
     return {
         item: [ring + corner[i] for ring in outline_of(volumes, int(row[i]))] for i, item in enumerate(ids.tolist())

@@ -18,7 +18,7 @@ from hitplanes.planes.common.tables import Text
 from hitplanes.planes.grid.fixed_point import pixel
 from hitplanes.planes.grid.spans import Box, Spans, meets
 from hitplanes.planes.scene.history import PastScene
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
 from ..explain.samples import Samples, detail_of
@@ -176,8 +176,8 @@ def _moved(then: Scene, now: Scene, items: Sequence[int], view_xyxy: Ints) -> It
     """Items, as JSON, that lie elsewhere or look different now, and were or are in a box."""
     before, after = then.items.stack(), now.items.stack()
     for item in items:
-        rank = int(before.rank_of[item])
-        old, new = before.box_xyxy[rank], after.box_xyxy[after.rank_of[item]]
+        rank, place = (int(stack.ranks(np.array(item))) for stack in (before, after))
+        old, new = before.box_xyxy[rank], after.box_xyxy[place]
         mask, corner = now.mask(item)
         same = np.array_equal(old, new) and np.array_equal(before.mask(rank), mask)
         if not same and meets(view_xyxy, np.stack([old, new])).any():

@@ -15,7 +15,7 @@ import numpy as np
 from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, integer
 from hitplanes.planes.common.limits import GOLDEN, HALF, SCALE_BITS, SEED_MAX, SUB
 from hitplanes.planes.grid.fixed_point import turned, unit
-from hitplanes.planes.scene.items import Role
+from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite
 
@@ -202,14 +202,15 @@ TRIES = 1000  # most tries per shot, before the scene is an error for lack of ro
 def targets_of(scene: Scene) -> list[Target]:
     """Return the hittable objects that have pixels, front to back: highest layer first, then latest added."""
     ids = scene.ids(Role.HITTABLE)
-    order = np.lexsort((-ids, -scene.items.layer[ids]))
+    order = np.lexsort((-ids, -scene.layer(ids)))
     targets = [(item, *scene.mask(item)) for item in ids[order].tolist()]
     return [target for target in targets if target[1].any()]
 
 
 def velocities_of(scene: Scene, targets: list[Target]) -> Ints:
     """Return how far targets move in a frame, (M, 2) in 1/256 px."""
-    return np.asarray(scene.items.velocity_256[[item for item, _, _ in targets]]).reshape(-1, 2)
+    rows = scene.items.table.rows(np.array([item for item, _, _ in targets], np.int64))
+    return np.asarray(scene.items.velocity_256[rows])
 
 
 def size_of(targets: list[Target]) -> float:
@@ -281,13 +282,13 @@ def copied(scene: Scene, ids: Ints, factor: float = 1.0) -> Scene:
     Shapes are filled at that scale, and masks are resampled from their frames. Layers stay.
     """
     alone, items = Scene(), scene.items
-    for item in ids.tolist():
-        form, place = items.forms[item], scaled(items.position_256[item] / SUB, factor).tolist()
+    for row in items.table.rows(ids).tolist():
+        form, place = items.forms[row], scaled(items.position_256[row] / SUB, factor).tolist()
         alone.add(
-            items.sprites[item], place, angle=items.angles[item], flip=form.flip, frame=form.frame,
+            items.sprites[row], place, angle=items.angles[row], flip=form.flip, frame=form.frame,
             scale=[v / (1 << SCALE_BITS) * factor for v in (form.scale_x, form.scale_y)],
-            layer=int(items.layer[item]), name=items.names[item],
-            velocity_xy=(items.velocity_256[item] / SUB * factor).tolist(),
+            layer=int(items.layer[row]), name=items.names[row],
+            velocity_xy=(items.velocity_256[row] / SUB * factor).tolist(),
         )  # fmt: skip
     return alone
 
@@ -298,5 +299,5 @@ def enlarged(scene: Scene, ids: Ints, factor: int) -> Scene:
     for item in ids.tolist():
         mask, (x, y) = scene.mask(item)
         big = Sprite.from_mask(np.kron(mask, square), pivot_xy=(0, 0))
-        alone.add(big, (factor * x, factor * y), layer=int(scene.items.layer[item]))
+        alone.add(big, (factor * x, factor * y), layer=int(scene.layer(item)))
     return alone

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from hitplanes.planes.bits.label_plane import label_plane
+from hitplanes.planes.bits.label_plane import id_plane
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, REACH_MAX, SCALE_BITS, SUB, TRIG_BITS
 from hitplanes.planes.files.png import cv2
@@ -125,15 +125,16 @@ def _truth(discs: Discs) -> Decisions:
 
 def _shape(scene: Scene, item: int) -> Round | Straight | None:
     """Return the exact shape of an object in the world, which is known of polygons and circles, but not of ellipses."""
-    form, outline = scene.items.forms[item], scene.items.sprites[item].outline
+    row = scene.items.table.row(item)
+    form, outline = scene.items.forms[row], scene.items.sprites[row].outline
     if outline is None or (outline.radius is not None and form.scale_x != form.scale_y):
         return None
-    position = scene.items.position_256[item] / SUB
+    position = scene.items.position_256[row] / SUB
     scale = form.scale_x / (1 << SCALE_BITS), form.scale_y / (1 << SCALE_BITS)
     if outline.radius is not None:
         return Round(position, outline.radius / SUB * scale[0])
     rings = [ring / SUB for ring in outline.rings]
-    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[item], position))
+    return Straight(placed_rings(rings, form.flip, scale, scene.items.angles[row], position))
 
 
 SCALES = (1 / 8, 1 / 4, 1 / 2, 1, 2, 4)
@@ -224,7 +225,8 @@ def _fit(make: Callable[[Bools], Volumes]) -> Make:
     def fitted(scene: Scene) -> list[Volumes]:
         made: dict[int, Volumes] = {}
         placed = []
-        for item, variant in enumerate(scene.items.variants):
+        for item, row in zip(scene.items.ids.tolist(), scene.items.rows.tolist(), strict=True):
+            variant = scene.items.variants[row]
             if variant.uid not in made:
                 made[variant.uid] = make(variant.mask)
             placed.append(shifted(made[variant.uid], np.array([scene.mask(item)[1]])))
@@ -253,18 +255,18 @@ def _pivot_circles(scene: Scene) -> list[Volumes]:
 def _reboxed(scene: Scene) -> list[Volumes]:
     """Rotate boxes of the unrotated masks, and return the bounds of their corners."""
     return [
-        fit.box(mask).rotated(scene.items.angles[item], pivot).bounds().translated(corner)
-        for item, (mask, pivot, corner) in enumerate(_unturned(scene))
+        fit.box(mask).rotated(angle, pivot).bounds().translated(corner)
+        for angle, (mask, pivot, corner) in zip(scene.angle(scene.ids()), _unturned(scene), strict=True)
     ]
 
 
 def _unturned(scene: Scene) -> Iterator[tuple[Bools, Floats, Floats]]:
     """Yield the masks of objects before rotation, their pivots in the masks, and the positions of the masks, px."""
     items = scene.items
-    for item in range(len(scene)):
-        variant = variant_of(items.sprites[item], items.forms[item]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
+    for row in items.rows.tolist():
+        variant = variant_of(items.sprites[row], items.forms[row]._replace(quarter=0, c=1 << TRIG_BITS, s=0))
         pivot = np.array([variant.pivot_x, variant.pivot_y]) / SUB
-        yield variant.mask, pivot, items.position_256[item] / SUB - pivot
+        yield variant.mask, pivot, items.position_256[row] / SUB - pivot
 
 
 def _method(discs: Discs, setting: float | None, make: Make) -> Method:
@@ -337,7 +339,7 @@ TURNED_DEG = 15.0  # least angle to the axes of a turned object, degrees
 def kind_of(scene: Scene, item: int) -> str:
     """Classify the shape of an object that has pixels; the first kind that applies is returned."""
     mask, _ = scene.mask(item)
-    off, radius = abs((scene.items.angles[item] + 45) % 90 - 45), float(fit.least_circle(mask).radius[0])
+    off, radius = abs((float(scene.angle(item)) + 45) % 90 - 45), float(fit.least_circle(mask).radius[0])
     short, long = sorted(np.hypot(*np.diff(fit.oriented_box(mask).points[:3], axis=0).T).tolist())
     x, y = fit.hull(mask).points.T
     hull_area = abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
@@ -440,7 +442,7 @@ def _stepping(alone: Scene, start: Ints, step: Ints, length: int) -> Curve:
     own_start, own_step = start / SUB - np.array(box[:2]) + 1, step / SUB
 
     def prepare(spacing: float) -> Callable[[], tuple[Ints, Ints]]:
-        labels = np.pad(label_plane(alone.items.stack(), box), 1)
+        labels = np.pad(id_plane(alone.items.stack(), box), 1)
         parts = np.arange(0, length + spacing, spacing)
         parts = parts[parts <= length] / length
         return lambda: _looked_up(labels, own_start, own_step, parts)
@@ -520,8 +522,8 @@ def _overlapping(alone: Scene, flights: Flights, setting: int | None, steps: int
     def prepare() -> Callable[[], list[Decisions]]:
         own = copied(alone, alone.ids())
         ids = own.ids()
-        moving = ids[own.items.velocity_256[ids].any(axis=1)]
-        place, velocity = (getattr(own.items, name)[moving] / SUB for name in ("position_256", "velocity_256"))
+        moving = ids[own.velocity(ids).any(axis=1)]
+        place, velocity = own.position(moving), own.velocity(moving)
 
         def run() -> list[Decisions]:
             live, found = np.arange(len(start)), []

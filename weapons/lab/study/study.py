@@ -62,7 +62,7 @@ def run_study(scene: Scene, seed: int, effort: Effort, show: Show, keep: Keep) -
     `complete` is false until the end.
     """
     ids = scene.ids("hittable")
-    ids = ids[scene.items.size_wh[ids, 0] > 0]
+    ids = ids[scene.items.size_wh[scene.items.table.rows(ids), 0] > 0]
     chosen = ids[np.linspace(0, len(ids) - 1, min(len(ids), effort.objects)).astype(np.int64)]  # evenly
     alone = copied(scene, chosen)
     discs = discs_at(alone, effort.shots, seed)

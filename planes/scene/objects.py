@@ -1,0 +1,116 @@
+"""Roles and ids of objects, and the row of the columns of `Items` that each object has.
+
+Ids count up and are never given out again, as hits and histories name objects by them. Rows are used again, so that the
+columns have as many as there ever were objects at once, however many came and went.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from ..common.checks import InputError, Ints
+from ..common.limits import IDS_MAX, ITEMS_MAX
+
+
+class Role(Enum):
+    """Role of an object; only HITTABLE and OCCLUDER decide hits, the others are only drawn."""
+
+    BACKGROUND = "background"
+    HITTABLE = "hittable"
+    MOVER = "mover"
+    OCCLUDER = "occluder"
+    HUD = "hud"
+
+
+ROLES = tuple(Role)
+DECIDING = Role.HITTABLE, Role.OCCLUDER
+HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
+ROLE_NAMES = tuple(role.value for role in ROLES)
+
+NAMELESS = -1 - len(ROLES)
+"""Row of an id whose name tells no role and id."""
+
+
+class RowTable:
+    """The row of each object, by its id, and the names of objects that are gone.
+
+    An id without an object takes four bytes, and the room of its name unless that is a role and the id.
+
+    Attributes
+    ----------
+    count : number of ids that were given out
+    height : number of rows that are or were in use
+    row_of : (n,) by id the row of an object; of an object that is gone -1 less the number of the role in its name
+    """
+
+    def __init__(self) -> None:
+        self.count = self.height = 0
+        self.row_of: npt.NDArray[np.int32] = np.zeros(16, np.int32)
+        self._names: dict[int, str] = {}
+        self._free: list[int] = []
+
+    @property
+    def living(self) -> int:
+        """Number of objects."""
+        return self.height - len(self._free)
+
+    def add(self) -> tuple[int, int]:
+        """Give out the next id, and a row for it."""
+        if self.living >= ITEMS_MAX:
+            raise InputError(f"objects: expected at most {ITEMS_MAX} at a time, got one more")
+        if self.count >= IDS_MAX:
+            raise InputError(f"objects: expected at most {IDS_MAX} in the life of a scene, got one more")
+        item = self.count
+        self._reserve(item + 1)
+        if self._free:
+            row = self._free.pop()
+        else:
+            row, self.height = self.height, self.height + 1
+        self.row_of[item], self.count = row, item + 1
+        return item, row
+
+    def skip_to(self, count: int) -> None:
+        """Give out all ids below `count` to no object; they have no names."""
+        if count > self.count:
+            self._reserve(count)
+            self.row_of[self.count : count] = NAMELESS
+            self.count = count
+
+    def drop(self, item: int, name: str) -> None:
+        """Take the row of an object, which has a name, away from it."""
+        self._free.append(self.row(item))
+        role, _, number = name.rpartition(" ")
+        if number == str(item) and role in ROLE_NAMES:
+            self.row_of[item] = -1 - ROLE_NAMES.index(role)
+        else:
+            self.row_of[item], self._names[item] = NAMELESS, name
+
+    def row(self, item: int) -> int:
+        """Row of an object; negative for an id without one."""
+        return self.row_of.item(item)
+
+    def rows(self, ids: Ints) -> Ints:
+        """Rows (n,) of objects; negative for ids without one."""
+        return self.row_of.take(ids).astype(np.int64)
+
+    def name_of_gone(self, item: int) -> str:
+        """Name that an object had when it was removed; "" of an id that no object had."""
+        row = self.row(item)
+        return self._names.get(item, "") if row == NAMELESS else f"{ROLE_NAMES[-1 - row]} {item}"
+
+    def copied(self, ids: Ints, count: int) -> RowTable:
+        """A table of the first `count` ids and their names; the objects, of rising ids (n,), have rows 0 .. n - 1."""
+        other = RowTable()
+        other.count, other.height, other._names = count, len(ids), dict(self._names)
+        other.row_of = self.row_of[:count].copy()
+        other.row_of[ids] = np.arange(len(ids))
+        return other
+
+    def _reserve(self, count: int) -> None:
+        size = len(self.row_of)
+        if count > size:
+            more = max(count - size, size // 4)
+            self.row_of = np.concatenate([self.row_of, np.zeros(more, np.int32)])
