@@ -39,6 +39,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.weapons.prepared.prepared_ray import OneRay, ReadyRay, direction
 from hitplanes.weapons.rays import one_ray, raycast
+from hitplanes.weapons.rays.contacts import NEVER
 from hitplanes.weapons.rays.one_ray import Ray, WideRay
 
 worlds = st.randoms(use_true_random=False)
@@ -120,6 +121,7 @@ def test_a_crowd(kernels: ModuleType, weapon: Weapon, exclude: object, bounded: 
 THROUGH = [
     Laser(300), Rifle(range=250, max_hits=2), Rifle(range=300, max_hits=4, falloff="linear"), Laser(None),
     Laser(300, width=5), Rifle(250, max_hits=2, width=3), Rifle(range=300, max_hits=3, width=1), Pistol(None, width=8),
+    Rifle(300, max_hits=3, width=14),
 ]  # fmt: skip
 
 
@@ -160,7 +162,7 @@ def test_a_ray_that_ends_on_a_corner_enters_cells_of_a_row_at_once(kernels: Modu
     ("kind", "weapon"), [(Ray, Rifle(400, max_hits=2)), (WideRay, Rifle(400, max_hits=2, width=4))], ids=repr
 )
 def test_few_rays_that_go_on_are_left_to_arrays(kind: Any, weapon: Weapon, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that end in an item that they have hit before, or enter it together with the occluder that ends them."""
+    """Those that enter an item together with the occluder that ends them, not those that end in what they have hit."""
     scene, told, inner = Scene(), [], kind.passed
     for x, y, side, role in [
         (100, 50, 9, "hittable"), (200, 50, 9, "hittable"), (203, 50, 9, "hittable"),
@@ -169,7 +171,7 @@ def test_few_rays_that_go_on_are_left_to_arrays(kind: Any, weapon: Weapon, monke
         scene.add(Sprite.box(side, side), (x, y), role=role)
     monkeypatch.setattr(kind, "passed", lambda *of: told.append(inner(*of)) or told[-1])
     ready = prepare(scene, weapon)
-    for at, left in [((20, 50), False), ((100, 50), False), ((150, 50), True), ((250, 80), True), ((50, 20), True)]:
+    for at, left in [((20, 50), False), ((100, 50), False), ((150, 50), False), ((250, 80), True), ((50, 20), False)]:
         told.clear()
         hits = ready.fire(at)
         assert [found is None for found in told] == [left]
@@ -178,18 +180,37 @@ def test_few_rays_that_go_on_are_left_to_arrays(kind: Any, weapon: Weapon, monke
     assert prepare(scene, first).fire((50, 20)).object.tolist() == [6] and told[-1] is not None
 
 
-def test_a_wide_ray_among_many_items_is_left_to_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It would look at all of them, though it ends at the first."""
-    scene, weapon, cast = Scene(), Pistol(900, width=4), []
-    for k in range(raycast.ROUND_PAIRS + 1):
+@pytest.mark.parametrize(
+    ("at", "by", "pixels", "wall"),
+    [
+        ((0, 0.5), (20, 0.5), [(5, 0), (6, 0)], (6, 1)),  # along a border, in two cells at a time
+        ((0, 0), (9, 9), [(0, 0), (1, 0)], (1, 1)),  # through a corner, where the box of what it hits ends
+    ],
+)
+def test_at_its_end_a_ray_walks_the_cell_of_the_occluder_alone(
+    at: tuple[float, float], by: tuple[float, float], pixels: list[tuple[int, int]], wall: tuple[int, int]
+) -> None:
+    scene, mask = Scene(), np.zeros((1, 7), np.bool_)
+    for x, y in pixels:
+        mask[y, x] = True
+    scene.add(Sprite.from_mask(mask, pivot_xy=(0, 0)))
+    scene.add([[1]], wall, role="occluder")
+    ready = prepare(scene, Laser(None))
+    for _ in range(2):
+        assert [(row.object, row.samples, row.first_xy) for row in ready.fire(at, toward=by)] == [(0, 1, pixels[0])]
+
+
+@pytest.mark.parametrize(("weapon", "left"), [(Laser(900), 1), (Laser(900, width=4), 1), (Pistol(900, width=4), 0)])
+def test_a_ray_that_looks_at_many_rows_is_left_to_arrays(
+    weapon: Weapon, left: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, cast = Scene(), list[Any]()
+    for k in range(150):
         scene.add(Sprite.box(4, 4), (20 + 6 * k, 50))
     monkeypatch.setattr(one_ray, "cast_together", lambda *of: cast.append(of) or raycast.cast_together(*of))
-    ready = prepare(scene, weapon)
-    for x, left in ((0, 1), (30, 0)):
-        cast.clear()
-        hits = ready.fire((x, 50))
-        assert len(cast) == left
-        assert hits == fire(scene, weapon, (x, 50), strategy="walk")
+    hits = prepare(scene, weapon).fire((0, 50))
+    assert len(cast) == left
+    assert hits == fire(scene, weapon, (0, 50), strategy="walk")
 
 
 @pytest.fixture
@@ -361,3 +382,21 @@ def test_kernels_may_change_between_shots() -> None:
             scene.move(0, (1000, 1000))
     finally:
         use_jit(None)
+
+
+@examples(60, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from([0, 100, 300, 1500]))
+def test_cells_up_to_an_end_are_counted_as_one_by_one(seed: int, radius: int) -> None:
+    """Also those of a row that a wide ray enters before others, which lie nearer to its start."""
+    rng = np.random.default_rng(seed)
+    start, step = rng.integers(-128, 128, 2).tolist(), rng.integers(-6000, 6001, 2).tolist()
+    ray = WideRay(start, step, radius) if radius else Ray(start, step)
+    runs = [(row, ray.run(row)) for row in range(-24, 25)]
+    full = [(row, first, bytes([1]) * (last - first + 1)) for row, (first, last) in runs if first <= last]
+    cells = sorted(ray.entered(row, first + k) for row, first, run in full for k in range(len(run)))
+    cells = [cell for cell in cells if cell[0] < NEVER]
+    for number in range(0, len(cells), max(len(cells) // 9, 1)):
+        last = cells[number]
+        sooner = [cell for cell in cells if cell[0] < last[0]]
+        for alone, rank, count in ((False, 4, number), (True, 4, len(sooner)), (True, 3, len(sooner) + 1)):
+            assert ray.walked(iter(full), (*last, 3, 1, 0), alone, rank) == count

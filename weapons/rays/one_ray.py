@@ -1,13 +1,13 @@
-"""One ray a call, or a few. A thin ray is followed in whole numbers of Python, which is faster than numpy.
+"""One ray a call, or a few, followed in whole numbers of Python, which is faster than numpy.
 
 A ray visits the boxes of items in the order in which it enters them, and in each box its cells, row by row, until no
-box is left that it enters before its end. The cells of a wide ray are found in arrays, those of all boxes at once; both
-have one rule for what is hit and where they end. Times are those of `grid.rasterize`: whole numbers over
-max(1, |dx|) max(1, |dy|), so that the order of two cells never depends on rounding.
+box is left that it enters before its end. Times are those of `grid.rasterize`: whole numbers over one of the ray, so
+that the order of two cells never depends on rounding.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -20,7 +20,7 @@ from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Ints
 from hitplanes.planes.common.limits import HALF, SUB
 from hitplanes.planes.grid.fixed_point import pixel
-from hitplanes.planes.grid.rasterize import Lines
+from hitplanes.planes.grid.rasterize import DIAGONAL, Lines
 from hitplanes.planes.grid.spans import Box, clipped, meets
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
@@ -31,14 +31,21 @@ from ..fire.strategy import RAY_WAYS, chosen_ray_way
 from ..kinds.rays import RayWeapon
 from .contacts import NEVER, Reason
 from .first_hit import marcher
-from .raycast import ROUND_PAIRS, Crossed, cast_together, first_cells, times_in
+from .raycast import cast_together
 
-ROWS_MOST = 400
-"""Most rows of masks that the ray looks at; with more, the raycast of a batch is faster."""
+ROWS_MOST = 120
+"""Most rows of masks that a ray looks at; with more, the raycast of a batch is faster."""
 
 Pair = tuple[int, int]
 Spell = tuple[int, int]
 """Times at which a ray enters and leaves a box or a cell."""
+
+
+Cell = tuple[int, int, int]
+"""When a ray enters a cell, and the cell's y and x."""
+
+Run = tuple[int, int, bytes]
+"""Cells of an item's mask along the longer axis of a ray: the row, the first cell, and one byte for each."""
 
 
 class Entered(NamedTuple):
@@ -48,7 +55,7 @@ class Entered(NamedTuple):
     ----------
     rank : (n,) places in the stack
     box_xyxy : (n, 4) boxes within the bounds, relative to the pixel on which the ray begins
-    entry, leave : (n,) times at which the ray enters and leaves the boxes; of a wide ray their bounds
+    entry, leave : (n,) times at which the ray enters and leaves the boxes; of a wide ray bounds of when it enters cells
     """
 
     rank: Ints
@@ -61,7 +68,7 @@ Followed = tuple[int, list[list[int]]]
 """When a ray ends, and what it hits, in order: rank, number of cells, first cell (x, y) in the world, and its time."""
 
 Touch = tuple[int, int, int, int, int, int]
-"""An item that a ray touches: time, y and x of its first cell, rank, cells, and when the ray leaves its box."""
+"""An item that a ray touches: time, y and x of its first cell, rank, cells, and its number in `Entered`."""
 
 Passed = tuple[int, list[list[int]], Touch | None]
 """Like `Followed`, with cells relative to the pixel on which the ray begins; and what it touches as it ends."""
@@ -159,15 +166,20 @@ class Ray:
     """A thin ray, relative to the pixel on which it begins, in 1/256 px."""
 
     reach = HALF  # how far from its axis it may touch a pixel's centre, along x and along y
+    strip = 0  # how long before its axis passes the centre of a pixel it may enter that; of no use for a thin one
 
     def __init__(self, start: Pair, step: Pair) -> None:
         self.start, self.step = start, step
         self.across = max(abs(step[1]), 1), max(abs(step[0]), 1)
+        self.scale = self.across[0] * self.across[1]  # the time at its end
         self.major = int(abs(step[1]) > abs(step[0]))
+        (u, along), (v, aside) = ((start[axis], step[axis]) for axis in (self.major, 1 - self.major))
+        per, slope = max(abs(aside), 1), (along if aside > 0 else -along) * (aside != 0)
+        self.slant = v, min(v, v + aside), max(v, v + aside), u * per, slope, per  # that all rows have in common
 
     def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Times at which the ray enters and leaves boxes (n, 4) of pixels; leave < entry if it does not touch a box."""
-        entry, leave = np.zeros(len(boxes_xyxy), np.int64), np.full(len(boxes_xyxy), self.across[0] * self.across[1])
+        entry, leave = np.zeros(len(boxes_xyxy), np.int64), np.full(len(boxes_xyxy), self.scale)
         for axis, across in enumerate(self.across):
             low = SUB * boxes_xyxy[:, axis] - (HALF + self.start[axis])
             high = SUB * boxes_xyxy[:, axis + 2] + (HALF - self.start[axis])
@@ -192,40 +204,58 @@ class Ray:
 
     def rows(self, box: list[int], times: Spell) -> range:
         """Rows of a box, across the longer axis of the ray, that it visits between two times, in its order."""
-        minor = 1 - self.major
-        begin, step, scale = self.start[minor], self.step[minor], self.across[0] * self.across[1]
-        at = sorted((begin + step * time // scale + HALF) // SUB for time in times)
-        first, last = max(at[0] - 1, box[minor]), min(at[1] + 1, box[minor + 2])  # on a border it is in two rows
+        minor, scale, reach = 1 - self.major, self.scale, self.reach
+        begin, step = self.start[minor], self.step[minor]
+        low, high = sorted(begin + step * min(max(time, 0), scale) // scale for time in times)
+        first, last = max(-((reach - low) // SUB), box[minor]), min((high + 1 + reach) // SUB, box[minor + 2])
         return range(first, last + 1) if step >= 0 else range(last, first - 1, -1)
 
-    def rows_about(self, times: Ints) -> int:
-        """About how many rows it visits in boxes in which it spends so much time each."""
-        minor = abs(self.step[1 - self.major]) / (SUB * self.across[0] * self.across[1])
-        return len(times) + int(times.sum() * minor)
+    def rows_about(self, near: Entered) -> int:
+        """About how many rows it visits in boxes, if it goes on to its range."""
+        minor = 1 - self.major
+        high = near.box_xyxy[:, minor + 2] - near.box_xyxy[:, minor] + 1
+        slope = abs(self.step[minor]) / (SUB * self.scale)
+        return int(np.minimum((near.leave - near.entry) * slope + 2 * self.reach / SUB, high).sum())
 
     def run(self, row: int) -> Spell:
         """First and last cell of a row that the ray touches, along its longer axis; (1, 0) if it touches none."""
-        u, along = self.start[self.major], self.step[self.major]
-        begin, step = self.start[1 - self.major], self.step[1 - self.major]
-        first = max(min(begin, begin + step), SUB * row - HALF) - begin
-        last = min(max(begin, begin + step), SUB * row + HALF) - begin
+        begin, low, high, base, slope, per = self.slant
+        first, last = max(low, SUB * row - HALF), min(high, SUB * row + HALF)
         if first > last:
             return 1, 0
-        if step:
-            per, slope = abs(step), along if step > 0 else -along
-            low, high = sorted((u * per + first * slope, u * per + last * slope))
+        if slope:
+            low, high = base + (first - begin) * slope, base + (last - begin) * slope
+            low, high = (low, high) if slope > 0 else (high, low)
         else:
-            per, low, high = 1, min(u, u + along), max(u, u + along)
+            low, high = min(base, base + self.step[self.major]), max(base, base + self.step[self.major])
         return -((HALF * per - low) // (SUB * per)), (high + HALF * per) // (SUB * per)
+
+    def cells(self, runs: Iterator[Run], every: bool) -> tuple[int, Cell | None]:
+        """Number of cells that are set in runs, unless only the first is looked for, and the first of them."""
+        count, rows_met, ahead = 0, 0, 1 if self.step[self.major] > 0 else -1
+        found: list[Cell] = []
+        for row, first, run in runs:
+            cells = run.count(1)
+            count, rows_met = count + cells, rows_met + (cells > 0)
+            if cells and rows_met <= 2:  # through a corner it enters two cells of a row, and of the next, at once
+                at = run.find(1) if ahead > 0 else run.rfind(1)
+                found += [self.entered(row, first + k) for k in (at, at + ahead) if 0 <= k < len(run) and run[k] == 1]
+            elif found and not every:
+                break
+        return count, min(found, default=None)
+
+    def entered(self, row: int, at: int) -> Cell:
+        """A cell of a row, and when the ray enters it; NEVER if it does not."""
+        x, y = (row, at) if self.major else (at, row)
+        return self.spell(x, y)[0], y, x
 
     # house: hit rule of rays
     def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Passed | None:
         """What a ray hits, up to `most` objects; None if arrays must decide it.
 
-        They do so if it looks at too many rows, if it enters another item at once with the occluder that ends it, or if
-        it ends in the box of an item that it has hit before.
+        They do so if it looks at too many rows, or if it enters another item at once with the occluder that ends it.
         """
-        if most != 1 and self.rows_about(near.leave - near.entry) > ROWS_MOST:
+        if most is None and self.rows_about(near) > 2 * ROWS_MOST:  # about half of them lie in front of occluders
             return None
         end, left, times = NEVER, ROWS_MOST, list[int]()
         touched: list[Touch] = []
@@ -239,50 +269,146 @@ class Ray:
                 return None
             blocks = stack.has_occluders and bool(stack.occluder[rank])
             every = most != 1 and not blocks  # of an occluder only the first cell matters
-            count, found = _cells(_runs(self, origin, box, rows, stack, rank), self, every)
+            count, found = self.cells(_runs(self, origin, box, rows, stack, rank), every)
             if found is None:
                 continue
-            touched.append((*found, rank, count, leave))
+            touched.append((*found, rank, count, k))
             if blocks:
                 end = min(end, found[0])
             elif most is not None:
                 times = sorted([*times, found[0]])[:most]
                 end = min(end, times[-1]) if len(times) == most else end
-        return _ended(sorted(met for met in touched if met[0] <= end), end, most, stack)
+        return self._ended(sorted(met for met in touched if met[0] <= end), end, origin, near, stack, most)
+
+    def _ended(
+        self, touched: list[Touch], end: int, origin: Pair, near: Entered, stack: Stack, most: int | None
+    ) -> Passed | None:
+        """What the ray hits before its end, of what it touches until then, in order."""
+        at_end = [rank for time, _, _, rank, _, _ in touched if time == end]
+        if not at_end:
+            return end, [[rank, count, x, y, time] for time, y, x, rank, count, _ in touched], None
+        blocked = stack.has_occluders and bool(stack.occluder[at_end].any())
+        if blocked and len(at_end) > 1:
+            return None
+        last, hits = (touched[-1], touched[:-1]) if blocked else (touched[most - 1], touched[:most])  # type: ignore[operator]
+        rows = []
+        for met in hits:
+            time, y, x, rank, count, k = met
+            if met is last:
+                count = 1
+            elif near.leave[k] >= end:
+                box = near.box_xyxy[k].tolist()
+                visited = self.rows(box, (int(near.entry[k]), end + 2 * self.strip))
+                count = self.walked(_runs(self, origin, box, visited, stack, rank), last, blocked, rank)
+            rows.append([rank, count, x, y, time])
+        return end, rows, last
+
+    def walked(self, runs: Iterator[Run], last: Touch, alone: bool, rank: int) -> int:
+        """Number of cells of an item of a rank that are set in runs, and that the ray enters up to its last cell.
+
+        `alone` says whether the last cell is the only one that it walks of those that it enters at that time.
+        """
+        end, last_y, last_x, last_rank, _, _ = last
+        count, ahead = 0, self.step[self.major] > 0
+        for row, first, run in runs:
+            at = run.find(1) if ahead else run.rfind(1)
+            while at >= 0:
+                time, y, x = cell = self.entered(row, first + at)
+                if end + self.strip < time < NEVER:
+                    break
+                here = (y, x) == (last_y, last_x) and rank <= last_rank
+                count += time < end or (time == end and (here or (not alone and cell < last[:3])))
+                at = run.find(1, at + 1) if ahead else run.rfind(1, 0, at)
+        return count
 
 
-class WideRay:
-    """A ray with a radius, half of its width, relative to the pixel on which it begins, in 1/256 px."""
+class WideRay(Ray):
+    """A ray with a radius, half of its width, relative to the pixel on which it begins, in 1/256 px.
+
+    Times are over the squared length. The disc of the radius comes nearest to the centre of a pixel at time u, and
+    covers it from u - root to u + root, where root^2 = radius^2 length^2 - v^2; u and v are the products of the ray,
+    along and across, with the vector from its start to the centre. See `grid.rasterize.Lines`.
+    """
 
     def __init__(self, start: Pair, step: Pair, radius: int) -> None:
-        self.start, self.step, self.reach = start, step, max(radius, HALF)
-        self.lines = Lines(np.array([start]), np.array([step]), radius)
+        super().__init__(start, step)
+        self.reach, self.scale = max(radius, DIAGONAL), step[0] ** 2 + step[1] ** 2
+        self.square, self.strip = radius**2 * self.scale, math.isqrt(self.reach**2 * self.scale)
+        low, high = sorted((start[self.major], start[self.major] + step[self.major]))
+        self.ends = -((self.reach - low) // SUB), (high + self.reach) // SUB  # first and last cell of any row
+        self.narrow = radius < DIAGONAL  # its axis may be in pixels whose centres the disc does not cover
 
     def times(self, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
         """Bounds of the times at which the ray enters cells of boxes (n, 4); leave < entry if it touches none."""
-        return times_in(self.lines, np.zeros(len(boxes_xyxy), np.int64), boxes_xyxy)
+        (x, y), (dx, dy), (left, top, right, low) = self.start, self.step, SUB * boxes_xyxy.T
+        near_x, far_x = (left - x, right - x) if dx >= 0 else (right - x, left - x)
+        near_y, far_y = (top - y, low - y) if dy >= 0 else (low - y, top - y)
+        entry, leave = near_x * dx + near_y * dy - (self.strip + 2), far_x * dx + far_y * dy + (self.strip + 2)
+        sides = far_x * dy - near_y * dx, near_x * dy - far_y * dx
+        beside = (np.maximum(*sides) < -self.strip) | (np.minimum(*sides) > self.strip)
+        return entry, np.where(beside | (entry > self.scale) | (leave < 0), entry - 1, leave)
 
-    def passed(self, origin: Pair, near: Entered, stack: Stack, most: int | None) -> Passed | None:
-        """What the ray hits, up to `most` objects; None if the raycast of a batch must decide it.
+    def rows(self, box: list[int], times: Spell) -> range:
+        """Rows of a box that the ray may touch, in its order: those near its axis between the box's sides."""
+        return super().rows(box, (times[0] + self.strip, times[1] - self.strip))
 
-        It does so if the ray may end long before it meets all boxes, and as it does for thin rays; see `Ray.passed`.
-        """
-        if most is not None and len(near.rank) > ROUND_PAIRS:
-            return None
-        first = first_cells(Crossed(np.zeros_like(near.rank), *near), self.lines, np.array([origin]), stack)
-        end, times = NEVER, first.entry
-        if stack.has_occluders:
-            blocks = stack.occluder[first.rank]
-            end, times = int(times[blocks].min(initial=NEVER)), times[~blocks]
-        if most is not None and len(times) >= most:
-            end = min(end, int(np.partition(times, most - 1)[most - 1]))
-        reached = (first.entry <= end).nonzero()[0]
-        columns = first.entry, first.y, first.x, first.rank, first.count, first.most
-        touched = zip(*(column[reached].tolist() for column in columns), strict=True)
-        return _ended(sorted(touched), end, most, stack)
+    def run(self, row: int) -> Spell:
+        """First and last cell of a row that the ray may touch, along its longer axis."""
+        v, _, _, base, slope, per = self.slant
+        if not slope:
+            return self.ends if abs((SUB * row - v) * self.step[self.major]) <= self.strip else (1, 0)
+        middle, cell = base + (SUB * row - v) * slope, SUB * per
+        return max(self.ends[0], -((self.strip - middle) // cell)), min(self.ends[1], (middle + self.strip) // cell)
+
+    def cells(self, runs: Iterator[Run], every: bool) -> tuple[int, Cell | None]:
+        """Number of cells that are set in runs and touched, unless only the first is looked for, and the first."""
+        count, best, (x0, y0), (dx, dy) = 0, None, self.start, self.step
+        du, dv = (SUB * dy, -SUB * dx) if self.major else (SUB * dx, SUB * dy)
+        for row, first, run in runs:
+            x, y = (row, first) if self.major else (first, row)
+            px, py = SUB * x - x0, SUB * y - y0
+            u, v = px * dx + py * dy, px * dy - py * dx
+            at = run.find(1) if du > 0 else run.rfind(1)
+            while at >= 0:
+                now = u + at * du
+                if best is not None and best[0] < now - self.strip and now <= self.scale:
+                    if not every:
+                        break
+                    if not self.narrow:  # all of the next cells are touched, and later, until the ray ends
+                        end = min(max((self.scale - u) // du if du > 0 else -((u - self.scale) // du), 0), len(run) - 1)
+                        low, high = min(at, end), max(at, end)
+                        count += run.count(1, low, high + 1)
+                        at = run.find(1, high + 1) if du > 0 else run.rfind(1, 0, low)
+                        continue
+                time = self.time(x + at * (1 - self.major), y + at * self.major, now, v + at * dv)
+                if time < NEVER:
+                    count, cell = count + 1, (time, y + at * self.major, x + at * (1 - self.major))
+                    best = cell if best is None or cell < best else best
+                at = run.find(1, at + 1) if du > 0 else run.rfind(1, 0, at)
+        return count, best
+
+    def entered(self, row: int, at: int) -> Cell:
+        """See `Ray.entered`."""
+        x, y = (row, at) if self.major else (at, row)
+        px, py, (dx, dy) = SUB * x - self.start[0], SUB * y - self.start[1], self.step
+        return self.time(x, y, px * dx + py * dy, px * dy - py * dx), y, x
+
+    def time(self, x: int, y: int, u: int, v: int) -> int:
+        """When the ray enters a pixel; NEVER if it does not."""
+        found, rest = NEVER, self.square - v * v
+        if rest >= 0:
+            root = math.isqrt(rest)
+            if max(u - root, 0) <= min(u + root, self.scale):
+                found = max(u - root, 0)
+        if self.narrow:
+            scale, (first, last) = self.across[0] * self.across[1], self.spell(x, y)
+            axis = -(-first * self.scale // scale)
+            if first <= last and axis <= last * self.scale // scale:
+                return min(axis, found)
+        return found
 
 
-def _near(ray: Ray | WideRay, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
+def _near(ray: Ray, origin: Pair, stack: Stack, bounds: Box | None, accepts: Bools | None) -> Entered:
     """Accepted items whose boxes a ray touches, in order of entry."""
     ends = [sorted((start, start + step)) for start, step in zip(ray.start, ray.step, strict=True)]
     around = [(low - ray.reach) // SUB + o for (low, _), o in zip(ends, origin, strict=True)]
@@ -300,14 +426,8 @@ def _near(ray: Ray | WideRay, origin: Pair, stack: Stack, bounds: Box | None, ac
     return Entered(rank[rows], box[rows], entry[rows], leave[rows])
 
 
-Cell = tuple[int, int, int]
-"""When a ray enters a cell, and the cell's y and x."""
-
-
-def _runs(
-    ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int
-) -> Iterator[tuple[int, int, bytes]]:
-    """The cells of an item's mask that a ray touches: row, first cell along the longer axis, and one byte for each."""
+def _runs(ray: Ray, origin: Pair, box: list[int], rows: range, stack: Stack, rank: int) -> Iterator[Run]:
+    """The cells of an item's mask that a ray may touch."""
     major, (left, top) = ray.major, (stack.box_xyxy[rank, :2] - origin).tolist()
     width, corner = int(stack.width[rank]), int(stack.offset[rank])
     step = width if major else 1
@@ -317,40 +437,3 @@ def _runs(
         if first <= last:
             begin = corner + ((first - top) * width + row - left if major else (row - top) * width + first - left)
             yield row, first, stack.masks[begin : begin + (last - first) * step + 1 : step].tobytes()
-
-
-def _entered(ray: Ray, row: int, at: int) -> Cell:
-    """A cell of a row, and when a ray enters it."""
-    x, y = (row, at) if ray.major else (at, row)
-    return ray.spell(x, y)[0], y, x
-
-
-def _ended(touched: list[Touch], end: int, most: int | None, stack: Stack) -> Passed | None:
-    """What a ray hit before its end, of what it touched until then, in order."""
-    at_end = [rank for time, _, _, rank, _, _ in touched if time == end]
-    blocked = bool(at_end) and stack.has_occluders and bool(stack.occluder[at_end].any())
-    hits = touched[:-1] if blocked else touched[:most]
-    passed = hits if blocked else hits[:-1]  # if one of them was entered as the ray ends, it is not left before
-    if at_end and any(leave >= end for *_, leave in passed):
-        return None
-    rows = [[rank, count, x, y, time] for time, y, x, rank, count, _ in hits]
-    if not at_end:
-        return end, rows, None
-    if not blocked:
-        rows[-1][1] = 1
-    return end, rows, touched[-1] if blocked else hits[-1]
-
-
-def _cells(runs: Iterator[tuple[int, int, bytes]], ray: Ray, every: bool) -> tuple[int, Cell | None]:
-    """Number of cells that are set in runs, unless only the first is looked for, and the first of them."""
-    count, rows_met, ahead = 0, 0, 1 if ray.step[ray.major] > 0 else -1
-    found: list[Cell] = []
-    for row, first, run in runs:
-        cells = run.count(1)
-        count, rows_met = count + cells, rows_met + (cells > 0)
-        if cells and rows_met <= 2:  # through a corner it enters two cells of a row, and of the next, at once
-            at = run.find(1) if ahead > 0 else run.rfind(1)
-            found += [_entered(ray, row, first + k) for k in (at, at + ahead) if 0 <= k < len(run) and run[k] == 1]
-        elif found and not every:
-            break
-    return count, min(found, default=None)
