@@ -383,7 +383,7 @@ def test_the_bytes_of_a_stage_are_those_of_its_arrays() -> None:
     word, runs = 8, 3 * 5 * 8
     told = {
         "shots": 2 * word,
-        "stack": 8 * word + 1,
+        "stack": 9 * word + 1,
         "patterns": (2 + 1 + 4) * word,
         "plan": 0,
         "weights": (9 + 1) * word + 3 * word,

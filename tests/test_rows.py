@@ -30,7 +30,7 @@ from hitplanes import (
     report_of,
     sees,
 )
-from hitplanes.planes.scene import objects
+from hitplanes.planes.scene import items, objects
 from hitplanes.planes.scene.render import draw_view
 
 SIZE, DOT = (24, 15), np.ones((3, 3), np.bool_)
@@ -80,8 +80,9 @@ def said(scene: Scene) -> list[Any]:
 
 @examples(40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32))
-def test_the_row_of_an_object_is_told_nowhere(jit: bool, seed: int) -> None:
+def test_the_row_of_an_object_is_told_nowhere(jit: bool, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """Two scenes that change alike, with other rows, answer alike: present and past, copies and what is kept ready."""
+    monkeypatch.setattr(items, "ROWS_SLACK", 1024 * (seed % 2))
     scenes = Scene(SIZE, (-6, 2)), scrambled()
     histories = [History(scene, interpolate=True) for scene in scenes]
     ready = [[prepare(scene, weapon) for weapon in (Disc(2), Pistol(20), Laser(20, width=2))] for scene in scenes]
@@ -190,6 +191,72 @@ def test_one_is_moved_before_its_mask_is_made_in_the_row_of_another() -> None:
     scene.move(np.array([other]), np.array([[22.0, 4.0]]))
     assert np.argwhere(label.read(scene.items)).min(axis=0).tolist() == [3, 21]
     assert scene.box(other).tolist() == [21, 3, 23, 5]
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_scene_that_was_full_once_is_as_small_as_others(turned: bool) -> None:
+    """Rows are laid out anew; what followed the changes of items follows them from there."""
+    scene, ways = Scene((13000, 9)), ("tiles", "visible", "labels", "integers")
+    history = History(scene)
+    ids = [scene.add(DOT, (4 * k, 4)) for k in range(3000)]
+    phase = scene.derived.index("grid")
+
+    def hit() -> list[list[int]]:
+        at = [(4 * k, 4) for k in (2, 1500, 2990, 2999)]
+        found = [fire(scene, Point(), at, strategy=way).object.tolist() for way in ways if way != "tiles"]
+        phase.read(scene.items).check()
+        return [*found, fire(scene, Point(), at, prefilter="box", broadphase="grid").object.tolist()]
+
+    assert hit() == [[2, 1500, 2990, 2999]] * 4
+    if turned:
+        scene.set(ids[2999], angle=90)
+    scene.remove(ids[:2990])
+    assert hit() == [[2990, 2999]] * 4
+    new = scene.add(DOT, (6000, 4))
+    assert hit() == [[new, 2990, 2999]] * 4
+    assert (scene.items.table.height, len(scene), list(scene)[-1]) == (11, 11, new)
+    history.record()
+    assert {len(column) for column in history.at(0).items._snapshot.columns.values()} == {11}
+    assert history.at(0).position(ids[2990]).tolist() == [4 * 2990, 4]
+
+
+def test_angles_between_ticks_are_those_of_the_same_object_in_copies_too() -> None:
+    """Equal lists of two moments of a copy may be of other objects."""
+    scene = Scene()
+    history = History(scene, interpolate=True)
+    first, second = scene.add(DOT, angle=10), scene.add(DOT, (20, 0), angle=20)
+    history.record(0)
+    scene.remove(first)
+    scene.set(second, angle=10)
+    scene.add(DOT, (40, 0), angle=20)
+    history.record(1)
+    for each in (history, copy.deepcopy(history), pickle.loads(pickle.dumps(history))):
+        assert each.at(0.5).angle(second) == 15
+
+
+def test_equal_columns_of_moments_are_pickled_once() -> None:
+    scene = Scene()
+    for k in range(300):
+        scene.add(DOT, (k, 0))
+    history, sizes = History(scene), []
+    for tick in range(40):
+        scene.move(5, (tick, 5))
+        history.record()
+        sizes.append(len(pickle.dumps(history)))
+    assert sizes[-1] < 6 * sizes[0]
+
+
+@pytest.mark.parametrize("kind", [bytes, bytearray])
+def test_scenes_of_one_pickle_that_share_its_arrays_change_apart(kind: Any) -> None:
+    scene, buffers = Scene((30, 30)), list[Any]()
+    for k in range(4):
+        scene.add(DOT, (5 * k + 3, 5))
+    data = pickle.dumps(scene, 5, buffer_callback=buffers.append)
+    raw = [kind(buffer.raw()) for buffer in buffers]
+    one, other = (pickle.loads(data, buffers=raw) for _ in range(2))
+    one.remove(1)
+    one.move(2, (9, 9))
+    assert (list(one), list(other), other.position(2).tolist()) == ([0, 2, 3], [0, 1, 2, 3], [13, 5])
 
 
 # Names and numbers of what is gone

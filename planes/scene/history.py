@@ -1,7 +1,7 @@
 """The history of a scene by tick, each tick readable as a scene; and a clock with a fixed time step.
 
-A column, a list or a whole moment that did not change between two
-recorded ticks is stored once. A moment never changes, so neither does a scene made of it.
+A column, a list or a whole moment that did not change between two recorded ticks is stored once. A moment never
+changes, so neither does a scene made of it.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class Snapshot:
             position[rows] += _part_of(step, part, parts)
             own.columns = self.columns | {"position_256": _sealed(position)}
         out = PastItems(own)
-        if self.lists["angles"] is not after.lists["angles"]:
-            then, to = self.lists["angles"], after.lists["angles"]
+        then, to = self.lists["angles"], after.lists["angles"]
+        if then is not to or not np.array_equal(rows, later):
             pairs = zip(rows.tolist(), later.tolist(), strict=True)
             turns = {row: (then[row], _short_turn(then[row], to[other])) for row, other in pairs}
             out.turn({row: angle + turn * (part / parts) for row, (angle, turn) in turns.items() if turn})
@@ -117,6 +117,11 @@ class PastTable(RowTable):
     def __init__(self, items: Items) -> None:
         self.count, self.height = items.table.count, items.table.height
         self.known, self._latest = (items.ids, items.rows), items.table
+
+    @property
+    def living(self) -> int:
+        """Number of objects."""
+        return len(self.known[0])
 
     def rows(self, ids: Ints) -> Ints:
         """See `RowTable.rows`."""
@@ -278,6 +283,9 @@ class History:
         with self._lock:
             snapshots = {id(moment.snapshot): moment.snapshot for moment in self._moments.values()}
             states: dict[int, Any] = {number: snapshot.items().state() for number, snapshot in snapshots.items()}
+            tables: dict[int, RowTable] = {}
+            for number, state in states.items():
+                state["table"] = tables.setdefault(id(snapshots[number].table.known[0]), state["table"])
             moments = {
                 tick: moment._replace(snapshot=states[id(moment.snapshot)]) for tick, moment in self._moments.items()
             }

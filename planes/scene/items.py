@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from .. import late
 from ..common.backend import kernels_of
-from ..common.checks import Bools, Floats, InputError, Ints, boxes_in, choice
+from ..common.checks import Bools, Floats, Ints
 from ..common.limits import CATEGORY_BITS, HALF, JOURNAL_EACH, JOURNAL_FEW, JOURNAL_ROWS, SUB
 from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from ..volumes.volumes import Volumes
 
 
-STACK_ROW_BYTES = 65
-"""Bytes of a row of a stack: eight numbers and whether it is an occluder."""
+STACK_ROW_BYTES = 73  # of a row of a stack: nine numbers, and whether it is an occluder
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +177,7 @@ EMPTY = {"sprites": NOTHING, "angles": 0.0, "forms": NO_TRANSFORM, "variants": N
 NO_EDGE = np.array([HALF, HALF, HALF - SUB, HALF - SUB])  # of an empty box
 NO_ROWS, NO_BOXES = np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
 
+ROWS_SLACK = 1024  # rows without an item that are kept, beside as many as there are items
 ARRANGEMENTS = itertools.count(1)  # source of numbers of arrangements; each of items of any scene has its own
 
 COLUMNS: dict[str, tuple[int, ...]] = {
@@ -252,7 +252,9 @@ class Items:
     def state(self) -> dict[str, Any]:
         """What a copy is made of: columns and lists with a row for each item by rising id, and the table of them."""
         ids, rows = self._known()
-        columns: dict[str, Any] = {name: getattr(self, name).take(rows, axis=0) for name in COLUMNS}
+        columns: dict[str, Any] = {name: getattr(self, name) for name in COLUMNS}
+        if len(self.alive) > len(rows) or (rows != np.arange(len(rows))).any():  # pickles store equal objects once
+            columns = {name: column.take(rows, axis=0) for name, column in columns.items()}
         lists = {name: [getattr(self, name)[row] for row in rows.tolist()] for name in (*Looks._fields, "names")}
         return columns | lists | {"table": self.table.copied(ids, self.count)}
 
@@ -265,8 +267,7 @@ class Items:
         items._reserve(count)
         for name in COLUMNS:
             getattr(items, name)[:count] = state[name]
-        for name in (*Looks._fields, "names"):
-            setattr(items, name, state[name])
+        vars(items).update({name: state[name] for name in (*Looks._fields, "names")})
         looks = items.looks(range(count))
         items._enter(range(count), variants_of(looks.sprites, looks.forms))
         items.record(np.arange(count))
@@ -314,8 +315,24 @@ class Items:
             for name, empty in EMPTY.items():
                 getattr(self, name)[row] = empty
         self._stack = None  # it would hold the masks until the next shot
+        if self.table.height > 2 * self.table.living + ROWS_SLACK:
+            self._compact_rows()
         if self.atlas.wasteful:
             self._compact()
+
+    def _compact_rows(self) -> None:
+        """Move the items to the first rows; what follows the journal begins anew."""
+        ids, rows = self._known()
+        unmade = [number for number, row in enumerate(rows.tolist()) if row in self.unmade]
+        lists = {name: [getattr(self, name)[row] for row in rows.tolist()] for name in EMPTY}
+        for name in (*COLUMNS, "_box", "_edge"):
+            setattr(self, name, getattr(self, name).take(rows, axis=0))
+        vars(self).update(lists, unmade=dict.fromkeys(unmade))
+        self.table.compact(ids)
+        self._present = ids, np.arange(len(ids)), self.count, len(ids)
+        self.arrangement, self._in_order = next(ARRANGEMENTS), False
+        self._journal.clear()
+        self._journal_rows, self._forgotten = 0, self.version
 
     def looks(self, rows: Sequence[int]) -> Looks:
         """What the masks of items are made of."""
@@ -489,10 +506,9 @@ class Items:
         if last is None or not self._in_order:
             return self.stack_of(*DECIDING)
         rows = last.rows
+        places = self._boxes_in_order(rows), self.offset.take(rows)
         columns = self._filtered_by(rows, last.occluder), self.owner.take(rows)
-        return last.reformed(
-            self.arrangement, self._boxes_in_order(rows), self.offset.take(rows), self.atlas.flat, *columns
-        )
+        return last.reformed(self.arrangement, *places, self.atlas.flat, *columns)
 
     def _filtered_by(self, rows: Ints, occluder: Bools) -> Ints:
         """Categories of a stack's items."""
@@ -518,8 +534,7 @@ class Items:
         ids, rows, occluder = ids[order], rows[order], occluder[order]
         return Stack(
             ids, rows, occluder, self._filtered_by(rows, occluder), self.owner[rows], self.boxes(rows),
-            self.offset[rows], self.atlas.flat, layered,
-            self.arrangement if roles == DECIDING else next(ARRANGEMENTS),
+            self.offset[rows], self.atlas.flat, layered, self.arrangement if roles == DECIDING else next(ARRANGEMENTS),
         )  # fmt: skip
 
     def imagery(self) -> list[Role]:
@@ -551,20 +566,6 @@ class Items:
         bounds = self.by_mask.bounds.setdefault(kind, late.fit.Bounds(kind))
         return bounds.rows(self.mask[rows], self.sprites, self.variants, rows, len(self.stack()))
 
-    def volumes(self, name: str, rows: Ints) -> Volumes:
-        """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
-        k = boxes_in("kind", name)
-        choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
-        for item in self.id[rows[self.size_wh[rows, 0] == 0]].tolist():
-            raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
-        if name == "box":
-            low, high = np.split(self.boxes(rows).astype(np.float64), 2, axis=1)
-            return late.volumes.Aabbs(low - 0.5, high + 0.5)
-        if not len(rows):
-            return late.volumes.Circles(np.zeros((0, 2)), 0.0)
-        volumes, of = self.bounding(late.fit.Kind(name) if k is None else late.fit.Kind(late.fit.KINDS[2], k), rows)
-        return late.fit.shifted(volumes.take(of), pixel(self.position_256[rows] - self.pivot_256[rows]))
-
     def _enter(self, rows: Sequence[int], variants: Sequence[Variant]) -> None:
         """Enter the masks of items into the atlas and the columns."""
         for row, variant in zip(rows, variants, strict=True):
@@ -582,11 +583,8 @@ class Items:
 
     def _reserve(self, count: int) -> None:
         """Make room for `count` rows."""
-        more = count - len(self.sprites)
-        if more <= 0:
-            return
         for name, empty in EMPTY.items():
-            getattr(self, name).extend([empty] * more)
+            getattr(self, name).extend([empty] * (count - len(getattr(self, name))))
         size = len(self.alive)
         if count <= size:
             return

@@ -7,6 +7,7 @@ columns have as many as there ever were objects at once, however many came and w
 from __future__ import annotations
 
 from enum import Enum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ DECIDING = Role.HITTABLE, Role.OCCLUDER
 HITTABLE, OCCLUDER = map(ROLES.index, DECIDING)
 ROLE_NAMES = tuple(role.value for role in ROLES)
 
+GROWTH_MOST = 2**20  # most ids that room is made for ahead
 NAMELESS = -1 - len(ROLES)
 """Row of an id whose name tells no role and id."""
 
@@ -51,6 +53,10 @@ class RowTable:
         self.row_of: npt.NDArray[np.int32] = np.zeros(16, np.int32)
         self._names: dict[int, str] = {}
         self._free: list[int] = []
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy has rows of its own, also where pickles share their arrays."""
+        vars(self).update(state, row_of=state["row_of"].copy())
 
     @property
     def living(self) -> int:
@@ -101,16 +107,22 @@ class RowTable:
         row = self.row(item)
         return self._names.get(item, "") if row == NAMELESS else f"{ROLE_NAMES[-1 - row]} {item}"
 
+    def compact(self, ids: Ints) -> None:
+        """Give the objects, of rising ids (n,), the rows 0 .. n - 1."""
+        self.row_of[ids] = np.arange(len(ids))
+        self.height, self._free = len(ids), []
+
     def copied(self, ids: Ints, count: int) -> RowTable:
         """A table of the first `count` ids and their names; the objects, of rising ids (n,), have rows 0 .. n - 1."""
         other = RowTable()
-        other.count, other.height, other._names = count, len(ids), dict(self._names)
+        other.count = count
+        other._names = {item: name for item, name in self._names.items() if item < count}
         other.row_of = self.row_of[:count].copy()
-        other.row_of[ids] = np.arange(len(ids))
+        other.compact(ids)
         return other
 
     def _reserve(self, count: int) -> None:
         size = len(self.row_of)
         if count > size:
-            more = max(count - size, size // 4)
+            more = max(count - size, min(size // 4, GROWTH_MOST))
             self.row_of = np.concatenate([self.row_of, np.zeros(more, np.int32)])

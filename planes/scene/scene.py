@@ -410,7 +410,7 @@ class Scene:
         ids : of the objects (n,), or of one
         kind : "box", "circle", "oriented box", "4 boxes" (or another number up to 64), "polygon"
         """
-        return self.items.volumes(kind, self._existing(ids))
+        return late.fit.volumes_of(self.items, kind, self._existing(ids))
 
     def extent(self) -> Box:
         """Inclusive box (x_min, y_min, x_max, y_max) of the bounds, or of all objects if there are no bounds."""

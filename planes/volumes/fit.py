@@ -17,12 +17,12 @@ import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..common.backend import LruCache
-from ..common.checks import Bools, Floats, InputError, Ints, array_of, bools, integer, real, reals
+from ..common.checks import Bools, Floats, InputError, Ints, array_of, bools, boxes_in, choice, integer, real, reals
 from ..common.limits import (
     BOUNDING_BYTES,
     BOUNDING_CACHE_BYTES,
@@ -40,6 +40,7 @@ from ..common.limits import (
     TRIG_BITS,
     TRIG_ERROR,
 )
+from ..grid.fixed_point import pixel
 from ..grid.spans import Spans
 from ..scene.sprite import Sprite, frame_pivot
 from ..scene.variants import Transform, Variant
@@ -57,6 +58,9 @@ from .polygons import (
     rows_of,
 )
 from .volumes import Aabbs, BoxSets, Capsules, Circles, Core, Hulls, Obbs, Parts, Polygons, Volumes, joined
+
+if TYPE_CHECKING:
+    from ..scene.items import Items
 
 AXES = 33  # number of lengths of a capsule's axis that are tried
 
@@ -343,6 +347,21 @@ class Bounds:
                 self._volumes = more if self._volumes is None else joined([self._volumes, more])
                 self._row |= zip(new, itertools.count(len(self._row)))
             return self._volumes, np.array([self._row[mask] for mask in masks.tolist()], np.int64)
+
+
+def volumes_of(items: Items, name: str, rows: Ints) -> Volumes:
+    """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
+    k = boxes_in("kind", name)
+    choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
+    for item in items.id[rows[items.size_wh[rows, 0] == 0]].tolist():
+        raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
+    if name == "box":
+        low, high = np.split(items.boxes(rows).astype(np.float64), 2, axis=1)
+        return Aabbs(low - 0.5, high + 0.5)
+    if not len(rows):
+        return Circles(np.zeros((0, 2)), 0.0)
+    volumes, of = items.bounding(Kind(name) if k is None else Kind(KINDS[2], k), rows)
+    return shifted(volumes.take(of), pixel(items.position_256[rows] - items.pivot_256[rows]))
 
 
 def shifted(volumes: Volumes, xy: Ints) -> Volumes:

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
 AUTO = ("auto", "auto", "auto")
 """Pre-filter, broad phase and strategy of a call that names none."""
 
+LOOKED_AT = 1000  # most ids among which owners that an error names are looked for
 OWNERS_NAMED = 3
 """Most owners that an error names: those of the greatest ids, which are nearest to one that is too great."""
 
@@ -340,8 +341,10 @@ def check_owners(scene: Scene, shots: Shots) -> None:
     if shots.last_owner < items.count:
         return
     row, column = np.argwhere(shots.exclude >= items.count)[0].tolist()
-    owners = [owner for owner in np.unique(items.owner[items.rows]).tolist() if items.name_of(owner)]
+    last = range(max(items.count - LOOKED_AT, 0), items.count)
+    parts = set(items.ids[items.owner[items.rows] != items.ids].tolist())
+    owners = [owner for owner in last if owner not in parts and items.name_of(owner)]
     near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in owners[-OWNERS_NAMED:])
-    known = f"the nearest are {near}" if near else "it has none"
+    known = f"the nearest are {near}" if near else "it never had any"
     got = shots.exclude[row, column]
     raise InputError(f"exclude[{row}][{column}]: expected an owner that the scene has or had, got {got}; {known}")

@@ -154,7 +154,9 @@ def check_present(hits: object) -> Hits:
     if hits.version == scene.version:
         return hits
     rows = scene.items.changed_rows(hits.version)
-    ids = [] if rows is None else sorted(scene.items.id[rows].tolist())
+    gone = [item for item in hits._stack.ids.tolist() if item not in scene]
+    there = [] if rows is None else scene.items.id[rows[scene.items.alive[rows] == 1]].tolist()
+    ids = sorted({*there, *gone})
     names = [f"{item} {json.dumps(scene.name_of(item))}" for item in ids[:CHANGED_MAX]]
     more = f" and {len(ids) - CHANGED_MAX} more" if len(ids) > CHANGED_MAX else ""
     changed = f": changed since: object {', '.join(names)}{more}" if names else ""
