@@ -26,12 +26,15 @@ from hitplanes import (  # fmt: skip
     Disc,
     History,
     InputError,
+    Laser,
     Pistol,
+    Point,
     Polygon,
     Ring,
     Rounds,
     Scene,
     ShotRecord,
+    Spans,
     Spread,
     Sprite,
     Stencil,
@@ -42,6 +45,7 @@ from hitplanes import (  # fmt: skip
     read_png,
     replay,
     report_of,
+    sees,
     use_jit,
     weapon_from_json,
     weapons_of,
@@ -110,7 +114,7 @@ ARRAYS: dict[str, tuple[Any, str]] = {
     "generator": ((v for v in (1, 2)), "at: expected numbers, got <generator"),
     "decimals": ([Decimal(1), Decimal(2)], "at: expected numbers, got .*Decimal"),
     "one number": (5, r"at: expected shape \(any, 2\), got \(\)"),
-    "empty list": ([], r"at: expected shape \(any, 2\), got \(0,\)"),
+    "empty row": ([[]], r"at: expected shape \(any, 2\), got \(1, 0\)"),
     "three numbers": ((1, 2, 3), r"at: expected shape \(any, 2\), got \(3,\)"),
     "columns for rows": (np.zeros((2, 5)), r"at: expected shape \(any, 2\), got \(2, 5\)"),
     "three dimensions": (np.zeros((1, 1, 2)), r"at: expected shape \(any, 2\), got \(1, 1, 2\)"),
@@ -847,3 +851,34 @@ def test_an_error_says_what_it_says_and_can_be_copied() -> None:
     error = InputError("name: expected 鴨 and é, got \x7f")
     assert str(error) == "name: expected 鴨 and é, got \\x7f"
     assert str(InputError(str(error))) == str(error) == str(pickle.loads(pickle.dumps(error)))
+
+
+def test_an_empty_list_of_points_is_none_of_them() -> None:
+    """A game whose last enemy is gone passes empty lists; no call expects the shape of what is not there."""
+    scene = Scene((50, 50))
+    wall = scene.add(np.ones((9, 9), np.bool_), (20, 20), role="occluder")
+    for weapon, aimed in ((Point(), {}), (Disc(3), {}), (Pistol(20), {"aim": []}), (Laser(None), {"toward": []})):
+        assert len(fire(scene, weapon, [], **aimed).shots) == len(fire(scene, weapon, (3, 3), toward=[]).shots) == 0
+    assert sees(scene, [], (3, 3)).size == sees(scene, (3, 3), []).size == 0
+    scene.move([], [])
+    scene.set([], position_xy=[], velocity_xy=[])
+    assert scene.carve({wall: []}) == {}
+    with pytest.raises(InputError, match="at: expected shape"):
+        fire(scene, Disc(3), np.zeros((0, 3)))
+
+
+SPANS = {
+    "alpha": (np.full((2, 2), 255, np.uint8), (0, 0), r"mask\[0\]\[0\]: expected 0 or 1, got 255"),
+    "masks": (np.ones((2, 2, 2), np.bool_), (0, 0), r"mask: expected shape \(any, any\), got \(2, 2, 2\)"),
+    "fraction": ([[1]], (10.5, 0), r"origin_xy\[0\]: expected a whole number"),
+    "corner": ([[1]], (10, 0, 0), r"origin_xy: expected shape \(2,\), got \(3,\)"),
+    "nowhere": ([[1]], (float("nan"), 0), r"origin_xy\[0\]: expected a whole number"),
+}
+
+
+@pytest.mark.parametrize("name", SPANS)
+def test_spans_are_of_a_mask_at_a_whole_pixel(name: str) -> None:
+    mask, corner, text = SPANS[name]
+    with pytest.raises(InputError, match=text):
+        Spans.from_mask(mask, corner)  # type: ignore[arg-type]
+    assert Spans.from_mask([[1, 0], [1, 1]], np.array([3, 4])).runs().tolist() == [[4, 3, 3], [5, 3, 4]]  # type: ignore[arg-type]

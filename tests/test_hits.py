@@ -741,7 +741,7 @@ AT = [(0, 0), (1, 1)]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"weapon": "disc"}, r"weapon: expected a weapon, got str"),
     ({"at": (0, 0, 0)}, r"at: expected shape \(any, 2\)"),
-    ({"at": []}, r"at: expected shape"),
+    ({"at": [[]]}, r"at: expected shape"),
     ({"at": "x"}, r"at: "),
     ({"at": None}, r"at: expected numbers"),
     ({"at": [(0, 0), (NAN, 0)]}, r"at\[1\]\[0\]: expected a finite number, got nan"),

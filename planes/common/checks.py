@@ -222,6 +222,8 @@ def _numeric(field: str, values: object, shape: Shape, kinds: str) -> npt.NDArra
     if array.dtype.kind not in kinds and not empty:
         kind = "booleans" if kinds.startswith("b") else "numbers"
         raise InputError(f"{field}: expected {kind}, got {shown(array.tolist() if array.size <= SHOWN else array)}")
+    if array.shape == (0,) and shape[1:] and shape[0] in (None, 0) and None not in shape[1:]:
+        array = array.reshape(0, *shape[1:])  # an empty list of points
     if len(array.shape) != len(shape) or any(e not in (None, g) for e, g in zip(shape, array.shape, strict=True)):
         raise InputError(f"{field}: expected shape {_spelled(shape)}, got {array.shape}")
     return array

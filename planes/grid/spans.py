@@ -16,7 +16,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from ..common.checks import Bools, Floats, Ints
+from ..common.checks import Bools, Floats, Ints, bools, integers
+from ..common.limits import POSITION_MAX
 
 Box = tuple[int, int, int, int]
 
@@ -155,7 +156,12 @@ class Spans:
 
     @classmethod
     def from_mask(cls, mask: Bools, origin_xy: tuple[int, int] = (0, 0)) -> Spans:
-        """Set pixels of a mask (h, w) whose pixel [0, 0] lies at `origin_xy`."""
+        """Set pixels of a mask (h, w) of booleans, or of 0 and 1, whose pixel [0, 0] lies at `origin_xy`, whole px."""
+        if type(mask) is not np.ndarray or mask.dtype != np.bool_ or mask.ndim != 2:
+            mask = bools("mask", mask, (None, None))
+        if type(origin_xy) is not tuple or [*map(type, origin_xy)] != [int, int]:
+            x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
+            origin_xy = x, y
         edges = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
         y, x_first = np.nonzero(edges == 1)
         x_last = np.nonzero(edges == -1)[1] - 1

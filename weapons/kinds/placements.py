@@ -380,6 +380,7 @@ def checked_shots(
 ) -> Shots:
     """Check the arguments of `fire`; each of them is one for all shots or one for each."""
     toward = None if toward is None else array_of("toward", toward)
+    toward = toward.reshape(0, 2) if toward is not None and toward.shape == (0,) else toward  # an empty list of points
     aim = aim if aim is None or isinstance(aim, int | float) else array_of("aim", aim)
     aimed = ("aim", aim) if toward is None else ("toward", toward)
     at_256, single = _for_each_aim(*places_256("at", at), *aimed)
