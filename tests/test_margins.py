@@ -126,3 +126,14 @@ def test_margins_of_a_batch() -> None:
     hits = fire(scene, Point(), [(0, 0), (100, 100), (5, 0)])
     assert [margin[:3] for margin in hits.margins()] == [(0, a, False), (0, b, True), (2, a, True), (2, b, False)]
     assert hits.margins(1) == [] and hits.margins(2) == hits.margins()[2:]
+
+
+def test_margins_with_a_line_of_sight_know_what_lies_beyond_the_reach_of_the_shot() -> None:
+    """A wall that only the ways of a shifted shot come to shelters what lies behind it."""
+    scene = Scene((60, 41))
+    target = scene.add(np.ones((1, 1), np.bool_), (30, 20))
+    for weapon, found in ((Disc(5), [target]), (Disc(5, line_of_sight="occluders"), [target])):
+        assert [margin.object for margin in fire(scene, weapon, (20, 20)).margins()] == found
+    scene.add(np.ones((41, 1), np.bool_), (29, 20), role="occluder")
+    assert not fire(scene, Disc(5, line_of_sight="occluders"), (20, 20)).margins()
+    assert [margin.object for margin in fire(scene, Disc(5), (20, 20)).margins()] == [target]

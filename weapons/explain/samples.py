@@ -17,10 +17,11 @@ from hitplanes.planes.common.checks import Bools, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, DETAIL_SAMPLES_MAX, FRAGILE_PX, MARGIN_PX, NEAR_PX
 from hitplanes.planes.grid.spans import Box, Spans, clipped, each_pixel, pieces
 from hitplanes.planes.scene.items import Stack
+from hitplanes.planes.scene.scene import Scene
 
 from ..fire.prefilter import pairs_of, refused
 from ..fire.shelter import shelter_ranks, sheltered
-from ..fire.spans import QueryContext, direct
+from ..fire.spans import QueryContext, context_of, direct
 from ..kinds.areas import parts_of
 from ..kinds.placements import Placements, Shots, placements_for
 from ..kinds.weapon import Weapon
@@ -399,18 +400,19 @@ class Margin(NamedTuple):
         return self.distance <= FRAGILE_PX
 
 
-def margins_of(context: QueryContext, weapon: Weapon, shots: Shots, first_shot: int = 0) -> list[Margin]:
+def margins_of(scene: Scene, stack: Stack, weapon: Weapon, shot: Shots, number: int) -> list[Margin]:
     """Margins of the objects for which a whole-pixel shift of a shot, up to MARGIN_PX, changes whether they are hit.
 
-    They are sorted by (shot, object); shots are numbered from the first one's number on.
+    They are sorted by object; `shot` is a batch of one, and `number` that of the shot.
     """
-    stack, found = context.stack, []
-    for row in range(len(shots) if len(stack) else 0):
-        still, flips = _flips(placements_for(weapon, shots.take(row, row + 1)), shots.take(row, row + 1), context)
-        for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):
-            dx, dy = SHIFTS[flips[rank]].tolist()
-            length = math.sqrt(dx * dx + dy * dy)
-            found.append(Margin(first_shot + row, int(stack.ids[rank]), bool(still[rank]), length, (dx, dy)))
+    if not len(stack):
+        return []
+    context, found = context_of(scene, stack, weapon, shot, MARGIN_PX), []
+    still, flips = _flips(placements_for(weapon, shot), shot, context)
+    for rank in sorted(np.flatnonzero(flips >= 0).tolist(), key=lambda rank: int(stack.ids[rank])):
+        dx, dy = SHIFTS[flips[rank]].tolist()
+        length = math.sqrt(dx * dx + dy * dy)
+        found.append(Margin(number, int(stack.ids[rank]), bool(still[rank]), length, (dx, dy)))
     return found
 
 

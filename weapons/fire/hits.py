@@ -384,13 +384,9 @@ class Hits:
         A margin is the shortest whole-pixel shift of the pattern, up to 8 px, that turns an object from hit to not
         hit or back. A margin of 1 px is fragile.
         """
-        if self._scenes is None and shot is None:
-            return late.samples.margins_of(self._context(0), self.weapon, self.shots)
         numbers = range(len(self.shots)) if shot is None else [self._checked(shot)]
         return [
-            margin
-            for i in numbers
-            for margin in late.samples.margins_of(self._context(i), self.weapon, self._one(i), i)
+            margin for i in numbers for margin in late.samples.margins_of(*self._then(i), self.weapon, self._one(i), i)
         ]
 
     @property

@@ -32,13 +32,13 @@ FEW_NEAR = 64
 """Most items near the shots that are listed alone; of more, all are, as that list is kept for the next shots."""
 
 
-def ways_box(weapon: Weapon, shots: Shots) -> Box:
-    """Box around the ways to all pixels of some shots, px."""
+def ways_box(weapon: Weapon, shots: Shots, shift: int = 0) -> Box:
+    """Box around the ways to all pixels of some shots, each of which may be shifted, px."""
     burst, spread, plain = parts_of(weapon)
     reach_256 = plain.reach_256 + (int(snap(spread.radius)) if spread else 0)
     if burst:
         reach_256 += burst.count * int(np.abs(snap(burst.recoil_xy)).max())
-    reach = reach_256 // SUB + SLACK_PX
+    reach = reach_256 // SUB + SLACK_PX + shift
     if len(shots) < 2:
         x, y = x_max, y_max = shots.xy[0].tolist() if len(shots) else (0, 0)
     else:

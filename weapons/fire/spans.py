@@ -54,14 +54,15 @@ class QueryContext:
     blockers: Blockers | None = None
 
 
-def context_of(scene: Scene, stack: Stack, weapon: Weapon, shots: Shots | None = None) -> QueryContext:
+def context_of(scene: Scene, stack: Stack, weapon: Weapon, shots: Shots | None = None, shift: int = 0) -> QueryContext:
     """What shots of a weapon were tested against: a stack of the scene, which may have changed since.
 
-    If `shots` are given, no others are looked at, and no pixels but theirs.
+    If `shots` are given, no others are looked at, and no pixels but theirs, or those of shots that are shifted by up to
+    `shift` px.
     """
     plain, blockers = parts_of(weapon)[2], None
     if plain.line_of_sight:
-        near = None if shots is None else late.shelter.ways_box(weapon, shots)
+        near = None if shots is None else late.shelter.ways_box(weapon, shots, shift)
         blockers = late.shelter.blockers_of(scene, stack, plain.line_of_sight, plain.inside, None, near)
     return QueryContext(stack, scene.bounds, plain.pierce, Candidates(scene.items, stack), Plan(), blockers)
 
