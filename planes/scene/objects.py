@@ -1,7 +1,7 @@
 """Roles and ids of objects, and the row of the columns of `Items` that each object has.
 
-Ids count up and are never given out again, as hits and histories name objects by them. Rows are used again, so that the
-columns have as many as there ever were objects at once, however many came and went.
+Ids count up and are never given out again, as hits and histories name objects by them. Rows are used again, and are
+laid out anew when most hold nothing: columns are about as long as the scene is full, however many came and went.
 """
 
 from __future__ import annotations
