@@ -335,7 +335,7 @@ class Index(Derivative):
             return self.boxes
 
     def query(self, items: Items, boxes_xyxy: Ints) -> tuple[Ints, Ints]:
-        """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (place, row of the item)."""
+        """Find the items whose boxes share a pixel with inclusive, non-empty boxes (n, 4): (box, row of the item)."""
         row, place = self.read(items).query(boxes_xyxy.astype(np.float64))
         return row, self._item_of[place]
 

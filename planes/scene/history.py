@@ -24,7 +24,7 @@ from ..grid.fixed_point import rounded_div
 from ..grid.spans import Box
 from .derived import NEVER, Derived
 from .items import ARRANGEMENTS, COLUMNS, EMPTY, NO_BOXES, UNARRANGED, Items, Stack
-from .objects import RowTable
+from .objects import RowTable, looked_up
 from .scene import Scene
 from .variants import MaskAtlas, variant_of, variants_of
 
@@ -32,10 +32,6 @@ T = TypeVar("T")
 
 RUNS_SHOWN = 8  # most runs of ticks that an error lists; of more it gives only the number
 PART_BITS = 31  # a step between two ticks has fewer than 2**31 parts: the square of their number stays inside int64
-
-
-LISTS = tuple(EMPTY)
-"""What items have beside their columns."""
 
 
 class Snapshot:
@@ -60,7 +56,7 @@ class Snapshot:
         }
         self.lists: dict[str, list[Any]] = lists
         if not arranged:
-            self.lists = {name: self._list(items, name, lists.get(name)) for name in LISTS}
+            self.lists = {name: self._list(items, name, lists.get(name)) for name in EMPTY}
         shared = earlier is not None and earlier.atlas.flat is atlas.flat
         self.atlas: MaskAtlas = earlier.atlas if earlier is not None and shared else _full(atlas.flat)
         self._items: PastItems | None = None
@@ -125,11 +121,7 @@ class PastTable(RowTable):
 
     def rows(self, ids: Ints) -> Ints:
         """See `RowTable.rows`."""
-        known, rows = self.known
-        if not len(known):
-            return np.full(len(ids), -1)
-        place = np.minimum(np.searchsorted(known, ids), len(known) - 1)
-        return np.asarray(np.where(known[place] == ids, rows[place], -1))
+        return looked_up(ids, *self.known)
 
     def row(self, item: int) -> int:
         """See `RowTable.row`."""

@@ -22,7 +22,7 @@ from ..grid import fixed_point
 from ..grid.fixed_point import boxes_at, pixel
 from ..grid.spans import Box, sorted_once
 from .derived import NEVER, ByMask
-from .objects import DECIDING, HITTABLE, OCCLUDER, ROLES, Role, RowTable
+from .objects import DECIDING, HITTABLE, OCCLUDER, ROLES, Role, RowTable, looked_up
 from .poses import Looks
 from .sprite import Sprite
 from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
@@ -91,9 +91,7 @@ class Stack:
 
     def ranks(self, ids: Ints) -> Ints:
         """Ranks (n,) of items in the stack by their ids, 0 in front; -1 for ids that are not in it."""
-        rising, rank = self._by_id
-        place = np.minimum(np.searchsorted(rising, ids), len(rising) - 1)
-        return np.where(rising[place] == ids, rank[place], -1) if len(rising) else np.full(np.shape(ids), -1)
+        return looked_up(ids, *self._by_id)
 
     @cached_property
     def rank_by_label(self) -> Ints:

@@ -36,6 +36,14 @@ NAMELESS = -1 - len(ROLES)
 """Row of an id whose name tells no role and id."""
 
 
+def looked_up(ids: Ints, rising: Ints, values: Ints) -> Ints:
+    """Values (n,) of ids, of which the known ones (m,) are rising and have values (m,); -1 for others."""
+    if not len(rising):
+        return np.full(np.shape(ids), -1)
+    place = np.minimum(np.searchsorted(rising, ids), len(rising) - 1)
+    return np.asarray(np.where(rising[place] == ids, values[place], -1))
+
+
 class RowTable:
     """The row of each object, by its id, and the names of objects that are gone.
 
