@@ -163,7 +163,7 @@ def fire_anew(
     bits = category_bits(present, "accept", accept), category_bits(present, "blocked_by", blocked_by)
     shots = checked_shots(weapon, at, aim, toward, *bits, exclude, seed, shot)
     if exclude is not None:
-        check_owners(present, shots)
+        check_owners(present, shots.owners)
     plan.run("shots", f"{len(shots)} checked", shots.nbytes)
     if aim is None and toward is None:
         plan.leave_out_all(unaimed, weapon)
@@ -196,18 +196,28 @@ def _ready(scene: Scene | History, weapon: Weapon, filters: Filtering, shot: Any
         return None  # `prepare` leaves several rays to `fire`
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
-    owner = int(exclude) if isinstance(exclude, np.integer) else exclude
-    plain = type(accepts) is type(blocks) is type(seed) is int and (owner is None or type(owner) is int)
+    owners = _plain_owners(exclude)
     drawn = not of_rays and parts_of(weapon)[1] is not None
-    if not plain or (drawn and not (shot is None or type(shot) is int)):
+    if owners is None or not (type(accepts) is type(blocks) is type(seed) is int):
         return None  # also of True, which would find what is kept for 1
+    if drawn and not (shot is None or type(shot) is int):
+        return None
 
     def make() -> Ready[Hits]:
         own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
         return late.prepare.prepare(scene, own)
 
     ready = scene.derived.when_asked_again((weapon.text, seed, shot) if drawn else weapon.text, make)
-    return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owner, seed)
+    return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owners, seed)
+
+
+def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
+    """Owners that one shot excludes; None if they are not plain whole numbers."""
+    if exclude is None:
+        return ()
+    given = exclude if isinstance(exclude, tuple | list) else (exclude,)
+    owners = tuple([int(owner) if isinstance(owner, np.integer) else owner for owner in given])
+    return owners if all(type(owner) is int for owner in owners) else None
 
 
 def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:
@@ -335,16 +345,18 @@ def category_bits(scene: Scene, field: str, value: object) -> object:
     return value
 
 
-def check_owners(scene: Scene, shots: Shots) -> None:
-    """Check that each excluded owner is the id of an object that a scene has or had, or -1."""
+def check_owners(scene: Scene, exclude: Ints | tuple[int, ...]) -> None:
+    """Check that each excluded owner (N, K), or (K,), is the id of an object that a scene has or had, or -1."""
     items = scene.latest.items
-    if shots.last_owner < items.count:
+    greatest = max(exclude, default=-1) if isinstance(exclude, tuple) else int(exclude.max(initial=-1))
+    if greatest < items.count:
         return
-    row, column = np.argwhere(shots.exclude >= items.count)[0].tolist()
+    every = np.atleast_2d(exclude)
+    row, column = np.argwhere(every >= items.count)[0].tolist()
     last = range(max(items.count - LOOKED_AT, 0), items.count)
     parts = set(items.ids[items.owner[items.rows] != items.ids].tolist())
     owners = [owner for owner in last if owner not in parts and items.name_of(owner)]
     near = ", ".join(f"{owner} {items.name_of(owner)!r}" for owner in owners[-OWNERS_NAMED:])
     known = f"the nearest are {near}" if near else "it never had any"
-    got = shots.exclude[row, column]
+    got = every[row, column]
     raise InputError(f"exclude[{row}][{column}]: expected an owner that the scene has or had, got {got}; {known}")

@@ -214,10 +214,9 @@ class Shots:
         return _spread(self._exclude, len(self))
 
     @property
-    def last_owner(self) -> int:
-        """Greatest number of an owner that is passed over; -1 if there is none."""
-        given = self._exclude
-        return max(given, default=-1) if isinstance(given, tuple) else int(given.max(initial=-1))
+    def owners(self) -> Ints | tuple[int, ...]:
+        """Owners that are passed over, as they were given: one row for all shots, or (N, K)."""
+        return self._exclude
 
     @cached_attribute
     def number(self) -> Ints:
@@ -392,10 +391,10 @@ def checked_shots(
         at_256,
         _directions(angles) if offset is None else None,
         offset,
-        filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n)),
-        _owners(exclude, n, single),
+        checked_filter(accept, blocked_by, n),
+        checked_owners(exclude, n, single),
         0 if shot is None else integers("shot", each("shot", shot, n), (n,), 0, 2**63 - 1),
-        _seeds(seed, n),
+        checked_seeds(seed, n),
         0,
         angles,
     )
@@ -405,8 +404,8 @@ def unaimed_shots(field: str, at: object, accept: object, blocked_by: object, ex
     """Check places and filters of shots that are aimed later; the places are the value of the field."""
     at_256, single = places_256(field, at)
     n = len(at_256)
-    meets = filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n))
-    return Shots(at_256, STRAIGHT, None, meets, _owners(exclude, n, single), 0, 0, 0)
+    meets, owners = checked_filter(accept, blocked_by, n), checked_owners(exclude, n, single)
+    return Shots(at_256, STRAIGHT, None, meets, owners, 0, 0, 0)
 
 
 def places_256(field: str, at: object) -> tuple[Ints, bool]:
@@ -455,6 +454,11 @@ def blocking_of(meets: Whole) -> Whole:
     """Category bits in a filter of what blocks."""
     bits: Whole = meets >> CATEGORY_BITS & ALL
     return bits
+
+
+def checked_filter(accept: object, blocked_by: object, n: int) -> Ints | int:
+    """Filter (n,) of what shots meet, or one value for all."""
+    return filter_of(_bits("accept", accept, n), _bits("blocked_by", blocked_by, n))
 
 
 def _bits(name: str, bits: object, n: int) -> Ints | int:
@@ -553,7 +557,7 @@ def recoiled(direction: Ints, round_: Ints, degrees: float) -> Ints:
     return turned(direction, c[round_], s[round_])
 
 
-def _seeds(seed: object, n: int) -> Words | int:
+def checked_seeds(seed: object, n: int) -> Words | int:
     """Seeds (n,), or one value for all shots."""
     if type(seed) is int and 0 <= seed <= SEED_MAX:
         return seed
@@ -568,12 +572,14 @@ def _seeds(seed: object, n: int) -> Words | int:
     return given.astype(np.uint64)
 
 
-def _owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, ...]:
+def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, ...]:
     """Owners (n, K): a number, one for each shot (n,), or several for all (1, K) or for each (n, K); -1 for none."""
     if exclude is None:
         return ()
     if type(exclude) is int and -1 <= exclude <= OWNER_MAX:
         return (exclude,)
+    if single and isinstance(exclude, tuple | list) and all(type(v) is int and -1 <= v <= OWNER_MAX for v in exclude):
+        return tuple(exclude)
     array = array_of("exclude", exclude)
     if array.ndim == 0:
         array = np.broadcast_to(array, (n, 1))

@@ -20,6 +20,7 @@ from numba.experimental import structref
 from hitplanes.planes.bits.front_to_back import NO_NUMBERS
 from hitplanes.planes.bits.tiles import visible_ns
 from hitplanes.planes.bits.visible import VisibleSet
+from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.costs import COMPILED
 from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
@@ -169,6 +170,11 @@ shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
+def filter_of(view: View) -> tuple[Ints, Ints]:
+    """Filter of the items that shots of a view meet, as columns of one shot."""
+    return np.array([view.meets]), np.array([view.exclude], np.int64).reshape(1, -1)
+
+
 class GroundCache:
     """Compiled form of `position_cache.GroundCache`: the items as columns of kernels."""
 
@@ -195,7 +201,6 @@ class PositionCache:
         self.quick = None  # each shot is looked up
         self.tiles: Any  # a ShotTiles
         self._scene, self._ground, self._view = scene, ground, kept.view(ground.pierce)
-        self._filter = np.array([kept.meets]), np.array([self._view.exclude], np.int64).reshape(1, -1)
         self._reach = np.array([-reach, -reach, reach, reach])
         self._is_visible = False
         self._lock = threading.Lock()
@@ -209,7 +214,7 @@ class PositionCache:
                 return
             worth = max(int(visible_ns(stack, COMPILED)), 1)
             bounds = self._scene.bounds or EVERYWHERE
-            kept = self._filter if self._view.may_refuse(stack) else ACCEPT_ALL
+            kept = filter_of(self._view) if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(
                 *self._ground.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
             )
@@ -274,23 +279,22 @@ class TargetsType(types.StructRef):
 
 
 class Targets(structref.StructRefProxy):
-    """What single rays are cast at, in kernels: columns of the accepted items, their ranks, and the bounds.
+    """What single rays are cast at, in kernels: columns of the items, the bounds, and the filter as in `ShotTiles`.
 
-    `grid`, `none` and `nobody` stand for cells and filters; they have the types of a batch, for which `follow` is
-    compiled.
+    `grid` and `none` stand for cells; they have the types of a batch, for which `follow` is compiled.
     """
 
 
 OF_TARGETS = [
-    ("box", BOXES), ("offset", INTS), ("masks", FLAGS), ("occluder", FLAGS), ("rank", NUMBERS), ("bounds", BOUNDS),
-    ("grid", GRID), ("none", INTS), ("nobody", OWNERS),
+    ("box", BOXES), ("offset", INTS), ("masks", FLAGS), ("occluder", FLAGS), ("categories", INTS), ("owner", INTS),
+    ("bounds", BOUNDS), ("grid", GRID), ("none", INTS), ("meets", INTS), ("exclude", OWNERS),
 ]  # fmt: skip
 TARGETS = struct_of(Targets, TargetsType, OF_TARGETS)
 
 
 @compiled(TARGETS(*[of for _, of in OF_TARGETS]))
-def _targets(box, offset, masks, occluder, rank, bounds, grid, none, nobody):
-    return Targets(box, offset, masks, occluder, rank, bounds, grid, none, nobody)
+def _targets(box, offset, masks, occluder, categories, owner, bounds, grid, none, meets, exclude):
+    return Targets(box, offset, masks, occluder, categories, owner, bounds, grid, none, meets, exclude)
 
 
 @compiled(types.UniTuple(types.int64, 7)(*[types.int64] * 8, TARGETS, ROWS_OUT), nogil=False)
@@ -299,19 +303,19 @@ def _one_ray(x, y, dx, dy, radius, side, wide_side, most, targets, others):
 
     The other objects that it hits are written to columns with the same five numbers.
     """
-    none = targets.none
-    items = targets.box, targets.offset, targets.masks, targets.occluder, none, none
+    none, room = targets.none, len(targets.box) + 1
+    items = targets.box, targets.offset, targets.masks, targets.occluder, targets.categories, targets.owner
     cells = targets.grid, none, none
-    near, found = np.empty(len(targets.rank) + 1, np.int64), np.empty((cast.COLUMNS, len(targets.rank) + 1), np.int64)
+    near, found = np.empty(room, np.int64), np.empty((cast.COLUMNS, room), np.int64)
     wide, ends = (radius, side, wide_side, dx * dx + dy * dy), np.empty((6, 1), np.int64)
     origin_x, origin_y, first = (x + HALF) >> 8, (y + HALF) >> 8, (-1, 0, 0, 0, 0)
     count = follow(
-        np.int64(0), x, y, dx, dy, wide, items, cells, targets.bounds, most, none, targets.nobody, near, found, ends
-    )
+        np.int64(0), x, y, dx, dy, wide, items, cells, targets.bounds, most, targets.meets, targets.exclude,
+        near, found, ends,
+    )  # fmt: skip
     for i in range(count):
         at = near[i]
-        rank = targets.rank[found[cast.RANK, at]]
-        column, row = found[cast.X, at] + origin_x, found[cast.Y, at] + origin_y
+        rank, column, row = found[cast.RANK, at], found[cast.X, at] + origin_x, found[cast.Y, at] + origin_y
         if i == 0:
             first = rank, found[cast.COUNT, at], column, row, found[cast.ENTRY, at]
             continue
@@ -326,13 +330,12 @@ one_ray = _one_ray.overloads[_one_ray.signatures[0]].entry_point
 
 def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
     """See `rays.one_ray.follower`."""
-    rank = np.flatnonzero(view.accepts(stack))
-    rows = slice(None) if len(rank) == len(stack) else rank
-    columns = stack.box_xyxy[rows], stack.offset[rows], stack.masks, stack.occluder[rows], rank
+    items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
+    accepts = filter_of(view) if view.may_refuse(stack) else ACCEPT_ALL
     targets = _targets(
-        *map(np.ascontiguousarray, columns), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], NOBODY
+        *map(np.ascontiguousarray, items), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], *accepts
     )
-    room, limit = (len(rank) if most is None else min(most, len(rank))) - 1, most or 0
+    room, limit = (len(stack) if most is None else min(most, len(stack))) - 1, most or 0
     none = np.empty((5, 0), np.int64)
 
     def followed(x: int, y: int, dx: int, dy: int) -> Followed | None:

@@ -109,12 +109,12 @@ class Filter:
     """Arguments of `fire` that are the same for all shots of a prepared weapon."""
 
     meets: int
-    exclude: Ints
+    exclude: tuple[int, ...]
     seed: int
 
     def view(self, pierce: bool) -> View:
         """View of the items that its shots accept."""
-        return View(pierce, self.meets, tuple(sorted(set(self.exclude[0].tolist()) - {-1})))
+        return View(pierce, self.meets, tuple(sorted({*self.exclude} - {-1})))
 
     def shot_at_origin(self, aim: float | None, number: int) -> Shots:
         """Batch of one shot, whose aim and number are checked."""

@@ -34,7 +34,7 @@ SIDE = 1 << CELL_SHIFT
 KEPT_BYTES = 64 * 2**20
 """Most memory of the squares of one prepared weapon, bytes; beyond it all are discarded."""
 
-FILTER_BYTES = 4 * 2**20
+FILTER_BYTES = 2**20
 """The same of each filter of a weapon that `fire` made ready, of which many are kept."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12

@@ -20,8 +20,8 @@ from hitplanes.planes.scene.scene import Scene
 
 from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
-from ..kinds.areas import Rays, has_no_range, parts_of, ray_parts_of
-from ..kinds.placements import accepted_of, blocking_of, checked_shots
+from ..kinds.areas import Rays, parts_of, ray_parts_of
+from ..kinds.placements import accepted_of, blocking_of, checked_filter, checked_owners, checked_seeds
 from ..kinds.rays import not_cast
 from ..kinds.weapon import Weapon
 from . import position_cache
@@ -29,6 +29,8 @@ from .one_shot import Answer, Arguments, Filter, Present, answer_of, reach_of, r
 from .position_cache import CELL_SHIFT, FARTHEST, FILTER_BYTES, KEPT_BYTES, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from ..fire.call import Angles, Filtered, Places, Wholes
     from ..rays.ray_hits import RayHits
 
@@ -40,7 +42,7 @@ AIMS_BYTES = 32 * 2**20
 AIM_BYTES = 200
 """Memory of an aim or a shot number in addition to its patterns, bytes."""
 
-FILTERS_MOST = 32
+FILTERS_MOST = 256
 """Filters and seeds of a weapon that are kept ready: those of the last shots, as each shooter excludes itself."""
 
 Looks = list[tuple[int, int, Look]]
@@ -89,7 +91,7 @@ class Ready(Generic[AnyHits]):
     ) -> AnyHits:
         """Decide what one shot hits; the arguments are those of `fire`."""
         kept = self._filter
-        exclude = kept.exclude if kept.exclude.size else None
+        exclude = [kept.exclude] if kept.exclude else None  # one row for all shots
         filters = accepted_of(kept.meets), blocking_of(kept.meets), exclude
         hits = fire_anew(self.scene, self.weapon, at, aim, toward, filters, kept.seed, shot)
         return cast("AnyHits", hits)
@@ -306,7 +308,7 @@ def prepare(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene: expected a Scene, got {type(scene).__name__}")
-    kept = _filter_of(scene, weapon, accept, blocked_by, exclude, seed)
+    kept = _filter_of(scene, accept, blocked_by, exclude, seed)
     parts = ray_parts_of(weapon)
     if parts is not None:
         from .prepared_ray import ReadyRay
@@ -317,19 +319,23 @@ def prepare(
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)
 
 
-def filtered(ready: Ready[AnyHits], accept: int, blocked_by: int, exclude: int | None, seed: int) -> Ready[AnyHits]:
+def filtered(
+    ready: Ready[AnyHits], accept: int, blocked_by: int, exclude: tuple[int, ...], seed: int
+) -> Ready[AnyHits]:
     """The same weapon with another filter and seed; those of the last shots are kept, and share its patterns."""
     key = accept, blocked_by, exclude, seed
-    return ready._filtered.get(key, lambda: ready._with(_filter_of(ready.scene, ready.weapon, *key)))
+    return ready._filtered.get(key, lambda: ready._with(_filter_of(ready.scene, *key)))
 
 
-def _filter_of(
-    scene: Scene, weapon: Weapon, accept: object, blocked_by: object, exclude: object, seed: object
-) -> Filter:
-    """Check the filter of a prepared weapon."""
-    toward = (1, 0) if has_no_range(weapon) else None
+def _filter_of(scene: Scene, accept: object, blocked_by: object, exclude: object, seed: object) -> Filter:
+    """Check the filter of one shot."""
     bits = category_bits(scene, "accept", accept), category_bits(scene, "blocked_by", blocked_by)
-    shots = checked_shots(weapon, (0, 0), None, toward, *bits, exclude, seed, None)
-    if exclude is not None:
-        check_owners(scene, shots)
-    return Filter(int(shots.meets[0]), shots.exclude, int(shots.seed[0]))
+    meets, owners = checked_filter(*bits, 1), checked_owners(exclude, 1, single=True)
+    check_owners(scene, owners)
+    of_shot = owners if isinstance(owners, tuple) else tuple(owners[0].tolist())
+    return Filter(_only(meets), of_shot, _only(checked_seeds(seed, 1)))
+
+
+def _only(value: npt.NDArray[Any] | int) -> int:
+    """A value of one shot."""
+    return value if isinstance(value, int) else int(value[0])
