@@ -16,7 +16,7 @@ import oracle_rays
 from oracle_rays import Item, Pass, StartsInside, Walk
 
 from hitplanes import ALL, Hits, Laser, Pistol, Rifle, Rounds, Scene, Spread, Sprite, Sweep, Weapon, fire
-from hitplanes.weapons.kinds.placements import disc_offsets
+from hitplanes.weapons.kinds.draws import disc_offsets
 
 Pixel = tuple[int, int]
 Place = tuple[float, float]

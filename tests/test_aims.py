@@ -87,7 +87,7 @@ def test_weights_of_integers_are_those_of_the_pattern_however_it_was_made(jit: b
     assert isinstance(patterns, AimedPatterns)
     for big, pattern in zip(patterns.bigs, patterns, strict=True):
         assert pattern.prefix is not None
-        assert big.weight(big.rows, pattern.spans.count) == big_of(pattern).weight(big.rows, 0) == pattern.prefix[-1]
+        assert big.share(big.rows, pattern.spans.count) == big_of(pattern).share(big.rows, 0) == pattern.prefix[-1]
 
 
 WHOLE_SIDES = [(3, 4), (5, 12), (8, 15), (7, 24), (20, 21), (63, 16)]

@@ -6,7 +6,7 @@ from examples import examples
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hitplanes.weapons.kinds import placements
+from hitplanes.weapons.kinds import draws
 
 GOLDEN_GAMMA = 0x9E3779B97F4A7C15
 WRAP = 2**64
@@ -26,7 +26,7 @@ counters = st.tuples(numbers, numbers, numbers)  # shot, round, pellet
 def offsets(radius_256: int, seed, shot, round_, pellet) -> np.ndarray:
     """Draw with the three counters broadcast to one length."""
     rows = np.broadcast_arrays(np.asarray(shot, np.int64), np.asarray(round_, np.int64), np.asarray(pellet, np.int64))
-    return placements.disc_offsets(radius_256, seed, *(np.atleast_1d(column).copy() for column in rows))
+    return draws.disc_offsets(radius_256, seed, *(np.atleast_1d(column).copy() for column in rows))
 
 
 def chi_square(counts: np.ndarray) -> float:
@@ -59,7 +59,7 @@ def cell_of(drawn: np.ndarray, radius: int) -> np.ndarray:
 @pytest.mark.parametrize("seed", PUBLISHED)
 def test_mix64_gives_the_published_numbers(seed: int) -> None:
     states = [(seed + k * GOLDEN_GAMMA) % WRAP for k in range(1, len(PUBLISHED[seed]) + 1)]
-    assert placements.mix64(np.array(states, dtype=np.uint64)).tolist() == PUBLISHED[seed]
+    assert draws.mix64(np.array(states, dtype=np.uint64)).tolist() == PUBLISHED[seed]
 
 
 def mix64_by_hand(z: int) -> int:
@@ -73,7 +73,7 @@ def mix64_by_hand(z: int) -> int:
 @given(st.lists(st.integers(0, WRAP - 1), min_size=1, max_size=30))
 def test_mix64_is_the_finaliser(values: list[int]) -> None:
     x = np.array(values, dtype=np.uint64)
-    mixed = placements.mix64(x)
+    mixed = draws.mix64(x)
     assert mixed.dtype == np.uint64
     assert mixed.tolist() == [mix64_by_hand(v) for v in values]
     assert x.tolist() == values
@@ -89,7 +89,7 @@ def test_a_disc_of_one_pixel_has_no_choice(radius_256: int) -> None:
 
 def test_no_rows() -> None:
     none = np.zeros(0, np.int64)
-    drawn = placements.disc_offsets(512, 1, none, none, none)
+    drawn = draws.disc_offsets(512, 1, none, none, none)
     assert drawn.shape == (0, 2)
     assert drawn.dtype == np.int64
 
@@ -137,9 +137,19 @@ def test_a_big_batch_can_be_fired_again_one_by_one() -> None:
     assert np.array_equal(offsets(5 * 256, 99, np.arange(7000, 7300), 1, 2), whole[7000:7300])
 
 
+@pytest.mark.parametrize("radius_256", [0, 256, 5 * 256, 5 * 256 + 99])
+def test_a_few_draws_are_those_of_many(radius_256: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    turns = np.arange(30)[:, None]
+    rows = np.uint64(WRAP - 3) + np.zeros_like(turns, np.uint64), turns, turns % 3, np.arange(40)
+    many = draws.disc_offsets(radius_256, *rows)
+    monkeypatch.setattr(draws, "FEW", 30 * 40)
+    assert np.array_equal(draws.disc_offsets(radius_256, *rows), many)
+    assert np.array_equal(draws.disc_offsets(radius_256, WRAP - 3, *(row[7] for row in rows[1:3]), rows[3]), many[7])
+
+
 def test_the_counters_are_left_alone() -> None:
     shot, round_, pellet = np.arange(9), np.arange(9) % 3, np.arange(9) % 2
-    placements.disc_offsets(700, 5, shot, round_, pellet)
+    draws.disc_offsets(700, 5, shot, round_, pellet)
     assert np.array_equal(shot, np.arange(9))
     assert np.array_equal(round_, np.arange(9) % 3)
     assert np.array_equal(pellet, np.arange(9) % 2)

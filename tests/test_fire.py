@@ -40,7 +40,8 @@ from hitplanes import (
     prepare,
 )
 from hitplanes.weapons.kinds.areas import AreaWeapon
-from hitplanes.weapons.kinds.placements import Shots, checked_shots, disc_offsets
+from hitplanes.weapons.kinds.draws import disc_offsets
+from hitplanes.weapons.kinds.placements import Shots, checked_shots
 
 Pixel = tuple[int, int]
 Bounds = tuple[int, int, int, int]

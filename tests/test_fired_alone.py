@@ -63,15 +63,24 @@ OTHERS: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("weapon", [Disc(3), Pistol(50), Spread(Disc(1), 3, 5)], ids=lambda weapon: weapon.kind)
 def test_another_filter_or_seed_is_ready_at_once(weapon: Weapon, jit: bool) -> None:
-    """Except the seed of a spread, whose pellets are others."""
     scene = crowd(1)
     assert readiness(scene, weapon, 2) == [False, True]
     for how in OTHERS:
-        soon = not ("seed" in how and isinstance(weapon, Spread))
-        assert readiness(scene, weapon, 3, **how) == [soon, True, True]
+        assert readiness(scene, weapon, 2, **how) == [True, True]
         assert fire(scene, weapon, AT, **how) == fire(scene, weapon, AT, strategy="direct", **how)
     assert readiness(scene, weapon, 1, accept="glass") == [True]
     assert readiness(scene, weapon_from_json(weapon.to_json()), 1) == [True]  # an equal one
+
+
+@pytest.mark.parametrize("weapon", [Beam(90, 5), Box(9, 4), Laser(150)], ids=lambda weapon: weapon.kind)
+def test_numbers_of_numpy_are_ready_as_those_of_python(weapon: Weapon, jit: bool) -> None:
+    scene = crowd(1)
+    assert readiness(scene, weapon, 2) == [False, True]
+    for number in (np.float64(33.3), np.float32(33.3), np.float16(33.3), np.int64(-7), np.uint8(200)):
+        hits = fire(scene, weapon, AT, aim=number, shot=np.int32(4))
+        assert is_ready(hits)
+        same(hits, fire(scene, weapon, AT, aim=number, shot=np.int32(4), strategy="direct"))
+        same(fire(scene, weapon, AT, aim=number.item(), shot=4), hits)
 
 
 def test_each_shooter_of_many_is_ready(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,11 +123,12 @@ def test_filters_of_a_spread_have_their_own_draws(jit: bool) -> None:
             same(prepare.filtered(ready, ALL, ALL, (), seed).fire(AT, shot=shot), truth)
 
 
-def test_each_draw_of_a_spread_is_asked_for_again(jit: bool) -> None:
+def test_new_draws_of_a_spread_are_ready_at_once(jit: bool) -> None:
     scene, weapon = crowd(1), Spread(Disc(1), 3, 9)
-    for shot in range(3):
-        assert readiness(scene, weapon, 2, shot=shot) == [False, True]
-    assert readiness(scene, weapon, 1, shot=np.int64(1)) == [False]
+    assert readiness(scene, weapon, 1) == [False]
+    for shot in (1, 2, 2**40, np.int64(1)):
+        assert readiness(scene, weapon, 1, shot=shot) == [True]
+        same(fire(scene, weapon, AT, shot=shot), fire(scene, weapon, AT, shot=shot, strategy="direct"))
     with pytest.raises(InputError, match="shot"):
         fire(scene, weapon, AT, shot=[[1]])
 

@@ -94,9 +94,9 @@ def test_weights_of_a_subset_are_added_up_with_planes_and_without() -> None:
     for _ in range(20):
         chosen = rng.random(spans.count) < rng.random()
         rows = sum(1 << int(y + 4) * pattern.stride + int(x + 3) for x, y in spans.pixels()[chosen].tolist())
-        assert pattern.weight(rows, int(chosen.sum())) == int(weights[: spans.count][chosen].sum())
+        assert pattern.share(rows, int(chosen.sum())) == int(weights[: spans.count][chosen].sum())
     assert before == pattern.nbytes > big_pattern(spans).nbytes
-    assert big_pattern(spans).weight(0b101, 2) == 2 * 65535
+    assert big_pattern(spans).share(0b101, 2) == 2 * 65535
 
 
 def test_a_pattern_without_pixels_has_no_weights_to_add_up() -> None:
@@ -106,7 +106,7 @@ def test_a_pattern_without_pixels_has_no_weights_to_add_up() -> None:
     )
     bits = pattern_bits_of([full, nothing])
     assert big_of(nothing).rows == big_of_bits(bits, 1).rows == 0
-    assert big_of_bits(bits, 0).weight(big_of(full).rows, 6) == 6
+    assert big_of_bits(bits, 0).share(big_of(full).rows, 6) == 6
 
 
 @pytest.mark.parametrize("bounds", [(-9, -9, 9, 9), (-2, -9, 9, 9), (-9, 0, 9, 9), (-9, -9, 1, 9), (-9, -9, 9, -1)])

@@ -43,6 +43,7 @@ from hitplanes import (
     fire,
     weapon_from_json,
 )
+from hitplanes.planes.bits import tiles
 from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.grid.fixed_point import ONE, unit
 from hitplanes.planes.grid.spans import Spans
@@ -430,7 +431,7 @@ def work_out(weapon: AreaWeapon) -> None:
     for _ in range(2):
         windows.pattern_bits_of([pattern])
     nearest = windows.big_of(pattern).depths.nearest
-    for _ in range(9):
+    for _ in range(tiles.OFTEN + 1):
         nearest(1)
     for prefilter in ("circle", "oriented box", "boxes", "polygon", "swept"):
         narrow.pattern_volumes(prefilter, [pattern])

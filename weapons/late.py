@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .explain import samples as samples
     from .fire import shelter as shelter
     from .fire import verdicts as verdicts
+    from .kinds import draws as draws
     from .prepared import prepare as prepare
     from .rays import one_ray as one_ray
     from .rays import ray_call as ray_call
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 
 _PLACES = (
     "explain.owners", "explain.ray_margins", "explain.ray_samples", "explain.ray_verdicts", "explain.samples",
-    "fire.shelter", "fire.verdicts", "prepared.prepare", "rays.one_ray", "rays.ray_call", "replay.shot_log",
+    "fire.shelter", "fire.verdicts", "kinds.draws", "prepared.prepare", "rays.one_ray", "rays.ray_call",
+    "replay.shot_log",
 )  # fmt: skip
 
 

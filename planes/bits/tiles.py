@@ -14,8 +14,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
-from operator import itemgetter
+from functools import reduce
+from itertools import chain, groupby
+from operator import itemgetter, or_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +30,11 @@ from ..scene.items import Stack
 from .bit_rows import WORD, Placed, Sums, Words, packed
 from .front_to_back import NO_NUMBERS, OrderedTiles
 
-OFTEN = 8
+OFTEN = 32
 """Answers of a pattern after which the planes of its depths, and of its weights, are made; they take as long."""
+
+FARTHEST = (1 << 62, 0, 0)
+"""Squared distance, y and x that are farther than those of all pixels."""
 
 PATTERN_BYTES = 500
 """Memory of a pattern beside its pixels, bytes."""
@@ -62,6 +66,41 @@ def pixels_of(bits: int, stride: int) -> Ints:
     return np.stack([x, y], axis=1)
 
 
+def nearest_of(bits: int, stride: int, left: int, top: int) -> tuple[int, int, int]:
+    """Squared distance, y and x of the nearest pixel of a set from pixel (0, 0); ties go to the least (y, x).
+
+    Rows are looked at from y = 0 on, down and then up, until they lie farther away than the nearest pixel.
+
+    Parameters
+    ----------
+    bits, stride : the pixels, at least one, as an integer
+    left, top : its first column and row
+    """
+    first = ((bits & -bits).bit_length() - 1) // stride
+    top, size, zero = top + first, stride >> 3, -left
+    count = (bits.bit_length() - 1) // stride + 1 - first
+    rows = (bits >> first * stride).to_bytes(count * size, "little")
+    begin = min(max(-top, 0), count - 1)
+    best = FARTHEST
+    for k in chain(range(begin, count), range(begin - 1, -1, -1)):
+        y = top + k
+        if y * y > best[0]:
+            if k < begin:
+                break
+            continue
+        row = int.from_bytes(rows[k * size : (k + 1) * size], "little")
+        if zero >= 0:
+            behind = row & (2 << zero) - 1
+            if behind:
+                x = behind.bit_length() - 1 - zero
+                best = min(best, (x * x + y * y, y, x))
+            row >>= zero + 1
+        if row:
+            x = (row & -row).bit_length() + (0 if zero >= 0 else left - 1)
+            best = min(best, (x * x + y * y, y, x))
+    return best
+
+
 class Depths:
     """Planes that find the nearest pixel of a subset of a pattern, or of a part of it.
 
@@ -75,7 +114,7 @@ class Depths:
     """
 
     def __init__(self, rows: int, stride: int, x: int, y: int) -> None:
-        self._rows, self._stride, self._x, self._y, self._corner = rows, stride, x, y, np.array([x, y])
+        self._rows, self._stride, self._x, self._y = rows, stride, x, y
         self._planes: list[int] | None = None
         self._calls = 0
 
@@ -89,10 +128,7 @@ class Depths:
         if self._planes is None:
             self._calls += 1
             if self._calls <= OFTEN:
-                pixels, distance2 = self._pixels(bits)
-                first = int(distance2.argmin())
-                x, y = (pixels[first] + self._corner).tolist()
-                return int(distance2[first]), y, x
+                return nearest_of(bits, self._stride, self._x, self._y)
             self._planes = self._made()
         for plane in self._planes:
             nearer = bits & plane
@@ -102,14 +138,11 @@ class Depths:
         x, y = x + self._x, y + self._y
         return x * x + y * y, y, x
 
-    def _pixels(self, bits: int) -> tuple[Ints, Ints]:
-        """Pixels (n, 2) of a subset, and their squared distances."""
-        pixels = pixels_of(bits, self._stride)
-        return pixels, ((pixels + self._corner) ** 2).sum(axis=1)
-
     def _made(self) -> list[int]:
         """The planes, that of the highest digit first."""
-        pixels, distance2 = self._pixels(self._rows)
+        pixels = pixels_of(self._rows, self._stride)
+        pixels_xy = pixels + np.array([self._x, self._y])
+        distance2 = (pixels_xy**2).sum(axis=1)
         number = np.unique(distance2, return_inverse=True)[1].reshape(-1)
         places = np.arange(int(number.max(initial=0)).bit_length() - 1, -1, -1)
         mask = np.zeros((len(places), int(pixels[:, 1].max(initial=0)) + 1, self._stride), np.bool_)
@@ -184,9 +217,13 @@ class BigPattern:
         each = np.diff(sums[: self.high * (self.wide + 1)].reshape(self.high, self.wide + 1), axis=1)
         return replace(self, weights=Weights(each.astype(np.int64), self.stride))
 
-    def weight(self, bits: int, count: int) -> int:
-        """Sum of the weights of a subset of so many pixels."""
+    def share(self, bits: int, count: int) -> int:
+        """What a hit on a tile, of so many pixels, adds to that on its item: the weights of the pixels."""
         return self.weights.of(bits) if self.weights else count * WEIGHT_FULL
+
+    def counted(self, share: int, pixels: int) -> tuple[int, int, int]:
+        """Samples, weight and pellets of a hit on an item."""
+        return pixels, share, 1
 
     def within(self, x: int, y: int, bounds: Box) -> int:
         """Its pixels within bounds, if it is placed on pixel (x, y)."""
@@ -199,6 +236,43 @@ class BigPattern:
             return 0
         row = ((1 << last - first + 1) - 1 << first).to_bytes(self.stride // 8, "little")
         return self.rows & int.from_bytes(row * (lower - upper + 1), "little") << self.stride * upper
+
+
+@dataclass(frozen=True, eq=False)
+class Scattered(BigPattern):
+    """Pellets of one pattern as one integer, of the pixels of all, and an integer of each."""
+
+    pellets: tuple[int, ...] = ()
+
+    def share(self, bits: int, count: int) -> int:
+        """The pixels themselves: tiles of an item share none, so that their sum has all."""
+        return bits
+
+    def counted(self, share: int, pixels: int) -> tuple[int, int, int]:
+        """Samples, weight and pellets of a hit on an item."""
+        each = [samples for pellet in self.pellets if (samples := (share & pellet).bit_count())]
+        return sum(each), sum(each) * WEIGHT_FULL, len(each)
+
+
+def scattered(pattern: BigPattern, offsets_xy: Ints) -> Scattered:
+    """Pellets of a pattern at offsets (K, 2) from the pixel that all are placed on; they have no weights."""
+    (left, top), (right, bottom) = offsets_xy.min(axis=0).tolist(), offsets_xy.max(axis=0).tolist()
+    wide, high = pattern.wide + right - left, pattern.high + bottom - top
+    stride = stride_of(wide)
+    rows = restrided(pattern.rows, pattern.high, pattern.stride, stride)
+    pellets = tuple(rows << (y - top) * stride + x - left for x, y in offsets_xy.tolist())
+    every = reduce(or_, pellets)
+    x, y = pattern.x + left, pattern.y + top
+    return Scattered(x, y, wide, high, stride, every, Depths(every, stride, x, y), pellets=pellets)
+
+
+def restrided(rows: int, high: int, stride: int, wider: int) -> int:
+    """So many rows of a stride as rows of a wider one."""
+    if stride == wider:
+        return rows
+    size, gap = stride >> 3, bytes(wider - stride >> 3)
+    data = rows.to_bytes(high * size, "little")
+    return int.from_bytes(b"".join([data[k : k + size] + gap for k in range(0, len(data), size)]), "little")
 
 
 def stride_of(wide: int) -> int:
@@ -418,7 +492,7 @@ class TileAtlas:
 
 
 Hit = tuple[int, int, int, int, int, int, int]
-"""Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels, and their weight."""
+"""Placement; squared distance, y and x of the nearest pixel; rank of the item; number of pixels, and their share."""
 
 Pair = tuple[int, int, int, int, int, bool]
 """Placement, and a tile near it: left, top, first row in the atlas, rank of its item, whether that is an occluder."""
@@ -506,7 +580,7 @@ def _hit_by(pattern: BigPattern, x: int, y: int, near: Iterator[Pair], ground: G
         if hit:
             if not blocks:
                 (distance2, down, right), count = nearest(hit), hit.bit_count()
-                yield placement, distance2, y + down, x + right, rank, count, pattern.weight(hit, count)
+                yield placement, distance2, y + down, x + right, rank, count, pattern.share(hit, count)
             if blocks or not pierce:
                 rest ^= hit
                 if not rest:

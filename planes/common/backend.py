@@ -54,7 +54,7 @@ COMPILED = {
     "hitplanes.planes.grid.turns": "hitplanes.planes.jit.planes",
     "hitplanes.planes.scene.variants": "hitplanes.planes.jit.planes",
     "hitplanes.planes.bits.label_plane": "hitplanes.planes.jit.areas",
-    "hitplanes.weapons.kinds.placements": "hitplanes.planes.jit.scene",
+    "hitplanes.weapons.kinds.draws": "hitplanes.planes.jit.scene",
     "hitplanes.planes.bits.bit_rows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.shadows": "hitplanes.planes.jit.bit_rows",
     "hitplanes.planes.bits.cells": "hitplanes.planes.jit.bit_rows",

@@ -561,14 +561,13 @@ def _disc_offsets(reach, radius2, bits, seed, shot, round_, pellet, offsets):
 
 
 def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
-    """See `kinds.placements.disc_offsets`."""
-    seed, reach = np.asarray(seed, np.uint64), radius_256 // SUB
-    words, shapes = [seed, shot, round_, pellet], {word.shape for word in (seed, shot, round_, pellet)}
-    shape = np.broadcast_shapes(*shapes)
-    if len(shapes) > 1:  # of one shape, this would take as long as the draws
-        words = [np.broadcast_to(word, shape) for word in words]
-    *turns, pellets = (word.reshape(shape if len(shape) > 1 else (*shape, 1)) for word in words)
-    offsets = np.empty((*pellets.shape, 2), np.int64)
+    """See `kinds.draws.disc_offsets`."""
+    *turns, pellets = (np.asarray(seed, np.uint64), shot, round_, pellet)
+    shape, reach = np.broadcast_shapes(*(word.shape for word in (*turns, pellets))), radius_256 // SUB
+    size = shape if len(shape) > 1 else (*shape, 1)  # a row for each turn
+    rows = [word.reshape(-1) if word.size == size[0] else np.broadcast_to(word, size)[:, 0] for word in turns]
+    each = pellets.reshape(size) if pellets.size == size[0] * size[1] else np.broadcast_to(pellets, size)
+    offsets = np.empty((*size, 2), np.int64)
     bits = np.uint64((1 << (2 * reach).bit_length()) - 1)
-    _disc_offsets(reach, radius_256**2, bits, *(word[:, 0] for word in turns), pellets, offsets.reshape(-1, 2))
+    _disc_offsets(reach, radius_256**2, bits, *rows, each, offsets.reshape(-1, 2))
     return offsets.reshape(*shape, 2)

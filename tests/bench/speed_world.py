@@ -13,7 +13,7 @@ from hitplanes import Beam, Disc, Pistol, Point, Scene, Spread, Sprite, Stencil,
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.grid.fixed_point import pixel, snap, unit
 from hitplanes.weapons.kinds.areas import AreaWeapon, pattern_of
-from hitplanes.weapons.kinds.placements import disc_offsets
+from hitplanes.weapons.kinds.draws import disc_offsets
 
 __all__ = [
     "MARGIN", "PATTERNS", "SEED", "WORLD", "Aimed", "Item", "Volleys", "items_of", "pattern_mask", "scene_of",

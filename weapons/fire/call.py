@@ -17,7 +17,7 @@ from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
 
 from .. import late
-from ..kinds.areas import Rays, parts_of, ray_parts_of
+from ..kinds.areas import Rays, ray_parts_of
 from ..kinds.placements import Shots, checked_shots
 from ..kinds.weapon import Weapon
 from .areas import request_of
@@ -131,7 +131,7 @@ def fire(
     how = prefilter, broadphase, strategy
     if how == AUTO and _is_one(at):
         filters = accept, blocked_by, exclude, seed
-        ready = _ready(scene, weapon, filters, shot) if tick is None else _ready_then(scene, weapon, filters, tick)
+        ready = _ready(scene, weapon, filters) if tick is None else _ready_then(scene, weapon, filters, tick)
         if ready is not None:
             return ready.fire(at, aim, toward, shot)
     return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
@@ -183,31 +183,24 @@ Filtering = tuple[Any, Any, Any, Any]
 """(accept, blocked_by, exclude, seed) of a call."""
 
 
-def _ready(scene: Scene | History, weapon: Weapon, filters: Filtering, shot: Any) -> Ready[Hits] | None:
-    """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call.
-
-    A spread must have been fired with the same draws, because pellets that are new cost more if they are looked up.
-    """
+def _ready(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Ready[Hits] | None:
+    """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call."""
     accept, blocked_by, exclude, seed = filters
     if type(scene) is not Scene or not isinstance(weapon, Weapon):
         return None
-    of_rays = ray_parts_of(weapon) is not None
-    if of_rays and not _is_one_ray(weapon):
+    if ray_parts_of(weapon) is not None and not _is_one_ray(weapon):
         return None  # `prepare` leaves several rays to `fire`
     accepts: Any = category_bits(scene, "accept", accept)
     blocks: Any = category_bits(scene, "blocked_by", blocked_by)
     owners = _plain_owners(exclude)
-    drawn = not of_rays and parts_of(weapon)[1] is not None
     if owners is None or not (type(accepts) is type(blocks) is type(seed) is int):
         return None  # also of True, which would find what is kept for 1
-    if drawn and not (shot is None or type(shot) is int):
-        return None
 
     def make() -> Ready[Hits]:
         own = copy(weapon)  # what a scene keeps holds no weapon of a caller, nor the patterns that it knows
         return late.prepare.prepare(scene, own)
 
-    ready = scene.derived.when_asked_again((weapon.text, seed, shot) if drawn else weapon.text, make)
+    ready = scene.derived.when_asked_again(weapon.text, make)
     return None if ready is None else late.prepare.filtered(ready, accepts, blocks, owners, seed)
 
 

@@ -6,7 +6,6 @@ No state is kept, so any shot of a batch can be fired again alone, in any order,
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
@@ -17,13 +16,14 @@ import numpy.typing as npt
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, integer, integers, reals
-from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, GOLDEN, POSITION_MAX, SEED_MAX, SUB
+from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSITION_MAX, SEED_MAX
 from hitplanes.planes.grid import fixed_point
 from hitplanes.planes.grid.fixed_point import ONE, Whole, pixel, snap, turned, unit, unit_of, unit_toward
 from hitplanes.planes.grid.spans import Columns
 from hitplanes.planes.scene.poses import one_place, points
 
-from .areas import AreaWeapon, check_aimed, parts_of, pattern_of, patterns_of
+from .. import late
+from .areas import AreaWeapon, Spread, check_aimed, parts_of, pattern_of, patterns_of
 from .weapon import PatternTable, Weapon
 
 C = TypeVar("C", bound="ShotColumns")
@@ -63,73 +63,6 @@ class ShotColumns(Columns):
 
 
 Words = npt.NDArray[np.uint64]
-
-ROWS_AT_ONCE = 2**15
-"""Draws made at a time: 256 KB for each of their arrays; with fewer, the calls of numpy take longer."""
-
-
-def mix64(words: Words) -> Words:
-    """Mix 64 bits: the finaliser of splitmix64 (Steele, Lea, Flood 2014; constants by Stafford, variant 13)."""
-    z = np.atleast_1d(np.asarray(words, np.uint64)).copy()
-    _mix(z)
-    return z
-
-
-def _mix(z: Words) -> None:
-    """Mix words in place."""
-    z ^= z >> np.uint64(30)
-    z *= np.uint64(0xBF58476D1CE4E5B9)
-    z ^= z >> np.uint64(27)
-    z *= np.uint64(0x94D049BB133111EB)
-    z ^= z >> np.uint64(31)
-
-
-def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
-    """Whole-pixel offsets (n, 2), uniform over the centres of a disc, by rejection on integers.
-
-    Parameters
-    ----------
-    radius_256 : radius in 1/256 px
-    seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
-    shot, round_, pellet : (n,) int64; a row depends only on its seed and its own three numbers. They may broadcast:
-        seeds, shots and rounds (n, 1) and pellets (k,) give offsets (n, k, 2)
-    """
-    words = np.asarray(seed, np.uint64), *(np.asarray(word).astype(np.uint64) for word in (shot, round_, pellet))
-    shape = np.broadcast_shapes(*(word.shape for word in words))
-    offsets = np.empty((*shape, 2), np.int64)
-    at_once = max(ROWS_AT_ONCE // max(shape[-1], 1), 1) if len(shape) > 1 else ROWS_AT_ONCE
-    for first in range(0, shape[0], at_once):
-        now = slice(first, first + at_once)
-        key, *rest = (word[now] if word.shape[:1] == shape[:1] and word.ndim == len(shape) else word for word in words)
-        key = mix64(key)
-        for word in rest:
-            key = key ^ word  # pellets broadcast to more columns
-            key += GOLDEN
-            _mix(key)
-        offsets[now] = _in_disc(key.reshape(-1), reach=radius_256 // SUB, radius2=radius_256**2).reshape(*key.shape, 2)
-    return offsets
-
-
-def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
-    """Offsets (n, 2) within a disc; each state is drawn again until its offset lies inside."""
-    bits, high = np.uint64((1 << (2 * reach).bit_length()) - 1), np.uint64(32)
-    offsets = np.empty((len(state), 2), np.int64)
-    pending = np.arange(len(state))
-    while len(pending):
-        state += GOLDEN
-        drawn = mix64(state)
-        x, y = (drawn & bits).view(np.int64), ((drawn >> high) & bits).view(np.int64)
-        x -= reach
-        y -= reach
-        distance2 = x * x
-        distance2 += y * y
-        within = distance2 <= radius2 // SUB**2
-        good, rest = within.nonzero()[0], np.logical_not(within).nonzero()[0]
-        row = pending.take(good)
-        offsets[row, 0], offsets[row, 1] = x.take(good), y.take(good)
-        pending, state = pending.take(rest), state.take(rest)
-    return offsets
-
 
 OWNER_MAX = 2**31
 STRAIGHT = (ONE, 0)
@@ -496,13 +429,16 @@ def placements_for(weapon: Weapon, shots: Shots) -> Placements:
     turn_xy = pixel(shots.at_256[shot] + round_[:, None] * snap(burst.recoil_xy)) if burst else shots.xy
     if not spread:
         return Placements(table, pattern, turn_xy, turn_xy, rounds)
-    turns = (column[shot, None] for column in (shots.seed, shots.number))
-    xy = kernels_of(sys.modules[__name__]).disc_offsets(
-        int(snap(spread.radius)), *turns, round_[:, None], np.arange(pellets)
-    )
-    xy += turn_xy[:, None]
+    xy = pellets_of(spread, shots.seed[shot, None], shots.number[shot, None], round_[:, None]) + turn_xy[:, None]
     pattern = None if pattern is None else pattern.repeat(pellets)
     return Placements(table, pattern, xy.reshape(-1, 2), turn_xy, rounds, pellets)
+
+
+def pellets_of(spread: Spread[Any], seed: Words, shot: Ints, round_: Ints) -> Ints:
+    """Offsets (T, K, 2) of the pellets of rounds, from their seeds, shots and rounds (T, 1)."""
+    radius = int(snap(spread.radius))
+    offsets: Ints = kernels_of(late.draws).disc_offsets(radius, seed, shot, round_, np.arange(spread.count))
+    return offsets
 
 
 def distinct_patterns(plain: AreaWeapon, direction: Ints | tuple[int, int]) -> tuple[PatternTable, Ints | None]:

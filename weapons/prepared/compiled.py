@@ -26,7 +26,20 @@ from hitplanes.planes.common.limits import HALF, WEIGHT_FULL
 from hitplanes.planes.grid.rasterize import DIAGONAL
 from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.jit import raycast as cast
-from hitplanes.planes.jit.areas import KEY, NOBODY, OWNERS, RANK, SAMPLES, SUMS, WEIGHT, X, Y, match_rounds
+from hitplanes.planes.jit.areas import (
+    KEY,
+    NOBODY,
+    OWNERS,
+    PELLETS,
+    PIXELS,
+    RANK,
+    SAMPLES,
+    SUMS,
+    WEIGHT,
+    X,
+    Y,
+    match_rounds,
+)
 from hitplanes.planes.jit.bit_rows import BOXES, EVERYWHERE, FEW_ROWS, FLAGS, INTS, ROWS_OUT, WORDS, cell_at
 from hitplanes.planes.jit.cache import compiled
 from hitplanes.planes.jit.raycast import NOWHERE, fits, follow
@@ -37,7 +50,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.hits import HitRow
 from ..kinds.weapon import Weapon
 from ..rays.one_ray import Follow, Followed
-from .one_shot import Answer, Filter, Round, answer_of
+from .one_shot import Filter, OneShot, Round
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
 
 EACH_TILE, EACH_SHOT = int(COMPILED.prepared_tile), int(COMPILED.prepared_near)
@@ -51,11 +64,11 @@ MAKE_VISIBLE = -1
 UNKNOWN = -2
 """Returned by `_shot` instead of a number of rows: the shot is left to `fire`."""
 
-ROW = 6
-"""Numbers of a row: item, samples, squared distance, x, y, weight."""
+ROW = 8
+"""Numbers of a row: item, samples, pixels, weight, pellets, x, y, squared distance."""
 
 ROW_BYTES, OUT = 8 * ROW, (Y + 1) * FEW_ROWS
-read = struct.Struct("6q").unpack_from
+read = struct.Struct("8q").unpack_from
 NO_STRIPS, ZERO = np.zeros((0, 4), np.int64), np.zeros(1, np.int64)
 ACCEPT_ALL = NO_NUMBERS, NOBODY
 NOWHERE_NEAR = (0, 0, 0, 0, 0), NO_NUMBERS, NO_NUMBERS
@@ -98,12 +111,12 @@ class ShapeType(types.StructRef):
 
 
 class Shape(structref.StructRefProxy):
-    """A round in kernels: columns of `PatternBits`, of one pattern without a strip."""
+    """A round in kernels: columns of `PatternBits`, of one pattern without a strip, and the pixels of its pellets."""
 
 
 OF_SHAPE = [
     ("box", BOXES), ("first", NUMBERS), ("rows", NUMBERS), ("words", types.uint64[::1]), ("sums", SUMS),
-    ("first_sum", NUMBERS),
+    ("first_sum", NUMBERS), ("pellet_x", INTS), ("pellet_y", INTS),
 ]  # fmt: skip
 
 
@@ -129,8 +142,8 @@ def _shot_tiles(
 
 
 @compiled(SHAPE(*[of for _, of in OF_SHAPE]))
-def _shape(box, first, rows, words, sums, first_sum):
-    return Shape(box, first, rows, words, sums, first_sum)
+def _shape(box, first, rows, words, sums, first_sum, pellet_x, pellet_y):
+    return Shape(box, first, rows, words, sums, first_sum, pellet_x, pellet_y)
 
 
 @compiled(types.int64(types.float64, types.float64, SHOT_TILES, SHAPE, types.int64[:, ::1]), nogil=False)
@@ -148,21 +161,27 @@ def _shot(at_x, at_y, tiles, shape, found):
         tiles.spent += EACH_TILE * count + EACH_SHOT
         if tiles.spent > tiles.worth:
             return MAKE_VISIBLE
-    scratch = np.empty(OUT + 2, np.int64)
-    out, x, y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 :]
-    x[0], y[0] = column, row
+    pellets = len(shape.pellet_x)
+    scratch = np.empty(OUT + 2 + 3 * pellets, np.int64)
+    out, origin_x, origin_y = scratch[:OUT].reshape(Y + 1, FEW_ROWS), scratch[OUT : OUT + 1], scratch[OUT + 1 : OUT + 2]
+    x, y, kind = scratch[OUT + 2 :].reshape(3, pellets)
+    origin_x[0], origin_y[0] = column, row
+    for pellet in range(pellets):
+        x[pellet], y[pellet], kind[pellet] = column + shape.pellet_x[pellet], row + shape.pellet_y[pellet], 0
     turn, rows, _ = match_rounds(
-        0, 1, 0, out, ZERO, x, y, x, y,
+        0, 1, 0, out, kind, x, y, origin_x, origin_y,
         shape.box, shape.first, shape.rows, shape.words, NO_STRIPS, shape.sums, shape.first_sum,
         tiles.rank, tiles.box, tiles.begin, tiles.words, tiles.occluder, tiles.categories, tiles.owner,
-        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, tiles.meets, tiles.exclude, 1,
+        left, top, bits, wide, high, begin, tiles.listed, tiles.pierce, tiles.bounds, tiles.meets, tiles.exclude,
+        pellets,
     )  # fmt: skip
     if turn < 1:
         return UNKNOWN
     for row in range(rows):
-        found[row, 0], found[row, 1], found[row, 2] = tiles.item[out[RANK, row]], out[SAMPLES, row], out[KEY, row]
-        found[row, 3], found[row, 4] = out[X, row], out[Y, row]
-        found[row, 5] = out[WEIGHT, row] if len(shape.sums) else WEIGHT_FULL * out[SAMPLES, row]
+        found[row, 0], found[row, 1], found[row, 2] = tiles.item[out[RANK, row]], out[SAMPLES, row], out[PIXELS, row]
+        found[row, 3] = out[WEIGHT, row] if len(shape.sums) else WEIGHT_FULL * out[SAMPLES, row]
+        found[row, 4], found[row, 5], found[row, 6] = out[PELLETS, row], out[X, row], out[Y, row]
+        found[row, 7] = out[KEY, row]
     return rows
 
 
@@ -238,10 +257,10 @@ class PositionCache:
 
 def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
-    shape, number, tell = _shape_of(fired), fired.number, answer_of(weapon)[1]
+    shape, number, tell = _shape_of(fired), fired.number, OneShot.append
     buffers: list[tuple[Any, memoryview]] = []
 
-    def look(x: float, y: float, hits: Answer) -> None:
+    def look(x: float, y: float, hits: OneShot) -> None:
         """Call the kernel and read its rows from a buffer."""
         try:
             buffer = buffers.pop()  # each thread takes its own
@@ -259,8 +278,8 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
                 return look(x, y, hits)
             view, at, end = buffer[1], 0, ROW_BYTES * count
             while at < end:  # faster than a range
-                item, n, distance2, column, row, weight = read(view, at)
-                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (column, row), distance2)))
+                item, samples, pixels, weight, pellets, column, row, distance2 = read(view, at)
+                tell(hits, new(HitRow, (0, number, item, samples, pixels, weight, pellets, (column, row), distance2)))
                 at += ROW_BYTES
         buffers.append(buffer)
 
@@ -269,8 +288,9 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
 
 def _shape_of(fired: Round) -> Any:
     """The Shape of a round."""
-    bits = fired.pattern.bits
-    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words, bits.sums, bits.first_sum)
+    bits, alone = fired.pattern.bits, (ZERO, ZERO)
+    pellets = alone if fired.pellets_xy is None else fired.pellets_xy.T
+    return _shape(bits.box_xyxy, bits.first, bits.rows, bits.words, bits.sums, bits.first_sum, *pellets)
 
 
 @structref.register

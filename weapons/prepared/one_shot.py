@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,14 +13,13 @@ from hitplanes.planes.common.backend import cached_attribute
 from hitplanes.planes.common.checks import Ints, integer
 from hitplanes.planes.common.limits import SUB
 from hitplanes.planes.grid.fixed_point import snap, toward, unit_of
-from hitplanes.planes.grid.spans import Box, Spans
+from hitplanes.planes.grid.spans import Box
 from hitplanes.planes.scene.derived import View
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.call import AUTO, fired
-from ..fire.hits import HitRow, Hits, Rows, rows_of_span_hits
+from ..fire.hits import HitRow, Hits, Rows
 from ..fire.plan import Plan, absent, unaimed, undrawn
 from ..fire.prefilter import Candidates, may_refuse
 from ..fire.spans import QueryContext, SpanHits, direct
@@ -33,6 +32,7 @@ from ..kinds.placements import (
     blocking_of,
     checked_shots,
     distinct_patterns,
+    pellets_of,
     placements_for,
 )
 from ..kinds.weapon import Pattern, PatternTable, Weapon
@@ -45,12 +45,20 @@ TURNED_PX = 2
 
 
 class Round(NamedTuple):
-    """A round of a shot at the origin: its pixel (x, y), its number, and one pattern, relative to (x, y)."""
+    """A round of a shot at the origin.
+
+    Parameters
+    ----------
+    x, y, number : its pixel, and its number
+    pattern : one pattern, relative to (x, y), or to the pixel of each pellet
+    pellets_xy : (K, 2) pixels of its pellets, relative to (x, y); None if it has none
+    """
 
     x: int
     y: int
     number: int
     pattern: PatternTable
+    pellets_xy: Ints | None = None
 
 
 def reach_of(weapon: Weapon) -> int | None:
@@ -67,35 +75,30 @@ def reach_of(weapon: Weapon) -> int | None:
     return reach if reach <= REACH_MOST else None
 
 
-def rounds_of(weapon: Weapon, shots: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
+def rounds_of(weapon: Weapon, shot: Shots, seed: int, number: int, offset_256: tuple[int, int] | None) -> list[Round]:
     """Rounds that have pixels, of a shot at the origin that is aimed toward an offset, if one is given."""
     if offset_256 is not None:
-        shots = shots.aimed(toward(*offset_256))
+        shot = shot.aimed(toward(*offset_256))
     burst, spread, plain = parts_of(weapon)
-    if burst is None and spread is None:
-        rounds = [Round(0, 0, 0, distinct_patterns(plain, shots.one_direction or STRAIGHT)[0])]
+    if burst is None:
+        pattern, drawn = distinct_patterns(plain, shot.one_direction or STRAIGHT)[0], None
+        if spread is not None:
+            drawn = pellets_of(spread, np.array([[seed]], np.uint64), np.array([[number]]), np.array([[0]]))[0]
+        rounds = [Round(0, 0, 0, pattern, drawn)]
     else:
-        placements = placements_for(weapon, shots)
+        placements = placements_for(weapon, shot)
         rounds = [
-            Round(x, y, number, _pattern_of_round(placements, number))
+            _round_of(placements, number, x, y, spread is not None)
             for number, (x, y) in enumerate(placements.turn_xy.tolist())
         ]
     return [each for each in rounds if each.pattern.box_xyxy[0, 0] <= each.pattern.box_xyxy[0, 2]]
 
 
-def _pattern_of_round(placements: Placements, number: int) -> PatternTable:
-    """Pixels of all pellets of a round, relative to its own pixel, as one pattern."""
-    table, pellets = placements.table, placements.pellets
-    if len(table) == 1 and not placements.scattered:
-        return table
-    rows = slice(number * pellets, (number + 1) * pellets)
-    patterns: list[Pattern] = [table.patterns[k] for k in placements.pattern[rows].tolist()]
-    if not placements.scattered:
-        return patterns[0].table
-    offsets = (placements.xy[rows] - placements.turn_xy[number]).tolist()
-    sets = [pattern.spans.translated(x, y) for pattern, (x, y) in zip(patterns, offsets, strict=True)]
-    runs = (np.concatenate([getattr(spans, name) for spans in sets]) for name in ("y", "x_first", "x_last"))
-    return Pattern(Spans.from_runs(*runs), None).table
+def _round_of(placements: Placements, number: int, x: int, y: int, scattered: bool) -> Round:
+    """A round of a burst, on pixel (x, y)."""
+    rows = slice(number * placements.pellets, (number + 1) * placements.pellets)
+    pattern: Pattern = placements.table.patterns[placements.pattern.item(rows.start)]
+    return Round(x, y, number, pattern.table, placements.xy[rows] - (x, y) if scattered else None)
 
 
 ORIGIN: Ints = np.zeros((1, 2), np.int64)
@@ -145,12 +148,14 @@ class Present:
     near: Any = None
 
 
-class Answer(Hits):
+class OneShot(Hits, list[HitRow]):
     """Hits of one shot of a prepared weapon, equal to those of `fire`.
 
-    The number of rows is known. The columns, the verdict counts and the plan are made when they are asked for, from the
-    snapshot of the scene.
+    It is a list of its rows, because a call of a Python function for each row would take a tenth of the time of a shot.
+    The columns, the verdict counts and the plan are made when they are asked for, from the snapshot of the scene.
     """
+
+    __slots__ = ("_at", "_present")  # set at each shot
 
     _present: Present
     _at: tuple[float, float]
@@ -165,8 +170,15 @@ class Answer(Hits):
     )
     _rows: cached_attribute[Rows] = cached_attribute(lambda hits: hits._columns())
 
+    __init__ = list.__init__
+    __len__ = list.__len__
+    __iter__ = list.__iter__
+
+    def __bool__(self) -> bool:
+        return len(self) > 0
+
     def _columns(self) -> Rows:
-        raise NotImplementedError
+        return Rows(*(np.array(column, np.int64) for column in zip(*self, strict=True))) if self else Rows.none()
 
     def of(self, shot: int) -> list[HitRow]:
         """Rows of the shot; its number is 0."""
@@ -201,61 +213,3 @@ class Answer(Hits):
         plan.leave_out_all(absent, self._stack, self._weighted, present.bounds is not None, choosy)
         plan.leave_out_all(undrawn, present.imagery)
         return plan
-
-
-class OneShot(Answer, list[HitRow]):
-    """Answer of a weapon that has one pellet: a list of its rows.
-
-    It is a list because a call of a Python function for each row would take a tenth of the time of a shot.
-    """
-
-    __slots__ = ("_at", "_present")  # set at each shot
-
-    __init__ = list.__init__
-    __len__ = list.__len__
-    __iter__ = list.__iter__
-
-    def __bool__(self) -> bool:
-        return len(self) > 0
-
-    def _columns(self) -> Rows:
-        return Rows(*(np.array(column, np.int64) for column in zip(*self, strict=True))) if self else Rows.none()
-
-
-class ManyPellets(Answer):
-    """Answer of a weapon with several pellets.
-
-    The look-up only counts its rows. They are made when they are read: as `fire` makes those of a batch, or, once the
-    scene has changed, by a walk of the snapshot.
-    """
-
-    _count = 0
-
-    __init__ = object.__init__
-
-    def append(self, _: HitRow) -> None:
-        """Count a row; its samples are not complete."""
-        self._count += 1
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __bool__(self) -> bool:
-        return self._count > 0
-
-    def _columns(self) -> Rows:
-        if not self._count:
-            return Rows.none()
-        present = self._present
-        if present.scene.version == present.version:
-            return fired(present.scene, present.weapon, self.shots, *AUTO)._rows
-        placements, met = self._met
-        return rows_of_span_hits(met, placements, present.stack.ids, 0)
-
-
-def answer_of(weapon: Weapon) -> tuple[Callable[[], Answer], Callable[[Any, HitRow], None]]:
-    """Class of the answers of a weapon, and its function that appends a row.
-
-    Called as a function of the class, appending takes a third of the time: `__getattr__` makes attributes slow.
-    """
-    return (OneShot, OneShot.append) if parts_of(weapon)[1] is None else (ManyPellets, ManyPellets.append)

@@ -14,7 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.bits.tiles import BigPattern, BigTiles, Ground, Hit, hit_by_one, integers_ns, visible_ns
+from hitplanes.planes.bits.tiles import (
+    BigPattern,
+    BigTiles,
+    Ground,
+    Hit,
+    hit_by_one,
+    integers_ns,
+    scattered,
+    visible_ns,
+)
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
 from hitplanes.planes.common.limits import POSITION_MAX
@@ -25,7 +34,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.areas import accepted
 from ..fire.hits import HitRow
 from ..kinds.weapon import Weapon
-from .one_shot import Answer, Filter, Round, answer_of
+from .one_shot import Filter, OneShot, Round
 
 CELL_SHIFT = 5
 SIDE = 1 << CELL_SHIFT
@@ -62,9 +71,9 @@ UNMADE: Square = ((0, 0, 0, 0, 0, 0),)
 
 Shared = tuple[int, int, int, int, int, int, int]
 """Hit of a round on an object: squared distance, y and x of the nearest pixel, relative to the round's pixel; a number
-that rises from front to back; id of the object; number of pixels, and their weight."""
+that rises from front to back; id of the object; number of pixels, and their share."""
 
-Look = Callable[[Any, Any, Answer], None]
+Look = Callable[[Any, Any, OneShot], None]
 """Function (x, y, answer) that appends the hits of a round at pixel (x, y) to an answer, in order.
 
 The compiled form takes any position. Both raise KeyError for a shot that is left to `fire`.
@@ -133,18 +142,21 @@ class GroundCache:
 # house: row order
 def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
-    pattern, number, tell = fired.pattern.bigs[0], fired.number, answer_of(weapon)[1]
+    plain, number, tell = fired.pattern.bigs[0], fired.number, OneShot.append
+    pattern = plain if fired.pellets_xy is None else scattered(plain, fired.pellets_xy)
+    share, counted = pattern.share, pattern.counted
     stride, rows, nearest = pattern.stride, pattern.rows, pattern.depths.nearest
     first_x, first_y, wide, high = pattern.x, pattern.y, pattern.wide - 1, pattern.high - 1
 
-    def look(x: int, y: int, hits: Answer) -> None:
+    def look(x: int, y: int, hits: OneShot) -> None:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
         shared: list[Shared] = []
         near: PositionCache = hits._present.near
         square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
         if square is UNMADE:
-            for distance2, py, px, item, n, weight in near.walked(pattern, x, y):
-                tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (px, py), distance2)))
+            for distance2, py, px, item, n, part in near.walked(pattern, x, y):
+                samples, weight, pellets = counted(part, n)
+                tell(hits, new(HitRow, (0, number, item, samples, n, weight, pellets, (px, py), distance2)))
             return
         left, top, last = x + first_x, y + first_y, -1
         right, bottom, tiles = left + wide, top + high, near.tiles(stride)
@@ -157,7 +169,7 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
                 hit = (bits << shift if shift >= 0 else bits >> -shift) & rows
                 if hit:
                     n = hit.bit_count()
-                    own: Shared = (*nearest(hit), len(shared), item, n, pattern.weight(hit, n))  # front to back
+                    own: Shared = (*nearest(hit), len(shared), item, n, share(hit, n))  # front to back
                     if item == last:
                         other = shared.pop()
                         own = (*min(own[:3], other[:3]), other[3], item, n + other[5], own[6] + other[6])
@@ -165,8 +177,9 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
                     last = item
         if len(shared) > 1:
             shared.sort()
-        for distance2, dy, dx, _, item, n, weight in shared:
-            tell(hits, new(HitRow, (0, number, item, n, n, weight, 1, (x + dx, y + dy), distance2)))
+        for distance2, dy, dx, _, item, n, part in shared:
+            samples, weight, pellets = counted(part, n)
+            tell(hits, new(HitRow, (0, number, item, samples, n, weight, pellets, (x + dx, y + dy), distance2)))
 
     return look, pattern.nbytes
 
@@ -217,7 +230,7 @@ class PositionCache:
         return tiles.read(visible.seen.words, begin)
 
     def walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
-        """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and weight of what it hits.
+        """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and share of what it hits.
 
         Raises
         ------
@@ -232,7 +245,7 @@ class PositionCache:
         near = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
         found: list[Hit] = hit_by_one(pattern, x, y, near, ground)
         ids = ground.stack.ids
-        return ((distance2, py, px, ids.item(rank), n, weight) for _, distance2, py, px, rank, n, weight in found)
+        return ((distance2, py, px, ids.item(rank), n, part) for _, distance2, py, px, rank, n, part in found)
 
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""

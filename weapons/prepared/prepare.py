@@ -25,7 +25,7 @@ from ..kinds.placements import accepted_of, blocking_of, checked_filter, checked
 from ..kinds.rays import not_cast
 from ..kinds.weapon import Weapon
 from . import position_cache
-from .one_shot import Answer, Arguments, Filter, Present, answer_of, reach_of, rounds_of
+from .one_shot import Arguments, Filter, OneShot, Present, reach_of, rounds_of
 from .position_cache import CELL_SHIFT, FARTHEST, FILTER_BYTES, KEPT_BYTES, ODD, PIXEL, Look
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ class AimCache:
 
     def _made(self, aim: Any, offset: tuple[int, int] | None, number: int, kept: Filter) -> Looks:
         looks: Looks = []
-        for fired in rounds_of(self._weapon, kept.shot_at_origin(aim, number), offset):
+        for fired in rounds_of(self._weapon, kept.shot_at_origin(aim, number), kept.seed, number, offset):
             look, size = self._look(fired, self._weapon)
             looks.append((fired.x, fired.y, look))
             self._grow(size)
@@ -178,7 +178,7 @@ class ReadyPattern(Ready[Hits]):
         self, scene: Scene, weapon: Weapon, kept: Filter, reach: int, aims: dict[ModuleType, AimCache] | None = None
     ) -> None:
         super().__init__(scene, weapon, kept)
-        self._reach, self._answer = reach, answer_of(weapon)[0]
+        self._reach = reach
         self._items, self._version = scene.items, -1
         self._lock = threading.Lock()
         self._kernels: ModuleType | None = None
@@ -203,7 +203,8 @@ class ReadyPattern(Ready[Hits]):
                 kind = type(x)
                 if kind is type(y) and (kind is float or kind is int):
                     if aim is None and toward is None and shot is None:
-                        hits, quick = self._answer(), self._quick
+                        hits: OneShot = OneShot()
+                        quick = self._quick
                         hits._present, hits._at = self._present, at
                         if quick is None:
                             self._straight(x, y, hits)
@@ -223,7 +224,7 @@ class ReadyPattern(Ready[Hits]):
 
     def _looked_up(self, at: Any, aim: Any, toward: Any, shot: Any) -> Hits:
         """Fire with arguments that are not in the cache yet, or of unusual types."""
-        place = plain_pair(at)
+        place, aim, shot = plain_pair(at), plain_number(aim), plain_number(shot)
         looks = None if place is None else self._aims.looks(place, aim, toward, shot, self._filter)
         if place is None or looks is None or max(map(abs, place)) > FARTHEST:
             return super().fire(at, aim, toward, shot)
@@ -236,9 +237,9 @@ class ReadyPattern(Ready[Hits]):
         except KeyError:  # too many items are near
             return super().fire(at, aim, toward, shot)
 
-    def _answer_at(self, at: tuple[float, float], arguments: Arguments, x: int, y: int, looks: Looks) -> Answer:
+    def _answer_at(self, at: tuple[float, float], arguments: Arguments, x: int, y: int, looks: Looks) -> OneShot:
         """Look up all rounds of a shot at a pixel."""
-        hits = self._answer()
+        hits: OneShot = OneShot()
         hits._present, hits._at, hits._arguments = self._present, at, arguments
         for dx, dy, look in looks:
             look(x + dx, y + dy, hits)
@@ -263,6 +264,11 @@ class ReadyPattern(Ready[Hits]):
             self._version = version
 
 
+def plain_number(value: Any) -> Any:
+    """Number of numpy as one of Python; any other value unchanged."""
+    return value.item() if type(value) in NUMPY_NUMBERS else value
+
+
 def plain_pair(value: object) -> tuple[float, float] | None:
     """Pair of Python numbers within the limits; None for anything that `fire` must check."""
     if type(value) is tuple and len(value) == 2 and type(value[0]) is float is type(value[1]):
@@ -270,7 +276,7 @@ def plain_pair(value: object) -> tuple[float, float] | None:
     elif type(value) is np.ndarray and value.shape == (2,) and value.dtype.kind in "iuf" and value.itemsize <= 8:
         pair = tuple(value.tolist())
     elif type(value) in (tuple, list) and len(value) == 2:  # type: ignore[arg-type]
-        pair = tuple(v.item() if type(v) in NUMPY_NUMBERS else v for v in value)  # type: ignore[attr-defined]
+        pair = tuple([plain_number(v) for v in value])  # type: ignore[attr-defined]
     else:
         return None
     for v in pair:

@@ -34,7 +34,7 @@ from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
-from .prepare import PLAIN, Ready, plain_pair
+from .prepare import PLAIN, Ready, plain_number, plain_pair
 
 Pair = tuple[float, float]
 
@@ -93,6 +93,7 @@ class ReadyRay(Ready[RayHits]):
         if self._items.version != self._version:
             self._follow()
         place, target = plain_pair(at), None if toward is None else plain_pair(toward)
+        aim, shot = plain_number(aim), plain_number(shot)
         numbered = shot is None or (type(shot) is int and 0 <= shot < 2**63)
         step = self._step(place, aim, target) if place and numbered and (target or toward is None) else None
         if place is None or step is None:

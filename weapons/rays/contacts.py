@@ -28,8 +28,8 @@ from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack
 
+from .. import late
 from ..fire.plan import Plan
-from ..kinds import placements
 from ..kinds.areas import Rounds, Spread
 from ..kinds.placements import ZEROS, Shots, recoiled
 from ..kinds.rays import Projectile, RayWeapon, Sweep, is_moving
@@ -92,7 +92,7 @@ def _steps(parts: Parts, shots: Shots, shot: Ints, round_: Ints, pellet: Ints) -
     step = ahead if length is None else scaled(ahead, length)
     if isinstance(several, Spread):
         key = shots.seed[shot], shots.number[shot], round_, pellet
-        step = step + SUB * kernels_of(placements).disc_offsets(int(snap(several.radius)), *key)
+        step = step + SUB * kernels_of(late.draws).disc_offsets(int(snap(several.radius)), *key)
     return step
 
 

@@ -21,7 +21,8 @@ from hitplanes.planes.scene.sprite import Sprite
 
 from ...fire.call import fire
 from ...fire.hits import Hits
-from ...kinds.placements import ShotColumns, mix64
+from ...kinds.draws import mix64
+from ...kinds.placements import ShotColumns
 from ...kinds.weapon import Weapon
 
 

@@ -1,0 +1,129 @@
+"""Seeded draws: the offsets of pellets, each of which depends on its own numbers alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import reduce
+
+import numpy as np
+import numpy.typing as npt
+
+from hitplanes.planes.common.checks import Ints
+from hitplanes.planes.common.limits import GOLDEN, SUB
+
+Words = npt.NDArray[np.uint64]
+
+ROWS_AT_ONCE = 2**15
+"""Draws made at a time: 256 KB for each of their arrays; with fewer, the calls of numpy take longer."""
+
+FEW = 64
+"""Most draws that are made one after another in integers of Python; they take as long as the calls of numpy."""
+
+WORD_MAX, STEP = 2**64 - 1, int(GOLDEN)
+
+
+def mix64(words: Words) -> Words:
+    """Mix 64 bits: the finaliser of splitmix64 (Steele, Lea, Flood 2014; constants by Stafford, variant 13)."""
+    z = np.atleast_1d(np.asarray(words, np.uint64)).copy()
+    _mix(z)
+    return z
+
+
+def _mix(z: Words) -> None:
+    """Mix words in place."""
+    z ^= z >> np.uint64(30)
+    z *= np.uint64(0xBF58476D1CE4E5B9)
+    z ^= z >> np.uint64(27)
+    z *= np.uint64(0x94D049BB133111EB)
+    z ^= z >> np.uint64(31)
+
+
+def disc_offsets(radius_256: int, seed: int | Words, shot: Ints, round_: Ints, pellet: Ints) -> Ints:
+    """Whole-pixel offsets (n, 2), uniform over the centres of a disc, by rejection on integers.
+
+    Parameters
+    ----------
+    radius_256 : radius in 1/256 px
+    seed : 0 .. 2**64 - 1; one for all rows, or one for each (n,) uint64
+    shot, round_, pellet : (n,) int64; a row depends only on its seed and its own three numbers. They may broadcast:
+        seeds, shots and rounds (n, 1) and pellets (k,) give offsets (n, k, 2)
+    """
+    words = np.asarray(seed, np.uint64), *(np.asarray(word).astype(np.uint64) for word in (shot, round_, pellet))
+    shape = np.broadcast_shapes(*(word.shape for word in words))
+    if math.prod(shape) <= FEW:
+        return np.array(_few(radius_256, words, shape), np.int64).reshape(*shape, 2)
+    offsets = np.empty((*shape, 2), np.int64)
+    at_once = max(ROWS_AT_ONCE // max(shape[-1], 1), 1) if len(shape) > 1 else ROWS_AT_ONCE
+    for first in range(0, shape[0], at_once):
+        now = slice(first, first + at_once)
+        key, *rest = (word[now] if word.shape[:1] == shape[:1] and word.ndim == len(shape) else word for word in words)
+        key = mix64(key)
+        for word in rest:
+            key = key ^ word  # pellets broadcast to more columns
+            key += GOLDEN
+            _mix(key)
+        offsets[now] = _in_disc(key.reshape(-1), reach=radius_256 // SUB, radius2=radius_256**2).reshape(*key.shape, 2)
+    return offsets
+
+
+def _in_disc(state: Words, reach: int, radius2: int) -> Ints:
+    """Offsets (n, 2) within a disc; each state is drawn again until its offset lies inside."""
+    bits, high = np.uint64((1 << (2 * reach).bit_length()) - 1), np.uint64(32)
+    offsets = np.empty((len(state), 2), np.int64)
+    pending = np.arange(len(state))
+    while len(pending):
+        state += GOLDEN
+        drawn = mix64(state)
+        x, y = (drawn & bits).view(np.int64), ((drawn >> high) & bits).view(np.int64)
+        x -= reach
+        y -= reach
+        distance2 = x * x
+        distance2 += y * y
+        within = distance2 <= radius2 // SUB**2
+        good, rest = within.nonzero()[0], np.logical_not(within).nonzero()[0]
+        row = pending.take(good)
+        offsets[row, 0], offsets[row, 1] = x.take(good), y.take(good)
+        pending, state = pending.take(rest), state.take(rest)
+    return offsets
+
+
+def _few(radius_256: int, words: Sequence[Words], shape: tuple[int, ...]) -> list[tuple[int, int]]:
+    """Offsets of rows whose seeds, shots, rounds and pellets broadcast to a shape, one after another."""
+    rows, columns = math.prod(shape), []
+    for word in words:  # to broadcast them all would take as long as the draws
+        every = word if word.size in (1, rows) else np.broadcast_to(word, shape)
+        columns.append(every.reshape(-1).tolist() * (rows if every.size == 1 else 1))
+    turns: dict[tuple[int, ...], int] = {}
+    offsets = []
+    for *turn, pellet in zip(*columns, strict=True):
+        key = tuple(turn)
+        if key not in turns:
+            seed, *rest = turn
+            turns[key] = reduce(_keyed, rest, _mixed(seed))
+        offsets.append(_offset(radius_256, _keyed(turns[key], pellet)))
+    return offsets
+
+
+def _keyed(state: int, number: int) -> int:
+    """State of draws that depend on one more number."""
+    return _mixed((state ^ number) + STEP & WORD_MAX)
+
+
+def _offset(radius_256: int, state: int) -> tuple[int, int]:
+    """Offset within a disc, drawn until it lies inside."""
+    reach = radius_256 // SUB
+    bits = (1 << (2 * reach).bit_length()) - 1
+    while True:
+        state = state + STEP & WORD_MAX
+        drawn = _mixed(state)
+        x, y = (drawn & bits) - reach, (drawn >> 32 & bits) - reach
+        if SUB**2 * (x * x + y * y) <= radius_256**2:
+            return x, y
+
+
+def _mixed(word: int) -> int:
+    """`mix64` of one word."""
+    word = (word ^ word >> 30) * 0xBF58476D1CE4E5B9 & WORD_MAX
+    word = (word ^ word >> 27) * 0x94D049BB133111EB & WORD_MAX
+    return word ^ word >> 31
