@@ -159,6 +159,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "size of zero": (lambda: Scene((0, 5)), r"size_wh\[0\]: expected a whole number from 1 .*, got 0"),
     "size of half a pixel": (lambda: Scene((5, 0.5)), r"size_wh\[1\]: expected a whole number from 1 .*, got 0.5"),
     "size of true": (lambda: Scene((True, 5)), r"size_wh\[0\]: expected a number like the others, got True"),
+    "size as two arguments": (lambda: Scene(5, 5), r"size_wh: expected shape \(2,\), got \(\)"),  # type: ignore[arg-type]
     "size of one number": (lambda: Scene(5), r"size_wh: expected shape \(2,\), got \(\)"),
     "planes of a world too large": (lambda: Scene((10**9, 10**9)).planes(), "bounds: expected a plane of sides up to"),
     "scene's name": (lambda: Scene(name=5), "name: expected a text of 1 to 200 characters, got 5"),
@@ -367,7 +368,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "toward, masked": (
         lambda: shot(at=[(1, 2), (3, 4)], toward=masked), r"toward\[1\]\[1\]: expected a value, got a mas"),
     "accept, negative": (lambda: shot(accept=-1), "accept.*: expected a whole number from 0 .*got -1"),
-    "accept, None": (lambda: shot(accept=None), "accept: expected numbers, got .*None"),
+    "accept, None": (lambda: shot(accept=None), "accept: expected category names or bits, or ALL, got None"),
     "accept, a name": (lambda: shot(accept="taget"), "accept: .*got 'taget' .did you mean 'target'"),
     "accept, unknown name": (lambda: shot(accept=["taget"]), "accept: .*got 'taget' .did you mean 'target'"),
     "exclude, -2": (lambda: shot(exclude=[0, -2]), r"exclude\[0\]\[1\]: expected a whole number from -1 .*got -2"),

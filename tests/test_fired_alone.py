@@ -58,6 +58,7 @@ def test_a_weapon_is_ready_from_the_second_shot_on(weapon: Weapon, jit: bool) ->
 OTHERS: list[dict[str, Any]] = [
     {"accept": ["glass"]}, {"blocked_by": 0}, {"exclude": 4}, {"exclude": np.int64(8)}, {"seed": 3},
     {"exclude": [4, 8]}, {"exclude": (np.int64(8), -1, 3)}, {"exclude": []},
+    {"exclude": np.array([4, 8], np.uint8)},
 ]  # fmt: skip
 
 

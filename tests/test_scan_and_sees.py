@@ -129,7 +129,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"at": HERE, "toward": [(1, 2), HERE]}, r"toward\[1\]: expected a point other than the shot's own"),
     ({"at": HERE, "toward": TARGETS, "aim": AIMS}, r"aim: expected aim or toward, got both"),
     ({"at": HERE, "aim": [1, 2], "accept": [1, 2, 3]}, r"accept: expected shape \(2,\), got \(3,\)"),
-    ({"at": HERE, "aim": [1, 2], "exclude": [1, 2, 3]}, r"exclude: expected shape \(2, any\)"),
+    ({"at": HERE, "aim": [1, 2], "exclude": [1, 2, 3]}, r"exclude: expected an owner for each of 2 shots"),
 ]
 
 
@@ -391,9 +391,9 @@ NONSENSE: list[tuple[Any, str]] = [
     (lambda s: sees(History(s), HERE, HERE), "tick: expected one, or one for each shot"),
     (lambda s: sees(s, HERE, HERE, accept="hare"), "accept: .*got 'hare'"),
     (lambda s: sees(s, [HERE] * 2, HERE, blocked_by=[1, 2, 3]), r"blocked_by: expected shape \(2,\), got \(3,\)"),
-    (lambda s: scan(s, [HERE] * 2, AIMS, 5, exclude=[1, 2, 3]), r"exclude: expected shape \(2, any\)"),
+    (lambda s: scan(s, [HERE] * 2, AIMS, 5, exclude=[1, 2, 3]), r"exclude: expected an owner for each of 2 shots"),
     (lambda s: scan(s, "x", AIMS, 5), "at: expected numbers, got 'x'"),
-    (lambda s: scan(s, HERE, 3, 5), r"angles: expected shape \(1, any\), got \(\)"),
+    (lambda s: scan(s, HERE, 3, 5), r"angles: expected a list of them, one for each beam, got 3"),
     (lambda s: scan(s, [HERE] * 2, [AIMS] * 3, 5), r"angles: expected shape \(2, any\), got \(3, 4\)"),
     (lambda s: scan(s, HERE, [0, math.nan], 5), r"angles\[1\]: expected a finite number, got nan"),
     (lambda s: scan(s, HERE, AIMS, None), "range: expected numbers, got None"),

@@ -355,7 +355,7 @@ def test_a_change_of_one_thing_keeps_the_others() -> None:
         ({"ids": [0, 1], "categories": [1, 2**32]}, r"categories\[1\]: expected a whole number"),
         ({"ids": [0, 1], "categories": 2**32}, "categories: expected a whole number"),
         ({"ids": [0, 1], "categories": ["glas"]}, "categories: expected one of .*did you mean 'glass'"),
-        ({"ids": [0, 1], "categories": "glass"}, "categories: expected bits or a list of names, got 'glass'"),
+        ({"ids": [0, 1], "categories": "glas"}, "categories: expected one of .*did you mean 'glass'"),
         ({"ids": [0, 1], "categories": [["glass"], ["glass", "target"]]}, "categor"),
         ({"ids": [0, 1], "role": "occluders"}, "role: expected one of .*did you mean 'occluder'"),
     ],
@@ -557,7 +557,7 @@ def test_planes_without_anything_in_them() -> None:
     ("given", "message"),
     [
         ({}, "planes: expected one or more"),
-        ({"hittable": np.zeros((3, 4)), "movers": np.zeros((4, 3))}, r"planes: .*size, got \[\(3, 4\), \(4, 3\)\]"),
+        ({"hittable": np.zeros((3, 4)), "movers": np.zeros((4, 3))}, "planes: .* size, got hittable of 4 x 3 px, mov"),
         ({"hittable": np.zeros((2, 3, 4), np.bool_), "hud": np.zeros((3, 5))}, "planes: .*all of one size"),
         ({"hittable": np.zeros(5)}, r"hittable: expected a plane .*got \(5,\)"),
         ({"occluders": np.zeros((0, 5))}, r"occluders: expected a plane .*got \(0, 5\)"),

@@ -76,8 +76,8 @@ class Scene:
             raise InputError(f"categories: expected distinct names, got {list(self.categories)}")
         self._bounds: Box | None = None
         if size_wh is not None:
-            x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
             w, h = integers("size_wh", size_wh, (2,), 1, POSITION_MAX).tolist()
+            x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
             self._bounds = (x, y, x + w - 1, y + h - 1)
         self._items = Items()
         self.weapons: dict[str, Any] = {}
@@ -102,10 +102,11 @@ class Scene:
         """
         given = dict(zip(FIELDS, (background, hittable, movers, occluders, hud), strict=True))
         arrays = {field: array_of(field, plane) for field, plane in given.items() if plane is not None}
-        sizes = {late.render.plane_size(field, array) for field, array in arrays.items()}
-        if len(sizes) != 1:
-            raise InputError(f"planes: expected one or more, all of one size, got {sorted(sizes)}")
-        scene = cls(next(iter(sizes)), origin_xy)
+        sizes = {field: late.render.plane_size(field, array) for field, array in arrays.items()}
+        if len(set(sizes.values())) != 1:
+            got = ", ".join(f"{field} of {w} x {h} px" for field, (w, h) in sizes.items()) or "none"
+            raise InputError(f"planes: expected one or more, all of one size, got {got}")
+        scene = cls(next(iter(sizes.values())), origin_xy)
         x, y = integers("origin_xy", origin_xy, (2,), -POSITION_MAX, POSITION_MAX).tolist()
         for field, array in arrays.items():
             role = ROLES[FIELDS.index(field)]
@@ -157,7 +158,7 @@ class Scene:
         flip : "none", "x" (left to right), "y" or "xy"
         frame : number or name of the sprite's frame
         layer : greater is nearer the viewer
-        categories : names, or bits; by default bit 0 for objects, all bits for occluders
+        categories : a name, several, or bits; by default bit 0 for objects, all bits for occluders
         owner : id of the object that this one is a part of; by default itself
         cost : what each px of it takes from the budget of a bullet that goes through it, 0 to 255
         velocity_xy : where it moves while a projectile flies, px a frame
@@ -262,7 +263,7 @@ class Scene:
             If the scene has changed since the shot, or is another one; or naming the id.
         """
         wanted = late.carving.pixels_to_carve(self, pixels)
-        given = {int(self._existing(integer("pixels", i, 0, self.items.count - 1))[0]): xy for i, xy in wanted.items()}
+        given = {int(self._existing(integer("ids", i, 0, self.items.count - 1))[0]): xy for i, xy in wanted.items()}
         sprites, lost = late.carving.carved_sprites(self.items, given)
         if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
@@ -554,6 +555,8 @@ class Scene:
             return default
         if isinstance(categories, int | np.integer):
             return integer("categories", categories, 0, ALL)
+        if isinstance(categories, str):
+            return self.category_bits(categories, field="categories")
         return self.category_bits(*listed("categories", categories, "bits or a list of names"), field="categories")
 
     def _bits_per_row(self, categories: object, n: int) -> Ints:

@@ -94,7 +94,7 @@ def verdicts_of_rays(walk: Walk, filters: Filters | None, bounds: Box | None) ->
 def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> Ints:
     """Number of cells (n,) of lines in inclusive boxes (n, 4), each in its own; with ends only those before them."""
     kept = np.flatnonzero((box_xyxy[:, :2] <= box_xyxy[:, 2:]).all(axis=1))
-    if len(kept) < len(lines):
+    if len(kept) < len(lines) or not len(lines):
         count = np.zeros(len(lines), np.int64)
         if len(kept):
             count[kept] = cells_in(lines.take(kept), box_xyxy[kept], None if ends is None else ends.take(kept))
@@ -105,7 +105,8 @@ def cells_in(lines: Lines, box_xyxy: Ints, ends: Terminations | None = None) -> 
     time = borders.last if ends is None else np.minimum(ends.time - 1, borders.last)
     cut = np.flatnonzero((box_xyxy != lines.box_xyxy).any(axis=1))
     count = borders.cells_by(time)
-    count[cut] = borders.take(cut).cells_in(box_xyxy[cut], time[cut])
+    if len(cut):
+        count[cut] = borders.take(cut).cells_in(box_xyxy[cut], time[cut])
     return count if ends is None else count + _last_cells(lines, box_xyxy, ends)
 
 

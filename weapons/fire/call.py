@@ -208,6 +208,8 @@ def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
     """Owners that one shot excludes; None if they are not plain whole numbers."""
     if exclude is None:
         return ()
+    if isinstance(exclude, np.ndarray) and exclude.ndim == 1 and exclude.dtype.kind in "iu":
+        exclude = exclude.tolist()
     given = exclude if isinstance(exclude, tuple | list) else (exclude,)
     owners = tuple([int(owner) if isinstance(owner, np.integer) else owner for owner in given])
     return owners if all(type(owner) is int for owner in owners) else None
@@ -328,6 +330,8 @@ def _fired_areas(scene: Scene, weapon: Weapon, shots: Shots, how: tuple[str, str
 
 def category_bits(scene: Scene, field: str, value: object) -> object:
     """Category bits of a name or a list of names, or of a list for each shot; any other value unchanged."""
+    if value is None:
+        raise InputError(f"{field}: expected category names or bits, or ALL, got None")
     names = (value,) if isinstance(value, str) else value
     if not isinstance(names, list | tuple):
         return value

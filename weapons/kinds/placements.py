@@ -523,4 +523,9 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
         array = array[None] if single else array[:, None]
     if array.ndim == 2 and len(array) == 1:
         array = np.broadcast_to(array, (n, array.shape[1]))
+    if len(array) != n:
+        raise InputError(
+            f"exclude: expected an owner for each of {n} shots, or one list of them for all, [[1, 2]], "
+            f"got {array_of('exclude', exclude).shape}"
+        )
     return integers("exclude", array, (n, None), -1, OWNER_MAX)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hitplanes.planes.common.backend import cached_attribute
+from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
@@ -57,7 +57,8 @@ class OneRay(OneShot, RayHits):
         rays, ray = rays_of(parts, self.shots), parts[2]
         lines = Lines(rays.start_256, rays.step_256, ray.radius_256)
         filters = filters_of(stack, self.shots, rays.shot)
-        found = raycast.hits_and_ends(stack, bounds, lines, ray.hits_most, filters)
+        cast = stack, bounds, lines, ray.hits_most, filters
+        found = kernels_of(raycast).hits_and_ends(*cast) or raycast.hits_and_ends(*cast)
         return raycast.walk_of(rays, ray, stack, bounds, found)
 
     @cached_attribute

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, array_of, real, reals
+from hitplanes.planes.common.checks import Bools, Floats, InputError, Ints, array_of, real, reals, shown
 from hitplanes.planes.common.limits import ALL, REACH_MAX, SUB
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.planes.scene.scene import Scene
@@ -129,7 +129,10 @@ def scan(
 
 def _beams(shots: Shots, angles: object) -> tuple[tuple[int, int], Aimed]:
     """Shape (N, B) of a table of beams, and the function that aims them."""
-    shared = array_of("angles", angles).ndim == 1
+    given = array_of("angles", angles)
+    if not given.ndim:
+        raise InputError(f"angles: expected a list of them, one for each beam, got {shown(angles)}")
+    shared = given.ndim == 1
     direction = np.stack(unit(reals("angles", angles, (None,) if shared else (len(shots), None))), axis=-1)
     beams = direction.shape[-2]
 
