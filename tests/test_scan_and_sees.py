@@ -219,6 +219,10 @@ def told(world: World, scene: Scene | None = None) -> tuple[np.ndarray, np.ndarr
     seen = sees(scene, world.places, targets, **world.filters)
     found = scan(scene, world.places, world.angles, world.range, **world.filters)
     assert seen.dtype == np.bool_ and seen.shape == (len(world.places), len(targets))
+    for row, place in enumerate(world.places):
+        own = {name: values[row] for name, values in world.filters.items()}
+        alone = [sees(scene, tuple(place), tuple(target), **own) for target in world.targets]
+        assert np.array_equal(np.concatenate([*alone, np.zeros((0, 1))]).T, seen[row : row + 1])
     assert found.dtype == np.float64 and found.shape == (len(world.places), len(world.angles))
     return seen, found
 
@@ -406,3 +410,27 @@ NONSENSE: list[tuple[Any, str]] = [
 def test_nonsense_is_named(call: Any, said: str) -> None:
     with pytest.raises(InputError, match=f"^{said}"):
         call(yard())
+    scene = yard()
+    for _ in range(2):  # so that a ray is ready
+        sees(scene, HERE, TARGETS[0])
+    with pytest.raises(InputError, match=f"^{said}"):
+        call(scene)
+
+
+def test_a_pair_is_seen_as_it_is_now(jit: bool) -> None:
+    """One pair a call, while objects move, come and go; numbers of any type."""
+    scene, wall = yard(), 3
+    for step in range(12):
+        if step < 8:
+            scene.move(wall, (40, 34 + 3 * step))
+        elif step == 8:
+            scene.remove(wall)
+        for eye, target in (
+            (HERE, (60, 31)),
+            (np.float32(HERE), [60, 31]),
+            ((20, np.float64(30.5)), np.array([60, 31])),
+        ):
+            seen = sees(scene, eye, target)
+            assert seen.dtype == np.bool_ and seen.tolist() == sees(scene, [eye], [target]).tolist() == [[step > 2]]
+        assert sees(scene, HERE, (60, 31), accept=ALL).tolist() == sees(scene, [HERE], [(60, 31)], accept=ALL).tolist()
+        assert sees(scene, HERE, HERE).tolist() == sees(scene, (40, 34), (40, 34)).tolist() == [[True]]

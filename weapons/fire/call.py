@@ -129,9 +129,9 @@ def fire(
     """
     _check_words(prefilter, broadphase, strategy)
     how = prefilter, broadphase, strategy
-    if how == AUTO and _is_one(at):
+    if how == AUTO and is_one(at):
         filters = accept, blocked_by, exclude, seed
-        ready = _ready(scene, weapon, filters) if tick is None else _ready_then(scene, weapon, filters, tick)
+        ready = ready_for(scene, weapon, filters) if tick is None else _ready_then(scene, weapon, filters, tick)
         if ready is not None:
             return ready.fire(at, aim, toward, shot)
     return fire_anew(scene, weapon, at, aim, toward, (accept, blocked_by, exclude), seed, shot, tick, how)
@@ -172,7 +172,7 @@ def fire_anew(
     return _fired_at_moments(moments_of(scene, tick, len(shots)), weapon, shots, how, plan)
 
 
-def _is_one(at: object) -> bool:
+def is_one(at: object) -> bool:
     """Whether this may be the position of one shot; a batch of two shots is not."""
     if type(at) is np.ndarray:
         return bool(at.shape == (2,))
@@ -183,7 +183,7 @@ Filtering = tuple[Any, Any, Any, Any]
 """(accept, blocked_by, exclude, seed) of a call."""
 
 
-def _ready(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Ready[Hits] | None:
+def ready_for(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Ready[Hits] | None:
     """The weapon as `prepare` makes it, if it was fired at the scene before, one shot a call."""
     accept, blocked_by, exclude, seed = filters
     if type(scene) is not Scene or not isinstance(weapon, Weapon):

@@ -29,7 +29,7 @@ from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon
 from ..kinds.weapon import Weapon
 from ..rays import raycast
-from ..rays.contacts import rays_of
+from ..rays.contacts import NEVER, rays_of
 from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
 from .one_shot import Filter, OneShot, Present
@@ -111,6 +111,17 @@ class ReadyRay(Ready[RayHits]):
             columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
             hits.append(new(HitRow, columns))
         return hits
+
+    def reaches(self, at: Any, target: Any) -> bool | None:
+        """Whether a ray from one point to another meets nothing; None if they must be checked, or are one."""
+        if self._items.version != self._version:
+            self._follow()
+        place, goal = plain_pair(at), plain_pair(target)
+        step = self._step(place, None, goal) if place and goal else None
+        if place is None or step is None:
+            return None
+        followed = self._follows(round(SUB * place[0]), round(SUB * place[1]), *step)
+        return None if followed is None else followed[0] == NEVER
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:
         """What a ray hits, by the way chosen now; the next rays go the same way unless it is pending."""

@@ -6,7 +6,7 @@ places and filters -> shots of one ray each, in chunks -> `ray_call.end_times` -
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from hitplanes.planes.common.limits import ALL, REACH_MAX, SUB
 from hitplanes.planes.grid.fixed_point import unit
 from hitplanes.planes.scene.scene import Scene
 
-from ..fire.call import category_bits, check_owners, moments_of, present_of
+from ..fire.call import Filtering, category_bits, check_owners, is_one, moments_of, present_of, ready_for
 from ..fire.prefilter import view_of
 from ..kinds.placements import Shots, places_256, unaimed_shots
 from ..kinds.rays import Pistol
@@ -64,12 +64,24 @@ def sees(
     InputError
         If an argument is invalid; the text names the argument and the row.
     """
+    clear = None if tick is not None else _is_clear(scene, eyes, targets, (accept, blocked_by, exclude, 0))
+    if clear is not None:
+        return np.array([[clear]])
     shots = _shots("eyes", eyes, scene, accept, blocked_by, exclude)
     targets_256, _ = places_256("targets", targets)
     seen = np.ones((len(shots), len(targets_256)), np.bool_)
     for pair, _, time in _ends(scene, tick, GAZE, shots, seen.shape[1], _gazes(shots, targets_256)):
         seen.reshape(-1)[pair] = time == NEVER
     return seen
+
+
+def _is_clear(scene: Scene | History, eye: object, target: object, filters: Filtering) -> bool | None:
+    """Whether one eye sees one target, if a ray is ready for the scene; None if there is more to check."""
+    if not (is_one(eye) and is_one(target)):
+        return None
+    ready: Any = ready_for(scene, GAZE, filters)
+    clear: bool | None = ready and ready.reaches(eye, target)
+    return clear
 
 
 def _gazes(shots: Shots, targets_256: Ints) -> Aimed:
