@@ -82,8 +82,8 @@ def first_touched(
             view = View(False, meets[k], tuple(sorted({*exclude[k]} - {-1})))
         elif stack.has_unmet:
             continue
-        followed = kernels_of(one_ray).follower(stack, bounds, view, 0, 1)(*at, *by)
-        assert followed is not None
+        seen = stack, bounds, view, 0, 1
+        followed = kernels_of(one_ray).follower(*seen)(*at, *by) or one_ray.follow_in_arrays(*at, *by, *seen)
         objects = [] if found[k][3] < 0 or stack.occluder[found[k][3]] else [found[k]]
         assert [(entry, x, y, rank) for rank, _, x, y, entry in followed[1]] == objects
         assert found[k] == NOTHING or followed[0] == found[k][0]

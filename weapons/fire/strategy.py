@@ -264,8 +264,8 @@ def chosen_ray_way(
 
 def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, prepared: bool, why: str) -> RayChoice:
     """Of rays that can be cast, whether they march; `why` tells what was passed over."""
-    now, items = costs(), len(scene.items.stack())
-    cast = _alone_ns(rays, items) if prepared else _cast_ns(rays, items)
+    now, stack = costs(), scene.items.stack()
+    cast = _alone_ns(rays, stack) if prepared else _cast_ns(rays, stack)
     march = now.prepared_march if prepared else now.march_call + rays * now.march_ray
     why += f"about {cast / 1e3:.0f} us cast at items"
     field = scene.derived.distance_field(view) if is_thin_first(ray) and view is not None else None
@@ -275,29 +275,29 @@ def _cast_or_march(ray: RayWeapon, scene: Scene, view: View | None, rays: int, p
     return other if cast <= march else _rented_or_bought(other, field, scene, cast - march)
 
 
-def are_faster_alone(rays: int, items: int) -> bool:
+def are_faster_alone(rays: int, stack: Stack) -> bool:
     """Whether so many rays take less time cast one after another than together."""
-    return _alone_ns(rays, items) < _cast_ns(rays, items)
+    return _alone_ns(rays, stack) < _cast_ns(rays, stack)
 
 
-def are_few(rays: int, items: int, most: int | None) -> bool:
+def are_few(rays: int, stack: Stack, most: int | None) -> bool:
     """Whether the rays of a call, which hit up to `most` objects, are so few that numpy follows them one by one.
 
     They must take half of the time, as half of a call is the same for both; rays that go on take twice as long.
     """
-    return 2 * _alone_ns(rays if most == 1 else 2 * rays, items) < _cast_ns(rays, items)
+    return 2 * _alone_ns(rays if most == 1 else 2 * rays, stack) < _cast_ns(rays, stack)
 
 
-def _cast_ns(rays: int, items: int) -> float:
-    """Time to cast rays together, ns."""
+def _cast_ns(rays: int, stack: Stack) -> float:
+    """Time to cast rays together, ns; large masks count as many, as rays pass more of their cells."""
     now = costs()
-    return now.cast_call + rays * (now.cast_ray + items * now.cast_pair)
+    return now.cast_call + rays * (now.cast_ray + tiles_in(stack) * now.cast_pair)
 
 
-def _alone_ns(rays: int, items: int) -> float:
+def _alone_ns(rays: int, stack: Stack) -> float:
     """Time to cast rays one after another, ns."""
     now = costs()
-    return rays * (now.prepared_cast + items * now.prepared_cast_item)
+    return rays * (now.prepared_cast + tiles_in(stack) * now.prepared_cast_item)
 
 
 def _rented_or_bought(other: RayChoice, field: DistanceField, scene: Scene, saved_ns: float) -> RayChoice:

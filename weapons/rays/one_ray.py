@@ -77,13 +77,23 @@ Follow = Callable[[int, int, int, int], Followed | None]
 """Function that follows one ray from (x, y) to (x + dx, y + dy), 1/256 px; None if it does not serve the ray."""
 
 
-def chosen_follower(scene: Scene, stack: Stack, ray: RayWeapon, view: View) -> tuple[Follow, bool]:
+def chosen_follower(
+    scene: Scene, stack: Stack, ray: RayWeapon, view: View, in_arrays: bool = True
+) -> tuple[Follow, bool]:
     """Function that follows one ray by the way chosen now, and whether the next ray may go another way.
 
-    A ray is cast if it comes to several pixels at once by march. None is returned of rays that must walk.
+    A ray is cast if it comes to several pixels at once by march. One that passes too many rows of masks is cast in
+    arrays, or None is returned of it if `in_arrays` is False, as of rays that must walk.
     """
     chosen = chosen_ray_way("auto", False, ray, scene, stack, view, 1, prepared=True)
-    cast: Follow = kernels_of(sys.modules[__name__]).follower(stack, scene.bounds, view, ray.radius_256, ray.hits_most)
+    bounds, radius, most = scene.bounds, ray.radius_256, ray.hits_most
+    alone: Follow = kernels_of(sys.modules[__name__]).follower(stack, bounds, view, radius, most)
+
+    def cast(x: int, y: int, dx: int, dy: int) -> Followed | None:
+        return alone(x, y, dx, dy) or (
+            follow_in_arrays(x, y, dx, dy, stack, bounds, view, radius, most) if in_arrays else None
+        )
+
     if chosen.way == "march":
         march = marcher(scene, stack, view)
         return lambda *line: march(*line) or cast(*line), chosen.pending
@@ -95,15 +105,6 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
 
     `most` is the number of objects that a ray may hit, or None.
     """
-    filters = np.array([view.meets]), np.array([view.exclude], np.int64)
-
-    def cast(x: int, y: int, dx: int, dy: int) -> Followed | None:
-        """Follow one ray in arrays."""
-        lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
-        hit, ends = cast_together(stack, bounds, lines, most, filters)
-        hit[3:5] += pixel(lines.start).T
-        return int(ends[1, 0]), hit[1:].T.tolist()
-
     accepted = view.accepts(stack)
     accepts = None if accepted.all() else accepted
 
@@ -111,19 +112,31 @@ def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: in
         """Follow one ray."""
         found = _passed((x, y), (dx, dy), radius, stack, bounds, accepts, most)
         if found is None:
-            return cast(x, y, dx, dy)
+            return None
         left, top = (x + HALF) // SUB, (y + HALF) // SUB
         return found[0], [[rank, count, x + left, y + top, time] for rank, count, x, y, time in found[1]]
 
     return follow
 
 
+def follow_in_arrays(
+    x: int, y: int, dx: int, dy: int, stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None
+) -> Followed:
+    """Follow one ray in arrays."""
+    filters = np.array([view.meets]), np.array([view.exclude], np.int64)
+    lines = Lines(np.array([[x, y]]), np.array([[dx, dy]]), radius)
+    hit, ends = cast_together(stack, bounds, lines, most, filters)
+    hit[3:5] += pixel(lines.start).T
+    return int(ends[1, 0]), hit[1:].T.tolist()
+
+
 def follow_each(
     stack: Stack, bounds: Box | None, lines: Lines, most: int | None, filters: Filters | None
 ) -> tuple[Ints, Ints]:
-    """`raycast.hits_and_ends` of a few rays, one after another."""
+    """`raycast.hits_and_ends` of a few rays, one after another; those that pass too many rows are cast together."""
     hits: list[list[int]] = []
     ends: list[list[int]] = []
+    rest: list[int] = []
 
     @cache
     def accepted(meets: int, exclude: tuple[int, ...]) -> Bools:
@@ -133,11 +146,8 @@ def follow_each(
         accepts = filters and accepted(int(filters[0][number]), tuple(filters[1][number].tolist()))
         found = _passed(start, step, lines.radius, stack, bounds, accepts, most)
         if found is None:
-            own = slice(number, number + 1)
-            among = filters and (filters[0][own], filters[1][own])
-            hit, end = cast_together(stack, bounds, lines.take(own), most, among)
-            hits += [[number, *row] for row in hit[1:].T.tolist()]
-            ends.append(end[:, 0].tolist())
+            rest.append(number)
+            ends.append([Reason.RANGE, NEVER, 0, 0, -1, False])
             continue
         time, rows, last = found
         hits += [[number, *row] for row in rows]
@@ -147,6 +157,12 @@ def follow_each(
             blocked = stack.has_occluders and bool(stack.occluder[last[3]])
             ends.append([Reason.OCCLUDER if blocked else Reason.HITS, time, *last[1:4], blocked])
     hit, end = (np.array(rows, np.int64).reshape(-1, 6).T for rows in (hits, ends))
+    if rest:
+        among = filters and (filters[0][rest], filters[1][rest])
+        others, end[:, rest] = cast_together(stack, bounds, lines.take(np.array(rest)), most, among)
+        others[0] = np.array(rest)[others[0]]
+        hit = np.concatenate([hit, others], axis=1)
+        hit = hit[:, np.argsort(hit[0], kind="stable")]
     return hit, end
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
+from itertools import takewhile
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -114,8 +115,8 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
     Rays end at the first thing that they meet, or NEVER. Rows, passes and stops are not made.
     """
     stack, follow = scene.items.stack(), None
-    if view is not None and are_faster_alone(count, len(stack)):
-        follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view)
+    if view is not None and are_faster_alone(count, stack):
+        follow, _ = late.one_ray.chosen_follower(scene, stack, ray, view, False)
     planned = cache(lambda: _planned(scene, ray, view, count, ("auto", "auto", "auto"), Plan()))
 
     def ended(shots: Shots) -> tuple[Rays, Ints]:
@@ -123,7 +124,8 @@ def end_times(scene: Scene, ray: RayWeapon, view: View | None, count: int) -> Ca
         rays = rays_of((None, None, ray), shots)
         if follow is not None:
             lines = zip(rays.start_256.tolist(), rays.step_256.tolist(), strict=True)
-            times = [found[0] for found in (follow(*start, *step) for start, step in lines) if found]
+            followed = takewhile(bool, (follow(*start, *step) for start, step in lines))
+            times = [found[0] for found in followed if found]
             if len(times) == len(rays):
                 return rays, np.array(times, np.int64)
         keep_arena()

@@ -141,7 +141,7 @@ def hits_and_ends(
     what rays hit, in order, as (ray, rank, count, x, y, entry) (6, P); and their ends, as (reason, time, y, x, rank,
     alone) (6, R); a compiled kernel returns None for rays that are too long or too wide for it
     """
-    if are_few(len(lines), len(stack), most):
+    if are_few(len(lines), stack, most):
         return late.one_ray.follow_each(stack, bounds, lines, most, filters)
     return cast_together(stack, bounds, lines, most, filters)
 
