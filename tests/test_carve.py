@@ -385,10 +385,10 @@ def test_hits_must_be_of_the_scene_as_it_is() -> None:
     ("pixels", "told"),
     [
         (5, "pixels: expected hits of this scene, or pixels of each id, got 5"),
-        ({9: [[1, 1]]}, "ids: expected a whole number from 0 to 1, got 9"),
+        ({9: [[1, 1]]}, "id of pixels: expected a whole number from 0 to 1, got 9"),
         ({0: [[30, 25]], 1: [[1, 2, 3]]}, r"pixels\[1\]: expected shape \(any, 2\), got \(1, 3\)"),
         ({0: [[30, 25]], 1: [[1.5, 2]]}, r"pixels\[1\]\[0\]\[0\]: expected a whole number"),
-        ({"hill": [[1, 1]]}, "ids: expected a whole number from 0 to 1, got 'hill'"),
+        ({"hill": [[1, 1]]}, "id of pixels: expected a whole number from 0 to 1, got 'hill'"),
     ],
 )
 def test_bad_pixels_change_nothing(pixels: Any, told: str) -> None:

@@ -84,6 +84,21 @@ def test_numbers_of_numpy_are_ready_as_those_of_python(weapon: Weapon, jit: bool
         same(fire(scene, weapon, AT, aim=number.item(), shot=4), hits)
 
 
+@pytest.mark.parametrize("weapon", [Beam(90, 5), Laser(150)], ids=lambda weapon: weapon.kind)
+def test_owners_are_those_of_each_aim(weapon: Weapon, jit: bool) -> None:
+    """One position with several aims is several shots, each with owners of its own."""
+    scene = crowd(1)
+    aims: list[dict[str, Any]] = [{"aim": [0, 90]}, {"toward": [(99, 50), (60, 90)]}, {"aim": np.array([0.0, 90.0])}]
+    struck = [set(fire(scene, weapon, AT, aim=aim, strategy="direct").object.tolist()) for aim in (0, 90)]
+    first, second = (min(own) for own in struck)
+    for how in aims:
+        for exclude in ([second, first], (second, first), np.array([second, first]), [first, second]):
+            truth = fire(scene, weapon, AT, exclude=exclude, strategy="direct", **how)
+            for _ in range(3):
+                assert fire(scene, weapon, AT, exclude=exclude, **how) == truth
+            assert ({first, second} <= set(truth.object.tolist())) == (list(exclude) == [second, first])
+
+
 def test_each_shooter_of_many_is_ready(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each excludes itself, and the filters of the last few are kept; also those that are made anew hit the same."""
     monkeypatch.setattr(prepare, "FILTERS_MOST", 20)
@@ -258,6 +273,8 @@ def test_random_rays_against_the_walk(rng: random.Random) -> None:
         {"exclude": True}, {"exclude": -2}, {"exclude": 10**6},
         {"exclude": [1, True]}, {"exclude": (1, 10**6)}, {"seed": True}, {"seed": -1}, {"shot": -1},
         {"aim": "left"},
+        {"aim": np.float32("nan")}, {"aim": np.float64("inf")}, {"at": (10**400, 1)}, {"at": (2**70, 1)},
+        {"aim": [3.5], "exclude": [1, 2]}, {"aim": [3.5, 4, 5], "exclude": [1, 2]}, {"toward": [], "exclude": [1, 2]},
         {"aim": 1, "toward": (1, 2)}, {"at": (1, float("nan"))}, {"at": (1, 2, 3)}, {"at": ("a", 2)}, {"tick": 3},
         {"weapon": "disc"}, {"scene": "world"}, {"strategy": "fast"}, {"prefilter": ["box"]}, {"broadphase": 3},
     ],

@@ -14,9 +14,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
-from itertools import chain, groupby
-from operator import itemgetter, or_
+from itertools import chain, groupby, takewhile
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,13 +81,10 @@ def nearest_of(bits: int, stride: int, left: int, top: int) -> tuple[int, int, i
     rows = (bits >> first * stride).to_bytes(count * size, "little")
     begin = min(max(-top, 0), count - 1)
     best = FARTHEST
-    for k in chain(range(begin, count), range(begin - 1, -1, -1)):
-        y = top + k
-        if y * y > best[0]:
-            if k < begin:
-                break
-            continue
-        row = int.from_bytes(rows[k * size : (k + 1) * size], "little")
+    down = takewhile(lambda k: (top + k) ** 2 <= best[0], range(begin, count))
+    up = takewhile(lambda k: (top + k) ** 2 <= best[0], range(begin - 1, -1, -1))
+    for k in chain(down, up):
+        y, row = top + k, int.from_bytes(rows[k * size : (k + 1) * size], "little")
         if zero >= 0:
             behind = row & (2 << zero) - 1
             if behind:
@@ -238,43 +234,6 @@ class BigPattern:
         return self.rows & int.from_bytes(row * (lower - upper + 1), "little") << self.stride * upper
 
 
-@dataclass(frozen=True, eq=False)
-class Scattered(BigPattern):
-    """Pellets of one pattern as one integer, of the pixels of all, and an integer of each."""
-
-    pellets: tuple[int, ...] = ()
-
-    def share(self, bits: int, count: int) -> int:
-        """The pixels themselves: tiles of an item share none, so that their sum has all."""
-        return bits
-
-    def counted(self, share: int, pixels: int) -> tuple[int, int, int]:
-        """Samples, weight and pellets of a hit on an item."""
-        each = [samples for pellet in self.pellets if (samples := (share & pellet).bit_count())]
-        return sum(each), sum(each) * WEIGHT_FULL, len(each)
-
-
-def scattered(pattern: BigPattern, offsets_xy: Ints) -> Scattered:
-    """Pellets of a pattern at offsets (K, 2) from the pixel that all are placed on; they have no weights."""
-    (left, top), (right, bottom) = offsets_xy.min(axis=0).tolist(), offsets_xy.max(axis=0).tolist()
-    wide, high = pattern.wide + right - left, pattern.high + bottom - top
-    stride = stride_of(wide)
-    rows = restrided(pattern.rows, pattern.high, pattern.stride, stride)
-    pellets = tuple(rows << (y - top) * stride + x - left for x, y in offsets_xy.tolist())
-    every = reduce(or_, pellets)
-    x, y = pattern.x + left, pattern.y + top
-    return Scattered(x, y, wide, high, stride, every, Depths(every, stride, x, y), pellets=pellets)
-
-
-def restrided(rows: int, high: int, stride: int, wider: int) -> int:
-    """So many rows of a stride as rows of a wider one."""
-    if stride == wider:
-        return rows
-    size, gap = stride >> 3, bytes(wider - stride >> 3)
-    data = rows.to_bytes(high * size, "little")
-    return int.from_bytes(b"".join([data[k : k + size] + gap for k in range(0, len(data), size)]), "little")
-
-
 def stride_of(wide: int) -> int:
     """Stride of a pattern of `wide` columns, px."""
     return WORD * -(-(wide + WORD - 1) // WORD)
@@ -293,7 +252,8 @@ class BigTiles(dict[int, int]):
 
     def __init__(self, stride: int) -> None:
         super().__init__()
-        self._columns, self._most = stride // WORD, TILES_BYTES_MOST // (WORD * stride // 8)
+        self._columns, self.nbytes_each = stride // WORD, WORD * stride // 8
+        self._most = TILES_BYTES_MOST // self.nbytes_each
 
     def read(self, words: Words, begin: int) -> int:
         """Make the tile whose 64 rows begin at a place in `words`."""

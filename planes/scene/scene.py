@@ -263,7 +263,9 @@ class Scene:
             If the scene has changed since the shot, or is another one; or naming the id.
         """
         wanted = late.carving.pixels_to_carve(self, pixels)
-        given = {int(self._existing(integer("ids", i, 0, self.items.count - 1))[0]): xy for i, xy in wanted.items()}
+        given = {
+            int(self._existing(integer("id of pixels", i, 0, self.items.count - 1))[0]): xy for i, xy in wanted.items()
+        }
         sprites, lost = late.carving.carved_sprites(self.items, given)
         if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))

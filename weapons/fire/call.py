@@ -65,6 +65,12 @@ if TYPE_CHECKING:
 AUTO = ("auto", "auto", "auto")
 """Pre-filter, broad phase and strategy of a call that names none."""
 
+ONE_AIM = int | float | np.number | None
+"""Types of the aim of one shot; several aims have one position, and their filters are those of several shots."""
+
+OWNERS_READY = 16
+"""Most owners that a filter which is kept excludes."""
+
 LOOKED_AT = 1000  # most ids among which owners that an error names are looked for
 OWNERS_NAMED = 3
 """Most owners that an error names: those of the greatest ids, which are nearest to one that is too great."""
@@ -129,7 +135,7 @@ def fire(
     """
     _check_words(prefilter, broadphase, strategy)
     how = prefilter, broadphase, strategy
-    if how == AUTO and is_one(at):
+    if how == AUTO and is_one(at) and (toward is None or is_one(toward)) and isinstance(aim, ONE_AIM):
         filters = accept, blocked_by, exclude, seed
         ready = ready_for(scene, weapon, filters) if tick is None else _ready_then(scene, weapon, filters, tick)
         if ready is not None:
@@ -205,14 +211,14 @@ def ready_for(scene: Scene | History, weapon: Weapon, filters: Filtering) -> Rea
 
 
 def _plain_owners(exclude: Any) -> tuple[int, ...] | None:
-    """Owners that one shot excludes; None if they are not plain whole numbers."""
+    """Owners that one shot excludes; None if they are many, or not plain whole numbers."""
     if exclude is None:
         return ()
     if isinstance(exclude, np.ndarray) and exclude.ndim == 1 and exclude.dtype.kind in "iu":
         exclude = exclude.tolist()
     given = exclude if isinstance(exclude, tuple | list) else (exclude,)
-    owners = tuple([int(owner) if isinstance(owner, np.integer) else owner for owner in given])
-    return owners if all(type(owner) is int for owner in owners) else None
+    owners = tuple([int(owner) if isinstance(owner, np.integer) else owner for owner in given[: OWNERS_READY + 1]])
+    return owners if len(owners) <= OWNERS_READY and all(type(owner) is int for owner in owners) else None
 
 
 def _ready_then(scene: Scene | History, weapon: Weapon, filters: Filtering, tick: object) -> Ready[Hits] | None:

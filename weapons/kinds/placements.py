@@ -516,7 +516,7 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
         return (exclude,)
     if single and isinstance(exclude, tuple | list) and all(type(v) is int and -1 <= v <= OWNER_MAX for v in exclude):
         return tuple(exclude)
-    array = array_of("exclude", exclude)
+    array = given = array_of("exclude", exclude)
     if array.ndim == 0:
         array = np.broadcast_to(array, (n, 1))
     elif array.ndim == 1:
@@ -526,6 +526,6 @@ def checked_owners(exclude: object, n: int, single: bool) -> Ints | tuple[int, .
     if len(array) != n:
         raise InputError(
             f"exclude: expected an owner for each of {n} shots, or one list of them for all, [[1, 2]], "
-            f"got {array_of('exclude', exclude).shape}"
+            f"got shape {given.shape}"
         )
     return integers("exclude", array, (n, None), -1, OWNER_MAX)

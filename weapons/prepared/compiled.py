@@ -48,7 +48,6 @@ from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.hits import HitRow
-from ..kinds.weapon import Weapon
 from ..rays.one_ray import Follow, Followed
 from .one_shot import Filter, OneShot, Round
 from .position_cache import FARTHEST, ODD, PIXEL, Look, new
@@ -255,15 +254,18 @@ class PositionCache:
                 self._use_visible(visible_set, scene.items.stack())
 
 
-def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
+BUFFERS: list[tuple[Any, memoryview]] = []
+"""Rows that kernels write to, of as many threads as shoot at a time."""
+
+
+def look(fired: Round) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
     shape, number, tell = _shape_of(fired), fired.number, OneShot.append
-    buffers: list[tuple[Any, memoryview]] = []
 
     def look(x: float, y: float, hits: OneShot) -> None:
         """Call the kernel and read its rows from a buffer."""
         try:
-            buffer = buffers.pop()  # each thread takes its own
+            buffer = BUFFERS.pop()  # each thread takes its own
         except IndexError:
             found = np.empty((FEW_ROWS, ROW), np.int64)
             buffer = found, memoryview(found).cast("B")
@@ -271,7 +273,7 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
         count = shot(x, y, near.tiles, shape, buffer[0])
         if count:
             if count < 0:
-                buffers.append(buffer)
+                BUFFERS.append(buffer)
                 if count == UNKNOWN:
                     raise KeyError
                 near.make_visible()
@@ -281,9 +283,10 @@ def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
                 item, samples, pixels, weight, pellets, column, row, distance2 = read(view, at)
                 tell(hits, new(HitRow, (0, number, item, samples, pixels, weight, pellets, (column, row), distance2)))
                 at += ROW_BYTES
-        buffers.append(buffer)
+        BUFFERS.append(buffer)
 
-    return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes
+    pellets = 0 if fired.pellets_xy is None else fired.pellets_xy.nbytes
+    return look, PIECE_BYTES + fired.pattern.bits.words.nbytes + fired.pattern.bits.sums.nbytes + pellets
 
 
 def _shape_of(fired: Round) -> Any:

@@ -40,6 +40,9 @@ from ..kinds.weapon import Pattern, PatternTable, Weapon
 REACH_MOST = 500
 """Largest distance of a pixel from that of its round, px; larger patterns are left to `fire`."""
 
+PELLETS_PX = 2**19
+"""Most pellets of a spread, times the pixels of its box; of others `fire` takes less time, and less is kept."""
+
 TURNED_PX = 2
 """Margin for the pixels of a pattern that turns, beyond its reach: pixels that its axis meets, and rounding."""
 
@@ -64,18 +67,21 @@ class Round(NamedTuple):
 def reach_of(weapon: Weapon) -> int | None:
     """Greatest distance of a pixel of an area weapon from that of its round, px.
 
-    None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position, if pellets have
-    weights, or if a line of sight is needed.
+    None if `fire` answers: if it is too large, if the pixels depend on the fraction of the position, if a line of sight
+    is needed, if pellets have weights or are many, and of bursts of spreads.
     """
     burst, spread, plain = parts_of(weapon)
-    if plain.line_of_sight or (spread and plain.falloff) or (burst and (snap(burst.recoil_xy) % SUB).any()):
+    if plain.line_of_sight or (burst and (spread or (snap(burst.recoil_xy) % SUB).any())):
         return None
     reach = plain.reach_256 // SUB + (TURNED_PX if plain.directed else 0)
-    reach += int(snap(spread.radius)) // SUB if spread else 0
+    if spread:
+        reach += int(snap(spread.radius)) // SUB
+        if plain.falloff or spread.count * (2 * reach + 1) ** 2 > PELLETS_PX:
+            return None
     return reach if reach <= REACH_MOST else None
 
 
-def rounds_of(weapon: Weapon, shot: Shots, seed: int, number: int, offset_256: tuple[int, int] | None) -> list[Round]:
+def rounds_of(weapon: Weapon, shot: Shots, offset_256: tuple[int, int] | None) -> list[Round]:
     """Rounds that have pixels, of a shot at the origin that is aimed toward an offset, if one is given."""
     if offset_256 is not None:
         shot = shot.aimed(toward(*offset_256))
@@ -83,22 +89,14 @@ def rounds_of(weapon: Weapon, shot: Shots, seed: int, number: int, offset_256: t
     if burst is None:
         pattern, drawn = distinct_patterns(plain, shot.one_direction or STRAIGHT)[0], None
         if spread is not None:
-            drawn = pellets_of(spread, np.array([[seed]], np.uint64), np.array([[number]]), np.array([[0]]))[0]
+            drawn = pellets_of(spread, shot.seed[:, None], shot.number[:, None], ORIGIN[:, :1])[0]
         rounds = [Round(0, 0, 0, pattern, drawn)]
     else:
         placements = placements_for(weapon, shot)
-        rounds = [
-            _round_of(placements, number, x, y, spread is not None)
-            for number, (x, y) in enumerate(placements.turn_xy.tolist())
-        ]
+        patterns: list[Pattern] = [placements.table.patterns[kind] for kind in placements.pattern.tolist()]
+        places = enumerate(placements.turn_xy.tolist())
+        rounds = [Round(x, y, number, patterns[number].table) for number, (x, y) in places]
     return [each for each in rounds if each.pattern.box_xyxy[0, 0] <= each.pattern.box_xyxy[0, 2]]
-
-
-def _round_of(placements: Placements, number: int, x: int, y: int, scattered: bool) -> Round:
-    """A round of a burst, on pixel (x, y)."""
-    rows = slice(number * placements.pellets, (number + 1) * placements.pellets)
-    pattern: Pattern = placements.table.patterns[placements.pattern.item(rows.start)]
-    return Round(x, y, number, pattern.table, placements.xy[rows] - (x, y) if scattered else None)
 
 
 ORIGIN: Ints = np.zeros((1, 2), np.int64)

@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import numpy as np
@@ -17,23 +20,24 @@ import numpy as np
 from hitplanes.planes.bits.tiles import (
     BigPattern,
     BigTiles,
+    Depths,
     Ground,
     Hit,
     hit_by_one,
     integers_ns,
-    scattered,
+    stride_of,
     visible_ns,
 )
 from hitplanes.planes.bits.visible import VisibleSet
 from hitplanes.planes.common import costs
-from hitplanes.planes.common.limits import POSITION_MAX
+from hitplanes.planes.common.checks import Ints
+from hitplanes.planes.common.limits import POSITION_MAX, WEIGHT_FULL
 from hitplanes.planes.grid.spans import meets
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
 
 from ..fire.areas import accepted
 from ..fire.hits import HitRow
-from ..kinds.weapon import Weapon
 from .one_shot import Filter, OneShot, Round
 
 CELL_SHIFT = 5
@@ -43,7 +47,7 @@ SIDE = 1 << CELL_SHIFT
 KEPT_BYTES = 64 * 2**20
 """Most memory of the squares of one prepared weapon, bytes; beyond it all are discarded."""
 
-FILTER_BYTES = 2**20
+FILTER_BYTES = 2**21
 """The same of each filter of a weapon that `fire` made ready, of which many are kept."""
 
 EDGE = (POSITION_MAX >> CELL_SHIFT) - 2**12
@@ -84,6 +88,48 @@ new = tuple.__new__
 
 ZERO = np.zeros(1, np.int64)
 """Number of the only shot, as a column."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scattered(BigPattern):
+    """Pellets of one pattern as one integer, of the pixels of all, and an integer of each."""
+
+    pellets: tuple[int, ...] = ()
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the pixels, of all pellets and of each."""
+        return super().nbytes + sum(pellet.bit_length() for pellet in self.pellets) // 7
+
+    def share(self, bits: int, count: int) -> int:
+        """The pixels themselves: tiles of an item share none, so that their sum has all."""
+        return bits
+
+    def counted(self, share: int, pixels: int) -> tuple[int, int, int]:
+        """Samples, weight and pellets of a hit on an item."""
+        each = [samples for pellet in self.pellets if (samples := (share & pellet).bit_count())]
+        return sum(each), sum(each) * WEIGHT_FULL, len(each)
+
+
+def scattered(pattern: BigPattern, offsets_xy: Ints) -> Scattered:
+    """Pellets of a pattern at offsets (K, 2) from the pixel that all are placed on; they have no weights."""
+    (left, top), (right, bottom) = offsets_xy.min(axis=0).tolist(), offsets_xy.max(axis=0).tolist()
+    wide, high = pattern.wide + right - left, pattern.high + bottom - top
+    stride = stride_of(wide)
+    rows = restrided(pattern.rows, pattern.high, pattern.stride, stride)
+    pellets = tuple(rows << (y - top) * stride + x - left for x, y in offsets_xy.tolist())
+    every = reduce(or_, pellets)
+    x, y = pattern.x + left, pattern.y + top
+    return Scattered(x, y, wide, high, stride, every, Depths(every, stride, x, y), pellets=pellets)
+
+
+def restrided(rows: int, high: int, stride: int, wider: int) -> int:
+    """So many rows of a stride as rows of a wider one."""
+    if stride == wider:
+        return rows
+    size, gap = stride >> 3, bytes(wider - stride >> 3)
+    data = rows.to_bytes(high * size, "little")
+    return int.from_bytes(b"".join([data[k : k + size] + gap for k in range(0, len(data), size)]), "little")
 
 
 class Made(dict[int, "Column"]):
@@ -140,7 +186,7 @@ class GroundCache:
 
 # house: way of areas
 # house: row order
-def look(fired: Round, weapon: Weapon) -> tuple[Look, int]:
+def look(fired: Round) -> tuple[Look, int]:
     """Function that looks up what a round hits, and the bytes kept for it."""
     plain, number, tell = fired.pattern.bigs[0], fired.number, OneShot.append
     pattern = plain if fired.pellets_xy is None else scattered(plain, fired.pellets_xy)
@@ -227,6 +273,7 @@ class PositionCache:
         """Make a visible tile as an integer."""
         visible = self._visible
         assert visible is not None  # squares list its tiles
+        self.nbytes += tiles.nbytes_each
         return tiles.read(visible.seen.words, begin)
 
     def walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:

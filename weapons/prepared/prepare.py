@@ -42,7 +42,7 @@ AIMS_BYTES = 32 * 2**20
 AIM_BYTES = 200
 """Memory of an aim or a shot number in addition to its patterns, bytes."""
 
-FILTERS_MOST = 256
+FILTERS_MOST = 128
 """Filters and seeds of a weapon that are kept ready: those of the last shots, as each shooter excludes itself."""
 
 Looks = list[tuple[int, int, Look]]
@@ -70,7 +70,7 @@ class Ready(Generic[AnyHits]):
     Patterns of up to 1000 px are looked up; weapons of one ray are cast (see `prepared_ray`). These are left to `fire`:
 
     - sweeps, spreads and bursts of rays, and rays that must walk (see `strategy.RAY_WAYS`)
-    - weapons with a line of sight, and spreads with a falloff
+    - weapons with a line of sight; spreads with a falloff, of many or far pellets, and bursts of spreads
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
     - batches and bad input
@@ -156,8 +156,8 @@ class AimCache:
 
     def _made(self, aim: Any, offset: tuple[int, int] | None, number: int, kept: Filter) -> Looks:
         looks: Looks = []
-        for fired in rounds_of(self._weapon, kept.shot_at_origin(aim, number), kept.seed, number, offset):
-            look, size = self._look(fired, self._weapon)
+        for fired in rounds_of(self._weapon, kept.shot_at_origin(aim, number), offset):
+            look, size = self._look(fired)
             looks.append((fired.x, fired.y, look))
             self._grow(size)
         self._grow(AIM_BYTES)
@@ -218,20 +218,20 @@ class ReadyPattern(Ready[Hits]):
                     looks = self._aims.known(aim, toward, shot, self._filter.seed)
                     if -FARTHEST < x < FARTHEST and -FARTHEST < y < FARTHEST and x != ODD and y != ODD:
                         return self._answer_at(at, (aim, None, shot), floor(x + PIXEL), floor(y + PIXEL), looks)
-        except (KeyError, ValueError, OverflowError):  # not made yet, too far, or not a pair
+        except (KeyError, ValueError, OverflowError, TypeError):  # not made yet, too far, or not a pair
             pass
         return self._looked_up(at, aim, toward, shot)
 
     def _looked_up(self, at: Any, aim: Any, toward: Any, shot: Any) -> Hits:
         """Fire with arguments that are not in the cache yet, or of unusual types."""
-        place, aim, shot = plain_pair(at), plain_number(aim), plain_number(shot)
-        looks = None if place is None else self._aims.looks(place, aim, toward, shot, self._filter)
+        place, angle, number = plain_pair(at), plain_number(aim), plain_number(shot)
+        looks = None if place is None else self._aims.looks(place, angle, toward, number, self._filter)
         if place is None or looks is None or max(map(abs, place)) > FARTHEST:
             return super().fire(at, aim, toward, shot)
         if aim is None is toward and shot is None and len(looks) == 1 and looks[0][:2] == (0, 0):
             self._straight, self._quick = looks[0][2], self._near.quick
         x, y = ((round(SUB * v) + HALF) >> 8 for v in place)
-        arguments = aim, None if toward is None else plain_pair(toward), shot
+        arguments = angle, None if toward is None else plain_pair(toward), number
         try:
             return self._answer_at(place, arguments, x, y, looks)
         except KeyError:  # too many items are near

@@ -94,9 +94,9 @@ class ReadyRay(Ready[RayHits]):
         if self._items.version != self._version:
             self._follow()
         place, target = plain_pair(at), None if toward is None else plain_pair(toward)
-        aim, shot = plain_number(aim), plain_number(shot)
-        numbered = shot is None or (type(shot) is int and 0 <= shot < 2**63)
-        step = self._step(place, aim, target) if place and numbered and (target or toward is None) else None
+        angle, number = plain_number(aim), plain_number(shot)
+        numbered = number is None or (type(number) is int and 0 <= number < 2**63)
+        step = self._step(place, angle, target) if place and numbered and (target or toward is None) else None
         if place is None or step is None:
             return Ready.fire(self, at, aim, toward, shot)
         start = round(SUB * place[0]), round(SUB * place[1])
@@ -104,7 +104,7 @@ class ReadyRay(Ready[RayHits]):
         if followed is None or (followed[0] == 0 and self._ray.inside != "hit"):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
-        hits._present, hits._at, hits._arguments = self._present, place, (aim, target, shot)
+        hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
         for rank, count, x, y, entry in followed[1]:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
