@@ -357,7 +357,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "fire at no scene": (
         lambda: fire(None, Disc(1), (0, 0)), "scene: expected a Scene or a History, got NoneType"),  # type: ignore[arg-type]
     "fire no weapon": (lambda: shot(weapon="disc"), "weapon: expected a weapon, got str"),
-    "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got type"),
+    "fire a class": (lambda: shot(weapon=Disc), "weapon: expected a weapon, got the class Disc"),
     "aim, NaN": (lambda: shot(aim=math.nan), "aim.*: expected a finite number, got nan"),
     "aim of a row": (
         lambda: shot(at=[(1, 2), (3, 4)], aim=[0, math.inf]), r"aim\[1\]: expected a finite number, got inf"),
@@ -863,13 +863,17 @@ def test_an_empty_list_of_points_is_none_of_them() -> None:
     assert sees(scene, [], (3, 3)).size == sees(scene, (3, 3), []).size == 0
     scene.move([], [])
     scene.set([], position_xy=[], velocity_xy=[])
-    assert scene.carve({wall: []}) == {}
+    assert scene.carve({wall: []}) == {wall: 0}
     with pytest.raises(InputError, match="at: expected shape"):
         fire(scene, Disc(3), np.zeros((0, 3)))
 
 
 SPANS = {
-    "alpha": (np.full((2, 2), 255, np.uint8), (0, 0), r"mask\[0\]\[0\]: expected 0 or 1, got 255"),
+    "alpha": (
+        np.full((2, 2), 255, np.uint8),
+        (0, 0),
+        r"mask\[0\]\[0\]: expected 0 or 1 .of an image of grey: mask > 127., got 255",
+    ),
     "masks": (np.ones((2, 2, 2), np.bool_), (0, 0), r"mask: expected shape \(any, any\), got \(2, 2, 2\)"),
     "fraction": ([[1]], (10.5, 0), r"origin_xy\[0\]: expected a whole number"),
     "corner": ([[1]], (10, 0, 0), r"origin_xy: expected shape \(2,\), got \(3,\)"),

@@ -26,6 +26,7 @@ Labels = npt.NDArray[np.unsignedinteger[Any]]  # of a label plane, see `hitplane
 Shape = tuple[int | None, ...]
 
 SHOWN = 60  # most characters of a value that an error shows
+GREY_MAX = 255  # greatest value of a pixel of an image
 
 FLOAT_MAX = sys.float_info.max
 
@@ -107,7 +108,10 @@ def bools(field: str, values: object, shape: Shape) -> Bools:
     """Check an array of booleans; numbers 0 and 1 pass."""
     array = _numeric(field, values, shape, "biu")
     if array.dtype.kind != "b":
-        _first_bad(field, array, (array == 0) | (array == 1), "0 or 1")
+        good = (array == 0) | (array == 1)
+        if not good.all():
+            grey = array.min() >= 0 and array.max() == GREY_MAX
+            _first_bad(field, array, good, f"0 or 1{' (of an image of grey: mask > 127)' if grey else ''}")
         return array.astype(np.bool_)
     return np.not_equal(array.view(np.uint8), 0)  # a view of other bytes as booleans may have any true byte
 
@@ -200,6 +204,11 @@ def printable(text: str) -> str:
     Escapes that are in the text stay as they are.
     """
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def kind_of(value: object) -> str:
+    """What a value is, for an error about its type."""
+    return f"the class {value.__name__}, not one made of it" if isinstance(value, type) else type(value).__name__
 
 
 def shown(value: object) -> str:

@@ -248,7 +248,7 @@ class Scene:
             self._items.record(rows, columns)
 
     def carve(self, pixels: HitPixels | Mapping[int, object]) -> dict[int, int]:
-        """Take pixels out of objects, as terrain that is shot away, and return how many each of them lost.
+        """Take pixels out of objects, as terrain that is shot away, and return how many each of them lost, or 0.
 
         An object loses exactly these pixels of its mask as it stands, and keeps its id, name and pose. The hole turns,
         flips and grows with it; other frames stay whole. One of which nothing is left stays, with an empty mask.
@@ -269,7 +269,7 @@ class Scene:
         sprites, lost = late.carving.carved_sprites(self.items, given)
         if rows := list(lost):
             self.items.reform(rows, self.items.looks(rows)._replace(sprites=sprites))
-        return {int(self._items.id[row]): count for row, count in lost.items()}
+        return {int(self._items.id[row]): lost.get(row, 0) for row in given}
 
     def _of_role(self, rows: Ints, role: Role) -> dict[str, Any]:
         """Columns of a new role; objects that have the default categories of the old role get those of the new one."""

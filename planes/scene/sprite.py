@@ -21,6 +21,7 @@ from ..common.checks import (
     choice,
     integer,
     integers,
+    kind_of,
     listed,
     real,
     reals,
@@ -295,7 +296,7 @@ def as_sprite(value: object) -> Sprite:
             return Sprite.from_mask(array)
         if array.ndim == 3:
             return Sprite.from_image(array)
-    got = array.shape if array.ndim else type(value).__name__
+    got = array.shape if array.ndim else kind_of(value)
     raise InputError(f"sprite: expected a Sprite, a mask (h, w) or an image (h, w, 3 or 4), got {got}")
 
 

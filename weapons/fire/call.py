@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, TypedDict, 
 import numpy as np
 
 from hitplanes.planes.common.backend import keep_arena, news
-from hitplanes.planes.common.checks import InputError, Ints, choice, each, reals, shown
+from hitplanes.planes.common.checks import InputError, Ints, choice, each, kind_of, reals, shown
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.scene.scene import Scene
 
@@ -268,7 +268,7 @@ def present_of(scene: object) -> Scene:
     from hitplanes.planes.scene.history import History
 
     if not isinstance(scene, History):
-        raise InputError(f"scene: expected a Scene or a History, got {type(scene).__name__}")
+        raise InputError(f"scene: expected a Scene or a History, got {kind_of(scene)}")
     return scene.scene
 
 

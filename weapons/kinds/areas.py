@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 
 from hitplanes.planes.common.backend import LruCache, jit_is_on, kernels_of
-from hitplanes.planes.common.checks import InputError, Ints, choice, integer, shown, within
+from hitplanes.planes.common.checks import InputError, Ints, choice, integer, kind_of, shown, within
 from hitplanes.planes.common.limits import HALF, MASK_SIDE_MAX, PATTERN_CACHE_BYTES, PELLETS_MAX, REACH_MAX, SUB
 from hitplanes.planes.common.tables import Flag, Mask, Number, Numbers, Optional, Rows, Value, Whole, Word, typed
 from hitplanes.planes.grid import fixed_point, rasterize, turns
@@ -398,7 +398,7 @@ def parts_of(weapon: Weapon) -> tuple[Rounds[Any] | None, Spread[Any] | None, Ar
     """Burst, spread and pattern of an area weapon."""
     parts = _parts_of(weapon)[0]
     if parts is None:
-        raise InputError(f"weapon: expected a weapon, got {type(weapon).__name__}")
+        raise InputError(f"weapon: expected a weapon, got {kind_of(weapon)}")
     return parts
 
 

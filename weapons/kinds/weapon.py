@@ -19,7 +19,7 @@ from hitplanes.planes.bits.bit_rows import NO_SUMS, WORD, PatternBits, Sums, Wor
 from hitplanes.planes.bits.span_walk import Runs
 from hitplanes.planes.bits.tiles import BigPattern, Depths, big_pattern, stride_of
 from hitplanes.planes.common.backend import LruCache, in_parts, jit_is_on, kernels_of
-from hitplanes.planes.common.checks import InputError, Ints, shown
+from hitplanes.planes.common.checks import InputError, Ints, kind_of, shown
 from hitplanes.planes.common.limits import MASK_AREA_MAX, REACH_MAX, SUB, WEIGHT_FULL
 from hitplanes.planes.common.tables import Number, Ref, Value
 from hitplanes.planes.grid import fixed_point
@@ -42,7 +42,8 @@ class Part(Ref):
     def check(self, name: str, value: object) -> object:
         """Check that the value is a weapon of one of the kinds."""
         if not isinstance(value, self.kinds):
-            raise InputError(f"{name}: expected {self.expected}, got {shown(value)}")
+            got = kind_of(value) if isinstance(value, type) else shown(value)
+            raise InputError(f"{name}: expected {self.expected}, got {got}")
         return value
 
 
