@@ -12,7 +12,7 @@ import pytest
 
 from hitplanes import Beam, Disc, InputError, Laser, Point, Scene, Spread, Sprite, fire, load_scene, weapons_of
 from hitplanes import Box as WeaponBox
-from hitplanes.weapons.report.canvas import World, heat_step, plain
+from hitplanes.weapons.report.canvas import RING, World, heat_step, plain
 from hitplanes.weapons.report.cards import CELL, COLUMNS, ROWS, inset_of, shot_card
 from hitplanes.weapons.report.differences import differences
 from hitplanes.weapons.report.overlay import LETTER, ROW, SHOT_BADGE, Overlay
@@ -148,7 +148,27 @@ def test_large_views_share_cells(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_heat_rises_in_lightness_and_spans_the_scale() -> None:
     lightness = [54 * r + 183 * g + 19 * b for r, g, b in HEAT]
     assert lightness == sorted(set(lightness))
-    assert (heat_step(1, 1000), heat_step(1000, 1000), heat_step(1, 1)) == (0, len(HEAT) - 1, 0)
+    assert (heat_step(1, 1000), heat_step(1000, 1000), heat_step(1, 1)) == (0, len(HEAT) - 1, len(HEAT) - 1)
+
+
+def test_hits_that_lie_alone_have_a_ring() -> None:
+    """One pixel at (10, 10), and five beside each other at (20..24, 30), 4 px of the picture each."""
+    world = World(None, None, (0, 0, 39, 39), 4)
+    runs = [[10, 10, 10, 1], [30, 20, 24, 1]]
+    batch = {"verdicts": {"hit": 6}, "heat": {"cell": 1, "origin_xy": [0, 0], "counts": {"hit": runs}}}
+    world.mark_heat(batch, "hit")
+    ringed = np.argwhere((world.image == MARKS["hit"][0]).all(axis=2))
+    assert len(ringed) > 20 and (abs(np.hypot(*(ringed - 42).T) - RING) < 1).all()
+
+
+@pytest.mark.parametrize("of_rays", [True, False])
+def test_the_ways_of_rays_are_lines(of_rays: bool) -> None:
+    world = World(None, None, (0, 0, 9, 9), 6)
+    plain, counts = world.image.copy(), {"empty": [[4, 0, 9, 1]]}
+    heat = {"cell": 1, "origin_xy": [0, 0], "counts": counts}
+    world.mark_heat({"verdicts": {"empty": 10} | ({"beyond": 0} if of_rays else {}), "heat": heat}, "empty")
+    marked = (world.image != plain).any(axis=2)
+    assert not marked[:24].any() and not marked[30:].any() and marked[24:30].all() == of_rays
     assert [heat_step(n, 1000) for n in range(1, 1001)] == sorted(heat_step(n, 1000) for n in range(1, 1001))
 
 

@@ -41,6 +41,9 @@ THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 DASH = 5  # length of the dashes of an outline, px
 SHADOW, SHADOW_ALPHA = (12, 14, 18), 170  # ground under the marks of hits, which keeps the gaps between them dark
 HEAT_ALPHA = 235  # opacity of the heat of hits, of 255
+LINE_ALPHA = 60  # the same of the cells of rays that decide nothing
+LONE_PX, LONE_PIXELS = 3, 2  # a hit lies alone if so few pixels are hit within so many px of it
+RINGS_MAX, RING = 400, 6  # most rings around hits that lie alone, and their radius, px
 OUTLINES_MAX = 1000  # most objects that are outlined in addition to those that were hit or blocked
 
 
@@ -105,8 +108,12 @@ class World:
         _lay(window, part, color, TINT)
         _lay(window, part & shape, color, alpha)
 
-    def mark_heat(self, heat: Mapping[str, Any], verdict: str) -> None:
-        """Colour each cell by its number of samples of one verdict, on a logarithmic scale."""
+    def mark_heat(self, batch: Mapping[str, Any], verdict: str) -> None:
+        """Colour each cell by its number of samples of one verdict, on a logarithmic scale; ring those that lie alone.
+
+        The cells of rays that decide nothing are tinted, which makes lines of them.
+        """
+        heat, of_rays = batch["heat"], "beyond" in batch["verdicts"]
         most = max((run[3] for run in heat["counts"].get(verdict, ())), default=0)
         steps = np.zeros((self.view[3] - self.view[1] + 1, self.view[2] - self.view[0] + 1), np.uint8)
         for count, box in heat_boxes(heat, verdict):
@@ -115,12 +122,26 @@ class World:
             return
         self.painted.add(verdict)
         there = enlarged(steps > 0, self.factor)
-        if verdict != "hit":
-            color, alpha = MARKS[verdict]
+        color, alpha = MARKS[verdict]
+        if verdict == "hit":
+            colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
+            blend(self.image, enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
+        elif of_rays and verdict in ("empty", "outside"):
+            _lay(self.image, there, color, LINE_ALPHA)
+        else:
             _lay(self.image, there & tiled_glyph(verdict, self.factor, there.shape), color, alpha // 2)
-            return
-        colors = np.array(HEAT, np.uint8)[np.maximum(steps, 1) - 1]
-        blend(self.image, enlarged(colors, self.factor), np.where(there, HEAT_ALPHA, 0).astype(np.uint8), 0, 0)
+        if verdict in ("hit", "occluded"):
+            self._ring_lone(steps > 0, color)
+
+    def _ring_lone(self, at: Bools, color: Color) -> None:
+        """Draw rings around the set pixels of a plane (h, w) that have no other within LONE_PX; at most RINGS_MAX."""
+        side = 2 * LONE_PX + 1
+        near = cv2.boxFilter(at.astype(np.float32), -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        lone = np.argwhere(at & (near <= LONE_PIXELS))
+        for y, x in lone.tolist() if len(lone) <= RINGS_MAX else ():
+            middle = x * self.factor + self.factor // 2, y * self.factor + self.factor // 2
+            cv2.circle(self.image, middle, RING, (20, 22, 26), 3)
+            cv2.circle(self.image, middle, RING, color, 1)
 
     def outline(self, item: int, kind: str) -> None:
         """Draw the border of an object's mask inside its pixels: thick for "hit", thick and dashed for "blocked"."""
@@ -196,8 +217,8 @@ def covered(view: Box, lists: Iterable[Sequence[Sequence[int]] | Ints]) -> Bools
 
 
 def heat_step(count: int, most: int) -> int:
-    """Step of a count from 1 to `most` on the scale of heat, by its number of binary digits."""
-    return (count.bit_length() - 1) * (len(HEAT) - 1) // max(most.bit_length() - 1, 1)
+    """Step of a count from 1 to `most` on the scale of heat, by its number of binary digits; the last if all are 1."""
+    return len(HEAT) - 1 if most == 1 else (count.bit_length() - 1) * (len(HEAT) - 1) // max(most.bit_length() - 1, 1)
 
 
 def _dimmed(scene: Scene, view: Box, light: int) -> Image:
@@ -315,7 +336,7 @@ def draw_texts(page: Image, texts: Sequence[Text]) -> None:
         shown = plain(text.text)
         x = text.x - text_width(shown) * (2 * text.right + text.middle) // 2
         font = cv2.FONT_HERSHEY_DUPLEX if text.bold else cv2.FONT_HERSHEY_SIMPLEX
-        cv2.putText(page, shown, (x, text.y), font, SIZE, text.color, 1, cv2.LINE_AA)
+        cv2.putText(page, shown, (x, text.y), font, SIZE, text.color, 1)
 
 
 def plain(text: str) -> str:
@@ -378,8 +399,9 @@ def legend_of(report: Mapping[str, Any], painted: Set[str], width: int) -> Legen
     if heat and "hit" in painted:
         scale = np.repeat(np.array(HEAT, np.uint8)[None], 14, axis=0)
         cell = report["batch"]["heat"]["cell"]
-        per = f" in {cell} x {cell} px" if cell > 1 else ""
-        entries.insert(0, Entry(f"1 to {max(run[3] for run in heat)} hits{per}", np.repeat(scale, 5, axis=1)))
+        per, most = f" in {cell} x {cell} px" if cell > 1 else "", max(run[3] for run in heat)
+        word, scale = (f"1 to {most} hits", scale) if most > 1 else ("1 hit", scale[:, [-1] * 3])
+        entries.insert(0, Entry(word + per, np.repeat(scale, 5, axis=1)))
     target = "other target" if painted & {"object hit", "object blocked"} else "target"
     words = {"hit": "object hit", "blocked": "object blocked", "other": target, "now": "where it is now"}
     words["shadow"] = "edge of a shadow"

@@ -76,7 +76,7 @@ def picture_of_report(report: Mapping[str, Any], scene: Scene, *, text: bool = T
         draw_cells(world, report)
     if report["batch"]:
         for verdict in MARKS:
-            world.mark_heat(report["batch"]["heat"], verdict)
+            world.mark_heat(report["batch"], verdict)
         world.outline_seen(scene.ids(Role.HITTABLE).tolist())
         texts, cards = [], batch_cards(report)
     else:
@@ -218,7 +218,7 @@ def _marked(world: World, report: Mapping[str, Any]) -> list[Text]:
     for verdict in MARKS:
         world.mark_samples(marked(report["shots"], verdict), verdict)
         if report["batch"]:
-            world.mark_heat(report["batch"]["heat"], verdict)
+            world.mark_heat(report["batch"], verdict)
     there = set() if world.scene is None else set(world.scene.ids().tolist())
     for item in sorted(there & {row["object"] for shot in report["shots"] for row in shot["rows"]}):
         world.outline(item, "hit")
