@@ -21,6 +21,7 @@ from hitplanes.planes.common.backend import LruCache
 from hitplanes.planes.common.checks import InputError
 from hitplanes.planes.common.limits import ALL
 from hitplanes.planes.files.scene_folder import load_scene
+from hitplanes.planes.scene.history import History
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.render import Planes
 from hitplanes.planes.scene.scene import Scene
@@ -426,6 +427,22 @@ def test_a_bad_value_is_named(values: dict[str, Any], message: str) -> None:
 
 
 # Names and categories
+
+
+def test_find_knows_the_names_of_now_and_of_then() -> None:
+    """Ids are found also where rows are used again, after changes, in copies, and in the past."""
+    scene = Scene()
+    history = History(scene, ticks=4)
+    first = [scene.add(Sprite.circle(2), (9 * k, 0), name=f"duck {k}") for k in range(5)]
+    history.record(0)
+    scene.remove(first[1:3])
+    other = scene.add(Sprite.circle(2), (0, 40), name="duck 1")
+    assert scene.find("duck 1") == scene.copy().find("duck 1") == other != first[1]
+    past = history.at(0)
+    assert [past.find(f"duck {k}") for k in range(5)] == first
+    for name in ("duck 2", "", 3):
+        with pytest.raises(InputError, match="name: expected one of"):
+            scene.find(name)  # type: ignore[arg-type]
 
 
 def test_find_suggests_a_name() -> None:

@@ -377,6 +377,9 @@ class Scene:
 
     def find(self, name: str) -> int:
         """Id of the object of a name; it must be the only one."""
+        every = self._items.names
+        if isinstance(name, str) and name and every.count(name) == 1:
+            return int(self._items.id[every.index(name)])
         names = {i: self._items.name_of(i) for i in self.ids().tolist()}
         choice("name", name, names.values())
         named = [i for i, other in names.items() if other == name]
