@@ -99,6 +99,37 @@ def test_owners_are_those_of_each_aim(weapon: Weapon, jit: bool) -> None:
             assert ({first, second} <= set(truth.object.tolist())) == (list(exclude) == [second, first])
 
 
+@pytest.mark.parametrize(
+    "weapon",
+    [
+        Rifle(90, budget=20),
+        Rifle(90, budget=0),
+        Laser(90, inside="ignore_until_exit"),
+        Laser(90, width=3, inside="error"),
+    ],
+    ids=str,
+)
+def test_rays_that_must_not_walk_are_ready(weapon: Weapon, jit: bool) -> None:
+    """Those with a budget that meet no object, and those that begin in none."""
+    scene = Scene()
+    scene.add(np.ones((9, 9), np.bool_), (20, 0))
+    scene.add(np.ones((9, 9), np.bool_), (0, 60), role="occluder")
+    budget = getattr(weapon, "budget", None)
+    fire(scene, weapon, (0.0, 0.0))
+    for aim, at, meets, begins in (
+        (0, (0.0, 0.0), True, False), (90, (0.0, 0.0), False, False), (180, (0.0, 0.0), False, False),
+        (0, (20.0, 0.0), True, True), (180, (24.5, 0.0), True, True), (0, (0.0, 60.0), False, True),
+    ):  # fmt: skip
+        if begins and getattr(weapon, "inside", "") == "error":
+            with pytest.raises(InputError):
+                fire(scene, weapon, at, aim=aim)
+            continue
+        hits, truth = fire(scene, weapon, at, aim=aim), fire(scene, weapon, at, aim=aim, strategy="walk")
+        same(hits, truth)
+        assert hits.stop == truth.stop and hits.passes == truth.passes
+        assert is_ready(hits) == (not (meets or budget == 0) if budget is not None else not begins)
+
+
 def test_each_shooter_of_many_is_ready(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each excludes itself, and the filters of the last few are kept; also those that are made anew hit the same."""
     monkeypatch.setattr(prepare, "FILTERS_MOST", 20)

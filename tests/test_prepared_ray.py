@@ -320,7 +320,7 @@ def test_positions_of_any_kind(kernels: ModuleType, at: object) -> None:
 
 
 @pytest.mark.parametrize("weapon", [
-    Rifle(90, budget=20), Laser(90, inside="ignore_until_exit"), Projectile(90, 3, steps=4), Projectile(0, 9),
+    Projectile(90, 3, steps=4), Projectile(0, 9),
     Rounds(Pistol(90), 2), Spread(Pistol(90), 3, 4),
 ], ids=repr)  # fmt: skip
 def test_other_weapons_of_rays_go_the_way_of_fire(weapon: Weapon) -> None:

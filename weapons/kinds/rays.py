@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -235,6 +235,15 @@ def not_cast(ray: RayWeapon) -> str:
         return "a budget is used up cell by cell"
     if ray.inside != "hit" and not ends_at_first(ray):
         return "items in which rays start are not hit"
-    if isinstance(ray, Projectile) and (ray.steps is not None or not ray.length_256):
-        return "a projectile is tested at moments of the frame"
-    return ""
+    return "a projectile is tested at moments of the frame" if is_stepped(ray) else ""
+
+
+def is_stepped(ray: RayWeapon) -> bool:
+    """Whether rays of a weapon are tested at some moments of the frame alone."""
+    return isinstance(ray, Projectile) and (ray.steps is not None or not ray.length_256)
+
+
+def unspent(ray: RayWeapon) -> RayWeapon:
+    """The weapon as it is for rays that begin in nothing and spend nothing, which can be cast."""
+    free = replace(ray, inside="hit") if ray.inside != "hit" else ray
+    return replace(free, budget=None) if isinstance(free, Rifle) and free.budget is not None else free

@@ -22,7 +22,7 @@ from ..fire.call import category_bits, check_owners, fire_anew
 from ..fire.hits import Hits
 from ..kinds.areas import Rays, parts_of, ray_parts_of
 from ..kinds.placements import accepted_of, blocking_of, checked_filter, checked_owners, checked_seeds
-from ..kinds.rays import not_cast
+from ..kinds.rays import is_stepped
 from ..kinds.weapon import Weapon
 from . import position_cache
 from .one_shot import Arguments, Filter, OneShot, Present, reach_of, rounds_of
@@ -69,7 +69,7 @@ class Ready(Generic[AnyHits]):
 
     Patterns of up to 1000 px are looked up; weapons of one ray are cast (see `prepared_ray`). These are left to `fire`:
 
-    - sweeps, spreads and bursts of rays, and rays that must walk (see `strategy.RAY_WAYS`)
+    - sweeps, spreads and bursts of rays, and rays that must walk (see `prepared_ray`)
     - weapons with a line of sight; spreads with a falloff, of many or far pellets, and bursts of spreads
     - larger patterns, and in numpy large patterns near which there are many items
     - bursts whose recoil is not a whole number of pixels
@@ -319,7 +319,7 @@ def prepare(
     if parts is not None:
         from .prepared_ray import ReadyRay
 
-        alone = parts[0] is None and parts[1] is None and not not_cast(parts[2])
+        alone = parts[0] is None and parts[1] is None and not is_stepped(parts[2])
         return ReadyRay(scene, weapon, kept, parts[2]) if alone else Ready(scene, weapon, kept)
     reach = reach_of(weapon)
     return Ready(scene, weapon, kept) if reach is None else ReadyPattern(scene, weapon, kept, reach)

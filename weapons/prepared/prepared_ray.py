@@ -26,7 +26,7 @@ from .. import late
 from ..fire.hits import HitRow
 from ..fire.prefilter import filters_of
 from ..kinds.areas import ray_parts_of
-from ..kinds.rays import RayWeapon
+from ..kinds.rays import RayWeapon, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
 from ..rays.contacts import NEVER, rays_of
@@ -37,6 +37,9 @@ from .position_cache import new
 from .prepare import PLAIN, Ready, plain_number, plain_pair
 
 Pair = tuple[float, float]
+
+ENTRY = 4
+"""Place in a row of `Followed` of the time at which the ray enters the object."""
 
 
 class OneRay(OneShot, RayHits):
@@ -72,13 +75,14 @@ class OneRay(OneShot, RayHits):
 class ReadyRay(Ready[RayHits]):
     """Prepared weapon of one ray that can be cast.
 
-    Bad input is left to `fire`, and so are a ray that starts inside an item if its weapon does not hit that item, and
-    projectiles while items move.
+    These are left to `fire`: bad input, projectiles while items move, a ray with a budget that meets an object, and a
+    ray that starts inside an item if its weapon does not hit that item.
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
         super().__init__(scene, weapon, kept)
         self._ray, self._length, self._fades, self._view = ray, ray.length_256, ray.fades, kept.view(pierce=False)
+        self._cast, self._budget_256 = unspent(ray), ray.budget_256
         self._items, self._version, self._arrangement = scene.items, -1, -1
         self._lock = threading.Lock()
         self._stack: Stack
@@ -101,7 +105,7 @@ class ReadyRay(Ready[RayHits]):
             return Ready.fire(self, at, aim, toward, shot)
         start = round(SUB * place[0]), round(SUB * place[1])
         followed = self._follows(*start, *step)
-        if followed is None or (followed[0] == 0 and self._ray.inside != "hit"):
+        if followed is None or self._must_walk(*followed):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
@@ -111,6 +115,12 @@ class ReadyRay(Ready[RayHits]):
             columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
             hits.append(new(HitRow, columns))
         return hits
+
+    def _must_walk(self, end: int, found: list[list[int]]) -> bool:
+        """Whether a ray that was cast to its end begins in an item that is not hit, or spends something."""
+        if self._ray.inside != "hit" and (end == 0 or (found and found[0][ENTRY] == 0)):
+            return True
+        return self._budget_256 is not None and (bool(found) or not self._budget_256)
 
     def reaches(self, at: Any, target: Any) -> bool | None:
         """Whether a ray from one point to another meets nothing; None if they must be checked, or are one."""
@@ -125,7 +135,7 @@ class ReadyRay(Ready[RayHits]):
 
     def _unsettled(self, x: int, y: int, dx: int, dy: int) -> Followed | None:
         """What a ray hits, by the way chosen now; the next rays go the same way unless it is pending."""
-        follow, pending = chosen_follower(self.scene, self._stack, self._ray, self._view)
+        follow, pending = chosen_follower(self.scene, self._stack, self._cast, self._view)
         if not pending:
             self._follows = follow
         return follow(x, y, dx, dy)
