@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -196,17 +196,12 @@ def look(fired: Round) -> tuple[Look, int]:
 
     def look(x: int, y: int, hits: OneShot) -> None:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
-        shared: list[Shared] = []
         near: PositionCache = hits._present.near
         square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
-        if square is UNMADE:
-            for distance2, py, px, item, n, part in near.walked(pattern, x, y):
-                samples, weight, pellets = counted(part, n)
-                tell(hits, new(HitRow, (0, number, item, samples, n, weight, pellets, (px, py), distance2)))
-            return
+        shared = near.walked(pattern, x, y) if square is UNMADE else []
         left, top, last = x + first_x, y + first_y, -1
         right, bottom, tiles = left + wide, top + high, near.tiles(stride)
-        for x_min, y_min, x_max, y_max, begin, item in square:
+        for x_min, y_min, x_max, y_max, begin, item in () if square is UNMADE else square:
             if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
                 bits = tiles.get(begin)
                 if bits is None:
@@ -276,8 +271,8 @@ class PositionCache:
         self.nbytes += tiles.nbytes_each
         return tiles.read(visible.seen.words, begin)
 
-    def walked(self, pattern: BigPattern, x: int, y: int) -> Iterator[tuple[int, int, int, int, int, int]]:
-        """Walk the tiles that a round may meet; yield squared distance, y, x, id, count and share of what it hits.
+    def walked(self, pattern: BigPattern, x: int, y: int) -> list[Shared]:
+        """Walk the tiles that a round at pixel (x, y) may meet; return what it hits, in order.
 
         Raises
         ------
@@ -292,7 +287,10 @@ class PositionCache:
         near = accepted((np.zeros_like(tile), tile), ground, self._shots, ZERO)
         found: list[Hit] = hit_by_one(pattern, x, y, near, ground)
         ids = ground.stack.ids
-        return ((distance2, py, px, ids.item(rank), n, part) for _, distance2, py, px, rank, n, part in found)
+        return [
+            (distance2, py - y, px - x, k, ids.item(rank), n, part)
+            for k, (_, distance2, py, px, rank, n, part) in enumerate(found)
+        ]
 
     def _lose(self, ns: float) -> None:
         """Count the time of a walk, which a visible set would save; make the set once that pays."""
