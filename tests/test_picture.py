@@ -175,7 +175,7 @@ def test_picture_without_text_is_the_same_on_every_opencv(kind: str) -> None:
 
 PICTURE_HASHES = {
     "shots": "6a419542aeceeb09",
-    "batch": "e3b0fa4f5bb513a2",
+    "batch": "d45ea7528a3a98ec",
     "out of view": "ef14ea21b7c2bff0",
     "circles": "484e7ac8e8fe2da3",
     "boxes": "9132ed929da2f872",

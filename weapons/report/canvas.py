@@ -130,7 +130,7 @@ class World:
             _lay(self.image, there, color, LINE_ALPHA)
         else:
             _lay(self.image, there & tiled_glyph(verdict, self.factor, there.shape), color, alpha // 2)
-        if verdict in ("hit", "occluded"):
+        if verdict == "hit" or (of_rays and verdict == "occluded"):
             self._ring_lone(steps > 0, color)
 
     def _ring_lone(self, at: Bools, color: Color) -> None:
