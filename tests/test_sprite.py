@@ -160,6 +160,16 @@ def test_centres_are_mapped_back_to_the_closed_squares_that_hold_them(
         assert (row - 1, column - 1) in inside if inside else not planes[k, row, column]
 
 
+def test_a_place_just_beyond_a_frame_is_not_held(jit: bool) -> None:
+    """The second centre lies 2**-22 px below the last row; the first pixel of the next frame is set."""
+    frames = [np.array([[1], [0], [0], [0], [0]], np.bool_), np.ones((1, 1), np.bool_)]
+    unit, first = np.array([[6 << 20, 4 << 20]]), np.array([[12 << 20, 16 << 20]])
+    step = np.array([[[2 - (9 << 20), (8 << 20) - 1], [1 + (4 << 20), 1]]])
+    grids = variants.Grids(np.zeros_like(unit), np.array([[12, 1]]), first, step, unit)
+    turned = kernels_of(variants).turned_masks(frames, np.array([0]), grids)
+    assert turned.area.tolist() == [0]
+
+
 @AGAINST
 @given(masks(), masks(), st.integers(0, 2**32))
 def test_a_pixel_is_set_if_a_set_square_holds_its_centre(

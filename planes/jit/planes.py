@@ -454,7 +454,7 @@ def _is_held(flat, frame, place, unit):
 @helper()
 def _within(place, step, size, near, far):
     """The part of near .. far - 1 whose places on an axis, which are DOUBT too great, may be on a frame of a size."""
-    most = (size << PLACE_BITS) + 2 * DOUBT
+    most = (size << PLACE_BITS) + 2 * DOUBT - 1  # `_map` looks exactly at all up to it
     if step == 0:
         return (near, far) if 0 <= place <= most else (near, near)
     first, last = float(-place) / float(step), float(most - place) / float(step)
