@@ -32,8 +32,8 @@ from .front_to_back import NO_NUMBERS, OrderedTiles
 OFTEN = 32
 """Answers of a pattern after which the planes of its depths, and of its weights, are made; they take as long."""
 
-FARTHEST = (1 << 62, 0, 0)
-"""Squared distance, y and x that are farther than those of all pixels."""
+NO_PIXEL = (1 << 62, 0, 0)
+"""Squared distance, y and x of no pixel, which are greater than those of any."""
 
 PATTERN_BYTES = 500
 """Memory of a pattern beside its pixels, bytes."""
@@ -80,7 +80,7 @@ def nearest_of(bits: int, stride: int, left: int, top: int) -> tuple[int, int, i
     count = (bits.bit_length() - 1) // stride + 1 - first
     rows = (bits >> first * stride).to_bytes(count * size, "little")
     begin = min(max(-top, 0), count - 1)
-    best = FARTHEST
+    best = NO_PIXEL
     down = takewhile(lambda k: (top + k) ** 2 <= best[0], range(begin, count))
     up = takewhile(lambda k: (top + k) ** 2 <= best[0], range(begin - 1, -1, -1))
     for k in chain(down, up):

@@ -564,7 +564,7 @@ def disc_offsets(radius_256: int, seed: Any, shot: Ints, round_: Ints, pellet: I
     """See `kinds.draws.disc_offsets`."""
     *turns, pellets = (np.asarray(seed, np.uint64), shot, round_, pellet)
     shape, reach = np.broadcast_shapes(*(word.shape for word in (*turns, pellets))), radius_256 // SUB
-    size = shape if len(shape) > 1 else (*shape, 1)  # a row for each turn
+    size = shape if len(shape) > 1 else (*shape, 1)  # a row for each turn, or for each pellet alone
     rows = [word.reshape(-1) if word.size == size[0] else np.broadcast_to(word, size)[:, 0] for word in turns]
     each = pellets.reshape(size) if pellets.size == size[0] * size[1] else np.broadcast_to(pellets, size)
     offsets = np.empty((*size, 2), np.int64)

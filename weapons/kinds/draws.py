@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
-import numpy.typing as npt
 
+from hitplanes.planes.bits.bit_rows import Words
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import GOLDEN, SUB
-
-Words = npt.NDArray[np.uint64]
 
 ROWS_AT_ONCE = 2**15
 """Draws made at a time: 256 KB for each of their arrays; with fewer, the calls of numpy take longer."""
@@ -21,6 +19,7 @@ FEW = 64
 """Most draws that are made one after another in integers of Python; they take as long as the calls of numpy."""
 
 WORD_MAX, STEP = 2**64 - 1, int(GOLDEN)
+"""Greatest word, and what a state grows by before each draw."""
 
 
 def mix64(words: Words) -> Words:
@@ -111,7 +110,7 @@ def _keyed(state: int, number: int) -> int:
 
 
 def _offset(radius_256: int, state: int) -> tuple[int, int]:
-    """Offset within a disc, drawn until it lies inside."""
+    """Offset within a disc, drawn until it lies inside; `_in_disc` of one state."""
     reach = radius_256 // SUB
     bits = (1 << (2 * reach).bit_length()) - 1
     while True:

@@ -11,9 +11,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from hitplanes.planes.bits.bit_rows import row_order
+from hitplanes.planes.bits.bit_rows import Words, row_order
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Floats, InputError, Ints, array_of, each, integer, integers, reals
 from hitplanes.planes.common.limits import ALL, CATEGORY_BITS, EVERYTHING, POSITION_MAX, SEED_MAX
@@ -61,8 +60,6 @@ class ShotColumns(Columns):
         every = cls.joined([replace(part, shot=own[part.shot]) for part, own in zip(parts, shots, strict=True)])
         return every.take(row_order(every.shot))
 
-
-Words = npt.NDArray[np.uint64]
 
 OWNER_MAX = 2**31
 STRAIGHT = (ONE, 0)

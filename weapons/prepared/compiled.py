@@ -188,7 +188,7 @@ shot = _shot.overloads[_shot.signatures[0]].entry_point
 """Its entry point, without the dispatch on argument types, which takes twice as long as the call."""
 
 
-def filter_of(view: View) -> tuple[Ints, Ints]:
+def filter_columns(view: View) -> tuple[Ints, Ints]:
     """Filter of the items that shots of a view meet, as columns of one shot."""
     return np.array([view.meets]), np.array([view.exclude], np.int64).reshape(1, -1)
 
@@ -232,7 +232,7 @@ class PositionCache:
                 return
             worth = max(int(visible_ns(stack, COMPILED)), 1)
             bounds = self._scene.bounds or EVERYWHERE
-            kept = filter_of(self._view) if self._view.may_refuse(stack) else ACCEPT_ALL
+            kept = filter_columns(self._view) if self._view.may_refuse(stack) else ACCEPT_ALL
             self.tiles = _shot_tiles(
                 *self._ground.read(stack), *NOWHERE_NEAR, self._view.pierce, tuple(bounds), *kept, worth
             )
@@ -354,7 +354,7 @@ one_ray = _one_ray.overloads[_one_ray.signatures[0]].entry_point
 def follower(stack: Stack, bounds: Box | None, view: View, radius: int, most: int | None) -> Follow:
     """See `rays.one_ray.follower`."""
     items = stack.box_xyxy, stack.offset, stack.masks, stack.occluder, stack.categories, stack.owner
-    accepts = filter_of(view) if view.may_refuse(stack) else ACCEPT_ALL
+    accepts = filter_columns(view) if view.may_refuse(stack) else ACCEPT_ALL
     targets = _targets(
         *map(np.ascontiguousarray, items), EVERYWHERE if bounds is None else tuple(bounds), *NOWHERE[:2], *accepts
     )

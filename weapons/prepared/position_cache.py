@@ -198,10 +198,12 @@ def look(fired: Round) -> tuple[Look, int]:
         """Append the hits on the tiles near a pixel to an answer, the nearest first."""
         near: PositionCache = hits._present.near
         square = near.made[x >> CELL_SHIFT][y >> CELL_SHIFT]
-        shared = near.walked(pattern, x, y) if square is UNMADE else []
+        shared: list[Shared] = []
+        if square is UNMADE:
+            shared, square = near.walked(pattern, x, y), ()
         left, top, last = x + first_x, y + first_y, -1
         right, bottom, tiles = left + wide, top + high, near.tiles(stride)
-        for x_min, y_min, x_max, y_max, begin, item in () if square is UNMADE else square:
+        for x_min, y_min, x_max, y_max, begin, item in square:
             if x_min <= right and left <= x_max and y_min <= bottom and top <= y_max:
                 bits = tiles.get(begin)
                 if bits is None:

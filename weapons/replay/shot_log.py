@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from hitplanes.planes.bits.bit_rows import Words
 from hitplanes.planes.common.checks import Floats, InputError, Ints, choice, integer, within
 from hitplanes.planes.common.limits import ALL, IDS_MAX, POSITION_MAX, SEED_MAX, SUB
 from hitplanes.planes.common.tables import (
@@ -34,7 +35,7 @@ from hitplanes.planes.scene.scene import Scene
 from ..fire.call import fire
 from ..fire.hits import Hits
 from ..kinds.areas import has_no_range, weapon_from_json, weapons_of
-from ..kinds.placements import Shots, Words
+from ..kinds.placements import Shots
 from ..kinds.weapon import Weapon
 
 AIM_MAX = 10**9  # largest absolute value of an aim, degrees; floats beyond it are too coarse for an angle

@@ -39,6 +39,7 @@ present place of an object that has moved, and of what a shot does not see."""
 THIN, DASHED = ("other", "shadow"), ("blocked", "now")
 
 DASH = 5  # length of the dashes of an outline, px
+DARK = (20, 22, 26)  # ground under thin lines, rings and labels
 SHADOW, SHADOW_ALPHA = (12, 14, 18), 170  # ground under the marks of hits, which keeps the gaps between them dark
 HEAT_ALPHA = 235  # opacity of the heat of hits, of 255
 LINE_ALPHA = 60  # the same of the cells of rays that decide nothing
@@ -140,7 +141,7 @@ class World:
         lone = np.argwhere(at & (near <= LONE_PIXELS))
         for y, x in lone.tolist() if len(lone) <= RINGS_MAX else ():
             middle = x * self.factor + self.factor // 2, y * self.factor + self.factor // 2
-            cv2.circle(self.image, middle, RING, (20, 22, 26), 3)
+            cv2.circle(self.image, middle, RING, DARK, 3)
             cv2.circle(self.image, middle, RING, color, 1)
 
     def outline(self, item: int, kind: str) -> None:

@@ -17,7 +17,7 @@ from hitplanes.planes.grid.spans import Box, Spans
 from hitplanes.planes.scene.objects import Role
 from hitplanes.planes.scene.scene import Scene
 
-from .canvas import INK, OUTLINES_MAX, Text, World, covered, enlarged
+from .canvas import DARK, INK, OUTLINES_MAX, Text, World, covered, enlarged
 from .phrases import NAME_MAX, apart, short
 from .symbols import BADGE, MARKS, MINT, NEAR_MISS, Signs
 
@@ -27,7 +27,6 @@ LINKS_MAX = 8  # most occluders that are linked to the object they kept most sam
 SHOT_BADGE = 11  # radius of the disc of a shot's number, px
 NEAR, CLOSE, FAR = 40, 110, 400  # how far a name may lie from its object, a link if it can, and a link or a number, px
 
-DARK = (20, 22, 26)
 WHITE = (255, 255, 255)
 
 
