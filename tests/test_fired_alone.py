@@ -311,7 +311,7 @@ def test_random_rays_against_the_walk(rng: random.Random) -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_bad_input_is_refused_in_the_same_words_at_each_call(bad: dict[str, Any]) -> None:
+def test_bad_input_is_refused_in_the_same_words_at_each_call(bad: dict[str, Any], jit: bool) -> None:
     """Also values that equal good ones, like True and 1, at a scene where a weapon is ready for these."""
     scene = crowd(6)
     for how in ({}, {"accept": 1}, {"blocked_by": 1}, {"exclude": 1}, {"seed": 1}):

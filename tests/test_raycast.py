@@ -56,6 +56,24 @@ def some_stack(rng: random.Random) -> Stack:
     return scene.items.stack()
 
 
+@examples(40, deadline=None)
+@given(worlds, st.sampled_from([None, 1, 2]), st.sampled_from([0, 128, 700]))
+def test_rays_that_pass_too_many_rows_are_cast_together(rng: random.Random, most: int | None, radius: int) -> None:
+    """All rays of a call, some of them or none: the rows and ends are those of a cast of all."""
+    stack, n = some_stack(rng), 16
+    start, step = (np.array([[rng.randint(-2500, 2500) for _ in range(2)] for _ in range(n)]) for _ in range(2))
+    filters = None
+    if rng.random() < 0.5:
+        filters = np.array([filter_of(rng.randint(0, 3), 3) for _ in range(n)]), np.full((n, 1), rng.randint(-1, 2))
+    call = stack, None, Lines(start, step, radius), most, filters
+    hits, ends = raycast.cast_together(*call)
+    for rows_most in (0, 2, 4, 6, 9, 999):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(one_ray, "ROWS_MOST", rows_most)
+            found = one_ray.follow_each(*call)
+        assert np.array_equal(found[0], hits) and np.array_equal(found[1], ends), rows_most
+
+
 First = tuple[int, int, int, int]
 NOTHING = -1, 0, 0, -1
 """Time, cell, and rank of what a ray touches first."""

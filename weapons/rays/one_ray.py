@@ -36,6 +36,9 @@ from .raycast import cast_together
 ROWS_MOST = 120
 """Most rows of masks that a ray looks at; with more, the raycast of a batch is faster."""
 
+AT_RANGE = [Reason.RANGE, NEVER, 0, 0, -1, False]
+"""End of a ray that meets nothing: why, when, y, x, rank, and whether an occluder's cell is walked alone."""
+
 Pair = tuple[int, int]
 Spell = tuple[int, int]
 """Times at which a ray enters and leaves a box or a cell."""
@@ -147,12 +150,12 @@ def follow_each(
         found = _passed(start, step, lines.radius, stack, bounds, accepts, most)
         if found is None:
             rest.append(number)
-            ends.append([Reason.RANGE, NEVER, 0, 0, -1, False])
+            ends.append(AT_RANGE)  # until all of them are cast
             continue
         time, rows, last = found
         hits += [[number, *row] for row in rows]
         if last is None:
-            ends.append([Reason.RANGE, NEVER, 0, 0, -1, False])
+            ends.append(AT_RANGE)
         else:
             blocked = stack.has_occluders and bool(stack.occluder[last[3]])
             ends.append([Reason.OCCLUDER if blocked else Reason.HITS, time, *last[1:4], blocked])
