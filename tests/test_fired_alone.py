@@ -103,6 +103,8 @@ def test_owners_are_those_of_each_aim(weapon: Weapon, jit: bool) -> None:
     "weapon",
     [
         Rifle(90, budget=20),
+        Rifle(90, budget=4),
+        Rifle(90, width=3, budget=4),
         Rifle(90, budget=0),
         Laser(90, inside="ignore_until_exit"),
         Laser(90, width=3, inside="error"),
@@ -110,15 +112,15 @@ def test_owners_are_those_of_each_aim(weapon: Weapon, jit: bool) -> None:
     ids=str,
 )
 def test_rays_that_must_not_walk_are_ready(weapon: Weapon, jit: bool) -> None:
-    """Those with a budget that meet no object, and those that begin in none."""
+    """Those with a budget, and those that begin in no item."""
     scene = Scene()
     scene.add(np.ones((9, 9), np.bool_), (20, 0))
     scene.add(np.ones((9, 9), np.bool_), (0, 60), role="occluder")
     budget = getattr(weapon, "budget", None)
     fire(scene, weapon, (0.0, 0.0))
-    for aim, at, meets, begins in (
-        (0, (0.0, 0.0), True, False), (90, (0.0, 0.0), False, False), (180, (0.0, 0.0), False, False),
-        (0, (20.0, 0.0), True, True), (180, (24.5, 0.0), True, True), (0, (0.0, 60.0), False, True),
+    for aim, at, begins in (
+        (0, (0.0, 0.0), False), (90, (0.0, 0.0), False), (180, (0.0, 0.0), False),
+        (0, (20.0, 0.0), True), (180, (24.5, 0.0), True), (0, (0.0, 60.0), True),
     ):  # fmt: skip
         if begins and getattr(weapon, "inside", "") == "error":
             with pytest.raises(InputError):
@@ -127,7 +129,20 @@ def test_rays_that_must_not_walk_are_ready(weapon: Weapon, jit: bool) -> None:
         hits, truth = fire(scene, weapon, at, aim=aim), fire(scene, weapon, at, aim=aim, strategy="walk")
         same(hits, truth)
         assert hits.stop == truth.stop and hits.passes == truth.passes
-        assert is_ready(hits) == (not (meets or budget == 0) if budget is not None else not begins)
+        assert is_ready(hits) == (not begins if budget is None else budget > 0)
+
+
+@pytest.mark.parametrize("most", [None, 2])
+def test_a_budget_that_would_be_used_up_behind_the_end(most: int | None, jit: bool) -> None:
+    """An occluder, or the last object, lies in the midst of an object which would use up the budget behind it."""
+    scene = Scene()
+    scene.add(np.ones((9, 9), np.bool_), (20, 0))
+    scene.add(np.ones((9, 1), np.bool_), (20, 0), role="hittable" if most else "occluder")
+    weapon = Rifle(90, budget=6, max_hits=most)
+    for _ in range(2):
+        hits = fire(scene, weapon, (0.0, 0.0), aim=0)
+    same(hits, fire(scene, weapon, (0.0, 0.0), aim=0, strategy="walk"))
+    assert is_ready(hits) and hits.samples.tolist() == ([4, 1] if most else [4])
 
 
 def test_each_shooter_of_many_is_ready(jit: bool, monkeypatch: pytest.MonkeyPatch) -> None:

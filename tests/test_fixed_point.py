@@ -165,6 +165,22 @@ def test_isqrt_is_the_floor_of_the_root(values: list[int]) -> None:
     assert fixed_point.isqrt(np.array(values, dtype=np.int64)).tolist() == [math.isqrt(v) for v in values]
 
 
+sizes = st.integers(0, 62).flatmap(
+    lambda bits: st.lists(st.tuples(st.integers(2**bits // 2 + 1, 2**bits), st.fractions(0, 1)), min_size=1)
+)
+
+
+@MANY
+@given(sizes, st.integers(0, 2**60))
+@example([(2**40 - 1, Fraction(1)), (2**40 - 1, Fraction(1, 3))], 2**60)
+@example([(2**43 - 1, Fraction(1, 3))], 2**60)
+def test_muldiv_is_the_floor_of_the_quotient(parts: list[tuple[int, Fraction]], factor: int) -> None:
+    divisors = [divisor for divisor, _ in parts]
+    values = [int(part * divisor) for divisor, part in parts]
+    truth = [value * factor // divisor for value, divisor in zip(values, divisors, strict=True)]
+    assert fixed_point.muldiv(np.array(values), factor, np.array(divisors)).tolist() == truth
+
+
 @FEW
 @given(st.lists(st.integers(1, 3037000499), min_size=1))
 def test_isqrt_steps_at_squares(rs: list[int]) -> None:

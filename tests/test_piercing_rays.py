@@ -27,6 +27,11 @@ WEAPONS: tuple[Any, ...] = (
     lambda reach, width: Rifle(reach, width=width, max_hits=1),
     lambda reach, width: Rifle(reach, width=width, max_hits=2),
     lambda reach, width: Rifle(reach, width=width, max_hits=7),
+    lambda reach, width: Rifle(reach, width=width, budget=3.25),
+    lambda reach, width: Rifle(reach, width=width, budget=9),
+    lambda reach, width: Rifle(reach, width=width, budget=70),
+    lambda reach, width: Rifle(reach, width=width, budget=20, max_hits=5),
+    lambda reach, width: Rifle(reach, width=width, budget=0),
     lambda reach, width: Projectile(reach, width / 2),
     lambda reach, width: Pistol(reach, width=width),
     lambda reach, width: Sweep(Laser(reach, width=width), 40, 5),
@@ -37,13 +42,14 @@ WEAPONS: tuple[Any, ...] = (
 def crowd(
     rng: np.random.Generator, items: int, side: int, at: tuple[int, int] = (0, 0), bounded: bool = False
 ) -> Scene:
-    """Items of up to 9 px with holes, many on the same cells, some of them occluders."""
+    """Items of up to 9 px with holes, many on the same cells, some of them occluders; a px costs from 0 to 3."""
     scene = Scene((side, side), at) if bounded else Scene()
     for number in range(items):
         mask = rng.random(rng.integers(1, 10, 2)) < 0.7
         scene.add(
             mask, rng.integers(-3, side + 3, 2) + at, role="occluder" if rng.random() < 0.15 else "hittable",
             layer=int(rng.integers(3)), owner=number // 3, categories=int(rng.integers(1, 4)),
+            cost=int(rng.integers(4)),
         )  # fmt: skip
     return scene
 

@@ -134,7 +134,6 @@ def test_a_way_that_cannot_serve_is_passed_over() -> None:
             (Projectile(9, 1), "only thin rays that end at their first hit do; "),
         ),
         "cast": (
-            (Rifle(9, budget=4), "a budget is used up cell by cell; "),
             (Laser(9, inside="ignore_until_exit"), "items in which rays start are not hit; "),
             (Projectile(9, 1, steps=3), "a projectile is tested at moments of the frame; "),
         ),

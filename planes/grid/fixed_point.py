@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -59,6 +59,9 @@ _FIXED_BITS = 160  # as exact as _PI
 
 ANGLES_KEPT = 2**12  # angles whose directions are kept: objects turn by the same steps again and again
 
+DIGIT, DIVISORS_MOST = 20, 2**40
+"""Bits of a digit of `muldiv`, and divisors of which a remainder, and a digit more, have room in int64."""
+
 
 def snap(values: object) -> Ints:
     """Round positions in px to the 1/256-px grid, half to even; a position is rounded nowhere else."""
@@ -78,6 +81,22 @@ def rounded_div(numerator: Ints, denominator: Ints | int) -> Ints:
     twice = 2 * rest
     up = (twice > denominator) | ((twice == denominator) & (quotient & 1 == 1))
     return np.asarray(quotient + up)
+
+
+def muldiv(values: Ints, factor: int, divisor: Ints) -> Ints:
+    """Floor of values * factor / divisor, exactly, where no value is less than 0, or greater than its divisor.
+
+    It divides digit by digit of the factor, as on paper. Python's integers have room for the remainders of divisors
+    from 2**40 on.
+    """
+    kind: Any = np.int64 if int(divisor.max(initial=1)) < DIVISORS_MOST else object
+    values, divisor = values.astype(kind), divisor.astype(kind)
+    whole = rest = np.zeros(len(values), kind)
+    for shift in reversed(range(0, factor.bit_length(), DIGIT)):
+        rest = (rest << DIGIT) + values * (factor >> shift & ((1 << DIGIT) - 1))
+        digit = rest // divisor
+        whole, rest = (whole << DIGIT) + digit, rest - digit * divisor
+    return whole.astype(np.int64)
 
 
 def isqrt(values: Ints) -> Ints:

@@ -231,8 +231,6 @@ def is_moving(ray: RayWeapon, items: Items, stack: Stack) -> bool:
 
 def not_cast(ray: RayWeapon) -> str:
     """Why rays of a weapon must walk cell by cell, whatever the scene; or ""."""
-    if ray.budget_256 is not None:
-        return "a budget is used up cell by cell"
     if ray.inside != "hit" and not ends_at_first(ray):
         return "items in which rays start are not hit"
     return "a projectile is tested at moments of the frame" if is_stepped(ray) else ""

@@ -133,7 +133,8 @@ class Filter:
 class Present:
     """Snapshot of a scene at one version, with the weapon and its filter; the roles are of items that decide no hit.
 
-    `near` is where patterns look up what is near them: a `PositionCache`.
+    `near` is where patterns look up what is near them, a `PositionCache`; or what a px of each item (M,) costs, for a
+    ray with a budget.
     """
 
     scene: Scene

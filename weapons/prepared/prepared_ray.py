@@ -17,7 +17,7 @@ import numpy as np
 from hitplanes.planes.common.backend import cached_attribute, kernels_of
 from hitplanes.planes.common.checks import Ints
 from hitplanes.planes.common.limits import HALF, POSITION_MAX, REACH_MAX, SUB, WEIGHT_FULL
-from hitplanes.planes.grid.fixed_point import ONE, over_one, quarter_turns, toward
+from hitplanes.planes.grid.fixed_point import ONE, over_one, pixel, quarter_turns, toward
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.scene.items import Stack
 from hitplanes.planes.scene.scene import Scene
@@ -29,9 +29,10 @@ from ..kinds.areas import ray_parts_of
 from ..kinds.rays import RayWeapon, unspent
 from ..kinds.weapon import Weapon
 from ..rays import raycast
-from ..rays.contacts import NEVER, rays_of
+from ..rays.contacts import NEVER, Rays, Touches, endless, rays_of
 from ..rays.one_ray import Follow, Followed, chosen_follower
 from ..rays.ray_hits import Later, RayHits, Walk, weights_at
+from ..rays.ray_walk import lines_of
 from .one_shot import Filter, OneShot, Present
 from .position_cache import new
 from .prepare import PLAIN, Ready, plain_number, plain_pair
@@ -62,7 +63,8 @@ class OneRay(OneShot, RayHits):
         filters = filters_of(stack, self.shots, rays.shot)
         cast = stack, bounds, lines, ray.hits_most, filters
         found = kernels_of(raycast).hits_and_ends(*cast) or raycast.hits_and_ends(*cast)
-        return raycast.walk_of(rays, ray, stack, bounds, found)
+        walk = raycast.walk_of(rays, ray, stack, bounds, found)
+        return walk if ray.budget_256 is None else raycast.spent(walk, self._present.near, ray.budget_256)
 
     @cached_attribute
     def _later(self) -> Later:
@@ -75,8 +77,8 @@ class OneRay(OneShot, RayHits):
 class ReadyRay(Ready[RayHits]):
     """Prepared weapon of one ray that can be cast.
 
-    These are left to `fire`: bad input, projectiles while items move, a ray with a budget that meets an object, and a
-    ray that starts inside an item if its weapon does not hit that item.
+    These are left to `fire`: bad input, projectiles while items move, a budget of 0, and a ray that starts inside an
+    item if its weapon does not hit that item.
     """
 
     def __init__(self, scene: Scene, weapon: Weapon, kept: Filter, ray: RayWeapon) -> None:
@@ -109,7 +111,10 @@ class ReadyRay(Ready[RayHits]):
             return Ready.fire(self, at, aim, toward, shot)
         hits: OneRay = OneRay()
         hits._present, hits._at, hits._arguments = self._present, place, (angle, target, number)
-        for rank, count, x, y, entry in followed[1]:
+        found = followed[1]
+        if self._budget_256 and found:
+            found = self._spent(start, step, self._budget_256, followed)
+        for rank, count, x, y, entry in found:
             column, row = x - ((start[0] + HALF) >> 8), y - ((start[1] + HALF) >> 8)
             weight = WEIGHT_FULL if self._fades is None else self._weight(step, entry)
             columns = 0, 0, self._ids[rank], count, count, weight, 1, (x, y), column * column + row * row
@@ -117,10 +122,23 @@ class ReadyRay(Ready[RayHits]):
         return hits
 
     def _must_walk(self, end: int, found: list[list[int]]) -> bool:
-        """Whether a ray that was cast to its end begins in an item that is not hit, or spends something."""
-        if self._ray.inside != "hit" and (end == 0 or (found and found[0][ENTRY] == 0)):
-            return True
-        return self._budget_256 is not None and (bool(found) or not self._budget_256)
+        """Whether a ray that was cast to its end begins in an item that is not hit, or with a budget of 0."""
+        starts_inside = self._ray.inside != "hit" and (end == 0 or (found and found[0][ENTRY] == 0))
+        return bool(starts_inside) or self._budget_256 == 0
+
+    def _spent(
+        self, start: tuple[int, int], step: tuple[int, int], budget_256: int, followed: Followed
+    ) -> list[list[int]]:
+        """What a ray hits before its budget is used up, of what it hits without one."""
+        start_256, ends = np.array([start]), endless(1)
+        ends.time[0], rows = followed[0], np.array(followed[1]).T
+        (left, top), (rank, count, x, y, entry) = pixel(start_256)[0].tolist(), rows
+        rays = Rays(start_256, np.array([step]), pixel(start_256), *np.zeros((3, 1), np.int64))
+        hit = Touches(np.zeros_like(rank), rank, count, x - left, y - top, entry)
+        walk = Walk(rays, lines_of(rays, self._ray), hit, ends, self._stack, self._present.bounds, None)
+        hit = raycast.spent(walk, self._present.near, budget_256).hit
+        found: list[list[int]] = np.stack([hit.rank, hit.count, hit.x + left, hit.y + top, hit.entry], axis=1).tolist()
+        return found
 
     def reaches(self, at: Any, target: Any) -> bool | None:
         """Whether a ray from one point to another meets nothing; None if they must be checked, or are one."""
@@ -171,7 +189,8 @@ class ReadyRay(Ready[RayHits]):
                 self._arrangement = stack.forms
                 self._ids = stack.ids.data
             self._follows = self._unsettled
-            self._present = self._snapshot(version, stack)
+            cost = None if self._budget_256 is None else items.cost[stack.rows]
+            self._present = self._snapshot(version, stack, cost)
             self._version = version
 
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from hitplanes.planes.common.backend import kernels_of
 from hitplanes.planes.common.checks import Bools, Floats, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, SUB
-from hitplanes.planes.grid.fixed_point import pixel, scaled, snap, turned, unit
+from hitplanes.planes.grid.fixed_point import muldiv, pixel, scaled, snap, turned, unit
 from hitplanes.planes.grid.rasterize import COMMON, ROOM, Lines
 from hitplanes.planes.grid.spans import Box, Columns, begins, clipped, merged_runs, pieces, ragged
 from hitplanes.planes.scene.items import Items, Stack
@@ -256,6 +256,9 @@ def _extreme_of_each(begin: Ints, group: Ints, keys: Sequence[Ints], better: np.
 
 def stretches(group: Ints, entry: Ints, leave: Ints) -> tuple[Ints, Ints, Ints]:
     """Union of the closed time intervals of each group: sorted (group, first, last), with no two that touch."""
+    if len(group):  # most touch the one before
+        at = np.flatnonzero(begins(group) | np.append(True, (entry[1:] > leave[:-1]) | (leave[1:] < entry[:-1])))
+        group, entry, leave = group[at], np.minimum.reduceat(entry, at), np.maximum.reduceat(leave, at)
     times, place = np.unique(np.concatenate([entry, leave]), return_inverse=True)
     first, last = np.split(2 * place.reshape(-1), 2)  # doubled, because neighbouring numbers would count as touching
     which, first, last = merged_runs(group, first, last)
@@ -289,7 +292,7 @@ def in_frame(met: Contacts, own: Lines, moving: bool) -> Contacts:
     """
     scale, (entry, leave) = own.scale[met.pair], _lasting(own, met, met.entry, met.leave)
     if moving:
-        entry, leave = (np.asarray(time.astype(object) * COMMON // scale, np.int64) for time in (entry, leave))
+        entry, leave = muldiv(entry, COMMON, scale), muldiv(leave, COMMON, scale)
     return met.at_times(entry, leave)
 
 
@@ -301,16 +304,15 @@ def at_steps(met: Contacts, own: Lines, steps: int) -> Contacts:
     own : the line of each pair, relative to the motion of its item
     """
     scale = own.scale[met.pair]
-    first: npt.NDArray[Any] = np.full(len(scale), steps + 1, object)
-    last: npt.NDArray[Any] = np.zeros(len(scale), object)
+    first, last = np.full(len(scale), steps + 1), np.zeros(len(scale), np.int64)
     for spell in own.spells(met.pair, met.x, met.y):
         touched = spell[0] <= spell[1]
-        entry, leave = (time.astype(object) for time in _lasting(own, met, *spell))
-        begin, end = np.maximum(-(-entry * steps // scale), 1), leave * steps // scale
-        touched &= np.asarray(begin <= end, np.bool_)
+        entry, leave = (np.where(touched, time, 0) for time in _lasting(own, met, *spell))
+        begin, end = np.maximum(steps - muldiv(scale - entry, steps, scale), 1), muldiv(leave, steps, scale)
+        touched &= begin <= end
         first = np.where(touched, np.minimum(first, begin), first)
         last = np.where(touched, np.maximum(last, end), last)
-    tested = met.at_times(np.asarray(first, np.int64), np.asarray(last, np.int64))
+    tested = met.at_times(first, last)
     return tested.only(tested.entry <= tested.leave)
 
 
@@ -415,7 +417,7 @@ def terminations_of(met: Contacts, lines: Lines, stack: Stack, cost: Ints, ray: 
     if ray.hits_most is not None:
         end_at_hits(ends, met.take(np.flatnonzero(objects)), ray.hits_most)
     if ray.budget_256 is not None:
-        _end_at_budget(ends, met.take(np.flatnonzero(objects & (cost[met.rank] > 0))), lines, cost, ray.budget_256)
+        end_at_budget(ends, met.take(np.flatnonzero(objects & (cost[met.rank] > 0))), lines, cost, ray.budget_256)
     at_items = (ends.reason == Reason.OCCLUDER) | (ends.reason == Reason.HITS)
     ends.fraction[at_items] = ends.time[at_items] / lines.scale[at_items]
     plan.run("stops", "")
@@ -469,7 +471,7 @@ def end_at_hits(ends: Terminations, met: Contacts, most: int) -> None:
     ends.alone[met.ray[last]] = alone
 
 
-def _end_at_budget(ends: Terminations, met: Contacts, lines: Lines, cost: Ints, budget_256: int) -> None:
+def end_at_budget(ends: Terminations, met: Contacts, lines: Lines, cost: Ints, budget_256: int) -> None:
     """End rays where the material along them uses up the budget, if nothing ends them sooner.
 
     `full` is the least whole number of units (time times cost) with (full * length / scale)^2 >= budget^2. The budget

@@ -239,14 +239,12 @@ def _followed(
     cast = cast_rays(rays, ray, shots, through) if way == "cast" else None
     if cast is None and way == "cast":
         through = _walking(through, choose, len(rays))
-    for walk in [cast] if cast else _walks(rays, ray, shots, through):
+    for walk in cast or _walks(rays, ray, shots, through):
         summed.append(walk.summed)
-        parts = walk.parts()
-        for part in parts:
-            pixels.append(pixels_of(part, rays))
-            plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
+        pixels.append(pixels_of(walk, rays))
+        plan.run("rows", "passes, gathered by object", pixels[-1].nbytes)
         if walk.traced is None:
-            walks += parts
+            walks.append(walk)
             continue
         room -= len(walk.traced[0].x)
         walks.append(walk if room >= 0 else Made(walk.passes, walk.stops))

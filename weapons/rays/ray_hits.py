@@ -12,7 +12,7 @@ import numpy as np
 from hitplanes.planes.bits.bit_rows import row_order
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_CELLS, HALF, IDS_MAX, SUB, WEIGHT_FULL
-from hitplanes.planes.grid.fixed_point import pixel
+from hitplanes.planes.grid.fixed_point import muldiv, pixel
 from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import Box, Spans, begins, pieces, sorted_once
 from hitplanes.planes.scene.items import Stack
@@ -129,7 +129,8 @@ class Walk:
     """Contacts with objects and occluders, also beyond the ends, and the line of each pair, relative to the motion of
     its item; None if items do not move, so that the contacts can be found again."""
 
-    def _contacts(self) -> tuple[Contacts, Lines]:
+    @property
+    def contacts(self) -> tuple[Contacts, Lines]:
         """Contacts with the objects that were hit, at least, and the line of each pair."""
         if self.traced:
             return self.traced
@@ -139,14 +140,14 @@ class Walk:
 
     def _walked(self) -> tuple[Contacts, Ints, Lines]:
         """Walked cells of objects, in the order of the passes; their pairs; and the lines of all pairs."""
-        met, lines = self._contacts()
+        met, lines = self.contacts
         walked, chosen = walked_of(met, self.ends, self.stack)
         return walked, chosen, lines
 
     @property
     def walked(self) -> Contacts:
         """Walked cells of objects, in any order."""
-        return cells_hit(self._contacts()[0], self.ends, self.stack)
+        return cells_hit(self.contacts[0], self.ends, self.stack)
 
     @cached_property
     def summed(self) -> Summed:
@@ -291,8 +292,7 @@ def weights_at(entry: Ints, scale: Ints, falloff: str | None) -> Ints:
     """Whole weights from 65,535 at the muzzle to 0 at the end of the ray."""
     if falloff is None:
         return np.full(len(entry), WEIGHT_FULL)
-    lost = np.asarray(entry.astype(object) * WEIGHT_FULL // scale, np.int64)
-    return smoothed(WEIGHT_FULL - lost, falloff)
+    return smoothed(WEIGHT_FULL - muldiv(entry, WEIGHT_FULL, scale), falloff)
 
 
 C = TypeVar("C", Passes, Stops)

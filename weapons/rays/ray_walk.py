@@ -196,19 +196,18 @@ def _entered(
     rays: Rays, ray: RayWeapon, lines: Lines, live: Ints, edges: tuple[float, float], through: Range
 ) -> tuple[Ints, Ints]:
     """Pairs of one chunk of the rays."""
-    candidates = through.candidates
-    if is_moving(ray, through.items, through.stack):  # each item has its own relative line
-        row, rank = candidates.every(len(live))
-    else:
-        asked = _stretch_boxes(rays, lines, live, *edges)
-        row, rank = candidates.meeting(asked)
-        if candidates.prefilter.name == "none":
-            return live[row], rank
-        if through.looked:
-            through.looked.boxes_xyxy.append(asked)
-        if candidates.index is not None:
-            why = f"{candidates.index.structure}: {candidates.index.followed} boxes placed anew"
-            through.plan.run("broad phase", why, row.nbytes + rank.nbytes)
+    candidates, asked = through.candidates, _stretch_boxes(rays, lines, live, *edges)
+    if is_moving(ray, through.items, through.stack):  # to wherever an item may move during the ray
+        fastest = -(-np.abs(through.items.velocity_256[through.stack.rows]).max(axis=0) // SUB)
+        asked += np.concatenate([-fastest, fastest])
+    row, rank = candidates.meeting(asked)
+    if candidates.prefilter.name == "none":
+        return live[row], rank
+    if through.looked:
+        through.looked.boxes_xyxy.append(asked)
+    if candidates.index is not None:
+        why = f"{candidates.index.structure}: {candidates.index.followed} boxes placed anew"
+        through.plan.run("broad phase", why, row.nbytes + rank.nbytes)
     relative = relative_lines(lines, ray, live[row], through.stack.rows[rank], through.items)
     enters = _enters(rays.origin_xy[live[row]], relative, through.stack.box_xyxy[rank])
     kept = np.flatnonzero((enters > edges[0]) & (enters <= edges[1]))

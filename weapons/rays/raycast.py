@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,9 +35,11 @@ from .contacts import (
     NEVER,
     Contacts,
     Rays,
+    Reason,
     Terminations,
     Touches,
     cells_most,
+    end_at_budget,
     end_at_hits,
     end_at_occluders,
     endless,
@@ -95,8 +97,11 @@ class Firsts(Columns):
 
 
 # house: way of rays
-def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk | None:
-    """Follow rays to their ends; None if they are too long or too wide for the kernel."""
+def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> list[Walk] | None:
+    """Follow rays to their ends, in parts whose cells can be found again; None if the kernel does not serve them.
+
+    A kernel serves no rays that are too long or too wide for it.
+    """
     stack, plan = through.stack, through.plan
     lines, filters = Lines(rays.start_256, rays.step_256, ray.radius_256), filters_of(stack, shots, rays.shot)
     kernels = kernels_of(sys.modules[__name__])
@@ -104,7 +109,38 @@ def cast_rays(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> Walk 
     if found is None:
         return None
     plan.run("cast", "each ray to its end: boxes, filters and occluders, too", sum(part.nbytes for part in found))
-    return walk_of(rays, ray, stack, through.bounds, found)
+    walks = walk_of(rays, ray, stack, through.bounds, found).parts()
+    if ray.budget_256 is None:
+        return walks
+    plan.run("stops", "where budgets are used up")
+    cost = through.items.cost[stack.rows]
+    return [spent(walk, cost, ray.budget_256) for walk in walks]
+
+
+def spent(walk: Walk, cost: Ints, budget_256: int) -> Walk:
+    """Rays as they end by a budget, from the same rays without one; `cost` (M,) is that of a px of each item.
+
+    A ray is no longer in a cell than its width and the cell's diagonal, so that most rays cannot spend all. Of those
+    that hit many objects, most end in the first few of them, which are looked at beforehand.
+    """
+    hit, ray = walk.hit, walk.hit.ray
+    most = np.bincount(ray, cost[hit.rank] * hit.count, len(walk.rays)) * (2 * (DIAGONAL + walk.lines.radius))
+    looked = (most >= budget_256)[ray]
+    many = np.flatnonzero(looked & (np.bincount(ray, minlength=len(most))[ray] > 2 * FEW))
+    if len(many):
+        few = many[many - np.searchsorted(ray, ray[many]) < FEW]
+        looked &= hit.entry <= _used_up(walk, few, cost, budget_256)[0].time[ray]
+    pairs, walked = np.flatnonzero(looked), np.zeros(len(ray), np.int64)
+    ends, walked[pairs] = _used_up(walk, pairs, cost, budget_256)
+    count = np.where(ends.reason[ray] == Reason.BUDGET, walked, hit.count)
+    return replace(walk, hit=replace(hit, count=count).take(np.flatnonzero(count)), ends=ends)
+
+
+def _used_up(walk: Walk, pairs: Ints, cost: Ints, budget_256: int) -> tuple[Terminations, Ints]:
+    """Ends of rays by a budget that some of their hits (n,) take from, and the cells of these that are walked."""
+    ends, met = walk.ends.take(np.arange(len(walk.rays))), replace(walk, hit=walk.hit.take(pairs)).contacts[0]
+    end_at_budget(ends, met.take(np.flatnonzero(cost[met.rank] > 0)), walk.lines, cost, budget_256)
+    return ends, np.bincount(met.pair[ends.walked(met)], minlength=len(pairs))
 
 
 def walk_of(rays: Rays, ray: RayWeapon, stack: Stack, bounds: Box | None, found: tuple[Ints, Ints]) -> Walk:
@@ -118,11 +154,11 @@ def walk_of(rays: Rays, ray: RayWeapon, stack: Stack, bounds: Box | None, found:
 
 def cast_to_ends(rays: Rays, ray: RayWeapon, shots: Shots, through: Range) -> tuple[Terminations, Ints]:
     """Ends of rays that end at their first hit; and the rays left to the walk."""
-    walk = cast_rays(rays, ray, shots, through)
-    if walk is None:
+    walks = cast_rays(rays, ray, shots, through)
+    if walks is None:
         return endless(len(rays)), np.arange(len(rays))
-    starts_inside = (walk.ends.time == 0) & (ray.inside != "hit")
-    return walk.ends, np.flatnonzero(starts_inside)
+    ends = Terminations.joined([walk.ends for walk in walks])
+    return ends, np.flatnonzero((ends.time == 0) & (ray.inside != "hit"))
 
 
 def hits_and_ends(
