@@ -361,10 +361,11 @@ def test_rays_are_cast_where_they_can_be(kernels: ModuleType) -> None:
         assert plan.has_run("walk") != plan.has_run("cast")
         return plan.has_run("cast")
 
-    for weapon in (Pistol(1000), Laser(900, width=4), Projectile(200, 3), Sweep(Rifle(300, max_hits=2), 30, 4)):
+    several = Sweep(Rifle(300, max_hits=2), 30, 4)
+    for weapon in (Pistol(1000), Laser(900, width=4), Rifle(900, budget=3), Projectile(200, 3), several):
         assert is_cast(1, weapon) and is_cast(3, weapon) and is_cast(300, weapon)
         assert not is_cast(2, weapon, prefilter="box") and not is_cast(2, weapon, strategy="direct")
-    for weapon in (Rifle(90, budget=3), Laser(90, inside="ignore_until_exit"), Projectile(90, 3, steps=2)):
+    for weapon in (Laser(90, inside="ignore_until_exit"), Projectile(90, 3, steps=2)):
         assert not is_cast(2, weapon, strategy="cast")
     hits = fire(scene, Pistol(90, inside="ignore_until_exit"), [(-500, 3), (-500, 9)])
     assert hits.plan.has_run("cast") and not hits.plan.has_run("walk")
