@@ -30,7 +30,6 @@ FIELDS: dict[str, tuple[type, int]] = {
     "gate": (np.float64, 4),  # points that belong to this cell: above the first two numbers, up to the last two
     "mid": (np.float64, 2),
     "child": (np.int64, 0),  # first of four, -1 for a leaf
-    "parent": (np.int64, 0),
     "depth": (np.int64, 0),  # -1 when the row is free
     "total": (np.int64, 0),  # boxes that reach into it
     "straddle": (np.int64, 0),  # those of them that cross a middle
@@ -85,7 +84,6 @@ class Quadtree(BroadPhase):
         inner = used[nodes["child"][used] >= 0]
         children = (nodes["child"][inner][:, None] + np.arange(4)).ravel()
         assert np.array_equal(np.sort(np.append(children, 0)), used), "a node is not the child of one parent"
-        assert (nodes["parent"][children] == np.repeat(inner, 4)).all(), "a child does not know its parent"
         assert (nodes["depth"][children] == np.repeat(nodes["depth"][inner] + 1, 4)).all(), "a depth is wrong"
         assert len(used) + 4 * len(self._free) == len(nodes["depth"]), "a row is neither in use nor free"
         box, node, straddle = self._paths(ids, self._rows[ids])
@@ -101,25 +99,13 @@ class Quadtree(BroadPhase):
         assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
 
     def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
-        every = np.arange(len(queries))
-        stack = [(every, np.zeros_like(every))]
         leaves: list[Pairs] = []
-        while stack:
-            query, node = stack.pop()
-            if len(query) > CHUNK_SAMPLES:  # bounds the memory of a wide search
-                half = len(query) // 2
-                stack += [(query[half:], node[half:]), (query[:half], node[:half])]
-                continue
-            child = self._nodes["child"].take(node)
-            leaf, inner = np.flatnonzero(child < 0), np.flatnonzero(child >= 0)
+        for query, node, _ in self._steps(queries):
+            leaf = np.flatnonzero(self._nodes["child"].take(node) < 0)
             leaves.append((query.take(leaf), node.take(leaf)))
             if work is not None:
                 work.visits.append((query, node))
-                work.compared += 4 * len(inner)
-            query, mid = query.take(inner), self._nodes["mid"].take(node.take(inner), axis=0)
-            row, quarter = np.divmod(np.flatnonzero(_quarters(queries.take(query, axis=0), mid)), 4)
-            if len(row):
-                stack.append((query.take(row), child.take(inner.take(row)) + quarter))
+                work.compared += 4 * (len(query) - len(leaf))
         query, leaf = piled(leaves)
         return self._in_leaves(queries, query, leaf, work)
 
@@ -172,7 +158,7 @@ class Quadtree(BroadPhase):
         nodes["cell"][0] = _root_of(rows)
         nodes["gate"][0] = (-np.inf, -np.inf, np.inf, np.inf)
         nodes["mid"][:] = _middle(nodes["cell"])
-        nodes["child"][0] = nodes["parent"][0] = -1
+        nodes["child"][0] = -1
         self._free = np.empty(0, np.int64)
         self._pool = np.empty(0, np.int64)
         self._used = self._live = 0
@@ -206,17 +192,23 @@ class Quadtree(BroadPhase):
         return _quarters(self._rows.take(box, axis=0), self._nodes["mid"].take(node, axis=0))
 
     def _steps(self, rows: Floats) -> Iterator[tuple[Ints, Ints, Bools]]:
-        """Every (box, node, quarters that it reaches) on the way from the root to the leaves, level by level."""
-        which = np.arange(len(rows))
-        node = np.zeros_like(which)
-        while len(which):
+        """Every (box, node, quarters that it reaches) on the way from the root to the leaves, some at a time."""
+        every = np.arange(len(rows))
+        stack = [(every, np.zeros_like(every))]
+        while stack:
+            which, node = stack.pop()
+            if len(which) > CHUNK_SAMPLES:  # bounds the memory of a wide search
+                half = len(which) // 2
+                stack += [(which[half:], node[half:]), (which[:half], node[:half])]
+                continue
             mid, child = self._nodes["mid"].take(node, axis=0), self._nodes["child"].take(node)
             reached = _quarters(rows.take(which, axis=0), mid)
             yield which, node, reached
             inner = np.flatnonzero(child >= 0)
             row, quarter = np.divmod(np.flatnonzero(reached.take(inner, axis=0)), 4)
             row = inner.take(row)
-            which, node = which.take(row), child.take(row) + quarter
+            if len(row):
+                stack.append((which.take(row), child.take(row) + quarter))
 
     def _paths(self, ids: Ints, rows: Floats) -> Paths:
         """Every (id, node, whether it straddles) on the way from the root to the leaves."""
@@ -332,7 +324,7 @@ class Quadtree(BroadPhase):
                 part[:, 1 if down else 3] = nodes["mid"][splits, 1]
                 nodes[bounds][child] = part
             nodes["mid"][child] = _middle(nodes["cell"][child])
-            nodes["child"][child], nodes["parent"][child] = -1, splits
+            nodes["child"][child] = -1
             nodes["depth"][child] = nodes["depth"][splits] + 1
 
     def _write(self, node: Ints, box: Ints, leaves: Ints) -> None:
