@@ -17,15 +17,16 @@ outline then lies up to a block's diagonal further out.
 from __future__ import annotations
 
 import heapq
+import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from ..common.checks import Bools, Floats, Ints
 from ..common.limits import BOXES_MAX, OUTLINE_CORNERS, OUTLINE_PIXELS, SUB
-from ..grid.spans import Spans
+from ..files.png import cv2
+from ..grid.spans import Box
 from .polygons import Point, extents, turn
 
 
@@ -43,41 +44,29 @@ def cover(mask: Bools, k: int) -> Ints:
     return min((few, area), _join(many, k), key=lambda found: found[1])[0]
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A tight box, its false pixels and its best cut: the saving, the axis, and the row or column."""
-
-    box: tuple[int, int, int, int]
-    false: int
-    saved: int = 0
-    axis: int = 0
-    at: int = 0
-
-
 def _cut(mask: Bools, k: int) -> tuple[Ints, Ints]:
     """Cut boxes in two, largest saving first; return the boxes at k, and at BOXES_MAX."""
-    height, width = mask.shape
-    parts: dict[int, _Part] = {0: _part(mask, 0, 0, width, height)}
-    heap = [(0, 0, 0)] if parts[0].false else []
-    few, made = list(parts.values()), 1
-    while heap and len(parts) < BOXES_MAX:
-        number = heapq.heappop(heap)[-1]
-        part = parts.pop(number)
-        x, y, x_end, y_end = part.box
-        at = (x + part.at, y_end) if part.axis else (x_end, y + part.at)  # where the first half ends
-        begin = (x + part.at, y) if part.axis else (x, y + part.at)  # where the second half begins
-        for half in (_part(mask, x, y, *at), _part(mask, *begin, x_end, y_end)):
-            parts[made] = half
-            if half.false:
-                heapq.heappush(heap, (-half.saved, -half.false, made))
-            made += 1
-        if len(parts) <= k:
-            few = list(parts.values())
-    return np.array([part.box for part in few]), np.array([part.box for part in parts.values()])
+    boxes: dict[int, Box] = {}
+    few: list[Box] = []
+    heap: list[tuple[int, int, int, list[Box]]] = []  # of a box: -saved and -false pixels, its number, its halves
+    numbers = itertools.count()
+    halves = [(0, 0, *mask.shape[::-1])]
+    while True:
+        for half in halves:
+            number = next(numbers)
+            boxes[number], false, saved, cut = _tight(mask, *half)
+            if false:
+                heapq.heappush(heap, (-saved, -false, number, cut))
+        if len(boxes) <= k:
+            few = list(boxes.values())
+        if not heap or len(boxes) == BOXES_MAX:
+            return np.array(few), np.array(list(boxes.values()))
+        *_, number, halves = heapq.heappop(heap)
+        del boxes[number]
 
 
-def _part(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> _Part:
-    """Shrink a box to its pixels and find its best cut."""
+def _tight(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> tuple[Box, int, int, list[Box]]:
+    """Shrink a box to its pixels: the box, its false pixels, what its best cut saves of them, and the two halves."""
     inside = mask[y:y_end, x:x_end]
     rows, first, last = extents(inside)
     top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(first.min()), int(last.max()) + 1
@@ -85,12 +74,17 @@ def _part(mask: Bools, x: int, y: int, x_end: int, y_end: int) -> _Part:
     box = (x + left, y + top, x + right, y + bottom)
     false = inside.size - int(np.count_nonzero(inside))
     if not false:
-        return _Part(box, 0)
+        return box, 0, 0, []
     by_row = _best_cut(rows - top, first, last, bottom - top)
     by_column = _best_cut(*extents(inside.T), right - left)
-    axis = int(by_column < by_row)
-    area, _, at = (by_row, by_column)[axis]
-    return _Part(box, false, inside.size - area, axis, at)
+    x, y, x_end, y_end = box
+    if by_column < by_row:
+        area, _, at = by_column
+        halves = [(x, y, x + at, y_end), (x + at, y, x_end, y_end)]
+    else:
+        area, _, at = by_row
+        halves = [(x, y, x_end, y + at), (x, y + at, x_end, y_end)]
+    return box, false, inside.size - area, halves
 
 
 def _best_cut(rows: Ints, first: Ints, last: Ints, height: int) -> tuple[int, int, int]:
@@ -200,19 +194,8 @@ def _root(parents: list[int], i: int) -> int:
 
 def _labels(mask: Bools) -> tuple[Ints, int]:
     """Label the parts that are connected by sides: labels (h, w), -1 off the mask, and their number."""
-    runs = Spans.from_mask(mask)
-    width = mask.shape[1] + 1
-    first, last = runs.y * width + runs.x_first, runs.y * width + runs.x_last
-    begin, end = np.searchsorted(last, first - width), np.searchsorted(first, last - width, side="right")
-    parents = list(range(len(runs)))
-    for i, (low, high) in enumerate(zip(begin.tolist(), end.tolist(), strict=True)):
-        for above in range(low, high):
-            parents[_root(parents, above)] = _root(parents, i)
-    roots = np.array([_root(parents, i) for i in range(len(runs))])
-    names, number = np.unique(roots, return_inverse=True)
-    labels = np.full(mask.shape, -1, np.int64)
-    labels[mask] = np.repeat(number, runs.lengths)
-    return labels, len(names)
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    return labels.astype(np.int64) - 1, count - 1
 
 
 def _bridged(labels: Ints, parts: int) -> Bools:
