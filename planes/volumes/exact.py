@@ -68,7 +68,7 @@ def orient2d(a: npt.ArrayLike, b: npt.ArrayLike, c: npt.ArrayLike, conservative:
     It is 1 when turning from +x towards +y, which is clockwise on the screen; 0 on the line; else -1 (Shewchuk,
     *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates*, 1997).
     """
-    return _signs(_ORIENT2D, [*_columns("a", a, 2), *_columns("b", b, 2), *_columns("c", c, 2)], conservative)
+    return _signs(_ORIENT2D, _points(2, a=a, b=b, c=c), conservative)
 
 
 def orient3d(
@@ -78,8 +78,7 @@ def orient3d(
 
     It is 1 where a, b, c turn from +x towards +y when seen from +z and d lies below them; 0 in the plane; else -1.
     """
-    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 3)]
-    return _signs(_ORIENT3D, columns, conservative)
+    return _signs(_ORIENT3D, _points(3, a=a, b=b, c=c, d=d), conservative)
 
 
 def circles_sign(
@@ -92,9 +91,7 @@ def circles_sign(
     shape = _numbers("c1", c1).shape
     if not shape or shape[-1] not in (2, 3):
         raise InputError(f"c1: expected 2 or 3 coordinates on the last axis, got {shape}")
-    centers = [*_columns("c1", c1, shape[-1]), *_columns("c2", c2, shape[-1])]
-    columns = [*centers, ("r1", _numbers("r1", r1)), ("r2", _numbers("r2", r2))]
-    return _signs(_CIRCLES, columns, conservative)
+    return _signs(_CIRCLES, _points(shape[-1], c1=c1, c2=c2) + _radii(r1=r1, r2=r2), conservative)
 
 
 def point_segment_sign(
@@ -105,8 +102,7 @@ def point_segment_sign(
 
     It is -1 nearer, 0 at that distance, 1 farther (Ericson, *Real-Time Collision Detection*, 2005, 5.1.2).
     """
-    points = [*_columns("p", p, 2), *_columns("a", a, 2), *_columns("b", b, 2)]
-    return _signs(_POINT_SEGMENT, [*points, ("r", _numbers("r", r)), ("r2", _numbers("r2", r2))], conservative)
+    return _signs(_POINT_SEGMENT, _points(2, p=p, a=a, b=b) + _radii(r=r, r2=r2), conservative)
 
 
 def segment_segment_sign(
@@ -117,9 +113,7 @@ def segment_segment_sign(
 
     It is -1 nearer, 0 at that distance (with radii 0: they meet), 1 farther.
     """
-    columns = [column for name, p in zip("abcd", (a, b, c, d), strict=True) for column in _columns(name, p, 2)]
-    columns += [("r", _numbers("r", r)), ("r2", _numbers("r2", r2))]
-    sign = _signs(_ENDS, columns, conservative)
+    sign = _signs(_ENDS, _points(2, a=a, b=b, c=c, d=d) + _radii(r=r, r2=r2), conservative)
     a, b, c, d = (np.asarray(v, np.float64) for v in (a, b, c, d))
     grown = (np.asarray(r, np.float64) > 0) | (np.asarray(r2, np.float64) > 0)
     crossing = _cross(a, b, c, d, sign >= 0, conservative)
@@ -150,11 +144,19 @@ def _numbers(field: str, values: npt.ArrayLike) -> Floats:
     return array.astype(np.float64, copy=False)
 
 
-def _columns(field: str, points: npt.ArrayLike, d: int) -> Given:
-    array = _numbers(field, points)
-    if not array.ndim or array.shape[-1] != d:
-        raise InputError(f"{field}: expected {d} coordinates on the last axis, got {array.shape}")
-    return [(field, array[..., k]) for k in range(d)]
+def _points(size: int, /, **given: npt.ArrayLike) -> Given:
+    """Columns of points in 2-D or 3-D, whose names are those of their arguments."""
+    columns = []
+    for field, points in given.items():
+        array = _numbers(field, points)
+        if not array.ndim or array.shape[-1] != size:
+            raise InputError(f"{field}: expected {size} coordinates on the last axis, got {array.shape}")
+        columns += [(field, array[..., k]) for k in range(size)]
+    return columns
+
+
+def _radii(**given: npt.ArrayLike) -> Given:
+    return [(field, _numbers(field, radii)) for field, radii in given.items()]
 
 
 def _signs(predicate: Predicate, given: Given, conservative: bool) -> Signs:

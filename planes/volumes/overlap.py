@@ -30,23 +30,15 @@ def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
     See Ericson, *Real-Time Collision Detection* (2005), 4.4.1, 5.1.2 and 5.2.1.
     """
     signs = np.zeros(len(rows), np.int8)
-    order = _by_corners(one, two, rows)
+    most_corners = np.maximum(one.counts[rows], two.counts[rows])
+    order = np.argsort(-most_corners, kind="stable")  # so rows of a chunk have about as many
     done = 0
     with np.errstate(all="ignore"):
         while done < len(rows):
-            most = int(max(v.counts[rows[order[done]]] for v in (one, two)))
-            chunk = order[done : done + max(CHUNK_ROWS // most, 1)]
+            chunk = order[done : done + max(CHUNK_ROWS // int(most_corners[order[done]]), 1)]
             signs[chunk] = _chunk_sign(one, two, rows[chunk])
             done += len(chunk)
     return signs
-
-
-def _by_corners(one: Core, two: Core, rows: Ints) -> Ints:
-    """Order of rows by number of corners, the most first, so that rows of a chunk have about as many."""
-    counts = one.counts[rows], two.counts[rows]
-    if all((c == c[:1]).all() for c in counts):
-        return np.arange(len(rows))
-    return np.lexsort((np.minimum(*counts), np.maximum(*counts)))[::-1]
 
 
 def _chunk_sign(one: Core, two: Core, rows: Ints) -> Signs:

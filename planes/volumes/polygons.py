@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from heapq import heappop, heappush
 from itertools import product
 from typing import Any
@@ -283,9 +284,9 @@ def outward_corners(lines: list[Line]) -> Floats:
     largest coordinate; rounding takes back at most half a unit on each axis, 0.71 of a unit along any normal.
     """
     pairs = list(zip(lines[-1:] + lines[:-1], lines, strict=True))
-    exact = [_crossing(one, other) for one, other in pairs]
-    corners = [(x / (2 * d), y / (2 * d)) for x, y, d in exact]
-    if all(_is(u, x, 2 * d) and _is(v, y, 2 * d) for (u, v), (x, y, d) in zip(corners, exact, strict=True)):
+    exact = [(Fraction(x, 2 * d), Fraction(y, 2 * d)) for x, y, d in itertools.starmap(_crossing, pairs)]
+    corners = [(float(x), float(y)) for x, y in exact]
+    if all(x == u and y == v for (x, y), (u, v) in zip(exact, corners, strict=True)):
         return np.array(corners)
     bits = 1 - math.frexp(math.ulp(2 * max(map(abs, itertools.chain(*corners)))))[1]
     moved = [(a, b, (c << bits) + 2 * (math.isqrt(a * a + b * b) + 1)) for a, b, c in lines]
@@ -297,11 +298,6 @@ def _crossing(one: Line, other: Line) -> tuple[int, int, int]:
     """Point where two lines meet; (x, y, d) stands for (x / d, y / d)."""
     (a, b, c), (p, q, r) = one, other
     return c * q - r * b, a * r - p * c, a * q - p * b
-
-
-def _is(value: float, numerator: int, denominator: int) -> bool:
-    top, bottom = value.as_integer_ratio()
-    return top * denominator == numerator * bottom
 
 
 EDGES = 6  # most edges of a polygon of a union: those of a square swept along a segment

@@ -38,12 +38,10 @@ class Core:
     def extent(self) -> tuple[Floats, Floats]:
         """Least and greatest coordinates (N, d) of the points of each row."""
         n, most = len(self.counts), int(self.counts.max())
-        low, high = np.empty((2, n, self.points.shape[1]))
-        if len(self.points) == most * n:  # all rows have as many points: no gathering
-            corners = list(self.points.reshape(n, most, -1).transpose(1, 2, 0))
-        else:
-            corners = [self.point(np.arange(n), np.minimum(k, self.counts - 1)).T for k in range(most)]
-        for axis, values in enumerate(zip(*corners, strict=True)):
+        if len(self.points) < most * n:
+            return np.minimum.reduceat(self.points, self.starts), np.maximum.reduceat(self.points, self.starts)
+        low, high = np.empty((2, n, self.points.shape[1]))  # column by column, which is faster
+        for axis, values in enumerate(self.points.reshape(n, most, -1).transpose(2, 1, 0)):
             low[:, axis] = functools.reduce(np.minimum, values)
             high[:, axis] = functools.reduce(np.maximum, values)
         return low, high
