@@ -17,12 +17,12 @@ from hitplanes.planes.common.limits import CORNERS, PLACE
 from hitplanes.planes.scene.sprite import Sprite, frame_pivot
 from hitplanes.planes.scene.variants import Variant, transform_of, variant_of
 from hitplanes.planes.volumes import fit
-from hitplanes.planes.volumes.fit import KINDS, Kind, bounding, fitted, moved
+from hitplanes.planes.volumes.fit import bounding, fitted, moved
 from hitplanes.planes.volumes.volumes import Aabbs, Circles, Parts, Polygons, Volumes
 
 Number = int | Fraction
 Point = tuple[Number, Number]
-EVERY = [Kind("circle"), Kind("oriented box"), Kind("boxes", 1), Kind("boxes", 5), Kind("polygon")]
+EVERY = ["circle", "oriented box", "1 boxes", "5 boxes", "polygon"]
 
 POSES = [
     ("none", (1, 1), 0), ("x", (1, 1), 90), ("y", (1, 1), 180), ("xy", (1, 1), 270), ("none", (1, 1), 37),
@@ -132,7 +132,7 @@ def check(sprite: Sprite, pose: tuple[str, tuple[float, float], float]) -> None:
     for kind in EVERY:
         volume = bounding(kind, [sprite], [seen])
         assert holds(volume, seen.mask), (kind, pose)
-        if kind.name != "circle":
+        if kind != "circle":
             points = (volume.parts if isinstance(volume, Parts) else volume).core().points / PLACE
             assert (points == np.rint(points)).all(), (kind, pose)
 
@@ -188,7 +188,7 @@ def test_long_thin_masks(name: str) -> None:
     sprite = Sprite.from_mask(mask)
     for angle in (1.0, 33.0, 91.5):
         seen = variant(sprite, ("none", (1.0, 1.0), angle))
-        assert holds(bounding(Kind(name), [sprite], [seen]), seen.mask & (np.arange(seen.mask.shape[1]) % 40 < 2))
+        assert holds(bounding(name, [sprite], [seen]), seen.mask & (np.arange(seen.mask.shape[1]) % 40 < 2))
 
 
 def test_shapes_are_fitted_as_they_are() -> None:
@@ -206,13 +206,12 @@ def test_flips_and_quarter_turns_are_exact() -> None:
     for flip in ("none", "x", "y", "xy"):
         for angle in (0, 90, 180, 270):
             seen = variant(sprite, (flip, (1.0, 1.0), angle))
-            for name in ("boxes", "polygon"):
-                kind = Kind(name, 4)
+            for kind in ("4 boxes", "polygon"):
                 volume, refitted = bounding(kind, [sprite], [seen]), fitted(kind, seen.mask)
                 low, high = volume.bounds(), refitted.bounds()
                 assert low.min.tolist() == high.min.tolist()
                 assert low.max.tolist() == high.max.tolist()
-            circle, again = (bounding(Kind("circle"), [sprite], [v]) for v in (seen, variant(sprite, POSES[0])))
+            circle, again = (bounding("circle", [sprite], [v]) for v in (seen, variant(sprite, POSES[0])))
             assert isinstance(circle, Circles)
             assert isinstance(again, Circles)
             assert circle.radius == again.radius
@@ -241,7 +240,7 @@ def test_rows_are_those_of_one_at_a_time() -> None:
     some = [(s, v) for s, v in zip(sprites, seen, strict=True) if v.area]
     for kind in EVERY:
         rows = bounding(kind, [s for s, _ in some], [v for _, v in some])
-        assert isinstance(rows, {"circle": Circles, "boxes": Parts}.get(kind.name, Polygons))
+        assert isinstance(rows, {"circle": Circles, "1 boxes": Parts, "5 boxes": Parts}.get(kind, Polygons))
         assert len(rows) == len(some)
         for i, (sprite, one) in enumerate(some):
             alone, row = bounding(kind, [sprite], [one]), rows.take([i])
@@ -251,10 +250,9 @@ def test_rows_are_those_of_one_at_a_time() -> None:
 
 def test_kinds() -> None:
     mask = np.ones((9, 40), np.bool_) & (np.hypot(*np.meshgrid(np.arange(40) / 2, np.arange(9))) < 12)
-    (ring,), _ = rings_of(fitted(Kind("polygon"), mask))
+    (ring,), _ = rings_of(fitted("polygon", mask))
     assert len(ring) <= CORNERS
-    assert len(rings_of(fitted(Kind("boxes", 6), mask))[0]) == 6
-    assert {kind.name for kind in EVERY} == set(KINDS)
+    assert len(rings_of(fitted("6 boxes", mask))[0]) == 6
 
 
 def test_the_last_bit_of_the_sine_far_from_the_pivot() -> None:
@@ -276,7 +274,7 @@ def test_frames_have_volumes_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("kind", EVERY, ids=str)
-def test_masks_asked_for_one_after_another(kind: Kind) -> None:
+def test_masks_asked_for_one_after_another(kind: str) -> None:
     """Whatever the order, a mask has its own volume, and an equal one the same row."""
     rng = np.random.default_rng(3)
     scene = Scene()
@@ -298,7 +296,7 @@ def test_masks_asked_for_one_after_another(kind: Kind) -> None:
 
 def test_masks_that_are_laid_out_anew() -> None:
     """Places of masks begin again when those in use are laid out without the others."""
-    scene, kind = Scene(), Kind("circle")
+    scene, kind = Scene(), "circle"
     sprites = [Sprite.from_mask(np.ones((n, 1200), np.bool_)) for n in (1000, 900, 500, 3)]
     ids = [scene.add(sprite, (0, 0)) for sprite in sprites]
     scene.items.bounding(kind, np.array(ids))
@@ -310,12 +308,11 @@ def test_masks_that_are_laid_out_anew() -> None:
 
 
 @pytest.mark.parametrize("kind", EVERY, ids=str)
-def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
+def test_volumes_of_objects_lie_where_the_objects_are(kind: str) -> None:
     scene = Scene()
     mask = np.array([[0, 1, 1, 0], [1, 1, 1, 1]], np.bool_)
     ids = [scene.add(mask, xy, angle=angle) for xy, angle in (((1e9, -7.4), 0), ((3.2, 4), 90), ((0, 0), 31))]
-    name = f"{kind.k} boxes" if kind.name == "boxes" else kind.name
-    volumes = scene.volumes(ids, name)
+    volumes = scene.volumes(ids, kind)
     bounds = volumes.bounds()
     for row, item in enumerate(ids):
         seen, (x, y) = scene.mask(item)
@@ -323,7 +320,7 @@ def test_volumes_of_objects_lie_where_the_objects_are(kind: Kind) -> None:
         side = max(seen.shape)
         assert (bounds.min[row] > (x - side, y - side)).all()
         assert (bounds.max[row] < (x + 2 * side, y + 2 * side)).all()
-    assert len(scene.volumes([], name)) == 0
+    assert len(scene.volumes([], kind)) == 0
 
 
 def test_volumes_that_objects_do_not_have() -> None:
@@ -381,7 +378,7 @@ FLIPPED = np.array([[1, 0, 1], [0, 1, 0], [0, 1, 0]], np.bool_)
 @example(FLIPPED, "none", (1.7, 0.6), 33.0, (2.0**40, -(2.0**38)))
 @example(np.array([[0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 0, 1]], np.bool_), "none", (0.5, 2.0), 23.0, (-1.0, -1.0))
 def test_volumes_hold_every_pixel_square_wherever_the_object_is(
-    kind: Kind, mask: Bools, flip: str, scale: tuple[float, float], angle: float, xy: tuple[float, float]
+    kind: str, mask: Bools, flip: str, scale: tuple[float, float], angle: float, xy: tuple[float, float]
 ) -> None:
     """Up to the limit of positions, where float64 holds no more than 1/4096 px."""
     scene = Scene()
@@ -389,7 +386,7 @@ def test_volumes_hold_every_pixel_square_wherever_the_object_is(
     seen, corner = scene.mask(item)
     if not seen.any():
         return
-    volume = scene.volumes([item], f"{kind.k} boxes" if kind.name == "boxes" else kind.name)
+    volume = scene.volumes([item], kind)
     assert holds(volume, seen, corner)
     low, high = volume.bounds().min[0] - corner, volume.bounds().max[0] - corner
     size = max(*mask.shape, 3) * max(*scale, 1)  # a mask that is scaled down may lose all pixels but one
@@ -398,7 +395,7 @@ def test_volumes_hold_every_pixel_square_wherever_the_object_is(
 
 
 @pytest.mark.parametrize("kind", EVERY, ids=str)
-def test_volumes_of_shapes_hold_every_pixel_square_far_away(kind: Kind) -> None:
+def test_volumes_of_shapes_hold_every_pixel_square_far_away(kind: str) -> None:
     """They are fitted to the turned mask: nothing but the shift grows them."""
     shapes = [Sprite.circle(7.3), Sprite.box(19, 2.5), Sprite.polygon([(0, 0), (9, 1), (3, 8)])]
     places = [(2.0**40, 2.0**40), (-(2.0**38) + 0.3, 5.0), (2.0**37, -(2.0**40) + 11.7)]
@@ -406,19 +403,18 @@ def test_volumes_of_shapes_hold_every_pixel_square_far_away(kind: Kind) -> None:
     for shape, xy, angle in itertools.product(shapes, places, (0, 12.5, 33, 70)):
         item = scene.add(shape, xy, angle=angle)
         seen, corner = scene.mask(item)
-        volume = scene.volumes([item], f"{kind.k} boxes" if kind.name == "boxes" else kind.name)
+        volume = scene.volumes([item], kind)
         assert holds(volume, seen, corner), (shape.source, xy, angle)
 
 
 @pytest.mark.parametrize("kind", EVERY, ids=str)
-def test_a_volume_far_away_does_not_depend_on_the_others(kind: Kind) -> None:
+def test_a_volume_far_away_does_not_depend_on_the_others(kind: str) -> None:
     scene = Scene()
     places = [(0.0, 3.0), (2.0**38, 5.5), (7.0, -(2.0**40)), (2.0**40, 2.0**40)]
     ids = [scene.add(FLIPPED, xy, angle=31.0) for xy in places]
-    name = f"{kind.k} boxes" if kind.name == "boxes" else kind.name
-    together = scene.volumes(ids, name).bounds()
+    together = scene.volumes(ids, kind).bounds()
     for row, item in enumerate(ids):
-        alone = scene.volumes([item], name).bounds()
+        alone = scene.volumes([item], kind).bounds()
         assert together.min[row].tolist() == alone.min[0].tolist()
         assert together.max[row].tolist() == alone.max[0].tolist()
 
@@ -457,11 +453,11 @@ def test_a_needle_has_a_box() -> None:
     lens = Sprite.from_mask(np.abs(y) <= 4 * (1 - (x / 100) ** 2))
     for scale, angle in (((1.0, 1.0), 20.0), ((1.5, 0.4), 100.0), ((1.0, 0.3), 0.0)):
         seen = variant(lens, ("none", scale, angle))
-        for kind in (Kind("oriented box"), Kind("polygon")):
+        for kind in ("oriented box", "polygon"):
             volume = bounding(kind, [lens], [seen])
             edges = seen.mask & (np.arange(seen.mask.shape[1]) % 7 < 2)
             assert holds(volume, edges)
-    sharp = bounding(Kind("polygon"), [lens], [variant(lens, ("none", (1.5, 0.4), 0.0))])
+    sharp = bounding("polygon", [lens], [variant(lens, ("none", (1.5, 0.4), 0.0))])
     assert len(sharp.core().points) == 4  # the box in its place
 
 
@@ -471,5 +467,5 @@ def test_masks_of_the_past_are_not_kept_for_ever() -> None:
     rows = []
     for angle in range(700):
         scene.set(item, angle=angle / 3)
-        rows.append(len(scene.items.bounding(Kind("polygon"), np.array([item]))[0]))
+        rows.append(len(scene.items.bounding("polygon", np.array([item]))[0]))
     assert 100 < max(rows) < 300

@@ -31,7 +31,7 @@ from hitplanes.planes.scene import variants
 from hitplanes.planes.scene.scene import Scene
 from hitplanes.planes.scene.sprite import Sprite, as_sprite, rows_of
 from hitplanes.planes.scene.variants import Transform, Variant, picture_of, transform_of, variant_of, variants_of
-from hitplanes.planes.volumes.fit import KINDS, Kind, bounding
+from hitplanes.planes.volumes.fit import bounding
 
 ROOT = Path(__file__).parent.parent
 
@@ -720,7 +720,8 @@ def answers(sprite: Sprite, form: Transform) -> list[Any]:
     """All that a sprite tells of a form: mask, picture, volumes."""
     variant = variant_of(sprite, form)
     image, *pivot = picture_of(sprite, form, WHITE)
-    volumes = [bounding(Kind(name, 3), [sprite], [variant]).bounds() for name in KINDS if variant.area]
+    kinds = ("circle", "oriented box", "3 boxes", "polygon") if variant.area else ()
+    volumes = [bounding(kind, [sprite], [variant]).bounds() for kind in kinds]
     return [
         variant.mask.tolist(), variant.area, variant.pivot_x, variant.pivot_y, image.tolist(), pivot,
         *((box.min.tolist(), box.max.tolist()) for box in volumes), sprite.frame_count, sprite.source, sprite.color,

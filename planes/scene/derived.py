@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ..bits.tiles import TileAtlas
     from ..bits.visible import Visible
     from ..broadphase.boxes import Index
-    from ..volumes.fit import Bounds, Kind
+    from ..volumes.fit import Bounds
     from .items import Change, Items, Stack
 
 Made = TypeVar("Made")
@@ -86,7 +86,7 @@ class ByMask:
 
     tiles: TileAtlas | None = None
     covers: Covers | None = None
-    bounds: dict[Kind, Bounds] = field(default_factory=dict)
+    bounds: dict[str, Bounds] = field(default_factory=dict)
 
 
 class Derivative:

@@ -29,7 +29,6 @@ from .variants import MaskAtlas, Transform, Variant, surely_fits, variants_of
 
 if TYPE_CHECKING:
     from ..bits.tiles import Tiles
-    from ..volumes.fit import Kind
     from ..volumes.volumes import Volumes
 
 
@@ -559,7 +558,7 @@ class Items:
         covers = self.by_mask.covers = self.by_mask.covers or late.shadows.Covers()
         return covers.of(self.mask.take(rows), lambda k: self.variants[rows[k]].mask, boxes_xyxy, near_xyxy)
 
-    def bounding(self, kind: Kind, rows: Ints) -> tuple[Volumes, Ints]:
+    def bounding(self, kind: str, rows: Ints) -> tuple[Volumes, Ints]:
         """Volumes of masks, px from the mask's pixel [0, 0], and which of them each item has; no mask may be empty."""
         bounds = self.by_mask.bounds.setdefault(kind, late.fit.Bounds(kind))
         return bounds.rows(self.mask[rows], self.sprites, self.variants, rows, len(self.stack()))

@@ -15,7 +15,7 @@ import itertools
 import math
 import threading
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -285,33 +285,22 @@ def _support(points: list[Point]) -> list[Point]:
 def _least_sides(ring: list[Point]) -> list[Line]:
     """Four lines of the least box: one lies on an edge of the hull, so each edge is tried."""
     lines, points = edge_lines(ring), np.array(ring).T
-    best: tuple[Fraction, list[Line]] | None = None
+    found: list[tuple[Fraction, list[Line]]] = []
     for a, b, c in lines:
         ways = ((-b, a), (-a, -b), (b, -a))
         right, far, left = (np.array(ways) @ points).max(axis=1).tolist()
         area = Fraction((right + left) * (far + c), a * a + b * b)
-        if best is None or area < best[0]:
-            best = area, [(a, b, c), *((*way, end) for way, end in zip(ways, (right, far, left), strict=True))]
-    assert best is not None
-    return best[1]
+        others = zip(ways, (right, far, left), strict=True)
+        found.append((area, [(a, b, c), *((*way, end) for way, end in others)]))
+    return min(found, key=lambda sides: sides[0])[1]
 
 
-KINDS = ("circle", "oriented box", "boxes", "polygon")
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of bounding volume, one of KINDS; `k` is the most boxes of "boxes"."""
-
-    name: str
-    k: int = 1
-
-
-def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
+def bounding(kind: str, sprites: Sequence[Sprite], variants: Sequence[Variant]) -> Volumes:
     """Volumes that contain the pixel squares of the masks of one or more variants of sprites, one row each.
 
-    Coordinates are px, from the centre of pixel [0, 0] of each mask. Corners and centres of circles are whole multiples
-    of PLACE, so a flip, a quarter turn and a shift by whole pixels are exact.
+    The kind is "circle", "oriented box", "polygon", or a number of boxes, as "4 boxes". Coordinates are px, from the
+    centre of pixel [0, 0] of each mask. Corners and centres of circles are whole multiples of PLACE, so a flip, a
+    quarter turn and a shift by whole pixels are exact.
     """
     return joined([_bounding_of(kind, sprite, variant) for sprite, variant in zip(sprites, variants, strict=True)])
 
@@ -319,7 +308,7 @@ def bounding(kind: Kind, sprites: Sequence[Sprite], variants: Sequence[Variant])
 class Bounds:
     """A cache of the volumes of one kind of the masks in use, which are made when first read; it is thread-safe."""
 
-    def __init__(self, kind: Kind) -> None:
+    def __init__(self, kind: str) -> None:
         self.kind = kind
         self._volumes: Volumes | None = None
         self._row: dict[int, int] = {}
@@ -351,8 +340,8 @@ class Bounds:
 
 def volumes_of(items: Items, name: str, rows: Ints) -> Volumes:
     """Bounding volumes of items in the world, one row each; see `Scene.volumes`."""
-    k = boxes_in("kind", name)
-    choice("kind", name if k is None else "4 boxes", ("box", "circle", "oriented box", "4 boxes", "polygon"))
+    counted = boxes_in("kind", name) is not None
+    choice("kind", "4 boxes" if counted else name, ("box", "circle", "oriented box", "4 boxes", "polygon"))
     for item in items.id[rows[items.size_wh[rows, 0] == 0]].tolist():
         raise InputError(f"ids: expected objects with a pixel, got {item}, whose mask is empty")
     if name == "box":
@@ -360,7 +349,7 @@ def volumes_of(items: Items, name: str, rows: Ints) -> Volumes:
         return Aabbs(low - 0.5, high + 0.5)
     if not len(rows):
         return Circles(np.zeros((0, 2)), 0.0)
-    volumes, of = items.bounding(Kind(name) if k is None else Kind(KINDS[2], k), rows)
+    volumes, of = items.bounding(name, rows)
     return shifted(volumes.take(of), pixel(items.position_256[rows] - items.pivot_256[rows]))
 
 
@@ -399,13 +388,14 @@ def _grown_circles(circles: Circles, off: Floats) -> Circles:
     return Circles(circles.center, np.where(off > 0, np.nextafter(radius + off, np.inf), radius))
 
 
-def fitted(kind: Kind, mask: Bools) -> Volumes:
+def fitted(kind: str, mask: Bools) -> Volumes:
     """Fit a volume to a mask with a pixel or more: one row, in px from the centre of its pixel [0, 0]."""
-    if kind.name == "circle":
+    if kind == "circle":
         return least_circle(mask)
-    if kind.name == "oriented box":
+    if kind == "oriented box":
         return oriented_box(mask)
-    return boxes(mask, kind.k) if kind.name == "boxes" else convex(mask, CORNERS)
+    k = boxes_in("kind", kind)
+    return convex(mask, CORNERS) if k is None else boxes(mask, k)
 
 
 def moved(volume: Volumes, pivot_256: tuple[int, int], variant: Variant) -> Volumes:
@@ -483,7 +473,7 @@ def _bytes(row: Volumes) -> int:
 _fitted: LruCache[tuple[Any, ...], Volumes] = LruCache(BOUNDING_CACHE_BYTES, _bytes)
 
 
-def _bounding_of(kind: Kind, sprite: Sprite, variant: Variant) -> Volumes:
+def _bounding_of(kind: str, sprite: Sprite, variant: Variant) -> Volumes:
     """The volume fitted to a shape's mask, or the moved volume of the frame."""
     if sprite.outline is not None:
         return _fitted.get((kind, sprite.uid, variant.form), lambda: _on_grid(fitted(kind, variant.mask)))

@@ -41,7 +41,6 @@ from ..kinds.weapon import Pattern, Swept
 
 if TYPE_CHECKING:
     from hitplanes.planes.broadphase.boxes import Index
-    from hitplanes.planes.volumes.fit import Kind
     from hitplanes.planes.volumes.volumes import Capsules, Volumes
 
 
@@ -54,17 +53,12 @@ class Prefilter(NamedTuple):
 
     Parameters
     ----------
-    name : one of PREFILTERS
-    volume : the items' kind of volume, one of `hitplanes.planes.volumes.fit.KINDS`; "" for boxes alone, or for none
-    k : the most boxes of "boxes"
+    name : one of PREFILTERS, or another number of boxes
+    volume : the items' kind of volume, as in `hitplanes.planes.volumes.fit.bounding`; "" for boxes alone, or for none
     """
 
     name: str
     volume: str = ""
-    k: int = 1
-
-    def __str__(self) -> str:
-        return f"{self.k} boxes" if self.name == "boxes" else self.name
 
 
 BOX = Prefilter("box")
@@ -83,7 +77,7 @@ def _known(name: str) -> Prefilter:
 def _named(name: object) -> Prefilter:
     k = boxes_in("prefilter", name)
     if k is not None:
-        return Prefilter("boxes", "boxes", k)
+        return Prefilter(f"{k} boxes", f"{k} boxes")
     known = choice("prefilter", name, PREFILTERS)
     if known in PREFILTERS[:3]:
         return Prefilter(known)
@@ -197,10 +191,9 @@ class Candidates:
 
     def near(self, placements: Placements, placement: Ints, rank: Ints) -> Bools:
         """Whether the volumes of pattern and item may meet, for pairs whose boxes do."""
-        kind = late.fit.Kind(self.prefilter.volume, self.prefilter.k)
         found = placements.count[placement] > 0  # the box of an empty pattern lies within others
-        placement, rank, name = placement[found], rank[found], self.prefilter.name
-        found[found] = near(name, kind, self.items, self.stack, placements, placement, rank)
+        placement, rank, (name, volume) = placement[found], rank[found], self.prefilter
+        found[found] = near(name, volume, self.items, self.stack, placements, placement, rank)
         return found
 
 
@@ -210,7 +203,7 @@ _kept: LruCache[tuple[ref[Pattern], str], Volumes] = LruCache(
 """Volumes of patterns; the key is a weak reference, so the patterns are not kept alive."""
 
 
-def near(name: str, kind: Kind, items: Items, stack: Stack, placed: Placements, placement: Ints, rank: Ints) -> Bools:
+def near(name: str, kind: str, items: Items, stack: Stack, placed: Placements, placement: Ints, rank: Ints) -> Bools:
     """Which pairs of placements and items may touch: their volumes meet, or floats cannot decide.
 
     Parameters
@@ -227,7 +220,7 @@ def near(name: str, kind: Kind, items: Items, stack: Stack, placed: Placements, 
     return _meet(kind, items, stack.rows[rank], shift, patterns, of_pattern)
 
 
-def near_rays(kind: Kind, items: Items, rows: Ints, corner_xy: Ints, lines: Lines) -> Bools:
+def near_rays(kind: str, items: Items, rows: Ints, corner_xy: Ints, lines: Lines) -> Bools:
     """Which pairs of a ray and an item may touch: the capsule around the ray meets the item's volume.
 
     Parameters
@@ -240,7 +233,7 @@ def near_rays(kind: Kind, items: Items, rows: Ints, corner_xy: Ints, lines: Line
     return _meet(kind, items, rows, corner_xy, capsules, np.arange(len(rows)))
 
 
-def _meet(kind: Kind, items: Items, rows: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
+def _meet(kind: str, items: Items, rows: Ints, corner_xy: Ints, others: Volumes, of_other: Ints) -> Bools:
     """Which volumes of items, placed by the corners of their masks, meet other volumes."""
     volumes, of = items.bounding(kind, rows)
     found = np.zeros(len(rows), np.bool_)

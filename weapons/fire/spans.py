@@ -134,7 +134,7 @@ def near_pairs(placements: Placements, which: Ints, boxes: Ints, context: QueryC
         plan.run("pre-filter", candidates.why, made)
         near, met = candidates.near(placements, placement, rank), len(rank)
         placement, rank = placement[near], rank[near]
-        plan.run("volumes", str(candidates.prefilter), near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
+        plan.run("volumes", candidates.prefilter.name, near.nbytes + placement.nbytes + rank.nbytes, (len(rank), met))
         made = 0
     plan.run("pre-filter", candidates.why, made, (len(rank), len(which) * len(context.stack)))
     return placement, rank

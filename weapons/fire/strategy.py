@@ -330,7 +330,7 @@ def chosen_candidates(prefilter: object, broadphase: object, scene: Scene, stack
         return Candidates(scene.items, stack, wanted, None, "none: every item", "no box is compared")
     if wanted.name == "auto":
         wanted = BOX
-    text = "box" if wanted == BOX else f"box, then {wanted}"
+    text = "box" if wanted == BOX else f"box, then {wanted.name}"
     if structure == "none":
         return Candidates(scene.items, stack, wanted, None, text)
     if structure == "auto":

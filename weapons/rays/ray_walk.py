@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from hitplanes.planes import late
 from hitplanes.planes.bits.distance_field import DistanceField
 from hitplanes.planes.common.checks import Floats, InputError, Ints
 from hitplanes.planes.common.limits import CHUNK_SAMPLES, HALF, SUB
@@ -253,9 +252,9 @@ def _touched(
         from ..fire.prefilter import near_rays
 
         corner = stack.box_xyxy[rank, :2] - origin
-        kept = near_rays(late.fit.Kind(wanted.volume, wanted.k), through.items, stack.rows[rank], corner, own)
+        kept = near_rays(wanted.volume, through.items, stack.rows[rank], corner, own)
         row, rank, own, origin = row[kept], rank[kept], own.take(kept), origin[kept]
-        plan.run("volumes", str(wanted), kept.nbytes + row.nbytes + rank.nbytes, (len(rank), len(kept)))
+        plan.run("volumes", wanted.name, kept.nbytes + row.nbytes + rank.nbytes, (len(rank), len(kept)))
     if through.looked:
         through.looked.pairs.append((row, rank))
     plan.run("pre-filter", "", 0, (len(rank), possible))

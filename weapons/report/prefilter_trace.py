@@ -15,7 +15,6 @@ from hitplanes.planes.grid.rasterize import Lines
 from hitplanes.planes.grid.spans import Box, meets, ragged
 from hitplanes.planes.scene.render import blend
 from hitplanes.planes.scene.scene import Scene
-from hitplanes.planes.volumes.fit import Kind
 from hitplanes.planes.volumes.volumes import Capsules, Parts, Volumes
 
 from ..fire.hits import Hits
@@ -53,7 +52,7 @@ class PrefilterTrace:
             number, boxes = number[kept], boxes[kept]
         cells = [{"box_xyxy": box, "opened": bool(n in opened)} for n, box in zip(number, boxes.tolist(), strict=True)]
         return {
-            "prefilter": str(self.prefilter),
+            "prefilter": self.prefilter.name,
             "broadphase": self.index.structure if self.index else "none",
             "cells": cells,
         }
@@ -229,7 +228,7 @@ def _item_outlines(world: World, report: Mapping[str, Any], scene: Scene) -> dic
     ids = stack.ids[seen]
     if not wanted.volume:
         return {item: [rectangle(box)] for item, box in zip(ids.tolist(), stack.box_xyxy[seen], strict=True)}
-    volumes, row = scene.items.bounding(Kind(wanted.volume, wanted.k), stack.rows[seen])
+    volumes, row = scene.items.bounding(wanted.volume, stack.rows[seen])
     corner = stack.box_xyxy[seen, :2]
     return {
         item: [ring + corner[i] for ring in outline_of(volumes, int(row[i]))] for i, item in enumerate(ids.tolist())
