@@ -164,10 +164,10 @@ def test_truth_of_spread_is_that_of_one_pixel_after_another() -> None:
         for thing in things_of(scene):
             on = [(x * x + y * y, cy + y, cx + x) for x, y in disc if (cx + x, cy + y) in thing.pixels]
             if on:
-                expected[number, thing.id] = len(on), min(on)[2], min(on)[1]
-    got = zip(parts.disc.tolist(), parts.object.tolist(), parts.pixels.tolist(), parts.nearest_xy.tolist(), strict=True)
-    assert {(d, i): (n, *xy) for d, i, n, xy in got} == expected
-    assert parts.whole == len(disc) and len(expected) > 15
+                expected[number, thing.id] = len(on) / len(disc), min(on)[2], min(on)[1]
+    got = zip(*(column.tolist() for column in parts), strict=True)
+    assert {(d, i): (share, *xy) for d, i, xy, share in got} == expected
+    assert len(expected) > 15
 
 
 def test_truth_tells_who_starts_inside() -> None:
@@ -304,10 +304,10 @@ def test_overlap_each_step_is_that_of_a_disc_where_it_is_then() -> None:
         for k in range(steps, 0, -1):
             at = start / SUB + k / steps * (step / SUB)
             parts = parts_of_discs(np.floor(at + 0.5).astype(int), round(hits.weapon.radius), targets)
-            pixel_xy = np.floor(at + 0.5)[parts.disc]
-            away = ((parts.nearest_xy - pixel_xy) ** 2).sum(axis=1)
-            for row in np.lexsort((away, parts.disc))[::-1].tolist():
-                expected[int(parts.disc[row])] = int(parts.object[row]), at[parts.disc[row]].tolist()
+            pixel_xy = np.floor(at + 0.5)[parts.shot]
+            away = ((parts.xy - pixel_xy) ** 2).sum(axis=1)
+            for row in np.lexsort((away, parts.shot))[::-1].tolist():
+                expected[int(parts.shot[row])] = int(parts.object[row]), at[parts.shot[row]].tolist()
         found = decided(method)
         told = zip(found.shot.tolist(), found.object.tolist(), found.xy.tolist(), strict=True)
         assert {shot: (item, xy) for shot, item, xy in told} == expected and expected

@@ -286,8 +286,7 @@ def _axis(triangles: Floats) -> Ints:
     The axis of the normal's largest component, by floats, is tried first; the exact sign of the area decides.
     """
     e, f = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normal = [e[:, i] * f[:, j] - e[:, j] * f[:, i] for i, j in KEPT]
-    guess = np.argmax(np.abs(np.stack(normal, axis=1)), axis=1)
+    guess = np.argmax(np.abs(np.cross(e, f)), axis=1)
     axis = np.full(len(triangles), -1)
     for k in range(3):
         left = np.flatnonzero(axis < 0)

@@ -448,16 +448,11 @@ def _space_directions(rng: Rng, n: int) -> Floats:
     return np.asarray(v / np.sqrt((v * v).sum(axis=1))[:, None])
 
 
-def cross3(p: Floats, q: Floats) -> Floats:
-    """Return the cross products of rows (n, 3)."""
-    return np.stack([p[:, k - 2] * q[:, k - 1] - p[:, k - 1] * q[:, k - 2] for k in range(3)], axis=1)
-
-
 def _touching3(rng: Rng, n: int, size: Any = 1.0, thin: Any = 1.0) -> Columns:
     """Make triangles that touch with a corner on a face, or with two crossing edges, on different sides of a plane."""
     thin, size = (np.broadcast_to(v, n)[:, None] for v in (thin, size))
     x, y = _space_directions(rng, n), _space_directions(rng, n)
-    up = cross3(x, y)
+    up = np.cross(x, y)
     face = np.stack([-0.4 * x, 0.6 * x, y * thin + x * rng.uniform(-0.4, 0.6, (n, 1))], axis=1)
     share = rng.dirichlet(np.ones(3), n)
     place = (face * share[:, :, None]).sum(axis=1)

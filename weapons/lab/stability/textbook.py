@@ -19,8 +19,6 @@ import numpy.typing as npt
 
 from hitplanes.planes.common.checks import Bools, Floats
 
-from .families import cross3
-
 Array = npt.NDArray[Any]
 
 
@@ -89,7 +87,7 @@ def triangles(a: Floats, b: Floats) -> Bools:
     side_a = (a * normal_b[:, None]).sum(axis=2) + at_b[:, None]
     side_b = (b * normal_a[:, None]).sum(axis=2) + at_a[:, None]
     apart = [(side > 0).all(axis=1) | (side < 0).all(axis=1) for side in (side_a, side_b)]
-    along = np.abs(cross3(normal_a, normal_b)).argmax(axis=1)
+    along = np.abs(np.cross(normal_a, normal_b)).argmax(axis=1)
     rows = np.arange(len(a))
     (low_a, high_a), (low_b, high_b) = _interval(a[rows, :, along], side_a), _interval(b[rows, :, along], side_b)
     meet = (low_a <= high_b) & (low_b <= high_a) & ~apart[0] & ~apart[1]
@@ -99,7 +97,7 @@ def triangles(a: Floats, b: Floats) -> Bools:
 
 
 def _plane(t: Floats) -> tuple[Floats, Floats]:
-    normal = cross3(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    normal = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
     return normal, -(normal * t[:, 0]).sum(axis=1)
 
 

@@ -119,8 +119,7 @@ def _truth(discs: Discs) -> Decisions:
     of = discs_on_shapes(discs.at, discs.radius, shapes)
     masks = [target for target in targets_of(discs.scene) if not discs.exact[target[0]]]
     on = parts_of_discs(np.floor(discs.at + 0.5).astype(np.int64), int(discs.radius), masks)
-    on_masks = Decisions(on.disc, on.object, on.nearest_xy.astype(np.float64), on.pixels / on.whole)
-    return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), on_masks])
+    return Decisions.joined([Decisions(of.shot, exact[of.object], of.xy, of.share), Decisions(*on)])
 
 
 def _shape(scene: Scene, item: int) -> Round | Straight | None:
@@ -555,7 +554,6 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
     radius = min(max(1, round(size_of(targets) / 2)), BLAST_RADIUS_MAX)
     place, _, _ = drawn_places(targets, shots, seed, SUB * radius, lambda xy: np.zeros(len(xy), np.bool_))
     at = pixel(place)
-    parts = parts_of_discs(at, radius, targets)
 
     def pellets(n: int) -> Method:
         weapon = Spread(Point(pierce=True), n, radius)
@@ -565,14 +563,13 @@ def spread_question(scene: Scene, shots: int, seed: int) -> Question:
 
     note = "a share is a part of the pellets; it does not tell where it hit"
     every = fired_method(
-        None, alone, Disc(radius, pierce=True),
-        lambda h: Decisions(h.shot, h.object, h.first_xy.astype(np.float64), h.samples / parts.whole), at=at,
-    )  # fmt: skip
+        None, alone, Disc(radius, pierce=True), lambda hits: _decided_by_planes([(hits, alone.ids())], 1), at=at
+    )
     return Question(
         "spread",
         f"How much of a blast of {radius} px lies on each object?",
         shots,
-        Decisions(parts.disc, parts.object, parts.nearest_xy.astype(np.float64), parts.pixels / parts.whole),
+        Decisions(*parts_of_discs(at, radius, targets)),
         "every pixel of the blast is looked up in the mask of every object, at full scale",
         (Curve("pellets", "pellets", tuple(map(pellets, PELLETS)), note), Curve("every pixel", "", (every,))),
         by_share=True,

@@ -54,23 +54,27 @@ def _between(target: Target, low: Ints, high: Ints) -> Ints:
 # Discs
 
 
-class Parts(NamedTuple):
-    """Discs and objects that share pixels (K,), how many, and the one nearest to the disc's centre (K, 2).
+class Touched(NamedTuple):
+    """Hits as columns: shot and object (K,), px of the object nearest to the shot (K, 2), share of the disc (K,)."""
 
-    Of several nearest ones it is the least (y, x). `whole` is the number of pixels of a disc.
-    """
-
-    disc: Ints
+    shot: Ints
     object: Ints
-    pixels: Ints
-    nearest_xy: Ints
-    whole: int
+    xy: Floats
+    share: Floats
+
+    @classmethod
+    def of(cls, found: Sequence[tuple[float, ...]]) -> Touched:
+        """Make columns of rows (shot, object, x, y, share)."""
+        table = np.array(found, np.float64).reshape(-1, 5)
+        shot, item = table[:, :2].T.astype(np.int64)
+        return cls(shot, item, table[:, 2:4], table[:, 4])
 
 
-def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> Parts:
+def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> Touched:
     """Count the pixels that discs around whole pixels (N, 2) share with objects, regardless of objects in front.
 
-    A pixel belongs to a disc when its centre is no farther away than the radius, px.
+    A pixel belongs to a disc when its centre is no farther away than the radius, px. Of several nearest pixels the
+    least (y, x) is returned.
     """
     side = np.arange(-radius, radius + 1)
     y, x = (grid.ravel() for grid in np.meshgrid(side, side, indexing="ij"))
@@ -86,9 +90,8 @@ def parts_of_discs(center_xy: Ints, radius: int, targets: Sequence[Target]) -> P
             on = np.flatnonzero(((at >= 0) & (at < size)).all(axis=1))
             on = on[mask[at[on, 1], at[on, 0]]]
             if len(on):
-                found.append((disc, number, len(on), *(center_xy[disc] + xy[on[0]]).tolist()))
-    rows = np.array(found, np.int64).reshape(-1, 5)
-    return Parts(rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3:], len(xy))
+                found.append((disc, number, *(center_xy[disc] + xy[on[0]]).tolist(), len(on) / len(xy)))
+    return Touched.of(found)
 
 
 # Rays
@@ -303,15 +306,6 @@ def _square_time(away: list[int], step: list[int]) -> Fraction | None:
 STRIPS = 1024  # into which a disc is cut; the error of a share is about STRIPS**-1.5, or 1 in 30,000
 
 
-class Touched(NamedTuple):
-    """Hits as columns: shot and object (K,), point nearest to the shot (K, 2), share of the disc (K,)."""
-
-    shot: Ints
-    object: Ints
-    xy: Floats
-    share: Floats
-
-
 @dataclass(frozen=True, eq=False)
 class Round:
     """A circle in the world, px."""
@@ -411,6 +405,4 @@ def discs_on_shapes(at: Floats, radius: float, shapes: Sequence[Round | Straight
             if shape.meets(place, radius):
                 chords = shape.chords(place[1] + off, place[0] - half, place[0] + half)
                 found.append((shot, k, *shape.nearest(place).tolist(), float(chords.sum() / (2 * half.sum()))))
-    table = np.array(sorted(found), np.float64).reshape(-1, 5)
-    shot, item = table[:, :2].T.astype(np.int64)
-    return Touched(shot, item, table[:, 2:4], table[:, 4])
+    return Touched.of(sorted(found))
