@@ -17,7 +17,7 @@ import numpy as np
 
 from ..common.checks import Bools, Floats, InputError, Ints, array_of, choice, integers, reals, shown
 from ..common.limits import CHUNK_PAIRS, INDEX_SLACK, STRUCTURES
-from ..grid.spans import meets
+from ..grid.spans import meets, sorted_once
 from ..scene.derived import Derivative
 from ..scene.items import Items
 from ..volumes.volumes import Aabbs, Volumes
@@ -53,10 +53,10 @@ def box_rows(field: str, values: object, dim: int | None = None) -> Floats:
     return rows
 
 
-def sorted_pairs(first: Ints, second: Ints, n: int) -> Ints:
-    """Pairs as (2, K), sorted by (first, second); every second is below n."""
-    key = np.sort(first * n + second) if n else first
-    return np.stack(np.divmod(key, n)) if n else np.empty((2, 0), np.int64)
+def sorted_pairs(first: Ints, second: Ints, n: int, once: bool = False) -> Ints:
+    """Pairs as (2, K), sorted by (first, second), and without repeats if `once`; every second is below n."""
+    key = first * n + second
+    return np.stack(np.divmod(sorted_once(key) if once else np.sort(key), max(n, 1)))
 
 
 def piled(found: Sequence[Pairs]) -> Ints:

@@ -12,7 +12,7 @@ import numpy as np
 from ..common.checks import Bools, Floats, InputError, Ints, integers, real
 from ..common.limits import BVH_LEAF, BVH_SMALL, CHUNK_SAMPLES
 from ..grid.spans import begins, meets, pieces, ragged, sorted_once
-from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows
+from .boxes import LARGEST, BroadPhase, Cells, Pairs, Work, box_rows, sorted_pairs
 
 
 class Tree:
@@ -242,7 +242,8 @@ class PartsBvh:
 
     def query(self, boxes: object) -> Ints:
         """Find the objects that overlap each of these boxes: (2, K) int64 [query, object], sorted."""
-        return _once(self.query_parts(boxes)[:2])
+        query, owner, _ = self.query_parts(boxes)
+        return sorted_pairs(query, owner, len(self._starts), once=True)
 
     def query_parts(self, boxes: object) -> Ints:
         """Find the parts that overlap each of these boxes: (3, K) int64 [query, object, part of it], sorted."""
@@ -260,7 +261,7 @@ class PartsBvh:
         again, _, right = self._parts_of(second[group])
         met = meets(self._parts.take(left.take(again), axis=0), self._parts.take(right, axis=0))
         good = group[again[met]]
-        return _once(np.stack((first[good], second[good])))
+        return sorted_pairs(first[good], second[good], len(self._starts), once=True)
 
     def _parts_of(self, objects: Ints) -> tuple[Ints, Ints, Ints]:
         """All parts of objects: (place of the object, number of the part, row)."""
@@ -354,13 +355,6 @@ def _girths(rows: Floats) -> Floats:
     dim = rows.shape[1] // 2
     with np.errstate(over="ignore"):
         return np.asarray((rows[:, dim:] - rows[:, :dim]).sum(axis=1))
-
-
-def _once(pairs: Ints) -> Ints:
-    """Sorted pairs without repeats."""
-    if not pairs.size:
-        return pairs[:, :0]
-    return pairs[:, np.append(True, (np.diff(pairs) != 0).any(axis=0))]
 
 
 def _quarter_side(rows: Floats) -> float:

@@ -211,17 +211,7 @@ class Grid(BroadPhase):
         self._home[ids] = np.where(large, BESIDE, FRESH)
         self._beside = np.concatenate((self._beside, ids[large]))
         both = zip(self._listings[1].entries(), self._listed(ids[~large]), strict=True)
-        key, entry = (np.concatenate(parts) for parts in both)
-        settled = len(self._listings[0].entry)
-        if not settled or len(key) > max(GRID_FRESH, settled // 16):
-            self._settle(key, entry)
-        else:
-            self._relist(key, entry)
-
-    def _relist(self, key: Ints, entry: Ints) -> None:
-        """Sort the fresh entries."""
-        self._listings[1] = Listing.of(key, entry)
-        self.written += len(key)
+        self._list(*(np.concatenate(parts) for parts in both))
 
     def _listed(self, ids: Ints) -> Pairs:
         """Cells of boxes that are not oversized, as (key, entry)."""
@@ -236,12 +226,8 @@ class Grid(BroadPhase):
         if (homes == BESIDE).any():
             self._beside = self._beside[self._home[self._beside] == BESIDE]
         key, entry = self._listings[1].entries()
-        if (homes == FRESH).any():
-            keep = self._home[entry >> FIRST_BITS] == FRESH
-            key, entry = key[keep], entry[keep]
-            self._relist(key, entry)
-        if 2 * self._stale > len(self._listings[0].entry):
-            self._settle(key, entry)
+        keep = self._home[entry >> FIRST_BITS] == FRESH
+        self._list(key[keep], entry[keep])
 
     def _shift(self, ids: Ints, rows: Floats) -> None:
         goes = (self._span(rows) != self._place[ids]).any(axis=(1, 2))
@@ -251,8 +237,13 @@ class Grid(BroadPhase):
         if goes.any():
             self._enter(ids[goes])
 
-    def _settle(self, key: Ints, entry: Ints) -> None:
-        """Sort the fresh entries in with all others, and drop the stale ones."""
+    def _list(self, key: Ints, entry: Ints) -> None:
+        """Sort the fresh entries; if these or the stale ones are many, sort all, and drop the stale ones."""
+        settled = len(self._listings[0].entry)
+        if settled and len(key) <= max(GRID_FRESH, settled // 16) and 2 * self._stale <= settled:
+            self._listings[1] = Listing.of(key, entry)
+            self.written += len(key)
+            return
         old_key, old_entry = self._listings[0].entries()
         keep = self._home[old_entry >> FIRST_BITS] == MAIN
         self._home[entry >> FIRST_BITS] = MAIN

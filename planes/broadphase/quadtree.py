@@ -257,14 +257,13 @@ class Quadtree(BroadPhase):
         node, box = np.concatenate((node, more_node)), np.concatenate((box, more_box))
         place = np.minimum(np.searchsorted(below, node), len(below) - 1)
         node = np.where(below[place] == node, top[place], node)
-        node, box = sorted_pairs(node, box, self._count)
-        once = np.append(True, (np.diff(node) != 0) | (np.diff(box) != 0))[: len(node)]
+        node, box = sorted_pairs(node, box, self._count, once=True)
         self._live -= int(nodes["length"][below].sum())
         nodes["length"][below] = 0
         nodes["depth"][below] = -1
         nodes["child"][tops] = -1
         self._free = np.sort(np.concatenate((self._free, firsts)))
-        return node[once], box[once], np.union1d(np.setdiff1d(leaves, below), tops)
+        return node, box, np.union1d(np.setdiff1d(leaves, below), tops)
 
     def _below(self, tops: Ints) -> tuple[Ints, Ints, Ints]:
         """All nodes below the given ones, the given node above each, and the first of each four siblings."""

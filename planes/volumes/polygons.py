@@ -24,7 +24,7 @@ from .exact import orient2d, point_segment_sign, segment_segment_sign
 
 Numbers = npt.NDArray[Any]
 Corner = tuple[float, float]
-Whole = tuple[int, int]
+Point = tuple[int, int]
 
 
 def rows_of(starts: Ints, total: int) -> tuple[Ints, Ints]:
@@ -106,9 +106,9 @@ def hull(points: list[Corner]) -> list[Corner]:
     return [given[p] for run in (whole, whole[::-1]) for p in chain(run)[:-1]]
 
 
-def chain(points: list[Whole]) -> list[Whole]:
+def chain(points: list[Point]) -> list[Point]:
     """Corners of one side of the hull of sorted points: Andrew's monotone chain."""
-    kept: list[Whole] = []
+    kept: list[Point] = []
     for point in points:
         while len(kept) > 1 and turn(kept[-2], kept[-1], point) <= 0:
             kept.pop()
@@ -142,7 +142,7 @@ def _edges(part: list[int]) -> list[tuple[int, int]]:
     return list(zip(part, part[1:] + part[:1], strict=True))
 
 
-def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> list[int]:
+def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Point]) -> list[int]:
     """Join two parts at their common edge, uv in a and vu in b; empty if the result is not convex."""
     k, m = a.index(v), b.index(u)
     a, b = a[k:] + a[:k], b[m:] + b[:m]  # from v to u, and from u to v
@@ -152,7 +152,7 @@ def _merged(a: list[int], b: list[int], u: int, v: int, whole: list[Whole]) -> l
     return a + b[1:-1]
 
 
-def _triangles(whole: list[Whole]) -> list[list[int]]:
+def _triangles(whole: list[Point]) -> list[list[int]]:
     n = len(whole)
     twice_area = sum(whole[i - 1][0] * whole[i][1] - whole[i][0] * whole[i - 1][1] for i in range(n))
     left = list(range(n)) if twice_area > 0 else list(range(n))[::-1]
@@ -164,13 +164,13 @@ def _triangles(whole: list[Whole]) -> list[list[int]]:
     return found
 
 
-def _without_straight(left: list[int], whole: list[Whole]) -> list[int]:
+def _without_straight(left: list[int], whole: list[Point]) -> list[int]:
     """Remove points on edges; this turns no other corner."""
     after = left[1:] + left[:1]
     return [k for i, k in enumerate(left) if turn(whole[left[i - 1]], whole[k], whole[after[i]]) != 0]
 
 
-def _is_ear(left: list[int], k: int, whole: list[Whole]) -> bool:
+def _is_ear(left: list[int], k: int, whole: list[Point]) -> bool:
     """Whether a corner turns inward and no other point lies in its closed triangle."""
     corner = (left[k - 1], left[k], left[(k + 1) % len(left)])
     a, b, c = (whole[i] for i in corner)
@@ -202,14 +202,13 @@ def turn(a: Any, b: Any, c: Any) -> Any:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _whole(points: list[Corner]) -> list[Whole]:
+def _whole(points: list[Corner]) -> list[Point]:
     """Points as integers in units of their smallest power of two."""
     ratios = [(x.as_integer_ratio(), y.as_integer_ratio()) for x, y in points]
     unit = max((max(x[1], y[1]) for x, y in ratios), default=1)
     return [(x[0] * (unit // x[1]), y[0] * (unit // y[1])) for x, y in ratios]
 
 
-Point = tuple[int, int]
 Line = tuple[int, int, int]
 Extents = tuple[Ints, Ints, Ints]  # rows with pixels, rising, and the first and last column of each
 
