@@ -104,19 +104,12 @@ def first_pixels(start_256: Ints, step_256: Ints, targets: Sequence[Target]) -> 
     object there: targets are given front to back. Returned are the segments (K,) that touch anything, in order, their
     objects (K,), and their pixels (K, 2).
     """
-    box = _boxes(targets)
-    found: list[tuple[int, int, int, int]] = []
-    for shot, (start, step) in enumerate(zip(start_256, step_256, strict=True)):
-        low, high = np.minimum(start, start + step) - HALF, np.maximum(start, start + step) + HALF
-        near = np.flatnonzero((box[:, :2] <= high).all(axis=1) & (box[:, 2:] >= low).all(axis=1))
-        if not len(near):
-            continue
-        pixels = [_between(targets[rank], low, high) for rank in near.tolist()]
-        xy, rank = np.concatenate(pixels), np.repeat(near, [len(rows) for rows in pixels])
-        time, met = _entries(PX * xy - start, step)
+    found = []
+    for shot, near in _nearby(Flights(start_256, step_256, 0), targets, np.zeros((len(targets), 2), np.int64)):
+        time, met = _entries(near.away, step_256[shot])
         if len(met):
-            first = met[np.lexsort((rank[met], xy[met, 0], xy[met, 1], time))[0]]
-            found.append((shot, targets[rank[first]][0], int(xy[first, 0]), int(xy[first, 1])))
+            first = met[np.lexsort((near.rank[met], near.xy[met, 0], near.xy[met, 1], time))[0]]
+            found.append((shot, targets[near.rank[first]][0], *near.xy[first].tolist()))
     rows = np.array(found, np.int64).reshape(-1, 4)
     return rows[:, 0], rows[:, 1], rows[:, 2:]
 
