@@ -208,7 +208,8 @@ class Bvh(BroadPhase):
     def _plant(self, number: int, ids: Ints) -> None:
         rows = self._rows[ids]
         if self._measures and 4 * len(ids) >= 3 * len(self):
-            self.slack = _quarter_side(rows)
+            quarters = (rows[:, self.dim :] / 4 - rows[:, : self.dim] / 4).max(axis=1)
+            self.slack = float(np.partition(quarters, len(ids) // 2)[len(ids) // 2])
         tree = Tree(ids, rows, self.slack)
         self._trees[number : number + 1] = [tree]
         self.written += len(ids) + sum(map(len, tree.levels))
@@ -355,9 +356,3 @@ def _girths(rows: Floats) -> Floats:
     dim = rows.shape[1] // 2
     with np.errstate(over="ignore"):
         return np.asarray((rows[:, dim:] - rows[:, :dim]).sum(axis=1))
-
-
-def _quarter_side(rows: Floats) -> float:
-    dim = rows.shape[1] // 2
-    longest = (rows[:, dim:] / 4 - rows[:, :dim] / 4).max(axis=1)
-    return float(np.partition(longest, len(rows) // 2)[len(rows) // 2])

@@ -95,7 +95,6 @@ class Quadtree(BroadPhase):
         due = sorted_pairs(node[leaf], box[leaf], self._count)
         listed = sorted_pairs(*self._entries(self._leaf_numbers()), self._count)
         assert np.array_equal(due, listed), "leaves do not list the boxes that reach into them"
-        assert nodes["length"].sum() == self._live, "the pool is miscounted"
         assert self._count_out(self._rows[ids]) == self._outside, "boxes outside are miscounted"
 
     def _find(self, queries: Floats, work: Work | None) -> list[Pairs]:
@@ -161,7 +160,7 @@ class Quadtree(BroadPhase):
         nodes["child"][0] = -1
         self._free = np.empty(0, np.int64)
         self._pool = np.empty(0, np.int64)
-        self._used = self._live = 0
+        self._used = 0
         self._outside = self._least = self._count_out(rows)
         nodes["total"][0] = len(ids)
         nodes["straddle"][0] = np.count_nonzero(_straddling(_quarters(rows, nodes["mid"])))
@@ -258,7 +257,6 @@ class Quadtree(BroadPhase):
         place = np.minimum(np.searchsorted(below, node), len(below) - 1)
         node = np.where(below[place] == node, top[place], node)
         node, box = sorted_pairs(node, box, self._count, once=True)
-        self._live -= int(nodes["length"][below].sum())
         nodes["length"][below] = 0
         nodes["depth"][below] = -1
         nodes["child"][tops] = -1
@@ -283,7 +281,6 @@ class Quadtree(BroadPhase):
         done = [(node[:0], box[:0], leaves[:0])]
         while len(leaves):
             splits = leaves[self._overfull(leaves)]
-            self._live -= int(self._nodes["length"][splits].sum())
             self._nodes["length"][splits] = 0
             goes = np.isin(node, splits)
             done.append((node[~goes], box[~goes], np.setdiff1d(leaves, splits)))
@@ -330,7 +327,6 @@ class Quadtree(BroadPhase):
         """Append the entries of leaves to the pool; compact it when half is unused."""
         node, box = sorted_pairs(node, box, self._count)
         length = np.bincount(np.searchsorted(leaves, node), minlength=len(leaves))
-        self._live += len(box) - int(self._nodes["length"][leaves].sum())
         self._nodes["length"][leaves] = length
         if self._used + len(box) > len(self._pool):
             kept = np.setdiff1d(self._leaf_numbers(), leaves)

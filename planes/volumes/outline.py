@@ -167,10 +167,10 @@ def _blocks(mask: Bools, block: int) -> Bools:
 def _joined(mask: Bools) -> Bools:
     """The mask as one part that is connected by sides."""
     mask = _without_crossings(mask)
-    labels, parts = _labels(mask)
-    if parts == 1:
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    if count == 2:  # the background and one part
         return mask
-    return _without_crossings(_bridged(labels, parts))
+    return _without_crossings(_bridged(labels.astype(np.int64) - 1, count - 1))
 
 
 def _without_crossings(mask: Bools) -> Bools:
@@ -192,14 +192,11 @@ def _root(parents: list[int], i: int) -> int:
     return i
 
 
-def _labels(mask: Bools) -> tuple[Ints, int]:
-    """Label the parts that are connected by sides: labels (h, w), -1 off the mask, and their number."""
-    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
-    return labels.astype(np.int64) - 1, count - 1
-
-
 def _bridged(labels: Ints, parts: int) -> Bools:
-    """Join parts by shortest paths, which cross where the cells nearest to one part touch those of another."""
+    """Join parts by shortest paths, which cross where the cells nearest to one part touch those of another.
+
+    Labels (h, w) number the parts from 0; off the mask they are -1.
+    """
     padded = np.pad(labels, 1, constant_values=-2)  # nothing spreads beyond the frame
     near, came, steps = _nearest(padded.reshape(-1), padded.shape[1])
     cells = np.flatnonzero(near >= 0)

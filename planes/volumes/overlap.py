@@ -44,7 +44,7 @@ def hulls_sign(one: Core, two: Core, rows: Ints) -> Signs:
 def _chunk_sign(one: Core, two: Core, rows: Ints) -> Signs:
     """Test the edges of one, then of the other, then distances; decided rows leave the batch."""
     a, b = (_corners(core, rows) for core in (one, two))
-    a_ends, b_ends = (_without_length(v) for v in (a, b))
+    a_ends, b_ends = ((v == np.roll(v, -1, axis=1)).all(axis=0) for v in (a, b))  # edges without length
     middle = a[:, :1].copy()
     a -= middle
     b -= middle
@@ -72,11 +72,6 @@ def _corners(core: Core, rows: Ints) -> Floats:
     pairs = np.ascontiguousarray(core.points).view(np.complex128)[:, 0]  # x and y are gathered as one
     found = pairs[core.starts[rows] + places]
     return np.stack([found.real, found.imag])
-
-
-def _without_length(a: Floats) -> Bools:
-    """Whether both ends of each edge (k, n) are equal."""
-    return np.asarray((a == np.roll(a, -1, axis=1)).all(axis=0))
 
 
 def _edges_sign(a: Floats, b: Floats, ends: Bools, reach: Floats) -> tuple[Signs, Bools]:
@@ -285,10 +280,6 @@ def _aabbs_aabbs(a: Aabbs, b: Aabbs, conservative: bool) -> Bools:
     return np.asarray(functools.reduce(np.logical_and, axes))
 
 
-def _capsules_capsules(a: Capsules, b: Capsules, conservative: bool) -> Bools:
-    return segment_segment_sign(a.a_xy, a.b_xy, b.a_xy, b.b_xy, a.radius, b.radius, conservative) <= 0
-
-
 def _hulls_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
     """Test bounds and then separating axes; a decided row leaves the batch.
 
@@ -312,12 +303,6 @@ def _quickly(a: Volumes, b: Volumes, one: Core, two: Core) -> tuple[Bools, Ints]
     return found, left[signs == 0]
 
 
-def _flat(core: Core, rows: Ints) -> Bools:
-    """Whether hulls have no area: one or two points, or a box whose first corner equals its second or last."""
-    p, q, s = (core.point(rows, k) for k in (0, 1, -1))
-    return np.asarray((core.counts[rows] < 3) | (p == q).all(axis=1) | (p == s).all(axis=1))
-
-
 def _round_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
     """Test a circle or capsule: one of its points lies in the hull, or an edge is within the radius."""
     one, two = a.core(), b.core()
@@ -332,7 +317,8 @@ def _round_hulls(a: Volumes, b: Volumes, conservative: bool) -> Bools:
 def _holds(hull: Core, other: Core, rows: Ints, conservative: bool) -> Bools:
     """Whether the hull has an area and contains the first point of the other."""
     p = other.point(rows, 0)
-    inside = ~_flat(hull, rows)
+    first, second, last = (hull.point(rows, k) for k in (0, 1, -1))  # of a box without area two of them are equal
+    inside: Bools = (hull.counts[rows] > 2) & (first != second).any(axis=1) & (first != last).any(axis=1)
     for k in range(int(hull.counts[rows].max(initial=0))):
         at = np.flatnonzero(inside)
         here = rows[at]
@@ -362,7 +348,9 @@ _PAIRS: dict[tuple[type[Volumes], type[Volumes]], Test] = {
     (Circles, Capsules): lambda a, b, quick: (
         point_segment_sign(a.center, b.a_xy, b.b_xy, a.radius, b.radius, quick) <= 0
     ),
-    (Capsules, Capsules): _capsules_capsules,
+    (Capsules, Capsules): lambda a, b, quick: (
+        segment_segment_sign(a.a_xy, a.b_xy, b.a_xy, b.b_xy, a.radius, b.radius, quick) <= 0
+    ),
 }
 TABLE = _PAIRS | {
     (b, a): lambda a, b, conservative, test=test: test(b, a, conservative)
